@@ -1,0 +1,1 @@
+"""Functions of records alone: rates, tables, the HTML report."""

@@ -1,0 +1,64 @@
+"""The errors a user can meet: one sentence each, naming the thing, its value and what is right.
+
+| error | raised when | on the command line |
+| --- | --- | --- |
+| `UnknownNameError` | a task, setting, split, … does not exist | exit code 2 |
+| `InvalidValueError` | a number or combination is out of range | exit code 2 |
+| `InvalidActionError` | an action has the wrong shape or is not finite | exit code 2; in a run, recorded |
+| `MissingDependencyError` | an extra or a model file is not installed | exit code 2 |
+| `RenderDeviceError` | no Vulkan device can render | exit code 2 |
+| `SceneRejectedError` | a seed yields no valid scene (callers try the next seed) | never seen |
+| `MotionPlanningError` | the oracle's hands find no path | recorded as an error |
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class RoboIRGError(Exception):
+    """Base class: everything that is reported as one sentence, without a traceback."""
+
+
+class InvalidValueError(RoboIRGError, ValueError):
+    """A value is outside what is allowed; the sentence says what would be right."""
+
+
+class UnknownNameError(InvalidValueError):
+    """A name that is not in its registry.
+
+    Args:
+        kind: what was looked up, for example ``"task"``.
+        name: what the caller asked for.
+        known: every valid name.
+    """
+
+    def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
+        names = list(known)
+        close = difflib.get_close_matches(
+            str(name).lower(), [known_name.lower() for known_name in names], n=1
+        )
+        nearest = [known_name for known_name in names if known_name.lower() in close]
+        hint = f" Did you mean {nearest[0]!r}?" if nearest else ""
+        super().__init__(f"There is no {kind} {name!r}; the {kind}s are {', '.join(names)}.{hint}")
+
+
+class InvalidActionError(RoboIRGError, ValueError):
+    """An action that the robot cannot execute: wrong shape, wrong type, or not finite."""
+
+
+class MissingDependencyError(RoboIRGError, ImportError):
+    """Something that has to be installed is not; the sentence says how."""
+
+
+class RenderDeviceError(RoboIRGError, RuntimeError):
+    """No Vulkan device can render; the sentence says what to install."""
+
+
+class SceneRejectedError(RoboIRGError):
+    """The sampler found no place for an object; the next seed is to be tried."""
+
+
+class MotionPlanningError(RoboIRGError, RuntimeError):
+    """No collision-free straight motion within the joint limits was found."""

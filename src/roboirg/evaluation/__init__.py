@@ -1,0 +1,1 @@
+"""Plans, rollouts, records: from a command line to a file that survives."""

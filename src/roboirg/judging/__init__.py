@@ -1,0 +1,1 @@
+"""Stages and events give a verdict, without a simulator."""

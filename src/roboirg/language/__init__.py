@@ -1,0 +1,1 @@
+"""The words: an episode and a setting give an instruction; the resolver reads it back."""

@@ -1,0 +1,94 @@
+"""What an instruction is: utterances, each with its stage, and the mentions in them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+Setting = Literal["explicit", "direct", "reasoning", "contextual", "spatial"]
+Form = Literal["implicit", "resolved"]
+UtteranceStage = Literal["introduction", "reinforcement", "distractor", "cue", "command"]
+Role = Literal["antecedent", "anaphor"]
+Expression = Literal[
+    "it", "them", "one", "former", "latter", "first", "second", "third",
+    "that", "there", "pair", "other", "before", "after",
+]  # fmt: skip
+
+SETTINGS: tuple[Setting, ...] = get_args(Setting)
+FORMS: tuple[Form, ...] = get_args(Form)
+
+
+@dataclass(frozen=True, slots=True)
+class Utterance:
+    """One turn of the speaker: a stage of the discourse and its text."""
+
+    stage: UtteranceStage
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Mention:
+    """A span that introduces a slot value (antecedent) or points back at one (anaphor).
+
+    Attributes:
+        utterance: index of the utterance.
+        start: first character of the span in that utterance's text.
+        end: one past the last character.
+        role: antecedent or anaphor.
+        expression: class of an anaphor; None for an antecedent.
+        slot: name of the goal slot.
+        value: what it stands for, as in the goal.
+    """
+
+    utterance: int
+    start: int
+    end: int
+    role: Role
+    expression: Expression | None
+    slot: str
+    value: str | int
+
+
+@dataclass(frozen=True, slots=True)
+class Instruction:
+    """All that is said to the robot in one episode.
+
+    Attributes:
+        task: name of the task.
+        episode: the episode's key, ``task/split/index``.
+        setting: one of the five settings.
+        form: ``implicit``, or ``resolved`` with each referring expression of the command
+            replaced by what it stands for. The explicit setting is its own resolved form.
+        utterances: in the order of speaking; the last one is the command.
+        mentions: in the order of their position.
+        metadata: reasoning pattern, context stages, landmarks, frame of reference, template
+            ids, language version; plain JSON values.
+    """
+
+    task: str
+    episode: str
+    setting: Setting
+    form: Form
+    utterances: tuple[Utterance, ...]
+    mentions: tuple[Mention, ...] = ()
+    metadata: Mapping[str, object] = field(default_factory=dict)
+
+    @property
+    def text(self) -> str:
+        """The single prompt that policies see: all utterances joined by one space."""
+        return " ".join(utterance.text for utterance in self.utterances)
+
+    @property
+    def turns(self) -> tuple[str, ...]:
+        """The utterances' texts."""
+        return tuple(utterance.text for utterance in self.utterances)
+
+    @property
+    def command(self) -> str:
+        """The final utterance, which says what to do."""
+        return self.utterances[-1].text
+
+    def span(self, mention: Mention) -> str:
+        """The characters of a mention."""
+        return self.utterances[mention.utterance].text[mention.start : mention.end]

@@ -1,0 +1,1 @@
+"""The world that plays any scene, built on SAPIEN; no file here knows a task's name."""

@@ -1,0 +1,35 @@
+"""Sizes of the objects, as RoboMME builds them. Metres."""
+
+from __future__ import annotations
+
+CUBE_HALF = 0.02
+"""Half side of a cube (ManiSkill's pick-cube configuration for the Panda)."""
+
+HIDDEN_CUBE_HALF = CUBE_HALF / 1.2
+"""Half side of a cube that a container can stand over."""
+
+TARGET_HALF_THICKNESS = 0.0025
+"""Half thickness of a target disc; its centre is at twice this, so it floats a little."""
+
+TARGET_HEIGHT = 0.005
+"""Height of a target disc's centre above the table."""
+
+BUTTON_SCALE = 1.5
+BUTTON_BASE_HALF = (0.025 * BUTTON_SCALE, 0.025 * BUTTON_SCALE, 0.005 * BUTTON_SCALE)
+BUTTON_CAP_RADIUS = 0.015 * BUTTON_SCALE
+BUTTON_CAP_HALF_LENGTH = 0.006 * BUTTON_SCALE
+BUTTON_TRAVEL = 0.1 * BUTTON_SCALE
+BUTTON_HEIGHT = BUTTON_BASE_HALF[2]
+"""Height of the button's origin, the centre of its base."""
+BUTTON_KEEP_OUT_HALF = 1.5 * BUTTON_BASE_HALF[0]
+"""Half side of the square around a button that stays free of other things."""
+
+CONTAINER_INNER = 2.5 * CUBE_HALF
+CONTAINER_WALL = 0.005
+CONTAINER_ROOF = 0.004
+CONTAINER_WALL_HEIGHT = 2.5 * CUBE_HALF
+CONTAINER_HALF = CONTAINER_INNER / 2 + CONTAINER_WALL / 2
+"""Distance from a container's axis to the middle of its walls."""
+CONTAINER_FOOTPRINT_HALF = CONTAINER_INNER / 2 + CONTAINER_WALL
+CONTAINER_HEIGHT = CONTAINER_WALL_HEIGHT + CONTAINER_ROOF / 2
+"""Height of the origin of a container that stands on the table."""

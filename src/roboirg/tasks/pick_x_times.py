@@ -1,0 +1,103 @@
+"""PickXtimes: pick a cube and place it on the target so many times, then press the button.
+
+Counting suite. Everything is visible from the start; after the first placement all states look
+alike, so only the count of past cycles tells when to press. Facts: RoboMME.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from roboirg.episode import COLOURS, Difficulty, Fact, Goal, Primitive, Scene, SceneObject, Stage
+from roboirg.tasks.fixtures import (
+    ORDINALS,
+    button_keep_out,
+    cube_footprint,
+    draw_button,
+    draw_cube,
+    draw_target,
+)
+from roboirg.tasks.placement import Footprint, Region
+from roboirg.tasks.task import Task
+
+CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
+REPEATS: dict[Difficulty, tuple[int, int]] = {"easy": (1, 3), "medium": (1, 3), "hard": (4, 5)}
+MAX_REPEATS = 5
+
+BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.2)
+WORK_REGION = Region(-0.1, 0.0, 0.2, 0.2)
+CUBE_GAP = 0.02
+TARGET_RADIUS = 0.04
+TARGET_GAP = 0.04
+
+
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+    """Button, cubes of different colours, target disc; target cube and repeats are uniform."""
+    low, high = REPEATS[difficulty]
+    repeats = int(rng.integers(low, high + 1))
+    button = draw_button(rng, BUTTON_REGION)
+    obstacles: list[Footprint] = [button_keep_out(button)]
+    cubes: list[SceneObject] = []
+    for index in rng.permutation(len(COLOURS))[: CUBES[difficulty]]:
+        colour = COLOURS[index]
+        cube = draw_cube(rng, f"cube_{colour}", colour, WORK_REGION, CUBE_GAP, obstacles)
+        cubes.append(cube)
+        obstacles.append(cube_footprint(cube))
+    target = draw_target(rng, "target", TARGET_RADIUS, WORK_REGION, TARGET_GAP, obstacles)
+    chosen = cubes[int(rng.integers(len(cubes)))]
+    goal = Goal.of(colour=str(chosen.colour), repeats=repeats)
+    return Scene((button, *cubes, target)), goal
+
+
+def goals(scene: Scene) -> tuple[Goal, ...]:
+    """Every cube of the scene, one to five times."""
+    return tuple(
+        Goal.of(colour=str(cube.colour), repeats=repeats)
+        for cube in scene.of_kind("cube")
+        for repeats in range(1, MAX_REPEATS + 1)
+    )
+
+
+def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
+    """Pick and place, as often as wanted, then press: 2 N + 1 stages."""
+    colour = goal.text("colour")
+    cube = f"cube_{colour}"
+    cubes = tuple(item.name for item in scene.of_kind("cube"))
+    pressed = Fact("pressed", "button")
+    wrong = (*(Fact("picked", other) for other in cubes if other != cube), pressed)
+    plan: list[Stage] = []
+    for ordinal in ORDINALS[: goal.number("repeats")]:
+        pick = Stage(
+            expects=Fact("picked", cube),
+            forbids=wrong,
+            primitive=Primitive("pick_cube", cube),
+            subgoal=f"pick up the {colour} cube {{at}} for the {ordinal} time",
+            points_at=cube,
+        )
+        put = Stage(
+            expects=Fact("placed", cube, "target"),
+            forbids=wrong,
+            primitive=Primitive("place_on", cube, "target"),
+            subgoal=f"place the {colour} cube onto the target {{at}}",
+            points_at="target",
+        )
+        plan += [pick, put]
+    press = Stage(
+        expects=pressed,
+        forbids=tuple(Fact("picked", any_cube) for any_cube in cubes),
+        primitive=Primitive("press", "button"),
+        subgoal="press the button {at} to stop",
+        points_at="button",
+    )
+    return (*plan, press)
+
+
+TASK = Task(
+    name="PickXtimes",
+    suite="counting",
+    code=1,
+    spatial=True,
+    sample=sample,
+    goals=goals,
+    stages=stages,
+)

@@ -1,0 +1,120 @@
+"""Where things may stand: exact clearance tests in the plane, and rejection sampling.
+
+Shapes are footprints on the table: rectangles for cubes, containers and buttons, circles for
+target discs. A placement is drawn uniformly and accepted at the first draw with enough clearance
+(256 draws at most, as in RoboMME); unlike there, obstacles are true rectangles.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+
+MAX_DRAWS = 256
+
+Placement = TypeVar("Placement")
+
+
+@dataclass(frozen=True, slots=True)
+class Rectangle:
+    """A footprint: centre (m), half sides (m) and yaw (rad)."""
+
+    x: float
+    y: float
+    half_x: float
+    half_y: float
+    yaw: float = 0.0
+
+    def grown(self, by: float) -> Rectangle:
+        """The rectangle with every side moved outwards by `by` metres."""
+        return Rectangle(self.x, self.y, self.half_x + by, self.half_y + by, self.yaw)
+
+    def to_local(self, x: float, y: float) -> tuple[float, float]:
+        """A world point in the rectangle's own frame."""
+        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
+        dx, dy = x - self.x, y - self.y
+        return cos * dx + sin * dy, cos * dy - sin * dx
+
+
+@dataclass(frozen=True, slots=True)
+class Circle:
+    """A round footprint: centre and radius, metres."""
+
+    x: float
+    y: float
+    radius: float
+
+
+Footprint = Rectangle | Circle
+
+
+class Region(NamedTuple):
+    """A rectangle of the table in which centres are drawn: centre and half extents, metres."""
+
+    x: float
+    y: float
+    half_x: float
+    half_y: float
+
+    def draw(self, rng: np.random.Generator, inset: float = 0.0) -> tuple[float, float]:
+        """A uniform point of the region shrunk by `inset` on each side."""
+        u, v = rng.random(2).tolist()
+        return (
+            self.x + (2.0 * u - 1.0) * (self.half_x - inset),
+            self.y + (2.0 * v - 1.0) * (self.half_y - inset),
+        )
+
+
+def overlap(first: Footprint, second: Footprint) -> bool:
+    """Whether two footprints touch or overlap."""
+    if isinstance(first, Rectangle) and isinstance(second, Rectangle):
+        return not (_axis_separates(first, second) or _axis_separates(second, first))
+    if isinstance(first, Circle) and isinstance(second, Circle):
+        return math.hypot(first.x - second.x, first.y - second.y) <= first.radius + second.radius
+    if isinstance(first, Circle) and isinstance(second, Rectangle):
+        return distance_to(second, first.x, first.y) <= first.radius
+    return overlap(second, first)
+
+
+def distance_to(rectangle: Rectangle, x: float, y: float) -> float:
+    """Euclidean distance from a point to a rectangle, metres; 0 inside."""
+    local_x, local_y = rectangle.to_local(x, y)
+    return math.hypot(
+        max(abs(local_x) - rectangle.half_x, 0.0), max(abs(local_y) - rectangle.half_y, 0.0)
+    )
+
+
+def _axis_separates(first: Rectangle, second: Rectangle) -> bool:
+    """Whether an axis of `first` separates the two (separating-axis test)."""
+    centre_x, centre_y = first.to_local(second.x, second.y)
+    cos, sin = abs(math.cos(second.yaw - first.yaw)), abs(math.sin(second.yaw - first.yaw))
+    reach_x = cos * second.half_x + sin * second.half_y
+    reach_y = sin * second.half_x + cos * second.half_y
+    return abs(centre_x) > first.half_x + reach_x or abs(centre_y) > first.half_y + reach_y
+
+
+def place(
+    draw: Callable[[], Placement],
+    clearance: Callable[[Placement], Footprint],
+    obstacles: Sequence[Footprint],
+) -> Placement | None:
+    """The first of at most 256 draws whose clearance shape is free of all obstacles.
+
+    Args:
+        draw: gives a candidate placement.
+        clearance: the area that the candidate needs for itself.
+        obstacles: areas that are taken.
+
+    Returns:
+        The accepted placement, or None when every draw hit something.
+    """
+    for _ in range(MAX_DRAWS):
+        candidate = draw()
+        area = clearance(candidate)
+        if not any(overlap(area, obstacle) for obstacle in obstacles):
+            return candidate
+    return None

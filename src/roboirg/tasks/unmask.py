@@ -1,0 +1,138 @@
+"""What the Unmask tasks share: containers that appear over cubes and have to be lifted."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from roboirg.episode import (
+    COLOURS,
+    Colour,
+    Fact,
+    Goal,
+    KeyPose,
+    Motion,
+    Point,
+    Primitive,
+    Scene,
+    SceneObject,
+    Stage,
+)
+from roboirg.tasks import geometry
+from roboirg.tasks.placement import Circle, Footprint, Rectangle, Region, place
+
+APPEAR_STEP = 32
+"""Containers are away until this step, then stand over the cubes at once."""
+
+AWAY = Point(10.0, 10.0, 10.0)
+
+
+def container_footprint(container: SceneObject) -> Rectangle:
+    """The square that a container covers."""
+    half = geometry.CONTAINER_FOOTPRINT_HALF
+    return Rectangle(container.position.x, container.position.y, half, half, container.yaw)
+
+
+def draw_containers(
+    rng: np.random.Generator,
+    count: int,
+    region: Region,
+    gap: float,
+    obstacles: Sequence[Footprint] = (),
+) -> list[SceneObject]:
+    """Up to `count` containers, `gap` metres free around each; ends at the first that fits nowhere.
+
+    As in RoboMME the gap counts on both sides: around the new container and around those placed.
+    """
+    radius = geometry.CONTAINER_HALF + gap
+    taken = list(obstacles)
+    containers: list[SceneObject] = []
+    for index in range(count):
+        spot = place(
+            lambda: region.draw(rng, inset=geometry.CONTAINER_HALF),
+            lambda spot: Circle(*spot, radius),
+            taken,
+        )
+        if spot is None:
+            break
+        position = Point(*spot, geometry.CONTAINER_HEIGHT)
+        yaw = rng.random() * math.pi / 2
+        container = SceneObject(f"container_{index}", "container", position, yaw)
+        containers.append(container)
+        taken.append(container_footprint(container).grown(gap))
+    return containers
+
+
+def hide_cubes(
+    rng: np.random.Generator, containers: Sequence[SceneObject]
+) -> tuple[SceneObject, ...]:
+    """A red, a green and a blue cube, in random order under the first three containers."""
+    order = rng.permutation(len(COLOURS))
+    return tuple(
+        _hidden_cube(COLOURS[index], container)
+        for index, container in zip(order, containers, strict=False)
+    )
+
+
+def _hidden_cube(colour: Colour, container: SceneObject) -> SceneObject:
+    x, y, _ = container.position
+    position = Point(x, y, geometry.HIDDEN_CUBE_HALF)
+    return SceneObject(f"cube_{colour}", "hidden_cube", position, 0.0, colour, container.name)
+
+
+def goals(scene: Scene) -> tuple[Goal, ...]:
+    """Any hidden cube, or any two of them in order."""
+    hidden = [str(cube.colour) for cube in scene.of_kind("hidden_cube")]
+    single = [(colour,) for colour in hidden]
+    pairs = list(itertools.permutations(hidden, 2))
+    return tuple(Goal.of(colours=colours) for colours in (*single, *pairs))
+
+
+def pick_stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
+    """Lift the container over each named cube in turn, putting it down in between."""
+    covers = {cube.colour: cube.inside for cube in scene.of_kind("hidden_cube")}
+    containers = tuple(item.name for item in scene.of_kind("container"))
+    plan: list[Stage] = []
+    for colour in goal.texts("colours"):
+        target = next(str(cover) for hidden, cover in covers.items() if hidden == colour)
+        wrong = tuple(Fact("lifted", other) for other in containers if other != target)
+        if plan:
+            plan.append(_put_down(plan[-1].primitive.subject, containers))
+        lift = Stage(
+            expects=Fact("lifted", target),
+            forbids=wrong,
+            primitive=Primitive("pick_container", target),
+            subgoal=f"pick up the container {{at}} that hides the {colour} cube",
+            points_at=target,
+        )
+        plan.append(lift)
+    return tuple(plan)
+
+
+def _put_down(held: str, containers: Sequence[str]) -> Stage:
+    return Stage(
+        expects=Fact("put_down", held),
+        forbids=tuple(Fact("lifted", other) for other in containers if other != held),
+        primitive=Primitive("put_down", held),
+        subgoal="put down the container",
+    )
+
+
+def appearing(scene: Scene) -> tuple[Motion, ...]:
+    """Every container is away for the first 32 steps and then stands at its place."""
+    keys = (KeyPose(0, AWAY), KeyPose(APPEAR_STEP, None))
+    return tuple(Motion(item.name, keys) for item in scene.of_kind("container"))
+
+
+def hold_still(steps: int) -> Stage:
+    """The robot stays where it is for so many control steps."""
+    return Stage(
+        expects=Fact("still", "robot"),
+        forbids=(),
+        primitive=Primitive("hold", "robot", steps=steps),
+        subgoal="static",
+        lasting=steps,
+    )

@@ -1,0 +1,53 @@
+"""VideoUnmask: see in the video which container covers which cube, then lift the right ones.
+
+Permanence suite. The video shows the open cubes, then identical containers stand over them; the
+policy sees only containers. In hard episodes one container is put down and a second is lifted.
+Facts: RoboMME.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from roboirg.episode import Difficulty, Goal, Scene, Stage
+from roboirg.errors import SceneRejectedError
+from roboirg.tasks import unmask
+from roboirg.tasks.placement import Region
+from roboirg.tasks.task import Task
+
+CONTAINERS: dict[Difficulty, int] = {"easy": 3, "medium": 5, "hard": 15}
+"""Upper bounds: placement ends at the first container that fits nowhere."""
+PICKS: dict[Difficulty, int] = {"easy": 1, "medium": 1, "hard": 2}
+
+REGION = Region(0.0, 0.0, 0.2, 0.2)
+GAP = 0.04
+HOLD_STEPS = 64
+HIDDEN_CUBES = 3
+
+
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+    """Containers at random, three of them over a cube; the first placed are the ones to lift."""
+    containers = unmask.draw_containers(rng, CONTAINERS[difficulty], REGION, GAP)
+    if len(containers) < HIDDEN_CUBES:
+        raise SceneRejectedError("fewer than three containers fit")
+    cubes = unmask.hide_cubes(rng, containers)
+    colours = tuple(str(cube.colour) for cube in cubes[: PICKS[difficulty]])
+    return Scene((*containers, *cubes)), Goal.of(colours=colours)
+
+
+def demonstration(_scene: Scene) -> tuple[Stage, ...]:
+    """The robot watches for 64 steps."""
+    return (unmask.hold_still(HOLD_STEPS),)
+
+
+TASK = Task(
+    name="VideoUnmask",
+    suite="permanence",
+    code=6,
+    spatial=True,
+    sample=sample,
+    goals=unmask.goals,
+    stages=unmask.pick_stages,
+    demonstration=demonstration,
+    motions=unmask.appearing,
+)
