@@ -1,1 +1,13 @@
 """Policies: the contract, the built-in ones, and how a name becomes one."""
+
+from roboirg.policies.base import Demonstration, Observation, Policy, PrivilegedPolicy
+from roboirg.policies.loading import load_policy_class, make_policy
+
+__all__ = [
+    "Demonstration",
+    "Observation",
+    "Policy",
+    "PrivilegedPolicy",
+    "load_policy_class",
+    "make_policy",
+]

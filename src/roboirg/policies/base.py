@@ -10,9 +10,6 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from roboirg.environment import RoboIRGEnv
 
-ACTION_SIZE = 8
-"""Seven absolute joint targets (rad), then the gripper: +1 open, -1 closed."""
-
 
 class Observation(TypedDict):
     """What the robot sees and feels now.

@@ -1,0 +1,189 @@
+"""Objects of a scene as SAPIEN bodies: shapes, masses and colours as RoboMME builds them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import sapien
+import sapien.physx
+import sapien.render
+from sapien.wrapper.actor_builder import ActorBuilder
+from sapien.wrapper.articulation_builder import ArticulationBuilder
+
+from roboirg.episode import Point, SceneObject
+from roboirg.tasks import geometry
+
+Rgba = tuple[float, float, float, float]
+
+COLOUR_RGBA: dict[str, Rgba] = {
+    "red": (1.0, 0.0, 0.0, 1.0),
+    "green": (0.0, 1.0, 0.0, 1.0),
+    "blue": (0.0, 0.0, 1.0, 1.0),
+}
+WHITE: Rgba = (1.0, 1.0, 1.0, 1.0)
+GRAY: Rgba = (0.5, 0.5, 0.5, 1.0)
+PURPLE: Rgba = (160 / 255, 32 / 255, 240 / 255, 1.0)
+
+UPRIGHT = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
+"""Turns SAPIEN's cylinders, which lie along x, upright."""
+UPSIDE_DOWN = (0.0, 1.0, 0.0, 0.0)
+RING_SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
+CAP_DENSITY = 1500.0
+BUTTON_STIFFNESS = 800.0
+BUTTON_DAMPING = 40.0
+
+
+@dataclass
+class Body:
+    """A scene object in the simulator.
+
+    Attributes:
+        item: the data it was built from.
+        entity: what moves (of a button: its base).
+        physics: the component that touches things; None for target discs.
+        joint: of a button: the articulation whose only joint is the cap's.
+    """
+
+    item: SceneObject
+    entity: sapien.Entity
+    physics: sapien.physx.PhysxBaseComponent | None = None
+    button: sapien.physx.PhysxArticulation | None = None
+
+    @property
+    def position(self) -> Point:
+        """Of the object's origin, world frame, m."""
+        return Point(*(float(value) for value in self.entity.pose.p))
+
+    def put(self, position: Point) -> None:
+        """Teleport the object, upright and at rest, with its own yaw."""
+        self.entity.set_pose(_pose(self.item, position))
+        if isinstance(self.physics, sapien.physx.PhysxRigidDynamicComponent):
+            self.physics.set_linear_velocity(np.zeros(3))
+            self.physics.set_angular_velocity(np.zeros(3))
+
+    @property
+    def pressed_depth(self) -> float:
+        """How far a button's cap is down, m; 0 for other objects."""
+        return -float(self.button.get_qpos()[0]) if self.button is not None else 0.0
+
+
+def build(scene: sapien.Scene, item: SceneObject, *, visible: bool) -> Body:
+    """Add an object to a scene, with or without what is only drawn."""
+    return _BUILDERS[item.kind](scene, item, visible)
+
+
+def _pose(item: SceneObject, position: Point) -> sapien.Pose:
+    half = item.yaw / 2.0
+    turned = sapien.Pose(position, [math.cos(half), 0.0, 0.0, math.sin(half)])
+    return turned * sapien.Pose(q=UPSIDE_DOWN) if item.kind == "container" else turned
+
+
+def _material(rgba: Rgba) -> sapien.render.RenderMaterial:
+    return sapien.render.RenderMaterial(base_color=list(rgba))
+
+
+def _finish(
+    builder: ActorBuilder, scene: sapien.Scene, item: SceneObject, kind: str
+) -> Body:
+    builder.set_scene(scene)
+    builder.set_physx_body_type(kind)
+    builder.set_initial_pose(_pose(item, item.position))
+    entity = builder.build(name=item.name)
+    physics = entity.find_component_by_type(sapien.physx.PhysxRigidBaseComponent)
+    return Body(item, entity, physics)
+
+
+def _build_cube(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
+    half = geometry.HIDDEN_CUBE_HALF if item.kind == "hidden_cube" else geometry.CUBE_HALF
+    builder = ActorBuilder()
+    builder.add_box_collision(half_size=[half] * 3)
+    if visible:
+        material = _material(COLOUR_RGBA[str(item.colour)])
+        builder.add_box_visual(half_size=[half] * 3, material=material)
+    return _finish(builder, scene, item, "dynamic")
+
+
+def _build_container(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
+    """Six boxes, built opening up and turned over; the knob is what the gripper grasps."""
+    wall, side = geometry.CONTAINER_WALL / 2, geometry.CONTAINER_HALF
+    roof, height = geometry.CONTAINER_ROOF / 2, geometry.CONTAINER_WALL_HEIGHT / 2
+    # Upside down, z is measured from the origin (the roof's top) towards the opening.
+    roof_z, wall_z = roof, geometry.CONTAINER_HEIGHT - height
+    boxes = [
+        ((0.0, 0.0, roof_z), (side, side, roof)),
+        ((-side, 0.0, wall_z), (wall, side, height)),
+        ((side, 0.0, wall_z), (wall, side, height)),
+        ((0.0, -side, wall_z), (side, wall, height)),
+        ((0.0, side, wall_z), (side, wall, height)),
+        ((0.0, 0.0, 0.0), (geometry.CUBE_HALF,) * 3),
+    ]
+    builder = ActorBuilder()
+    for centre, half in boxes:
+        builder.add_box_collision(sapien.Pose(centre), half_size=half)
+        if visible:
+            builder.add_box_visual(sapien.Pose(centre), half_size=half, material=_material(WHITE))
+    return _finish(builder, scene, item, "dynamic")
+
+
+def _build_target(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
+    """Five concentric discs, purple and white in turn; nothing collides with them."""
+    radius = float(item.radius or 0.0)
+    builder = ActorBuilder()
+    for index, share in enumerate(RING_SHARES if visible else ()):
+        builder.add_cylinder_visual(
+            sapien.Pose(q=UPRIGHT),
+            radius=radius * share,
+            half_length=geometry.TARGET_HALF_THICKNESS + index * 1e-5,
+            material=_material(WHITE if index % 2 else PURPLE),
+        )
+    return _finish(builder, scene, item, "kinematic")
+
+
+def _build_button(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
+    """A base and a cap on a sprung vertical joint; negative joint positions are pressed."""
+    builder = ArticulationBuilder()
+    builder.set_scene(scene)
+    builder.set_initial_pose(_pose(item, item.position))
+    base = builder.create_link_builder()
+    base.set_name("button_base")
+    base.add_box_collision(half_size=geometry.BUTTON_BASE_HALF)
+    cap = builder.create_link_builder(base)
+    cap.set_name("button_cap")
+    cap.set_joint_name("button_joint")
+    # SAPIEN's prismatic joints slide along x: both joint frames are turned so that x points up.
+    rest = geometry.BUTTON_BASE_HALF[2] + geometry.BUTTON_CAP_HALF_LENGTH
+    up = (math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0)
+    cap.set_joint_properties(
+        "prismatic",
+        [[-geometry.BUTTON_TRAVEL, 0.0]],
+        sapien.Pose([0.0, 0.0, rest], up),
+        sapien.Pose([0.0, 0.0, 0.0], up),
+    )
+    shape = {
+        "radius": geometry.BUTTON_CAP_RADIUS,
+        "half_length": geometry.BUTTON_CAP_HALF_LENGTH,
+    }
+    cap.add_cylinder_collision(sapien.Pose(q=UPRIGHT), density=CAP_DENSITY, **shape)
+    if visible:
+        base.add_box_visual(half_size=geometry.BUTTON_BASE_HALF, material=_material(WHITE))
+        cap.add_cylinder_visual(sapien.Pose(q=UPRIGHT), material=_material(GRAY), **shape)
+    articulation = builder.build(fix_root_link=True)
+    articulation.set_name(item.name)
+    articulation.set_qpos(np.zeros(1))
+    joint = articulation.active_joints[0]
+    joint.set_drive_properties(BUTTON_STIFFNESS, BUTTON_DAMPING, mode="force")
+    joint.set_drive_target(0.0)
+    cap_link = articulation.links[1]
+    return Body(item, articulation.links[0].entity, cap_link, articulation)
+
+
+_BUILDERS: dict[str, Callable[[sapien.Scene, SceneObject, bool], Body]] = {
+    "cube": _build_cube,
+    "hidden_cube": _build_cube,
+    "container": _build_container,
+    "target": _build_target,
+    "button": _build_button,
+}

@@ -1,0 +1,158 @@
+"""The Franka Panda with a wrist camera: loading, control, and what it feels."""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import Any
+
+import numpy as np
+import sapien
+import sapien.physx
+from numpy.typing import NDArray
+from sapien.wrapper.urdf_loader import URDFLoader
+
+from roboirg.episode import ROBOT_BASE
+from roboirg.simulation import settings
+from roboirg.simulation.assets import find_model_files
+
+ARM_JOINTS = 7
+FINGERS = ("panda_leftfinger", "panda_rightfinger")
+TOOL_LINK = "panda_hand_tcp"
+CAMERA_LINK = "camera_link"
+
+GRASP_FORCE = 0.5
+"""Newtons on each finger at which an object counts as grasped (ManiSkill)."""
+GRASP_ANGLE = math.radians(85.0)
+"""Largest angle between a finger's force and its opening direction."""
+STILL_SPEED = 0.2
+"""Joint speed, rad/s, up to which the robot counts as still."""
+
+
+class Robot:
+    """A Panda in a scene, fixed at its base, at home with an open gripper.
+
+    Args:
+        scene: where to build it; it has to be the first thing that is built.
+        visible: whether to load its pictures' meshes too.
+    """
+
+    def __init__(self, scene: sapien.Scene, *, visible: bool) -> None:
+        builder = _builder(visible)
+        builder.set_scene(scene)
+        builder.initial_pose = sapien.Pose(ROBOT_BASE)
+        self.articulation = builder.build()
+        for link in self.articulation.links:
+            link.disable_gravity = True
+        for joint in self.articulation.active_joints:
+            joint.set_drive_properties(
+                settings.STIFFNESS, settings.DAMPING, settings.FORCE_LIMIT, mode="force"
+            )
+            joint.set_friction(0.0)
+        self.links = {link.name: link for link in self.articulation.links}
+        self.tool = self.links[TOOL_LINK]
+        self._joints = list(self.articulation.active_joints)
+        self._fingers = [self.links[name] for name in FINGERS]
+        self.reset()
+
+    def reset(self) -> None:
+        """Put the robot at home, at rest."""
+        qpos = np.append(settings.HOME, [settings.FINGER_OPEN] * 2)
+        self.articulation.set_qpos(qpos)
+        self.articulation.set_qvel(np.zeros_like(qpos))
+        self.articulation.set_qf(np.zeros_like(qpos))
+        for joint, target in zip(self._joints, qpos, strict=True):
+            joint.set_drive_target(float(target))
+
+    def set_targets(self, action: NDArray[np.floating[Any]]) -> None:
+        """Drive towards an action (8): seven joint targets (rad) and the gripper in [-1, 1]."""
+        for joint, target in zip(self._joints, action[:ARM_JOINTS], strict=False):
+            joint.set_drive_target(float(target))
+        share = (min(max(float(action[ARM_JOINTS]), -1.0), 1.0) + 1.0) / 2.0
+        span = settings.FINGER_OPEN - settings.FINGER_SQUEEZE
+        for joint in self._joints[ARM_JOINTS:]:
+            joint.set_drive_target(settings.FINGER_SQUEEZE + share * span)
+
+    @property
+    def arm_positions(self) -> NDArray[np.float64]:
+        """Joint angles of the arm (7), rad."""
+        return np.asarray(self.articulation.get_qpos()[:ARM_JOINTS], dtype=np.float64)
+
+    @property
+    def finger_positions(self) -> NDArray[np.float64]:
+        """Positions of the two fingers, m: 0 closed, 0.04 open."""
+        return np.asarray(self.articulation.get_qpos()[ARM_JOINTS:], dtype=np.float64)
+
+    @property
+    def tool_pose(self) -> sapien.Pose:
+        """Pose of the tool centre point between the fingertips, world frame."""
+        return self.tool.entity_pose
+
+    def is_still(self) -> bool:
+        """Whether no arm joint moves faster than 0.2 rad/s."""
+        speeds = np.abs(self.articulation.get_qvel()[:ARM_JOINTS])
+        return bool(speeds.max() <= STILL_SPEED)
+
+    def grasps(
+        self, body: sapien.physx.PhysxBaseComponent, contacts: list[sapien.physx.PhysxContact]
+    ) -> bool:
+        """Whether both fingers push the body with enough force against their opening direction.
+
+        Args:
+            body: the object's physical component.
+            contacts: of the last physics step.
+        """
+        for finger, sign in zip(self._fingers, (1.0, -1.0), strict=True):
+            force = _force_on(finger, body, contacts)
+            size = float(np.linalg.norm(force))
+            if size < GRASP_FORCE:
+                return False
+            opening = sign * finger.entity_pose.to_transformation_matrix()[:3, 1]
+            cosine = float(np.dot(opening, force)) / size
+            if math.acos(min(max(cosine, -1.0), 1.0)) > GRASP_ANGLE:
+                return False
+        return True
+
+
+def _force_on(
+    finger: sapien.physx.PhysxArticulationLinkComponent,
+    body: sapien.physx.PhysxBaseComponent,
+    contacts: list[sapien.physx.PhysxContact],
+) -> NDArray[np.float64]:
+    """Mean force of `body` on `finger` in the last physics step, N, world frame."""
+    impulse = np.zeros(3)
+    for contact in contacts:
+        first, second = contact.bodies
+        if first == finger and second == body:
+            sign = 1.0
+        elif first == body and second == finger:
+            sign = -1.0
+        else:
+            continue
+        for point in contact.points:
+            impulse += sign * point.impulse
+    return impulse * settings.PHYSICS_RATE
+
+
+class _InvisibleLoader(URDFLoader):  # type: ignore[misc]  # SAPIEN's wrappers have no types
+    """Leaves the visual meshes out, so that no Vulkan device is needed."""
+
+    def _build_link(self, link: Any, link_builder: Any) -> None:  # noqa: ANN401
+        link.visuals.clear()
+        super()._build_link(link, link_builder)
+
+
+@functools.cache
+def _builder(visible: bool) -> Any:  # noqa: ANN401 - SAPIEN's builders have no types
+    """The parsed robot description; parsing takes longer than building."""
+    loader = URDFLoader() if visible else _InvisibleLoader()
+    loader.fix_root_link = True
+    # The loader wants a scene even to parse; the one to build in is set later.
+    loader.set_scene(sapien.Scene([sapien.physx.PhysxCpuSystem()]))
+    for finger in FINGERS:
+        loader.set_link_material(finger, 2.0, 2.0, 0.0)
+        loader.set_link_patch_radius(finger, 0.1)
+        loader.set_link_min_patch_radius(finger, 0.1)
+    urdf = find_model_files().robot
+    builders, _, _ = loader.parse(str(urdf), str(urdf.with_suffix(".srdf")))
+    return builders[0]
