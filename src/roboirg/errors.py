@@ -2,7 +2,7 @@
 
 | error | raised when | on the command line |
 | --- | --- | --- |
-| `UnknownNameError` | a task, setting, split, … does not exist | exit code 2 |
+| `UnknownNameError` | a name does not exist | exit code 2 |
 | `InvalidValueError` | a number or combination is out of range | exit code 2 |
 | `InvalidActionError` | an action has the wrong shape or is not finite | exit code 2; in a run, recorded |
 | `MissingDependencyError` | an extra or a model file is not installed | exit code 2 |

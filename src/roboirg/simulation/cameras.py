@@ -7,6 +7,7 @@ picture if it is outside; without shadows that cannot change a pixel.
 
 from __future__ import annotations
 
+import functools
 import math
 
 import cv2
@@ -47,7 +48,7 @@ class Cameras:
         scene.add_entity(fixed)
         mount.add_component(self._components["wrist"])
         for component in self._components.values():
-            _skip_lookup_table(component)
+            component.set_texture("BRDFLUT", _stand_in_table())
         self._bodies = _bodies(scene)
         self._boxes = np.stack([_local_corners(body) for body in self._bodies])
 
@@ -106,12 +107,15 @@ def _component(name: str) -> sapien.render.RenderCameraComponent:
     return component
 
 
-def _skip_lookup_table(component: sapien.render.RenderCameraComponent) -> None:
-    """Give a camera of a scene a stand-in for a table that its shader never needs."""
-    # The shader samples this table only for an environment map, which is black here; without a
-    # stand-in SAPIEN computes it for three seconds before the first picture.
-    table = sapien.render.RenderTexture(np.zeros((2, 2, 4), np.uint8), 2, "r8g8b8a8unorm")
-    component.set_texture("BRDFLUT", table)
+@functools.cache
+def _stand_in_table() -> sapien.render.RenderTexture:
+    """A tiny texture in the place of a table that the cameras' shader never needs.
+
+    The shader samples the table only for an environment map, which is black here; without a
+    stand-in SAPIEN computes it for three seconds before the first picture. It is kept for the
+    life of the process, because cameras do not keep their textures alive.
+    """
+    return sapien.render.RenderTexture(np.zeros((2, 2, 4), np.uint8), 2, "r8g8b8a8unorm")
 
 
 def _bodies(scene: sapien.Scene) -> list[sapien.render.RenderBodyComponent]:

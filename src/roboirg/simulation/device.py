@@ -85,19 +85,33 @@ def find_render_device(name: str | None = None) -> sapien.Device:
     return software
 
 
-@functools.cache
 def render_system() -> sapien.render.RenderSystem:
-    """Return the render system of this process, made at the first call.
+    """Return a new render system, for one scene: scenes that share one spoil each other's pictures.
 
-    SAPIEN frees its whole render engine (shaders, meshes, tables) when the last scene goes, and
-    making it again takes seconds; this one lives as long as the process and keeps the engine.
-    SAPIEN renders on one device per process, so ``ROBOIRG_RENDER_DEVICE`` is read once.
+    SAPIEN frees its whole render engine (shaders, meshes, tables) when the last system goes, and
+    making it again takes seconds; so the first call also makes one that lives as long as the
+    process and keeps the engine. SAPIEN renders on one device per process, so
+    ``ROBOIRG_RENDER_DEVICE`` is read once.
 
     Raises:
         MissingDependencyError: SAPIEN is not installed.
         RenderDeviceError: no device can render, or its driver refuses.
     """
-    device = find_render_device()
+    _engine_keeper()
+    return _new_system(_chosen_device())
+
+
+@functools.cache
+def _chosen_device() -> sapien.Device:
+    return find_render_device()
+
+
+@functools.cache
+def _engine_keeper() -> sapien.render.RenderSystem:
+    return _new_system(_chosen_device())
+
+
+def _new_system(device: sapien.Device) -> sapien.render.RenderSystem:
     try:
         return _sapien().render.RenderSystem(device)
     except RuntimeError as error:

@@ -1,0 +1,27 @@
+"""Makes the environments known to Gymnasium when it is imported, as Gymnasium's convention is.
+
+``gymnasium.make("roboirg.gym:RoboIRG/PickXtimes-v0", setting="spatial", episode=3)`` imports it.
+"""
+
+from __future__ import annotations
+
+import gymnasium
+
+from roboirg.tasks import all_tasks
+
+NAMESPACE = "RoboIRG"
+VERSION = 0
+"""Goes up whenever scores could change."""
+
+
+def environment_id(task: str) -> str:
+    """The registered id of a task's environment."""
+    return f"{NAMESPACE}/{task}-v{VERSION}"
+
+
+for _task in all_tasks():
+    gymnasium.register(
+        id=environment_id(_task),
+        entry_point="roboirg.environment:RoboIRGEnv",
+        kwargs={"task": _task},
+    )
