@@ -56,11 +56,11 @@ def _numbers(action: ArrayLike) -> NDArray[Any]:
 def _finite(numbers: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float64]:
     if numbers.shape != shape:
         raise InvalidActionError(_shape_message(numbers.shape))
-    if not np.isfinite(numbers).all():
-        *_, column = np.argwhere(~np.isfinite(numbers))[0]
-        value = numbers[..., column].ravel()[~np.isfinite(numbers[..., column].ravel())][0]
+    bad = np.argwhere(~np.isfinite(numbers))
+    if len(bad):
         raise InvalidActionError(
-            f"Action value {column} is {value}; every value has to be a finite number."
+            f"Action value {bad[0][-1]} is {numbers[tuple(bad[0])]}; "
+            "every value has to be a finite number."
         )
     return numbers
 

@@ -66,7 +66,7 @@ def make_episode(
     )
 
 
-@functools.lru_cache(maxsize=4096)
+@functools.lru_cache(maxsize=4096, typed=True)
 def get_episode(task_name: str, split: str, index: int) -> Episode:
     """Episode number `index` (from 0) of a split of a task.
 

@@ -1,0 +1,143 @@
+"""The judge's rule, driven by synthetic facts."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roboirg.episode import Fact, Primitive, Stage
+from roboirg.judging import Judge, Status, changes, plain_subgoal
+from roboirg.splits import get_episode
+from roboirg.tasks import all_tasks
+
+A, B, BAD = Fact("picked", "a"), Fact("placed", "a", "target"), Fact("pressed", "button")
+
+
+def stage(expects: Fact, *forbids: Fact, lasting: int = 0) -> Stage:
+    primitive = Primitive("press", expects.subject)
+    return Stage(expects, forbids, primitive, "do {at} it", points_at="a", lasting=lasting)
+
+
+def judged(stages, *steps):
+    judge = Judge(stages)
+    for number, facts in enumerate(steps):
+        judge.update(number, frozenset(facts))
+    return judge
+
+
+def test_stages_complete_in_order():
+    judge = judged([stage(A, BAD), stage(B, BAD)], [], [A], [A], [B])
+    assert judge.status is Status.SUCCESS
+    assert judge.cause is None
+
+
+def test_a_later_stage_does_not_complete_early():
+    assert judged([stage(A), stage(B)], [B]).index == 0
+
+
+def test_one_stage_per_evaluation():
+    judge = judged([stage(A), stage(A)], [A])
+    assert (judge.index, judge.status) == (1, Status.ONGOING)
+    judge.update(1, frozenset([A]))
+    assert judge.status is Status.SUCCESS
+
+
+def test_what_is_forbidden_counts_before_what_is_expected():
+    judge = judged([stage(A, BAD)], [A, BAD])
+    assert judge.status is Status.FAILURE
+    assert judge.cause == "pressed button while due: do it"
+
+
+def test_what_ends_a_stage_is_not_held_against_the_next_in_the_same_step():
+    # The cube is picked, which the next stage forbids; it is gone by the next evaluation.
+    judge = judged([stage(A), stage(B, A)], [A], [B])
+    assert judge.status is Status.SUCCESS
+    assert judged([stage(A), stage(B, A)], [A], [A]).status is Status.FAILURE
+
+
+def test_verdicts_are_final():
+    judge = judged([stage(A, BAD)], [BAD], [A])
+    assert judge.status is Status.FAILURE
+    judge = judged([stage(A, BAD)], [A], [BAD])
+    assert judge.status is Status.SUCCESS
+
+
+def test_lasting_stages_count_from_the_first_evaluation_and_start_again():
+    still = Fact("still", "robot")
+    watch = [stage(still, lasting=3)]
+    assert judged(watch, *[[still]] * 3).status is Status.ONGOING
+    assert judged(watch, *[[still]] * 4).status is Status.SUCCESS
+    interrupted = [[still], [still], [], [still], [still]]
+    assert judged(watch, *interrupted).status is Status.ONGOING
+    assert judged(watch, *interrupted, [still]).status is Status.SUCCESS
+
+
+facts = st.frozensets(st.sampled_from([A, B, BAD, Fact("still", "robot")]))
+
+
+@given(st.lists(facts, max_size=20))
+def test_events_tell_the_same_story_as_the_facts(history):
+    before: frozenset[Fact] = frozenset()
+    rebuilt: set[Fact] = set()
+    for step, now in enumerate(history):
+        for event in changes(step, before, now):
+            assert event.step == step
+            (rebuilt.add if event.holds else rebuilt.remove)(event.fact)
+        assert rebuilt == now
+        before = now
+
+
+def perfect_run(episode):
+    """What the facts of a perfect execution look like: each stage's, held long enough."""
+    for due in (*episode.demonstration, *episode.stages):
+        for _ in range(due.lasting + 1):
+            yield frozenset([due.expects])
+
+
+@pytest.mark.parametrize("task", all_tasks())
+@pytest.mark.parametrize("index", range(4))
+def test_perfect_runs_succeed(task, index):
+    episode = get_episode(task, "test", index)
+    judge = Judge((*episode.demonstration, *episode.stages))
+    for step, now in enumerate(perfect_run(episode)):
+        judge.update(step, now)
+    assert judge.status is Status.SUCCESS
+
+
+@pytest.mark.parametrize("task", all_tasks())
+@pytest.mark.parametrize("index", range(4))
+def test_every_forbidden_fact_of_every_stage_fails(task, index):
+    episode = get_episode(task, "test", index)
+    tested = 0
+    for number, due in enumerate(episode.stages):
+        for wrong in due.forbids:
+            judge = Judge(episode.stages)
+            judge.index = number
+            judge.update(0, frozenset([wrong, due.expects]))
+            assert judge.status is Status.FAILURE
+            assert wrong.subject in str(judge.cause)
+            assert plain_subgoal(due) in str(judge.cause)
+            tested += 1
+    assert tested > 0
+
+
+def test_pick_x_times_rules():
+    episode = get_episode("PickXtimes", "test", 2)
+    colour, repeats = episode.goal.text("colour"), episode.goal.number("repeats")
+    cube, target = f"cube_{colour}", "target"
+    others = [c.name for c in episode.scene.of_kind("cube") if c.name != cube]
+    picked, placed = Fact("picked", cube), Fact("placed", cube, target)
+    pressed = Fact("pressed", "button")
+    cycle = [[picked], [], [placed]]
+
+    def verdict(*steps):
+        return judged(episode.stages, *steps).status
+
+    assert verdict(*cycle * repeats, [placed], [pressed, placed]) is Status.SUCCESS
+    assert verdict(*cycle * (repeats - 1), [pressed]) is Status.FAILURE
+    assert verdict(*cycle * repeats, [picked]) is Status.FAILURE
+    assert verdict([Fact("picked", others[0])]) is Status.FAILURE
+    assert verdict([Fact("placed", others[0], target)]) is Status.ONGOING
+    # Dropped beside the target and picked up again: the same repetition.
+    assert verdict([picked], [], [picked], [placed], *cycle * (repeats - 1), [pressed]) is (
+        Status.SUCCESS
+    )

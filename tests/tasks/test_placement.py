@@ -1,0 +1,106 @@
+"""Clearance tests are exact: compared with dense sampling of the shapes."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roboirg.tasks.placement import (
+    MAX_DRAWS,
+    Circle,
+    Rectangle,
+    Region,
+    distance_to,
+    overlap,
+    place,
+)
+
+coordinates = st.floats(-0.3, 0.3)
+sizes = st.floats(0.01, 0.15)
+angles = st.floats(-math.pi, math.pi)
+rectangles = st.builds(Rectangle, coordinates, coordinates, sizes, sizes, angles)
+circles = st.builds(Circle, coordinates, coordinates, sizes)
+footprints = st.one_of(rectangles, circles)
+
+
+def outline(shape: Rectangle | Circle, inside: float) -> np.ndarray:
+    """Points all over a shape shrunk (inside > 0) or grown (inside < 0) by some metres."""
+    u = np.linspace(-1, 1, 41)
+    if isinstance(shape, Circle):
+        angle, share = np.meshgrid(np.linspace(0, 2 * math.pi, 120), np.linspace(0, 1, 15))
+        radius = share * max(shape.radius - inside, 0)
+        return np.stack(
+            [shape.x + (radius * np.cos(angle)).ravel(), shape.y + (radius * np.sin(angle)).ravel()]
+        )
+    x, y = np.meshgrid(u * max(shape.half_x - inside, 0), u * max(shape.half_y - inside, 0))
+    cos, sin = math.cos(shape.yaw), math.sin(shape.yaw)
+    return np.stack([shape.x + (cos * x - sin * y).ravel(), shape.y + (sin * x + cos * y).ravel()])
+
+
+def contains(shape: Rectangle | Circle, points: np.ndarray, inside: float) -> bool:
+    if isinstance(shape, Circle):
+        radius = shape.radius - inside
+        distance = np.hypot(points[0] - shape.x, points[1] - shape.y)
+        return radius > 0 and bool((distance <= radius).any())
+    local = np.array([shape.to_local(x, y) for x, y in points.T])
+    within = (np.abs(local) <= [shape.half_x - inside, shape.half_y - inside]).all(axis=1)
+    return bool(within.any())
+
+
+@given(footprints, footprints)
+def test_shapes_that_share_points_overlap(first, second):
+    if contains(second, outline(first, 1e-6), 1e-6):
+        assert overlap(first, second)
+
+
+@given(footprints, footprints)
+def test_shapes_far_from_sharing_points_do_not_overlap(first, second):
+    # The sampled points of the one are at most 1 cm apart, so growing both by that misses nothing.
+    grown = -0.01
+    if not contains(second, outline(first, grown), grown):
+        assert not overlap(first, second)
+
+
+@given(footprints, footprints)
+def test_overlap_is_symmetric(first, second):
+    assert overlap(first, second) == overlap(second, first)
+
+
+@given(rectangles, st.floats(0.001, 0.05), coordinates, coordinates)
+def test_growing_brings_an_edge_nearer_by_as_much(rectangle, by, x, y):
+    before, after = distance_to(rectangle, x, y), distance_to(rectangle.grown(by), x, y)
+    assert after <= before
+    assert before - after <= by * math.sqrt(2) + 1e-9
+
+
+def test_touching_counts_as_overlap():
+    assert overlap(Rectangle(0, 0, 1, 1), Rectangle(2, 0, 1, 1))
+    assert overlap(Circle(0, 0, 1), Circle(2, 0, 1))
+    assert overlap(Circle(0, 0, 1), Rectangle(2, 0, 1, 1))
+    assert not overlap(Rectangle(0, 0, 1, 1), Rectangle(2.001, 0, 1, 1))
+
+
+@given(st.integers(0, 2**32), coordinates, coordinates, sizes, sizes)
+def test_regions_draw_inside_themselves(seed, x, y, half_x, half_y):
+    inset = min(half_x, half_y) / 2
+    drawn = Region(x, y, half_x, half_y).draw(np.random.default_rng(seed), inset)
+    assert abs(drawn[0] - x) <= half_x - inset + 1e-12
+    assert abs(drawn[1] - y) <= half_y - inset + 1e-12
+
+
+@pytest.mark.parametrize("free_after", [0, 5, MAX_DRAWS - 1])
+def test_place_takes_the_first_free_draw(free_after):
+    draws = iter(range(10_000))
+    blocked = Circle(0, 0, 1)
+    placed = place(
+        lambda: next(draws), lambda n: Circle(0 if n < free_after else 9, 0, 1), [blocked]
+    )
+    assert placed == free_after
+
+
+def test_place_gives_up_after_its_draws():
+    draws = iter(range(10_000))
+    assert place(lambda: next(draws), lambda _: Circle(0, 0, 1), [Circle(0, 0, 1)]) is None
+    assert next(draws) == MAX_DRAWS

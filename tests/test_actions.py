@@ -1,0 +1,59 @@
+"""Actions are checked once, with one sentence for each fault."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from roboirg.actions import ACTION_HIGH, ACTION_LOW, check_action, check_chunk
+from roboirg.errors import InvalidActionError
+
+finite = st.floats(-10, 10)
+
+
+@given(hnp.arrays(np.float64, 8, elements=finite))
+def test_good_actions_pass_unchanged(action):
+    assert np.array_equal(check_action(action), action)
+    assert np.array_equal(check_action(action.tolist()), action)
+    assert np.array_equal(check_chunk(action), action[None])
+
+
+@given(
+    hnp.arrays(
+        np.float32, st.tuples(st.integers(1, 20), st.just(8)), elements=st.floats(-1, 1, width=32)
+    )
+)
+def test_good_chunks_pass_unchanged(chunk):
+    assert np.array_equal(check_chunk(chunk), chunk)
+
+
+@given(hnp.arrays(np.float64, hnp.array_shapes(min_dims=0, max_dims=3), elements=finite))
+def test_other_shapes_are_refused_with_their_shape(action):
+    if action.shape != (8,):
+        with pytest.raises(InvalidActionError, match=r"got shape"):
+            check_action(action)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("column", [0, 7])
+def test_values_that_are_not_finite_are_named(bad, column):
+    action = np.zeros(8)
+    action[column] = bad
+    with pytest.raises(InvalidActionError, match=f"value {column} is {bad}"):
+        check_action(action)
+    chunk = np.zeros((3, 8))
+    chunk[2, column] = bad
+    with pytest.raises(InvalidActionError, match=f"value {column} is {bad}"):
+        check_chunk(chunk)
+
+
+@pytest.mark.parametrize("bad", ["open", None, {"a": 1}, [[1, 2], [3]], np.zeros((0, 8))])
+def test_what_is_not_an_array_of_numbers_is_refused(bad):
+    with pytest.raises(InvalidActionError):
+        check_chunk(bad)
+
+
+def test_limits_enclose_home():
+    home = np.array([0, 0, 0, -np.pi / 2, 0, np.pi / 2, np.pi / 4, 1])
+    assert ((home >= ACTION_LOW) & (home <= ACTION_HIGH)).all()
