@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -15,10 +15,10 @@ from roboirg.errors import InvalidValueError, UnknownNameError
 from roboirg.judging import Event, Status, plain_subgoal
 from roboirg.language import instruct
 from roboirg.policies.base import Demonstration
-from roboirg.simulation.session import Session
 from roboirg.simulation.cameras import CAMERAS, SIZE
 from roboirg.simulation.device import describe, find_render_device
 from roboirg.simulation.proprioception import Proprioception
+from roboirg.simulation.session import Session
 from roboirg.splits import get_episode
 
 MAX_STEPS = 1300
@@ -67,7 +67,11 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         InvalidValueError: the split has no such episode, or the combination is not defined.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 20}
+    metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium declares it so
+        "render_modes": ["rgb_array"],
+        "render_fps": 20,
+    }
+    observation_space: spaces.Dict
 
     def __init__(
         self,
@@ -158,9 +162,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         self._call_hook(demonstration=False)
         return observation, {**self._info(), "demonstration": self._stack(frames)}
 
-    def step(
-        self, action: ArrayLike
-    ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+    def step(self, action: ArrayLike) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Execute one action for one control step.
 
         Raises:
@@ -179,7 +181,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         reward = float(status == Status.SUCCESS)
         return observation, reward, terminated, status == "timeout", self._info()
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """Front and wrist picture side by side, uint8 (256, 512, 3); None without render mode."""
         if self.render_mode is None:
             return None

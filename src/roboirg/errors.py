@@ -4,7 +4,7 @@
 | --- | --- | --- |
 | `UnknownNameError` | a name does not exist | exit code 2 |
 | `InvalidValueError` | a number or combination is out of range | exit code 2 |
-| `InvalidActionError` | an action has the wrong shape or is not finite | exit code 2; in a run, recorded |
+| `InvalidActionError` | an action has a wrong shape or is not finite | exit code 2; or recorded |
 | `MissingDependencyError` | an extra or a model file is not installed | exit code 2 |
 | `RenderDeviceError` | no Vulkan device can render | exit code 2 |
 | `SceneRejectedError` | a seed yields no valid scene (callers try the next seed) | never seen |
