@@ -1,0 +1,108 @@
+"""Straight moves are straight, within limits, and end where they should."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from roboirg.errors import MotionPlanningError
+from roboirg.simulation.hands import Hands
+from roboirg.simulation.planning import (
+    JOINT_ACCELERATION_LIMIT,
+    JOINT_SPEED_LIMIT,
+    Planner,
+    ToolPose,
+    timed,
+)
+from roboirg.simulation.settings import CONTROL_PERIOD, HOME
+from roboirg.simulation.world import World
+from roboirg.splits import get_episode
+
+pytestmark = pytest.mark.sim
+
+DOWN = Rotation.from_quat([1.0, 0.0, 0.0, 0.0])
+
+
+@pytest.fixture(scope="module")
+def planner() -> Planner:
+    return Planner(World(get_episode("PickXtimes", "test", 0).scene, visible=False).robot)
+
+
+def random_goals(count: int):
+    rng = np.random.default_rng(1)
+    for _ in range(count):
+        position = rng.uniform([-0.3, -0.25, 0.0], [0.15, 0.25, 0.3])
+        yield ToolPose(position, DOWN * Rotation.from_rotvec([0, 0, rng.uniform(-0.8, 0.8)]))
+
+
+def test_forward_kinematics_of_home_is_where_the_simulator_has_the_tool(planner):
+    assert planner.forward(HOME).position == pytest.approx([-0.0605, 0.0, 0.5211], abs=1e-4)
+
+
+def test_moves_are_straight_and_end_at_the_goal(planner):
+    for goal in random_goals(30):
+        path = planner.straight(HOME, goal)
+        assert path[0] == pytest.approx(HOME, abs=1e-9)
+        end = planner.forward(path[-1])
+        assert end.position == pytest.approx(goal.position, abs=1e-5)
+        assert (end.rotation.inv() * goal.rotation).magnitude() < 1e-5
+        start = planner.forward(path[0]).position
+        along = (goal.position - start) / np.linalg.norm(goal.position - start)
+        for arm in path:
+            offset = planner.forward(arm).position - start
+            assert np.linalg.norm(offset - along * (offset @ along)) < 1e-3
+
+
+def test_moves_keep_joint_speed_and_acceleration_limits(planner):
+    for goal in random_goals(30):
+        path = planner.straight(HOME, goal)
+        speed = np.diff(path, axis=0) / CONTROL_PERIOD
+        # Samples are up to a fraction of a step closer in time than the control period.
+        slack = len(path) / (len(path) - 1) * 1.02
+        assert np.abs(speed).max() <= JOINT_SPEED_LIMIT * slack
+        acceleration = np.diff(speed, axis=0) / CONTROL_PERIOD
+        assert np.abs(acceleration).max() <= JOINT_ACCELERATION_LIMIT * slack**2 * 1.05
+
+
+def test_plans_repeat_themselves(planner):
+    for goal in random_goals(5):
+        assert np.array_equal(planner.straight(HOME, goal), planner.straight(HOME, goal))
+
+
+def test_out_of_reach_is_said(planner):
+    with pytest.raises(MotionPlanningError):
+        planner.straight(HOME, ToolPose(np.array([1.5, 0.0, 0.3]), DOWN))
+
+
+def test_a_move_to_where_one_is_takes_no_time():
+    assert timed(np.stack([HOME, HOME])).shape == (1, 7)
+
+
+@pytest.mark.parametrize(
+    ("travel", "low", "high"),
+    [
+        ((0, 0, -0.10), 20, 26),
+        ((0, 0, -0.15), 20, 27),
+        ((0, 0.10, 0), 16, 22),
+        ((0, 0.2, 0), 22, 30),
+    ],
+)
+def test_free_moves_take_as_long_as_robomme_s(planner, travel, low, high):
+    start = planner.straight(HOME, ToolPose(np.array([-0.1, 0.0, 0.2]), DOWN))[-1]
+    goal = ToolPose(np.array([-0.1, 0.0, 0.2]) + travel, DOWN)
+    assert low <= len(planner.straight(start, goal)) <= high
+
+
+@pytest.mark.parametrize(
+    ("task", "primitive", "low", "high"),
+    [("PickXtimes", "pick_cube", 89, 137), ("VideoUnmask", "pick_container", 77, 117)],
+)
+def test_first_picks_take_as_long_as_robomme_s(task, primitive, low, high):
+    for index in range(8):
+        episode = get_episode(task, "test", index)
+        world = World(episode.scene, visible=False)
+        stage = next(stage for stage in episode.stages if stage.primitive.kind == primitive)
+        for piece in Hands(world).perform(stage.primitive):
+            for action in piece:
+                world.step(action)
+        assert low <= world.elapsed <= high
+        assert stage.expects in world.facts
