@@ -1,4 +1,4 @@
-"""The world is RoboMME's: sizes, masses, rest positions, scripted motions; and it repeats itself."""
+"""The world is RoboMME's (sizes, masses, rest positions, motions) and repeats itself."""
 
 import numpy as np
 import pytest

@@ -1,0 +1,137 @@
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from roboirg.analysis.report import render, write_report
+from roboirg.evaluation.plan import Plan
+from roboirg.evaluation.record import EventRecord, MentionSpan, Record, Turn
+from roboirg.evaluation.rollout import Course, describe
+from roboirg.evaluation.store import RecordStore, StoreError
+
+pytest.importorskip("jinja2")
+
+PLAN = Plan(
+    policies=("listener", "forgetful"), tasks=("PickXtimes", "VideoUnmask"), episodes=(0, 1, 2)
+)
+VOID = {"meta", "link", "input", "br"}
+
+
+class Page(HTMLParser):
+    """Collects what the tests ask about and checks that tags are closed."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.cards: list[dict[str, str | None]] = []
+        self.marks: list[str] = []
+        self.videos: list[dict[str, str | None]] = []
+        self.links: list[str] = []
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        fields = dict(attrs)
+        if tag not in VOID:
+            self.open.append(tag)
+        if tag == "article":
+            self.cards.append(fields)
+        if tag == "video":
+            self.videos.append(fields)
+        self.links += [str(fields[name]) for name in ("src", "href", "poster") if name in fields]
+
+    def handle_endtag(self, tag: str) -> None:
+        # `li` and the like are written with their end tags too.
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] == "mark":
+            self.marks.append(data)
+
+
+def records() -> list[Record]:
+    found = []
+    for index, job in enumerate(PLAN.jobs()):
+        events = [EventRecord(step=40, kind="picked", subject="cube_red")]
+        course = Course("success", None, steps=80, events=events)
+        if index % 3 == 1:
+            course = Course("failure", "picked the wrong cube", steps=50, events=events)
+        if index % 7 == 6:
+            course = Course("error", "policy: ValueError: <b>&", details="Traceback <x>")
+        found.append(describe(job, course, started_at="now"))
+    return found
+
+
+def test_every_episode_is_there_and_nothing_comes_from_outside() -> None:
+    text = render(records(), planned=PLAN.jobs())
+    page = Page(text)
+    assert len(page.cards) == len(PLAN.jobs())
+    for outcome in ("success", "failure", "error"):
+        assert sum(card["data-outcome"] == outcome for card in page.cards) == sum(
+            record.outcome == outcome for record in records()
+        )
+    assert all(link.startswith(("#", "data:")) for link in page.links)
+    assert not re.search(r"https?:|@import|url\(", text)
+
+
+def test_words_are_escaped() -> None:
+    text = render(records())
+    assert "policy: ValueError: &lt;b&gt;&amp;" in text
+    assert "Traceback &lt;x&gt;" in text
+
+
+def test_mentions_are_marked_at_their_characters() -> None:
+    record = records()[0].model_copy(
+        update={
+            "instruction": (Turn(stage="introduction", text="I see a red cube & it."),),
+            "mentions": (
+                MentionSpan(
+                    utterance=0, start=18 + 1, end=21, role="anaphor", expression="it",
+                    slot="colour", value="red",
+                ),
+                MentionSpan(
+                    utterance=0, start=6, end=16, role="antecedent", expression=None,
+                    slot="colour", value="red",
+                ),
+                MentionSpan(  # the same words for a second value
+                    utterance=0, start=6, end=16, role="antecedent", expression=None,
+                    slot="colour", value="blue",
+                ),
+            ),
+        }
+    )  # fmt: skip
+    text = render([record])
+    assert Page(text).marks == ["first named", "referred to", "a red cube", "it"]
+    assert "antecedent: colour red, blue" in text
+
+
+def test_films_are_inside_and_wait_to_be_played(tmp_path: Path) -> None:
+    (tmp_path / "videos").mkdir()
+    (tmp_path / "videos" / "x.mp4").write_bytes(b"film")
+    (tmp_path / "videos" / "x.jpg").write_bytes(b"poster")
+    first, second, *_ = records()
+    filmed = first.model_copy(update={"video": "videos/x.mp4"})
+    lost = second.model_copy(update={"video": "videos/gone.mp4"})
+    (video,) = Page(render([filmed, lost], tmp_path)).videos
+    assert video["preload"] == "none"
+    assert video["src"] == "data:video/mp4;base64,ZmlsbQ=="
+    assert video["poster"] == "data:image/jpeg;base64,cG9zdGVy"
+    assert Page(render([filmed])).videos == []
+
+
+def test_the_page_is_written_whole_and_the_same_again(tmp_path: Path) -> None:
+    with RecordStore(tmp_path) as store:
+        for record in records():
+            store.append(record)
+    path = write_report(tmp_path)
+    first = path.read_bytes()
+    assert write_report(tmp_path).read_bytes() == first
+    assert not list(tmp_path.glob(".*.part"))
+
+
+def test_no_records_is_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="There are no records"):
+        write_report(tmp_path)

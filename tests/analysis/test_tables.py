@@ -1,0 +1,36 @@
+from __future__ import annotations
+
+import io
+
+from rich.console import Console
+
+from roboirg.analysis.statistics import EXPLICIT, Cell, Condition, Panel, Variant
+from roboirg.analysis.tables import points, print_tables
+
+
+def test_the_table_says_rates_gaps_and_what_is_amiss() -> None:
+    direct, spatial = Variant("direct"), Variant("spatial")
+    panel = Panel(
+        "listener",
+        Condition("listener", "test", 1300),
+        ("PickXtimes",),
+        (EXPLICIT, direct, spatial),
+        {
+            ("PickXtimes", EXPLICIT): Cell(4, 0, pairs=4, gap=0.0),
+            ("PickXtimes", direct): Cell(1, 2, errors=1, missing=2, pairs=3, gap=-2 / 3),
+            (None, EXPLICIT): Cell(4, 0),
+            (None, direct): Cell(1, 2, errors=1, missing=2, pairs=3, gap=-2 / 3),
+        },
+    )
+    console = Console(file=io.StringIO(), width=40)
+    print_tables([panel], console)
+    text = " ".join(console.file.getvalue().split())  # type: ignore[attr-defined]
+    assert "100" in text
+    assert "33 (−67) 1! 2…" in text
+    assert "ended in an error" in text
+    assert "still to be played" in text
+    assert "all tasks" not in text  # there is only one
+
+
+def test_points_have_a_sign() -> None:
+    assert [points(gap) for gap in (-0.5, 0.25, 0.0, -0.001)] == ["−50", "+25", "±0", "±0"]

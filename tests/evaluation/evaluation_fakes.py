@@ -1,0 +1,91 @@
+"""A way to play without a simulator, and the run that the crash tests kill."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import signal
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from roboirg.errors import RenderDeviceError
+from roboirg.evaluation.executors import LocalProcesses
+from roboirg.evaluation.plan import Plan
+from roboirg.evaluation.record import EventRecord, Job, Record
+from roboirg.evaluation.rollout import Course, describe
+from roboirg.evaluation.runner import run_plan
+
+
+@dataclass(frozen=True)
+class FakePlay:
+    """Plays nothing; the outcome follows from the job alone.
+
+    Attributes:
+        folder: where each start is noted, one file per process; None notes nothing.
+        seconds: how long an episode takes.
+        deadly: the episode in which the worker kills itself.
+        deaths: how often it does so.
+        fatal: the episode in which the graphics turn out to be missing.
+    """
+
+    folder: Path | None = None
+    seconds: float = 0.0
+    deadly: int | None = None
+    deaths: int = 99
+    fatal: int | None = None
+
+    def __call__(self, job: Job) -> Record:
+        started_at = str(time.time())
+        if self.folder is not None:
+            with (self.folder / f"worker-{os.getpid()}").open("a") as file:
+                file.write(job.slug + "\n")
+        if job.episode == self.fatal:
+            raise RenderDeviceError("No Vulkan device can render; install one.")
+        if job.episode == self.deadly and self._dies(job):
+            os.kill(os.getpid(), signal.SIGKILL)
+        time.sleep(self.seconds)
+        return describe(job, fake_course(job), started_at=started_at, duration_s=self.seconds)
+
+    def _dies(self, job: Job) -> bool:
+        return self.folder is None or len(starts(self.folder, job)) <= self.deaths
+
+
+def fake_course(job: Job) -> Course:
+    luck = hashlib.sha256(job.slug.encode()).digest()[0]
+    events = [EventRecord(step=luck, kind="picked", subject="cube_red")]
+    if luck % 2 or job.setting == "explicit":
+        return Course("success", None, steps=luck, events=events)
+    return Course("failure", "picked the wrong cube", steps=luck, events=events)
+
+
+def starts(folder: Path, job: Job | None = None) -> list[str]:
+    lines = [line for path in folder.glob("worker-*") for line in path.read_text().split()]
+    return [line for line in lines if job is None or line == job.slug]
+
+
+def worker_pids(folder: Path) -> list[int]:
+    return [int(path.name.removeprefix("worker-")) for path in folder.glob("worker-*")]
+
+
+def is_alive(pid: int) -> bool:
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+    return state not in "ZX"
+
+
+def small_plan(episodes: int = 4, policies: tuple[str, ...] = ("random",)) -> Plan:
+    return Plan(
+        policies=policies,
+        tasks=("PickXtimes",),
+        settings=("explicit", "direct"),
+        episodes=tuple(range(episodes)),
+    )
+
+
+if __name__ == "__main__":
+    folder = Path(sys.argv[1])
+    run_plan(small_plan(8), folder, FakePlay(folder, seconds=0.15), LocalProcesses(2))

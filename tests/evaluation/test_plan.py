@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from roboirg.errors import InvalidValueError, UnknownNameError
+from roboirg.evaluation.plan import (
+    Plan,
+    make_plan,
+    parse_episodes,
+    parse_numbers,
+    read_plan,
+    write_plan,
+)
+from roboirg.evaluation.record import Job
+from roboirg.language import expressible
+from roboirg.splits import get_episode
+from roboirg.tasks import all_tasks
+
+
+def test_a_number_is_the_first_episodes_and_a_list_is_a_list() -> None:
+    assert parse_episodes("4") == (0, 1, 2, 3)
+    assert parse_episodes("0,3,5-9") == (0, 3, 5, 6, 7, 8, 9)
+    assert parse_episodes("7,") == (7,)
+    assert parse_numbers("stage", "1,5,1") == (1, 5)
+
+
+@pytest.mark.parametrize("text", ["0", "-3", "a", "3-1", "1.5", "", ",", "1,,b"])
+def test_what_is_no_list_is_one_sentence(text: str) -> None:
+    with pytest.raises(InvalidValueError) as caught:
+        parse_episodes(text)
+    assert "\n" not in str(caught.value)
+
+
+def test_all_settings_are_those_that_each_episode_can_be_told_in() -> None:
+    plan = make_plan(["random"], episodes="6")
+    for task in all_tasks():
+        for episode in range(6):
+            played = [
+                job.setting for job in plan.jobs() if (job.task, job.episode) == (task, episode)
+            ]
+            assert tuple(played) == expressible(get_episode(task, "test", episode))
+
+
+def test_the_same_words_are_one_job() -> None:
+    plan = make_plan(["random"], forms="implicit,resolved", stages="1,5", frame="camera")
+    jobs = plan.jobs()
+    assert len(set(jobs)) == len(jobs)
+    assert {job.form for job in jobs if job.setting == "explicit"} == {"implicit"}
+    for job in jobs:
+        assert (job.stages == (1, 5)) == (job.setting == "contextual")
+        assert (job.frame == "camera") == (job.setting == "spatial")
+
+
+def test_jobs_are_ordered_and_named_uniquely() -> None:
+    plan = make_plan(["random", "oracle"], policy_seeds="0-2", forms="implicit,resolved")
+    assert plan.jobs() == plan.jobs()
+    assert len({job.slug for job in plan.jobs()}) == len(plan.jobs())
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"tasks": "PickXtime"}, r"no task 'PickXtime'.*Did you mean 'PickXtimes'\?"),
+        ({"settings": "contextal"}, r"no setting 'contextal'.*Did you mean 'contextual'\?"),
+        ({"split": "tests"}, r"no split 'tests'.*Did you mean 'test'\?"),
+        ({"forms": "resolve"}, r"no form 'resolve'.*Did you mean 'resolved'\?"),
+        ({"episodes": "0,50"}, r"no episode 50: split 'test' has episodes 0 to 49"),
+        ({"episodes": "51"}, r"no episode 50"),
+        ({"video": "on"}, r"no video mode 'on'"),
+        ({"stages": "2,5"}, r"stages \(2, 5\)"),
+        ({"distractor": "loud"}, r"no distractor 'loud'"),
+        ({"frame": "world"}, r"no frame 'world'"),
+        ({"max_steps": 0}, r"max_steps is 0; it must be at least 1"),
+        ({"max_steps": "many"}, r"max_steps is 'many'"),
+    ],
+)
+def test_what_cannot_be_played_is_told_up_front(options: dict[str, str], sentence: str) -> None:
+    with pytest.raises(InvalidValueError, match=sentence):
+        make_plan(["random"], **options)
+
+
+@pytest.mark.parametrize("spec", ["orakel", "nowhere.at.all:Policy", "roboirg.errors:Policy"])
+def test_an_unknown_policy_is_told_up_front(spec: str) -> None:
+    with pytest.raises(InvalidValueError, match=spec.partition(":")[0]):
+        make_plan([spec])
+
+
+def test_a_policy_close_to_a_known_one_is_suggested() -> None:
+    with pytest.raises(UnknownNameError, match="Did you mean 'listener'"):
+        make_plan(["listner"])
+
+
+def test_a_plan_is_kept_beside_its_records(tmp_path: Path) -> None:
+    plan = make_plan(["random"], stages="1,5")
+    write_plan(plan, tmp_path)
+    assert read_plan(tmp_path) == plan
+    (tmp_path / "plan.json").write_text('{"from": "the future"}')
+    assert read_plan(tmp_path) is None
+
+
+def test_a_record_has_the_slug_of_its_job() -> None:
+    from evaluation_fakes import FakePlay
+
+    job = Plan(policies=("a b/c:D",), tasks=("PickXtimes",), episodes=(0,)).jobs()[0]
+    record = FakePlay()(job)
+    assert record.identity == job
+    assert type(record.identity) is Job
+    assert record.slug == job.slug
+    assert job.slug.startswith("a-b-c-D-PickXtimes-test-0-explicit-implicit-")

@@ -1,0 +1,233 @@
+"""One episode against a world and a policy made of paper."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from roboirg.errors import (
+    InvalidActionError,
+    MissingDependencyError,
+    MotionPlanningError,
+    RenderDeviceError,
+)
+from roboirg.evaluation import rollout
+from roboirg.evaluation.record import Job
+from roboirg.evaluation.rollout import Player, load_policy, one_line, play_episode
+from roboirg.evaluation.video import VideoOptions
+
+JOB = Job(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
+
+
+class PaperWorld:
+    """Ends after `length` steps with `status`."""
+
+    render_device = "none"
+
+    def __init__(self, length: int = 5, status: str = "success", cause: str | None = None) -> None:
+        self.length, self.status, self.cause = length, status, cause
+        self.instruction = SimpleNamespace(text="do it")
+        self.steps = 0
+        self.hook: Callable[[Any, bool], None] | None = None
+        self.closed = False
+        self.trouble: Exception | None = None
+
+    @property
+    def unwrapped(self) -> PaperWorld:
+        return self
+
+    def set_frame_hook(self, hook: Callable[[Any, bool], None], every: int = 1) -> None:
+        del every
+        self.hook = hook
+
+    def picture(self, camera: str) -> np.ndarray:
+        return np.full((256, 256, 3), 40 * self.steps + len(camera), np.uint8)
+
+    def reset(self, seed: int | None = None) -> tuple[dict[str, Any], dict[str, Any]]:
+        del seed
+        if self.hook:
+            self.hook(self, True)
+        first = {"step": 3, "kind": "still", "subject": "robot", "place": None, "holds": True}
+        shown = {"joint_positions": np.zeros((3, 7))}
+        return {}, {"demonstration": shown, "elapsed_steps": 4, "events": [first]}
+
+    def step(self, action: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        assert action.shape == (8,)
+        if self.trouble:
+            raise self.trouble
+        self.steps += 1
+        if self.hook:
+            self.hook(self, False)
+        over = self.steps == self.length
+        event = {"step": 4 + self.steps, "kind": "picked", "subject": "cube", "place": None}
+        info = {
+            "status": self.status if over else "ongoing",
+            "cause": self.cause if over else None,
+            "events": [{**event, "holds": True}] if over else [],
+        }
+        return {}, 0.0, over and self.status != "timeout", over and self.status == "timeout", info
+
+    def close(self) -> None:
+        self.closed = True
+
+
+class PaperPolicy:
+    cameras = ()
+
+    def __init__(self, answer: Any = None) -> None:
+        self.answer = np.zeros((3, 8)) if answer is None else answer
+        self.heard: list[Any] = []
+
+    def reset(self, instruction: str, demonstration: Any) -> None:
+        self.heard += [instruction, len(demonstration["joint_positions"])]
+
+    def act(self, observation: Any) -> Any:
+        del observation
+        if isinstance(self.answer, Exception):
+            raise self.answer
+        return self.answer
+
+
+class PaperInsider(PaperPolicy):
+    def attach(self, env: Any) -> None:
+        self.heard.append(type(env).__name__)
+
+
+@pytest.fixture
+def stage(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
+    def play(world: PaperWorld, policy: Any) -> rollout.Course:
+        monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: world)
+        monkeypatch.setattr(rollout, "load_policy", lambda _job: policy)
+        return play_episode(JOB)
+
+    return play
+
+
+def test_all_rows_are_played_until_the_end(stage: Callable[..., rollout.Course]) -> None:
+    policy, world = PaperPolicy(), PaperWorld(length=5)
+    course = stage(world, policy)
+    assert (course.outcome, course.cause, course.steps) == ("success", None, 5)
+    assert course.demonstration_steps == 3
+    assert [event.step for event in course.events] == [-1, 5]
+    assert course.render_device is None
+    assert policy.heard == ["do it", 3]
+    assert world.closed
+
+
+def test_one_row_is_a_chunk_of_one(stage: Callable[..., rollout.Course]) -> None:
+    assert stage(PaperWorld(2), PaperPolicy(np.zeros(8))).steps == 2
+
+
+def test_an_insider_is_attached_before_reset(stage: Callable[..., rollout.Course]) -> None:
+    policy = PaperInsider()
+    stage(PaperWorld(), policy)
+    assert policy.heard == ["PaperWorld", "do it", 3]
+
+
+@pytest.mark.parametrize(
+    ("status", "given", "outcome", "cause"),
+    [
+        ("failure", "picked the red cube", "failure", "picked the red cube"),
+        ("timeout", None, "failure", "not done after 1300 steps"),
+    ],
+)
+def test_the_judge_decides(
+    stage: Callable[..., rollout.Course],
+    status: str,
+    given: str | None,
+    outcome: str,
+    cause: str,
+) -> None:
+    course = stage(PaperWorld(3, status, given), PaperPolicy())
+    assert (course.outcome, course.cause) == (outcome, cause)
+
+
+@pytest.mark.parametrize(
+    ("answer", "cause"),
+    [
+        (ValueError("bad weights"), "policy: ValueError: bad weights"),
+        (MotionPlanningError("no path to the cube"), "policy: no path to the cube"),
+        (np.zeros((2, 7)), "invalid action: .*shape"),
+        (np.zeros((0, 8)), "invalid action: .*shape"),
+        (np.full((2, 8), np.nan), "invalid action: .*nan"),
+        ("left", "invalid action: .*numbers"),
+    ],
+)
+def test_a_fault_of_the_policy_is_an_error_not_a_failure(
+    stage: Callable[..., rollout.Course], answer: Any, cause: str
+) -> None:
+    world = PaperWorld()
+    course = stage(world, PaperPolicy(answer))
+    assert course.outcome == "error"
+    assert rollout.re.fullmatch(f"{cause}.*", str(course.cause))
+    assert "Traceback" in str(course.details)
+    assert world.closed
+
+
+@pytest.mark.parametrize(
+    ("trouble", "cause"),
+    [
+        (RuntimeError("physics\nexploded"), "environment: RuntimeError: physics exploded"),
+        (InvalidActionError("got nan"), "invalid action: got nan"),
+    ],
+)
+def test_a_fault_of_the_world_is_an_error(
+    stage: Callable[..., rollout.Course], trouble: Exception, cause: str
+) -> None:
+    world = PaperWorld()
+    world.trouble = trouble
+    course = stage(world, PaperPolicy())
+    assert (course.outcome, course.cause) == ("error", cause)
+    assert course.demonstration_steps == 3
+
+
+@pytest.mark.parametrize("error", [RenderDeviceError("no"), MissingDependencyError("no")])
+def test_what_ends_every_episode_ends_the_run(
+    stage: Callable[..., rollout.Course], error: Exception
+) -> None:
+    with pytest.raises(type(error)):
+        stage(PaperWorld(), PaperPolicy(error))
+
+
+def test_ctrl_c_is_nobodys_fault(stage: Callable[..., rollout.Course]) -> None:
+    policy = PaperPolicy()
+    policy.act = lambda _observation: (_ for _ in ()).throw(KeyboardInterrupt)  # type: ignore[method-assign]
+    with pytest.raises(KeyboardInterrupt):
+        stage(PaperWorld(), policy)
+
+
+def test_the_policys_luck_is_the_same_in_every_setting_and_another_in_every_episode() -> None:
+    def luck(**changes: object) -> int:
+        return load_policy(JOB.model_copy(update=changes)).seed  # type: ignore[attr-defined]
+
+    assert luck() == luck(setting="explicit")
+    assert len({luck(), luck(episode=3), luck(policy_seed=1)}) == 3
+
+
+def test_one_line_is_the_same_in_every_process() -> None:
+    error = KeyError("<Thing at 0x7f3a12345678>\n  was lost \ud800")
+    assert "0x…" in one_line(error)
+    assert "\n" not in one_line(error)
+    one_line(error).encode()
+
+
+@pytest.mark.parametrize(
+    ("mode", "status", "filmed"),
+    [("all", "success", True), ("failures", "success", False), ("failures", "failure", True)],
+)
+def test_films_are_kept_as_asked(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, mode: Any, status: str, filmed: bool
+) -> None:
+    monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: PaperWorld(5, status))
+    monkeypatch.setattr(rollout, "load_policy", lambda _job: PaperPolicy())
+    record = Player(tmp_path, mode, VideoOptions(cameras=("front",)))(JOB)
+    assert (record.video is not None) == filmed
+    files = sorted(path.suffix for path in tmp_path.rglob("*") if path.is_file())
+    assert files == ([".jpg", ".mp4"] if filmed else [])
+    if record.video:
+        assert record.video == f"videos/{JOB.slug}.mp4"

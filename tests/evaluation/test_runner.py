@@ -1,0 +1,154 @@
+"""Real processes, real signals."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import evaluation_fakes
+import pytest
+from evaluation_fakes import FakePlay, is_alive, small_plan, starts, worker_pids
+
+from roboirg.errors import InvalidValueError, RenderDeviceError
+from roboirg.evaluation.executors import InProcess, LocalProcesses, choose_executor
+from roboirg.evaluation.plan import read_plan
+from roboirg.evaluation.record import Record
+from roboirg.evaluation.runner import Summary, run_plan
+from roboirg.evaluation.store import RECORDS_FILE, RecordStore, StoreError, read_records
+
+WAIT_S = 20.0
+
+
+def comparable(records: tuple[Record, ...]) -> list[dict[str, object]]:
+    return [record.comparable() for record in sorted(records, key=lambda record: record.slug)]
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + WAIT_S
+    while not condition():
+        assert time.monotonic() < deadline, "it takes too long"
+        time.sleep(0.02)
+
+
+def line_count(folder: Path) -> int:
+    path = folder / RECORDS_FILE
+    return path.read_bytes().count(b"\n") if path.exists() else 0
+
+
+def begin(folder: Path) -> subprocess.Popen[bytes]:
+    """The run of `evaluation_fakes` in a process of its own, until three episodes have ended."""
+    child = subprocess.Popen([sys.executable, evaluation_fakes.__file__, folder])
+    wait_until(lambda: line_count(folder) >= 3)
+    return child
+
+
+def finish(folder: Path) -> Summary:
+    return run_plan(small_plan(8), folder, FakePlay(), LocalProcesses(2))
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, object]]:
+    folder = tmp_path_factory.mktemp("uninterrupted")
+    run_plan(small_plan(8), folder, FakePlay(), InProcess())
+    return comparable(read_records(folder))
+
+
+def test_one_and_two_workers_give_the_same_records(
+    tmp_path: Path, uninterrupted: list[dict[str, object]]
+) -> None:
+    for workers in (1, 2):
+        folder = tmp_path / str(workers)
+        run_plan(small_plan(8), folder, FakePlay(), LocalProcesses(workers))
+        assert comparable(read_records(folder)) == uninterrupted
+
+
+def test_after_sigkill_the_workers_are_gone_and_the_same_command_goes_on(
+    tmp_path: Path, uninterrupted: list[dict[str, object]]
+) -> None:
+    child = begin(tmp_path)
+    child.send_signal(signal.SIGKILL)
+    child.wait()
+    wait_until(lambda: not any(map(is_alive, worker_pids(tmp_path))))
+    stored = len(read_records(tmp_path))
+    assert 3 <= stored < 16
+    # The worst that a kill can leave behind:
+    with (tmp_path / RECORDS_FILE).open("ab") as file:
+        file.write(b'{"policy":"random","ta')
+
+    summary = finish(tmp_path)
+
+    assert summary.played == 16 - stored
+    assert summary.torn_bytes == 22
+    assert comparable(read_records(tmp_path)) == uninterrupted
+    assert line_count(tmp_path) == 16
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_stopped_run_ends_its_workers_and_keeps_what_ended(
+    tmp_path: Path, number: signal.Signals, uninterrupted: list[dict[str, object]]
+) -> None:
+    child = begin(tmp_path)
+    child.send_signal(number)
+    assert child.wait(WAIT_S) != 0
+    assert not any(map(is_alive, worker_pids(tmp_path)))
+    assert 3 <= len(read_records(tmp_path)) < 16
+    finish(tmp_path)
+    assert comparable(read_records(tmp_path)) == uninterrupted
+
+
+def test_a_worker_that_dies_twice_costs_one_error_and_the_rest_goes_on(tmp_path: Path) -> None:
+    summary = run_plan(small_plan(), tmp_path, FakePlay(tmp_path, deadly=2), LocalProcesses(2))
+    errors = summary.errors
+    assert {record.episode for record in errors} == {2}
+    assert {record.cause for record in errors} == {"environment: worker died (signal 9)"}
+    assert len(summary.records) == 8
+    assert all(len(starts(tmp_path, record.identity)) == 2 for record in errors)
+
+
+def test_a_worker_that_dies_once_costs_nothing(tmp_path: Path) -> None:
+    play = FakePlay(tmp_path, deadly=1, deaths=1)
+    summary = run_plan(small_plan(), tmp_path, play, LocalProcesses(1))
+    assert not summary.errors
+    assert len(summary.records) == 8
+
+
+def test_errors_are_played_again_unless_asked_not_to(tmp_path: Path) -> None:
+    run_plan(small_plan(), tmp_path, FakePlay(deadly=2), LocalProcesses(1))
+    same = run_plan(small_plan(), tmp_path, FakePlay(), InProcess(), retry_errors=False)
+    assert (same.played, len(same.errors)) == (0, 2)
+    mended = run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
+    assert (mended.played, len(mended.errors)) == (2, 0)
+    assert run_plan(small_plan(), tmp_path, FakePlay(), InProcess()).played == 0
+
+
+def test_missing_graphics_stop_the_run_and_lose_nothing(tmp_path: Path) -> None:
+    with pytest.raises(RenderDeviceError, match="No Vulkan device can render; install one"):
+        run_plan(small_plan(), tmp_path, FakePlay(fatal=2), LocalProcesses(1))
+    assert {record.episode for record in read_records(tmp_path)} == {0, 1}
+
+
+def test_a_folder_may_get_more_and_fewer_jobs(tmp_path: Path) -> None:
+    run_plan(small_plan(2), tmp_path, FakePlay(), InProcess())
+    more = run_plan(small_plan(4), tmp_path, FakePlay(), InProcess())
+    assert (more.played, len(more.records)) == (4, 8)
+    fewer = run_plan(small_plan(1), tmp_path, FakePlay(), InProcess())
+    assert (fewer.played, len(fewer.records)) == (0, 2)
+    assert len(read_records(tmp_path)) == 8
+    assert read_plan(tmp_path) == small_plan(1)
+
+
+def test_a_second_run_in_the_same_folder_is_refused(tmp_path: Path) -> None:
+    with RecordStore(tmp_path), pytest.raises(StoreError, match="being written by another run"):
+        run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
+
+
+def test_workers_are_counted() -> None:
+    assert choose_executor(0) == InProcess()
+    assert choose_executor(3) == LocalProcesses(3)
+    assert isinstance(choose_executor(None), LocalProcesses)
+    with pytest.raises(InvalidValueError, match="workers is -1"):
+        choose_executor(-1)

@@ -1,0 +1,172 @@
+from __future__ import annotations
+
+import functools
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+from evaluation_fakes import fake_course, small_plan
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from roboirg.evaluation.record import EventRecord, Record
+from roboirg.evaluation.rollout import describe
+from roboirg.evaluation.store import (
+    RECORDS_FILE,
+    TORN_FILE,
+    RecordStore,
+    StoreError,
+    latest,
+    read_contents,
+    read_records,
+    write_atomically,
+)
+
+
+@functools.cache
+def some_records() -> tuple[Record, ...]:
+    return tuple(describe(job, fake_course(job), started_at="now") for job in small_plan().jobs())
+
+
+def fill(folder: Path, records: tuple[Record, ...]) -> bytes:
+    with RecordStore(folder) as store:
+        for record in records:
+            store.append(record)
+    return (folder / RECORDS_FILE).read_bytes()
+
+
+texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=40)
+records = st.builds(
+    lambda cause, steps, events, goal: some_records()[0].model_copy(
+        update={"cause": cause, "steps": steps, "events": tuple(events), "goal": goal}
+    ),
+    st.none() | texts,
+    st.integers(0, 2000),
+    st.lists(
+        st.builds(
+            EventRecord,
+            step=st.integers(-100, 2000),
+            kind=texts,
+            subject=texts,
+            place=st.none() | texts,
+            holds=st.booleans(),
+        ),
+        max_size=4,
+    ),
+    st.dictionaries(texts, texts | st.integers() | st.lists(texts).map(tuple), max_size=3),
+)
+
+
+@given(st.lists(records, max_size=4))
+@settings(max_examples=50, deadline=None)
+def test_what_is_appended_is_read_back(many: list[Record]) -> None:
+    with tempfile.TemporaryDirectory() as name:
+        fill(Path(name), tuple(many))
+        assert read_contents(Path(name) / RECORDS_FILE).records == tuple(many)
+
+
+@given(st.data())
+@settings(max_examples=150, deadline=None)
+def test_a_file_cut_anywhere_loses_only_the_line_that_was_cut(data: st.DataObject) -> None:
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        whole = fill(folder, some_records())
+        cut = data.draw(st.integers(0, len(whole)))
+        (folder / RECORDS_FILE).write_bytes(whole[:cut])
+        # A record is there as soon as its last brace is; its newline may be missing.
+        complete = [i for i, byte in enumerate(whole) if byte == ord("\n") and i <= cut]
+
+        assert read_contents(folder / RECORDS_FILE).records == some_records()[: len(complete)]
+        with RecordStore(folder) as store:
+            assert store.records == some_records()[: len(complete)]
+            torn = store.torn
+            store.append(some_records()[-1])
+
+        mended = (folder / RECORDS_FILE).read_bytes()
+        kept = whole[: complete[-1] + 1] if complete else b""
+        last = some_records()[-1].model_dump_json().encode() + b"\n"
+        assert mended == kept + last
+        assert torn == whole[len(kept) : cut]
+        if torn:
+            assert (folder / TORN_FILE).read_bytes() == torn + b"\n"
+
+
+def test_every_torn_line_is_kept(tmp_path: Path) -> None:
+    for torn in (b'{"policy": "a', b'{"policy": "b'):
+        with (tmp_path / RECORDS_FILE).open("ab") as file:
+            file.write(torn)
+        RecordStore(tmp_path).close()
+    assert (tmp_path / TORN_FILE).read_bytes() == b'{"policy": "a\n{"policy": "b\n'
+    assert (tmp_path / RECORDS_FILE).read_bytes() == b""
+
+
+def test_a_second_writer_is_told_who_writes(tmp_path: Path) -> None:
+    with (
+        RecordStore(tmp_path),
+        pytest.raises(StoreError, match=rf"being written by .*process {os.getpid()}"),
+    ):
+        RecordStore(tmp_path)
+    RecordStore(tmp_path).close()
+
+
+def test_a_killed_writer_leaves_no_lock(tmp_path: Path) -> None:
+    code = (
+        "import os, pathlib, signal, sys; from roboirg.evaluation.store import RecordStore;"
+        "s = RecordStore(pathlib.Path(sys.argv[1])); os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    assert subprocess.run([sys.executable, "-c", code, tmp_path], check=False).returncode == -9
+    RecordStore(tmp_path).close()
+
+
+def test_another_schema_version_is_refused_and_nothing_changes(tmp_path: Path) -> None:
+    whole = fill(tmp_path, some_records())
+    newer = whole.replace(b'"schema_version":1', b'"schema_version":7', 1)
+    (tmp_path / RECORDS_FILE).write_bytes(newer)
+    with pytest.raises(StoreError, match=r"line 1 has schema version 7, .* reads version 1"):
+        RecordStore(tmp_path)
+    assert (tmp_path / RECORDS_FILE).read_bytes() == newer
+    (tmp_path / RECORDS_FILE).write_bytes(whole)
+    RecordStore(tmp_path).close()  # the lock was given back
+
+
+@pytest.mark.parametrize(
+    ("line", "sentence"),
+    [
+        (b"nonsense", "line 1 is damaged"),
+        (b'{"schema_version":1,"policy":3}', "line 1 is not a record: policy"),
+        (b"[]", "line 1 has schema version None"),
+    ],
+)
+def test_damage_in_the_middle_is_told_with_its_line(
+    tmp_path: Path, line: bytes, sentence: str
+) -> None:
+    (tmp_path / RECORDS_FILE).write_bytes(line + b"\n")
+    with pytest.raises(StoreError, match=sentence):
+        read_records(tmp_path)
+
+
+def test_the_newest_record_of_a_job_wins() -> None:
+    first = some_records()[0]
+    newer = first.model_copy(update={"steps": 1234})
+    assert next(iter(latest([first, *some_records()[1:], newer]).values())) == newer
+
+
+def test_no_records_is_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="There are no records in"):
+        read_records(tmp_path / "nowhere")
+
+
+def test_a_folder_that_cannot_be_made_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(StoreError, match="Cannot write to"):
+        RecordStore(tmp_path / "file")
+
+
+def test_atomic_writing_replaces_and_leaves_no_part(tmp_path: Path) -> None:
+    for text in ("one", "two"):
+        write_atomically(tmp_path / "x.txt", text)
+    assert [path.name for path in tmp_path.iterdir()] == ["x.txt"]
+    assert (tmp_path / "x.txt").read_text() == "two"

@@ -1,0 +1,50 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from roboirg.evaluation.video import DEMONSTRATION_COLOUR, Film, VideoOptions, compose
+
+av = pytest.importorskip("av")
+
+
+class Grey:
+    def picture(self, camera: str) -> np.ndarray:
+        return np.full((256, 256, 3), 200 if camera == "wrist" else 90, np.uint8)
+
+
+def test_a_film_is_small_playable_and_appears_when_complete(tmp_path: Path) -> None:
+    film = Film(tmp_path / "videos" / "x.mp4")
+    film.shoot(Grey(), True)
+    for _ in range(20):
+        film.shoot(Grey())
+    assert not film.path.exists()
+    assert film.finish()
+    assert sorted(path.name for path in film.path.parent.iterdir()) == ["x.jpg", "x.mp4"]
+    assert film.path.stat().st_size < 20_000
+    with av.open(str(film.path)) as container:
+        stream = container.streams.video[0]
+        assert stream.codec_context.name == "h264"
+        assert stream.codec_context.pix_fmt == "yuv420p"
+        assert (stream.width, stream.height, stream.average_rate) == (512, 256, 10)
+        frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(stream)]
+    assert len(frames) > 21
+    assert np.abs(frames[0][1, 100].astype(int) - DEMONSTRATION_COLOUR).max() < 40
+    assert abs(int(frames[-1][128, 128, 0]) - 90) < 8
+    assert abs(int(frames[-1][128, 384, 0]) - 200) < 8
+
+
+def test_a_film_thrown_away_leaves_nothing(tmp_path: Path) -> None:
+    film = Film(tmp_path / "x.mp4", VideoOptions(cameras=("front",)))
+    film.shoot(Grey())
+    film.discard()
+    assert not film.finish()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_only_the_demonstration_has_a_border() -> None:
+    pictures = [Grey().picture("front"), Grey().picture("wrist")]
+    assert tuple(compose(pictures, is_demonstration=True)[0, 0]) == DEMONSTRATION_COLOUR
+    assert tuple(compose(pictures, is_demonstration=False)[0, 0]) == (90, 90, 90)

@@ -1,0 +1,58 @@
+"""What the language tests share: episodes, and every way to say one."""
+
+import itertools
+from collections.abc import Iterator
+from typing import Any
+
+from roboirg.episode import SPLITS, Episode
+from roboirg.errors import SceneRejectedError
+from roboirg.language import FORMS, STAGE_SETS, expressible
+from roboirg.splits import CYCLE, SIZES, get_episode, make_episode
+from roboirg.tasks import all_tasks
+
+TASKS = tuple(all_tasks())
+PAIRS = [(name, setting) for name, task in all_tasks().items() for setting in task.settings]
+
+Variant = tuple[str, str, dict[str, Any]]
+
+
+def split_episodes(task: str) -> Iterator[Episode]:
+    for split in SPLITS:
+        for index in range(SIZES[split]):
+            yield get_episode(task, split, index)
+
+
+def random_episodes(task: str, count: int, base: int = 7_000_000) -> Iterator[Episode]:
+    """Episodes of seeds that no split uses, with all patterns and difficulties."""
+    index = 0
+    for seed in itertools.count(base):
+        if index == count:
+            return
+        try:
+            yield make_episode(task, seed, CYCLE[index % len(CYCLE)], "test", index)
+        except SceneRejectedError:
+            continue
+        index += 1
+
+
+def options_of(setting: str) -> Iterator[dict[str, Any]]:
+    if setting == "contextual":
+        for stages, distractor in itertools.product(STAGE_SETS, ("neutral", "competing")):
+            yield {"stages": stages, "distractor": distractor}
+    elif setting == "spatial":
+        yield from ({"frame": frame} for frame in ("robot", "camera"))
+    else:
+        yield {}
+
+
+def variants(episode: Episode) -> Iterator[Variant]:
+    """Every setting, form, stage set, distractor level and frame of an episode."""
+    for setting, form in itertools.product(expressible(episode), FORMS):
+        for options in options_of(setting):
+            yield setting, form, options
+
+
+def default_variants(episode: Episode) -> Iterator[Variant]:
+    """Every setting and form with the default options."""
+    for setting, form in itertools.product(expressible(episode), FORMS):
+        yield setting, form, {}

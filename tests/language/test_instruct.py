@@ -1,0 +1,88 @@
+"""The interface: names, options, errors, sameness."""
+
+import itertools
+import subprocess
+import sys
+
+import pytest
+from language_variants import PAIRS, random_episodes
+
+from roboirg.errors import InvalidValueError, UnknownNameError
+from roboirg.language import SETTINGS, expressible, instruct
+from roboirg.language.settings import all_settings
+from roboirg.splits import get_episode
+from roboirg.tasks import all_tasks
+
+EPISODE = get_episode("PickXtimes", "test", 2)
+
+
+def test_settings_come_from_the_registry():
+    assert tuple(all_settings()) == SETTINGS
+    variants = [pair for pair in PAIRS if pair[1] != "explicit"]
+    spatial = sum(task.spatial for task in all_tasks().values())
+    assert len(variants) == 3 * len(all_tasks()) + spatial
+    for task in all_tasks().values():
+        assert set(task.settings) <= set(all_settings())
+        assert set(task.commands.patterns)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "nearest"),
+    [
+        (("directt",), {}, "direct"),
+        (("direct", "resolve"), {}, "resolved"),
+        (("contextual",), {"distractor": "neutrl"}, "neutral"),
+        (("spatial",), {"frame": "robt"}, "robot"),
+    ],
+)
+def test_unknown_names_are_refused_with_the_nearest(arguments, options, nearest):
+    with pytest.raises(UnknownNameError, match=f"Did you mean '{nearest}'"):
+        instruct(EPISODE, *arguments, **options)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"stages": (1, 3, 5)}, {"stages": ()}, {"stages": (5, 1)}, {"distractors": 0},
+     {"distractors": True}],
+)  # fmt: skip
+def test_invalid_options_are_refused(options):
+    with pytest.raises(InvalidValueError):
+        instruct(EPISODE, "contextual", **options)
+
+
+def test_lists_of_stages_are_fine():
+    said = instruct(EPISODE, "contextual", stages=[1, 2, 5])
+    assert [one.stage for one in said.utterances] == ["introduction", "reinforcement", "command"]
+
+
+def test_explicit_is_its_own_resolved_form():
+    implicit, resolved = instruct(EPISODE), instruct(EPISODE, "explicit", "resolved")
+    assert (implicit.text, implicit.form, resolved.form) == (resolved.text, "implicit", "resolved")
+
+
+def test_distractors_are_as_many_as_asked_for():
+    for distractor in ("neutral", "competing"):
+        said = instruct(EPISODE, "contextual", distractors=64, distractor=distractor)
+        remarks = [one.text for one in said.utterances if one.stage == "distractor"]
+        assert len(remarks) == 64
+        assert all(one != two for one, two in itertools.pairwise(remarks))
+
+
+def test_an_episode_without_landmark_is_refused_in_the_spatial_setting():
+    lacking = next(
+        episode
+        for episode in random_episodes("VideoUnmask", 1000)
+        if "spatial" not in expressible(episode)
+    )
+    with pytest.raises(InvalidValueError, match="no landmark"):
+        instruct(lacking, "spatial")
+
+
+def test_the_same_words_in_another_process():
+    program = (
+        "from roboirg.splits import get_episode; from roboirg.language import instruct;"
+        "print(instruct(get_episode('PickXtimes', 'test', 2), 'contextual').text, end='')"
+    )
+    command = [sys.executable, "-c", program]
+    other = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert other.stdout == instruct(EPISODE, "contextual").text

@@ -1,0 +1,127 @@
+"""Landmarks: clear margins, mirrored frames, and a reader that finds the same object."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from roboirg.episode import COLOURS, Point, Scene, SceneObject
+from roboirg.language.landmarks import MARGIN, landmarks, selectors
+from roboirg.language.resolver.places import find, read_places
+from roboirg.language.resolver.tokens import split_sentences
+
+GRID = st.integers(-17, 17).map(lambda step: step / 100)
+PLACES = st.lists(st.tuples(GRID, GRID), min_size=1, max_size=8, unique=True)
+"""Centimetre grid: ties, exact margins and collinear rows are common."""
+
+
+def containers(places):
+    return Scene(
+        tuple(
+            SceneObject(f"container_{index}", "container", Point(x, y, 0.05))
+            for index, (x, y) in enumerate(places)
+        )
+    )
+
+
+def cubes(places, button=(-0.2, 0.0), target=(0.0, 0.1)):
+    things = [
+        SceneObject(f"cube_{colour}", "cube", Point(x, y, 0.02), colour=colour)
+        for colour, (x, y) in zip(COLOURS, places, strict=False)
+    ]
+    fixtures = [
+        SceneObject(kind, kind, Point(*place, 0.0))
+        for kind, place in (("button", button), ("target", target))
+    ]
+    return Scene((*fixtures, *things))
+
+
+def phrases(scene, target, thing="container", frame="robot"):
+    return {one.phrase for one in landmarks(scene, thing, scene[target], frame)}
+
+
+@settings(max_examples=200, deadline=None)
+@given(PLACES, st.sampled_from(["robot", "camera"]))
+def test_the_reader_finds_what_a_landmark_names(places, frame):
+    scene = containers(places)
+    for target in scene.of_kind("container"):
+        for landmark in landmarks(scene, "container", target, frame):
+            check_reader(scene, "container", landmark, target, frame)
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    st.lists(st.tuples(GRID, GRID), min_size=1, max_size=3, unique=True),
+    st.tuples(GRID, GRID),
+    st.tuples(GRID, GRID),
+)
+def test_every_class_reads_as_it_selects(places, button, target):
+    scene = cubes(places, button, target)
+    for frame in ("robot", "camera"):
+        for selector in selectors(scene, "cube", frame):
+            selected = selector.selected()
+            if selected is not None:
+                check_reader(scene, "cube", selector.landmark, selected, frame)
+
+
+def check_reader(scene, thing, landmark, target, frame):
+    (sentence,) = split_sentences(f"the {thing} {landmark.phrase}")
+    (place,) = read_places(sentence)
+    mirrored = frame == "camera"
+    assert find(place, scene, thing, mirrored=mirrored) is target, landmark
+
+
+@settings(max_examples=200, deadline=None)
+@given(PLACES)
+def test_extremes_win_by_the_margin(places):
+    scene = containers(places)
+    for index, (x, y) in enumerate(places):
+        others = [place for at, place in enumerate(places) if at != index]
+        found = phrases(scene, f"container_{index}")
+        extremes = {
+            "at the far left": all(y - other[1] >= MARGIN for other in others),
+            "at the far right": all(other[1] - y >= MARGIN for other in others),
+            "closest to you": all(other[0] - x >= MARGIN for other in others),
+            "farthest from you": all(x - other[0] >= MARGIN for other in others),
+        }
+        if any(extremes.values()):
+            assert found == {phrase for phrase, holds in extremes.items() if holds}
+        else:
+            assert not found & set(extremes)
+
+
+def test_a_single_candidate_is_every_extreme():
+    scene = cubes([(0.0, 0.0)])
+    found = phrases(scene, "cube_red", "cube")
+    assert found == {"at the far left", "at the far right", "closest to you", "farthest from you"}
+
+
+def test_ties_have_no_landmark_of_that_direction():
+    scene = containers([(0.0, 0.1), (0.1, 0.1), (0.05, -0.1)])
+    assert phrases(scene, "container_0") == {"closest to you"}
+    assert phrases(scene, "container_2") == {"at the far right"}
+
+
+def test_collinear_things_are_told_by_rank():
+    scene = containers([(0.0, y) for y in (-0.16, -0.08, 0.0, 0.08, 0.16)])
+    assert phrases(scene, "container_2") == {"third from the left", "third from the right"}
+    assert phrases(scene, "container_3") == {"second from the left"}
+
+
+def test_left_is_the_robots_and_mirrored_for_the_camera():
+    scene = containers([(0.0, 0.15), (0.0, -0.15)])
+    assert phrases(scene, "container_0") == {"at the far left"}
+    assert phrases(scene, "container_0", frame="camera") == {"at the far right"}
+
+
+def test_near_and_far_are_the_robots_in_both_frames():
+    scene = containers([(-0.15, 0.0), (0.15, 0.0)])
+    for frame in ("robot", "camera"):
+        assert phrases(scene, "container_0", frame=frame) == {"closest to you"}
+
+
+@pytest.mark.parametrize("gap", [0.0, MARGIN / 2, math.nextafter(MARGIN, 0.0), MARGIN])
+def test_the_margin_is_inclusive(gap):
+    scene = containers([(0.0, gap), (0.0, 0.0)])
+    assert bool(phrases(scene, "container_0")) == (gap >= MARGIN)

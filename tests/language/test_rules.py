@@ -1,0 +1,192 @@
+"""What the language promises: no leaks, paired words, exact spans, balanced patterns, English."""
+
+import itertools
+import json
+import re
+from collections import Counter
+
+import pytest
+from language_variants import TASKS, default_variants, random_episodes, split_episodes, variants
+
+from roboirg.episode import COLOURS
+from roboirg.language import STAGE_SETS, instruct, templates
+from roboirg.language.settings import all_settings
+from roboirg.splits import get_episode
+from roboirg.tasks import all_tasks, get_task
+
+SPELLINGS = {
+    1: ("1", "one", "ones", "once", "first", "single", "1st"),
+    2: ("2", "two", "twos", "twice", "second", "double", "2nd", "both", "pair"),
+    3: ("3", "three", "threes", "thrice", "third", "3rd"),
+    4: ("4", "four", "fours", "fourth", "4th"),
+    5: ("5", "five", "fives", "fifth", "5th"),
+}
+
+
+def words_of(text):
+    return re.findall(r"[a-z0-9]+", text.lower())
+
+
+def hidden_slots(instruction):
+    """The slots that the command must not state."""
+    if instruction.setting in ("direct", "contextual"):
+        return {"colour", "colours", "repeats"}
+    if instruction.setting == "spatial":
+        return {"colour", "colours"}
+    exclusion = instruction.metadata["pattern"] == "colour exclusion"
+    return {"colour", "colours"} if exclusion else {"repeats"}
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_implicit_commands_leak_no_hidden_value(task):
+    for episode in split_episodes(task):
+        for setting, form, options in default_variants(episode):
+            if form == "resolved" or setting == "explicit":
+                continue
+            instruction = instruct(episode, setting, form, **options)
+            words = set(words_of(instruction.command))
+            for slot, value in episode.goal.slots:
+                if slot not in hidden_slots(instruction):
+                    continue
+                if isinstance(value, int):
+                    assert not words & set(SPELLINGS[value]), instruction.command
+                else:
+                    assert not words & {*COLOURS, "reds", "greens", "blues"}, instruction.command
+            for landmark in instruction.metadata["landmarks"]:
+                assert landmark not in instruction.command
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_one_episode_has_one_wording(task):
+    for episode in itertools.islice(split_episodes(task), 100):
+        explicit = instruct(episode)
+        direct, contextual = instruct(episode, "direct"), instruct(episode, "contextual")
+        assert instruct(episode, "contextual", stages=(1, 5)).turns == direct.turns
+        assert contextual.turns[0] == direct.turns[0]
+        assert contextual.command == direct.command
+        resolved = instruct(episode, "direct", "resolved")
+        assert resolved.turns == (direct.turns[0], explicit.command)
+        long = instruct(episode, "contextual", distractors=4)
+        assert long.turns[:3] == contextual.turns[:3]
+        assert long.turns[-2:] == contextual.turns[-2:]
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_resolved_differs_from_implicit_only_in_its_references(task):
+    for episode in itertools.islice(split_episodes(task), 100):
+        for setting in all_settings():
+            if setting not in {variant[0] for variant in default_variants(episode)}:
+                continue
+            implicit, resolved = (instruct(episode, setting, form) for form in FORM_PAIR)
+            assert implicit.turns[:-1] == resolved.turns[:-1]
+            assert without_mentions(implicit) == without_mentions(resolved)
+            last = len(resolved.utterances) - 1
+            assert not [
+                one for one in resolved.mentions if one.utterance == last and one.role == "anaphor"
+            ]
+            if setting != "explicit":
+                assert implicit.command != resolved.command
+
+
+FORM_PAIR = ("implicit", "resolved")
+
+
+def without_mentions(instruction):
+    last = len(instruction.utterances) - 1
+    text = instruction.command
+    for mention in reversed([one for one in instruction.mentions if one.utterance == last]):
+        text = text[: mention.start] + "@" + text[mention.end :]
+    return text
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_mention_spans_are_exact(task):
+    for episode in itertools.islice(split_episodes(task), 60):
+        for setting, form, options in variants(episode):
+            instruction = instruct(episode, setting, form, **options)
+            order = [(one.utterance, one.start, one.end) for one in instruction.mentions]
+            assert order == sorted(order)
+            for mention in instruction.mentions:
+                span = instruction.span(mention)
+                assert span
+                assert span == span.strip()
+                assert (mention.expression is None) == (mention.role == "antecedent")
+                if mention.role == "anaphor":
+                    assert not set(words_of(span)) & set(COLOURS)
+                if mention.expression in ("it", "there", "former", "latter", "other", "that"):
+                    assert mention.expression in span.lower()
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_english(task):
+    for episode in random_episodes(task, 40):
+        for setting, form, options in variants(episode):
+            for text in instruct(episode, setting, form, **options).turns:
+                check_english(text)
+
+
+def check_english(text):
+    assert text == text.strip()
+    assert text[0].isupper()
+    assert text.endswith(".")
+    assert not re.search(r"[{}\[\]|]|  | [,.;]|,,|\.\.", text), text
+    assert all(sentence[0].isupper() for sentence in text.split(". ")), text
+    words = words_of(text)
+    assert not [one for one, two in itertools.pairwise(words) if one == two], text
+    assert not re.search(r"\ba [aeio]", text.lower()), text
+    assert not re.search(r"\ban [^aeiou]", text.lower()), text
+    assert not re.search(r"\b(one|1) (times|cubes|containers|cats|minutes|meetings)\b", text), text
+    assert not re.search(r"\b(two|three|four|five) (time|cube|container|cat|minute)\b", text), text
+    assert not re.search(r"\b(up|down) it\b|colour|favourite|neighbour", text), text
+
+
+def test_neutral_remarks_and_cues_name_nothing_that_fills_a_slot():
+    forbidden = {*COLOURS, "left", "right", "front", "back", "near", "far", "there", "corner"}
+    forbidden |= {"closest", "farthest", "next", "last", "before", "cube", "container"}
+    forbidden |= {"button", "target", "it", "them", "former", "latter", "half", "all"}
+    forbidden |= set(itertools.chain.from_iterable(SPELLINGS.values()))
+    allowed = {"last", "it", "all"}  # "last night", "it has been raining", "all right"
+    for sentence in (*templates.NEUTRAL_DISTRACTORS, *templates.CUES):
+        words = words_of(re.sub("all right", "", sentence.lower()))
+        assert not set(words) & (forbidden - allowed), sentence
+
+
+def test_there_are_enough_paraphrases():
+    assert len(templates.NEUTRAL_DISTRACTORS) >= 8
+    assert len(set(templates.NEUTRAL_DISTRACTORS)) == len(templates.NEUTRAL_DISTRACTORS)
+    assert len(templates.CUES) >= 4
+    for name, value in vars(templates).items():
+        if name.endswith(("INTRODUCTIONS", "REINFORCEMENTS")):
+            assert len(value) >= 3, name
+    for task in all_tasks().values():
+        by_parts = Counter(wording.parts for wording in task.commands.wordings)
+        assert min(by_parts.values()) >= 2
+        assert task.commands.patterns
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_patterns_are_balanced_in_every_difficulty(task):
+    names = get_task(task).commands.patterns
+    found: dict[str, Counter] = {}
+    for index in range(48):
+        episode = get_episode(task, "test", index)
+        pattern = instruct(episode, "reasoning").metadata["pattern"]
+        found.setdefault(episode.difficulty, Counter())[pattern] += 1
+    for counts in found.values():
+        assert set(counts) == set(names)
+        assert max(counts.values()) - min(counts.values()) <= 2
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_metadata_is_plain_and_complete(task):
+    keys = None
+    for episode in itertools.islice(split_episodes(task), 8):
+        for setting, form, options in variants(episode):
+            metadata = instruct(episode, setting, form, **options).metadata
+            assert json.loads(json.dumps(metadata)) == dict(metadata)
+            keys = keys or set(metadata)
+            assert set(metadata) == keys
+            assert metadata["language_version"] == templates.LANGUAGE_VERSION
+            assert (metadata["frame"] is not None) == (setting == "spatial")
+            if setting == "contextual":
+                assert tuple(metadata["stages"]) in STAGE_SETS

@@ -1,0 +1,182 @@
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from roboirg import cli
+from roboirg.evaluation.record import Job
+from roboirg.evaluation.rollout import Course, describe
+from roboirg.evaluation.store import RecordStore
+
+RUN = ("run", "--policy", "random", "--tasks", "PickXtimes")
+
+
+class Said:
+    def __init__(self, code: int, out: str, err: str) -> None:
+        self.code, self.out, self.err = code, out, err
+
+
+@pytest.fixture
+def roboirg(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+    """The command, in this process."""
+
+    def call(*words: str | Path) -> Said:
+        monkeypatch.setattr(sys, "argv", ["roboirg", *map(str, words)])
+        try:
+            cli.main()
+            code = 0
+        except SystemExit as left:
+            code = left.code if isinstance(left.code, int) else 0
+        told = capsys.readouterr()
+        return Said(code, told.out, told.err)
+
+    return call
+
+
+class CannedPlayer:
+    """Stands in for `Player`: no simulator, and the outcome that the test asks for."""
+
+    course = Course("success", None, steps=7)
+
+    def __init__(self, folder: Path, video: str) -> None:
+        del folder, video
+
+    def __call__(self, job: Job):
+        return describe(job, self.course, started_at="now")
+
+
+@pytest.fixture
+def canned(monkeypatch: pytest.MonkeyPatch) -> type[CannedPlayer]:
+    monkeypatch.setattr("roboirg.evaluation.rollout.Player", CannedPlayer)
+    monkeypatch.setattr(CannedPlayer, "course", Course("success", None, steps=7))
+    return CannedPlayer
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--tasks", "PickXtime"), "There is no task 'PickXtime'"),
+        (("--settings", "spatail"), "Did you mean 'spatial'?"),
+        (("--split", "dev"), "There is no split 'dev'; the splits are train, val, test."),
+        (("--episodes", "50,"), "There is no episode 50: split 'test' has episodes 0 to 49."),
+        (("--episodes", "four"), "'four' is no episode"),
+        (("--policy", "listner"), "Did you mean 'listener'?"),
+        (("--workers", "-1"), "workers is -1; it must be at least 1."),
+    ],
+)
+def test_what_is_wrong_is_one_sentence_and_exit_code_2(
+    roboirg, tmp_path: Path, words: tuple[str, ...], sentence: str
+) -> None:
+    said = roboirg(*RUN, "--out", tmp_path / "out", *words)
+    assert said.code == 2
+    assert sentence in said.err
+    assert said.err.count("\n") == 1
+    assert said.out == ""
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "words", [("run",), ("play",), ("report",), ("report", "nowhere"), ("instruct", "PickXtimes")]
+)
+def test_wrong_usage_is_exit_code_2(roboirg, words: tuple[str, ...]) -> None:
+    said = roboirg(*words)
+    assert said.code == 2
+    assert "Traceback" not in said.err
+
+
+def test_a_second_run_in_the_folder_is_told_so(roboirg, tmp_path: Path) -> None:
+    with RecordStore(tmp_path):
+        said = roboirg(*RUN, "--out", tmp_path, "--workers", "0")
+    assert said.code == 2
+    assert "is being written by another run" in said.err
+
+
+@pytest.mark.usefixtures("canned")
+def test_run_then_report(roboirg, tmp_path: Path) -> None:
+    command = (*RUN, "--episodes", "2", "--workers", "0", "--out", tmp_path)
+    said = roboirg(*command)
+    assert said.code == 0, said.err
+    lines = (tmp_path / "records.jsonl").read_text().splitlines()
+    assert "[1/10] random PickXtimes test/0 explicit: success" in said.out
+    assert len(lines) == 10
+    keys = {"policy", "task", "split", "episode", "seed", "difficulty", "setting", "form"}
+    assert keys | {"policy_seed", "outcome", "cause", "steps"} <= set(json.loads(lines[0]))
+
+    again = roboirg(*command)
+    assert "10 of 10 episodes are already there." in again.out
+
+    told = roboirg("report", tmp_path)
+    assert told.code == 0
+    assert "PickXtimes" in told.out
+    assert told.out.splitlines()[-1] == str(tmp_path / "report.html")
+    assert (tmp_path / "report.html").exists()
+
+
+def test_errors_are_told_and_are_exit_code_2(
+    roboirg, tmp_path: Path, canned: type[CannedPlayer]
+) -> None:
+    canned.course = Course("error", "invalid action: Action value 3 is nan", steps=2)
+    command = (*RUN, "--episodes", "1", "--workers", "0", "--out", tmp_path)
+    said = roboirg(*command)
+    assert said.code == 2
+    assert "5 of 5 episodes ended in an error" in said.err
+    assert "Action value 3 is nan" in said.err
+    canned.course = Course("success", None)
+    assert roboirg(*command).code == 0
+
+
+def test_missing_graphics_are_one_sentence(
+    roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from roboirg.errors import RenderDeviceError
+
+    def fail(_self: CannedPlayer, _job: Job) -> None:
+        raise RenderDeviceError("No Vulkan device can render; install Mesa.")
+
+    monkeypatch.setattr("roboirg.evaluation.rollout.Player", CannedPlayer)
+    monkeypatch.setattr(CannedPlayer, "__call__", fail)
+    said = roboirg(*RUN, "--workers", "0", "--out", tmp_path)
+    assert (said.code, said.err) == (2, "roboirg: No Vulkan device can render; install Mesa.\n")
+
+
+@pytest.mark.usefixtures("canned")
+def test_demo_ends_with_the_path_of_the_page(roboirg, tmp_path: Path) -> None:
+    said = roboirg("demo", "--out", tmp_path, "--episodes", "1", "--workers", "0")
+    assert said.code == 0, said.err
+    assert said.out.splitlines()[-1] == str(tmp_path / "report.html")
+    for policy in cli.DEMO_POLICIES:
+        assert policy in said.out
+
+
+def test_tasks_are_listed(roboirg) -> None:
+    assert "PickXtimes" in roboirg("tasks").out
+
+
+def test_instructions_are_printed(roboirg) -> None:
+    said = roboirg("instruct", "PickXtimes", "3", "--setting", "contextual", "--stages", "1,5")
+    words = [line.split()[0] for line in said.out.splitlines()]
+    assert words == ["contextual:", "introduction", "command"]
+    assert "explicit:" in roboirg("instruct", "VideoUnmask", "0").out
+    wrong = roboirg("instruct", "VideoUnmask", "99")
+    assert (wrong.code, wrong.err.count("\n")) == (2, 1)
+
+
+def test_help_needs_nothing_heavy() -> None:
+    code = (
+        "import sys; sys.argv = ['roboirg', '--help']\n"
+        "from roboirg.cli import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "heavy = {'numpy', 'pydantic', 'sapien', 'gymnasium', 'jinja2', 'av'} & set(sys.modules)\n"
+        "assert not heavy, heavy"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+
+
+def test_python_dash_m_is_the_command() -> None:
+    command = [sys.executable, "-m", "roboirg", "tasks"]
+    assert b"VideoUnmask" in subprocess.run(command, check=True, capture_output=True).stdout

@@ -1,0 +1,101 @@
+"""The doctor, on this machine and on machines with something missing."""
+
+import os
+import subprocess
+import sys
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+from roboirg import doctor
+from roboirg.doctor import Check
+
+
+def run_module(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "roboirg.doctor", *arguments],
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=150,
+    )
+
+
+@pytest.mark.sim
+def test_a_healthy_machine_passes() -> None:
+    result = run_module()
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert result.stdout.endswith("All is well.\n")
+
+
+def test_without_vulkan_the_remedy_is_named() -> None:
+    nowhere = {"VK_DRIVER_FILES": "/nonexistent", "VK_ICD_FILENAMES": "/nonexistent"}
+    result = run_module(**nowhere)
+    assert result.returncode == 1
+    assert "FAIL  render device" in result.stdout
+    assert "apt-get install mesa-vulkan-drivers" in result.stdout
+    frame = run_module("--frame", **nowhere)
+    assert frame.returncode == 1
+    assert frame.stderr.count("\n") == 1, "one sentence and no traceback"
+
+
+@pytest.mark.sim
+def test_an_unknown_render_device_is_named_with_the_known_ones() -> None:
+    result = run_module("--frame", ROBOIRG_RENDER_DEVICE="cuda:77")
+    assert result.returncode == 1
+    assert "'cuda:77' does not exist; set ROBOIRG_RENDER_DEVICE to one of " in result.stderr
+
+
+def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    versions = {"roboirgbench": "0.1.0", "av": "9.2", "mani-skill": "3.0.1"}
+
+    def version(name: str) -> str:
+        if name not in versions:
+            raise metadata.PackageNotFoundError(name)
+        return versions[name]
+
+    requirements = [
+        "numpy>=1.26",
+        "av>=12; extra == 'world'",
+        "mani-skill==3.0.1; extra == 'sim'",
+        "ruff>=0.6; extra == 'dev'",
+    ]
+    monkeypatch.setattr(metadata, "version", version)
+    monkeypatch.setattr(metadata, "requires", lambda _: requirements)
+    assert list(doctor._check_packages()) == [
+        Check("roboirgbench", True, "0.1.0"),
+        Check("numpy", False, "not installed, >=1.26 is needed", "pip install 'numpy>=1.26'"),
+        Check("av", False, "9.2, >=12 is needed", "pip install 'av>=12'"),
+        Check("mani-skill", True, "3.0.1"),
+    ]
+
+
+def test_missing_model_files_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    package = tmp_path / "mani_skill"
+    package.mkdir()
+    (package / "__init__.py").write_text("raise RuntimeError('must not be imported')\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    check = doctor._check_model_files()
+    assert not check.ok
+    assert "panda_v3.urdf" in check.found
+
+
+def test_a_crash_of_the_driver_is_a_failed_check(monkeypatch: pytest.MonkeyPatch) -> None:
+    crash = subprocess.CompletedProcess([], -11, "device: a card\n", "")
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: crash)
+    device, frame = doctor._check_rendering()
+    assert device.ok
+    assert not frame.ok
+    assert "crashed" in frame.found
+
+
+def test_the_report_has_a_remedy_below_every_failure() -> None:
+    text = doctor.report([Check("a", True, "1"), Check("bb", False, "none", "install b")])
+    assert text.splitlines() == [
+        "ok    a   1",
+        "FAIL  bb  none",
+        "          -> install b",
+        "1 of 2 checks failed.",
+    ]

@@ -1,0 +1,140 @@
+"""The functions of scripts/setup, sourced by bash and fed with made-up apt sources."""
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+SETUP = Path(__file__).parent.parent / "scripts" / "setup"
+
+DEB822 = """\
+# a comment
+Types: deb deb-src
+URIs: http://mirror.example/debian
+Suites: bookworm bookworm-updates
+Components: main contrib
+Signed-By: /usr/share/keyrings/archive.gpg
+
+Enabled: no
+Types: deb
+URIs: http://off.example/debian
+Suites: bookworm
+Components: main
+"""
+
+EMBEDDED_KEY = """\
+Types: deb
+URIs: http://mirror.example/ubuntu
+Suites: noble
+Components: main
+Signed-By:
+ -----BEGIN PGP PUBLIC KEY BLOCK-----
+ .
+ abc=
+"""
+
+
+def bash(code: str, apt_dir: Path | None = None) -> subprocess.CompletedProcess[str]:
+    environment = {"PATH": "/usr/sbin:/usr/bin:/sbin:/bin"}
+    if apt_dir is not None:
+        environment["ROBOIRG_APT_DIR"] = str(apt_dir)
+    return subprocess.run(
+        ["bash", "-c", f"source '{SETUP}'; {code}"],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.fixture
+def apt_dir(tmp_path: Path) -> Path:
+    (tmp_path / "sources.list.d").mkdir()
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("version", "enough"),
+    [
+        ("22.3.6-1+deb12u2", False),
+        ("23.2.1-1ubuntu3.1~22.04.3", True),
+        ("25.0.7-2~bpo12+1", True),
+        ("1:23.10-1", True),
+        ("9.0", False),
+        ("(none)", False),
+        ("", False),
+    ],
+)
+def test_versions_are_compared_as_numbers(version: str, enough: bool) -> None:
+    assert (bash(f"version_at_least '{version}' 23.2").returncode == 0) is enough
+
+
+def test_backports_use_the_mirror_and_key_of_a_deb822_source(apt_dir: Path) -> None:
+    (apt_dir / "sources.list.d" / "debian.sources").write_text(DEB822)
+    assert bash("backports_source bookworm", apt_dir).stdout == (
+        "Types: deb\n"
+        "URIs: http://mirror.example/debian\n"
+        "Suites: bookworm-backports\n"
+        "Components: main\n"
+        "Signed-By: /usr/share/keyrings/archive.gpg\n"
+    )
+
+
+def test_a_key_inside_the_source_is_kept_as_it_is(apt_dir: Path) -> None:
+    (apt_dir / "sources.list.d" / "ubuntu.sources").write_text(EMBEDDED_KEY)
+    source = bash("backports_source noble", apt_dir).stdout
+    assert "Suites: noble-backports\n" in source
+    assert source.endswith("\n -----BEGIN PGP PUBLIC KEY BLOCK-----\n .\n abc=\n")
+
+
+@pytest.mark.parametrize(
+    ("line", "key"),
+    [
+        ("deb http://mirror.example/debian bookworm main", ""),
+        ("deb [arch=amd64 signed-by=/k.gpg] http://mirror.example/debian bookworm main", "/k.gpg"),
+        (
+            "deb [ signed-by=/k.gpg arch=amd64 ] http://mirror.example/debian bookworm main",
+            "/k.gpg",
+        ),
+    ],
+)
+def test_backports_use_the_mirror_and_key_of_a_one_line_source(
+    apt_dir: Path, line: str, key: str
+) -> None:
+    security = "deb http://security.example/debian bookworm-security main"
+    source_line = "deb-src http://source.example/debian bookworm main"
+    (apt_dir / "sources.list").write_text(f"# deb no\n{source_line}\n{security}\n{line} # why\n")
+    source = bash("backports_source bookworm", apt_dir).stdout
+    assert "URIs: http://mirror.example/debian\nSuites: bookworm-backports\n" in source
+    assert source.partition("Signed-By: ")[2].strip() == key
+
+
+def test_files_that_apt_ignores_are_ignored(apt_dir: Path) -> None:
+    line = "deb http://wrong.example/debian bookworm main\n"
+    for name in ("a.list.disabled", "b.list~", "c.save", "d,e.list"):
+        (apt_dir / "sources.list.d" / name).write_text(line)
+    assert bash("archives", apt_dir).stdout == ""
+    assert bash("backports_source bookworm", apt_dir).returncode == 1
+
+
+def test_the_administrator_is_told_every_command(apt_dir: Path) -> None:
+    (apt_dir / "sources.list.d" / "debian.sources").write_text(DEB822)
+    fakes = "mesa_candidate() { echo 22.3.6-1; }; distribution_codename() { echo bookworm; }; "
+    commands = bash(fakes + "administrator_commands ${VULKAN_PACKAGES[*]}", apt_dir).stdout
+    assert commands.startswith(f"cat > {apt_dir}/sources.list.d/roboirg-backports.sources <<'END'")
+    assert commands.endswith(
+        "apt-get update\napt-get install --target-release bookworm-backports "
+        "mesa-vulkan-drivers libvulkan1 libegl1\n"
+    )
+
+
+def test_a_new_enough_mesa_needs_no_backports(apt_dir: Path) -> None:
+    fakes = "mesa_candidate() { echo 25.0.7-2; }; "
+    commands = bash(fakes + "administrator_commands ${VULKAN_PACKAGES[*]}", apt_dir).stdout
+    assert commands == "apt-get update\napt-get install mesa-vulkan-drivers libvulkan1 libegl1\n"
+
+
+def test_opencv_alone_needs_no_backports(apt_dir: Path) -> None:
+    fakes = "mesa_candidate() { echo 22.3.6-1; }; "
+    commands = bash(fakes + "administrator_commands ${OPENCV_PACKAGES[*]}", apt_dir).stdout
+    assert commands == "apt-get update\napt-get install libgl1 libglib2.0-0\n"
