@@ -48,6 +48,8 @@ def test_containers_appear_over_their_cubes_after_32_steps():
     assert all(
         body.position.z > 5 for body in world.bodies.values() if body.item.kind == "container"
     )
+    # Where they are parked is not a lift.
+    assert world.facts == {Fact("still", "robot")}
     rest(world, 33)
     for body in world.bodies.values():
         if body.item.kind == "container":

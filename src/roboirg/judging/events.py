@@ -27,9 +27,7 @@ class Event(NamedTuple):
         }
 
 
-def changes(
-    step: int, before: AbstractSet[Fact], now: AbstractSet[Fact]
-) -> tuple[Event, ...]:
+def changes(step: int, before: AbstractSet[Fact], now: AbstractSet[Fact]) -> tuple[Event, ...]:
     """What changed between two evaluations, in a fixed order."""
     begun = [Event(step, fact, True) for fact in sorted(now - before, key=_order)]
     ceased = [Event(step, fact, False) for fact in sorted(before - now, key=_order)]

@@ -87,4 +87,3 @@ def describe_violation(fact: Fact, stage: Stage) -> str:
 def plain_subgoal(stage: Stage) -> str:
     """The stage's simple subgoal: its words without the slot for a pixel."""
     return stage.subgoal.replace("{at} ", "").replace(" {at}", "")
-

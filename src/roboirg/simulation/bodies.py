@@ -85,9 +85,7 @@ def _material(rgba: Rgba) -> sapien.render.RenderMaterial:
     return sapien.render.RenderMaterial(base_color=list(rgba))
 
 
-def _finish(
-    builder: ActorBuilder, scene: sapien.Scene, item: SceneObject, kind: str
-) -> Body:
+def _finish(builder: ActorBuilder, scene: sapien.Scene, item: SceneObject, kind: str) -> Body:
     builder.set_scene(scene)
     builder.set_physx_body_type(kind)
     builder.set_initial_pose(_pose(item, item.position))

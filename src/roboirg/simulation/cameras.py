@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -30,8 +31,17 @@ CULLING_MARGIN = 0.002
 CAMERAS = ("front", "wrist")
 
 
+class _Drawn(NamedTuple):
+    """A picture and the poses of everything when it was drawn."""
+
+    state: bytes
+    picture: NDArray[np.uint8]
+
+
 class Cameras:
     """The two cameras of a scene.
+
+    While nothing has moved, a picture is not drawn again.
 
     Args:
         scene: with all its bodies built.
@@ -50,17 +60,27 @@ class Cameras:
         for component in self._components.values():
             component.set_texture("BRDFLUT", _stand_in_table())
         self._bodies = _bodies(scene)
+        self._last: dict[str, _Drawn] = {}
         self._boxes = np.stack([_local_corners(body) for body in self._bodies])
 
     def picture(self, camera: str) -> NDArray[np.uint8]:
         """What the camera sees now, RGB, shape (256, 256, 3)."""
         component = self._components[camera]
+        poses = np.stack([body.entity.pose.to_transformation_matrix() for body in self._bodies])
+        view = np.asarray(component.get_extrinsic_matrix(), dtype=np.float64)
+        state = poses.tobytes() + view.tobytes()
+        known = self._last.get(camera)
+        if known is None or known.state != state:
+            known = _Drawn(state, self._draw(component, self._visible(poses, view)))
+            self._last[camera] = known
+        return known.picture.copy()
+
+    def _draw(
+        self, component: sapien.render.RenderCameraComponent, visible: NDArray[np.bool_]
+    ) -> NDArray[np.uint8]:
+        """A new picture with the bodies outside the view left out."""
         self._scene.update_render()
-        hidden = [
-            body
-            for body, visible in zip(self._bodies, self._visible(component), strict=True)
-            if not visible
-        ]
+        hidden = [body for body, seen in zip(self._bodies, visible, strict=True) if not seen]
         for body in hidden:
             body.visibility = 0.0
         component.take_picture()
@@ -69,14 +89,12 @@ class Cameras:
             body.visibility = 1.0
         return np.asarray(cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB), dtype=np.uint8)
 
-    def _visible(self, component: sapien.render.RenderCameraComponent) -> NDArray[np.bool_]:
+    def _visible(self, poses: NDArray[np.float64], view: NDArray[np.float64]) -> NDArray[np.bool_]:
         """For each body whether its box reaches into the camera's view."""
-        poses = np.stack([body.entity.pose.to_transformation_matrix() for body in self._bodies])
         world = np.einsum("bij,bkj->bki", poses, self._boxes)
-        eye = world @ np.asarray(component.get_extrinsic_matrix(), dtype=np.float64).T
         # OpenCV axes: x right, y down, z forward; the half view is 45 degrees, so the sides of
         # the view are the planes |x| = z and |y| = z.
-        x, y, z = eye[..., 0], eye[..., 1], eye[..., 2]
+        x, y, z = np.moveaxis(world @ view.T, -1, 0)[:3]
         outside = (
             (z < NEAR).all(axis=1)
             | (x > z).all(axis=1)

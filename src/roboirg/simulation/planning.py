@@ -129,9 +129,7 @@ class Planner:
             arm = arm + jacobian.T @ np.linalg.solve(gain, error)
         raise MotionPlanningError(f"The arm cannot reach {_where(pose)} in a straight move.")
 
-    def _checked(
-        self, arm: NDArray[np.float64], seed: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _checked(self, arm: NDArray[np.float64], seed: NDArray[np.float64]) -> NDArray[np.float64]:
         if bool(((arm < self._low) | (arm > self._high)).any()):
             raise MotionPlanningError("A straight move would exceed a joint limit.")
         if float(np.abs(arm - seed).max()) > LARGEST_JOINT_STEP:

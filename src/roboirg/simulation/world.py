@@ -50,6 +50,12 @@ class World:
             item.name: bodies.build(self._scene, item, visible=visible) for item in scene.objects
         }
         self._motions = tuple(motions)
+        # Objects that a motion holds somewhere; nothing is to be concluded from where they are.
+        self._held = {
+            motion.subject
+            for motion in motions
+            if motion.keys[0].step == 0 and motion.keys[0].position is not None
+        }
         self._cameras: Cameras | None = None
         if visible:
             settings.add_lights(self._scene)
@@ -95,9 +101,12 @@ class World:
             body, key = self.bodies[motion.subject], due[-1]
             if key.position is not None:
                 body.put(key.position)
+                self._held.add(motion.subject)
             elif key.step == self.elapsed:
                 body.put(body.item.position)
+                self._held.discard(motion.subject)
 
     def _detect(self) -> frozenset[Fact]:
         contacts = self._scene.physx_system.get_contacts() if self.elapsed else []
-        return detection.detect(list(self.bodies.values()), self.robot, contacts)
+        free = [body for name, body in self.bodies.items() if name not in self._held]
+        return detection.detect(free, self.robot, contacts)
