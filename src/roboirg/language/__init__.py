@@ -1,1 +1,22 @@
 """The words: an episode and a setting give an instruction; the resolver reads it back."""
+
+from __future__ import annotations
+
+from roboirg.language.compose import STAGE_SETS, expressible, instruct
+from roboirg.language.instruction import FORMS, SETTINGS, Instruction, Mention, Utterance
+from roboirg.language.resolver import Resolution, resolve
+from roboirg.language.templates import LANGUAGE_VERSION
+
+__all__ = [
+    "FORMS",
+    "LANGUAGE_VERSION",
+    "SETTINGS",
+    "STAGE_SETS",
+    "Instruction",
+    "Mention",
+    "Resolution",
+    "Utterance",
+    "expressible",
+    "instruct",
+    "resolve",
+]

@@ -18,7 +18,7 @@ from roboirg.tasks.fixtures import (
     draw_target,
 )
 from roboirg.tasks.placement import Footprint, Region
-from roboirg.tasks.task import Task
+from roboirg.tasks.task import Commands, Task, Wording
 
 CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
 REPEATS: dict[Difficulty, tuple[int, int]] = {"easy": (1, 3), "medium": (1, 3), "hard": (4, 5)}
@@ -92,6 +92,26 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     return (*plan, press)
 
 
+COMMANDS = Commands(
+    thing="cube",
+    by_colour="{cube}",
+    by_place="the cube {place}",
+    patterns=("colour exclusion", "number deduction"),
+    wordings=(
+        Wording(
+            "Take {colour} and place it on the target {repeats}, then press the button to stop."
+        ),
+        Wording(
+            "Grab {colour} and set it on the target {repeats}, "
+            "and press the button when you are done."
+        ),
+        Wording(
+            "I want you to take {colour} and put it down on the target {repeats}, "
+            "and to press the button at the end."
+        ),
+    ),
+)
+
 TASK = Task(
     name="PickXtimes",
     suite="counting",
@@ -100,4 +120,5 @@ TASK = Task(
     sample=sample,
     goals=goals,
     stages=stages,
+    commands=COMMANDS,
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,39 @@ def _no_stages(_scene: Scene) -> tuple[Stage, ...]:
 
 def _no_motions(_scene: Scene) -> tuple[Motion, ...]:
     return ()
+
+
+class Wording(NamedTuple):
+    """One way to say the command.
+
+    Attributes:
+        text: a sentence with a field for each part of the goal: ``{repeats}`` for a slot with one
+            value, ``{colours.0}``, ``{colours.1}`` for a slot with several.
+        parts: how many things are handled one after the other in this sentence.
+    """
+
+    text: str
+    parts: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Commands:
+    """How a task is commanded; the settings of the language fill the fields.
+
+    Attributes:
+        thing: what the robot handles, a ``"cube"`` or a ``"container"``; places are told among
+            all things of that kind.
+        by_colour: the thing told by a colour; ``{cube}`` is the cube of that colour.
+        by_place: the thing told by a place.
+        patterns: reasoning patterns, in the order in which the episodes cycle through them.
+        wordings: at least two for each number of parts.
+    """
+
+    thing: Literal["cube", "container"]
+    by_colour: str
+    by_place: str
+    patterns: tuple[str, ...]
+    wordings: tuple[Wording, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +65,7 @@ class Task:
             yields no valid scene.
         goals: every goal that somebody could have in a scene, the listener's choices.
         stages: what must happen, in order, for a goal in a scene.
+        commands: how it is commanded in words.
         demonstration: stages the oracle plays before the policy's turn.
         motions: scripted movements of objects.
     """
@@ -42,6 +77,7 @@ class Task:
     sample: Callable[[np.random.Generator, Difficulty], tuple[Scene, Goal]]
     goals: Callable[[Scene], tuple[Goal, ...]]
     stages: Callable[[Scene, Goal], tuple[Stage, ...]]
+    commands: Commands
     demonstration: Callable[[Scene], tuple[Stage, ...]] = _no_stages
     motions: Callable[[Scene], tuple[Motion, ...]] = _no_motions
 

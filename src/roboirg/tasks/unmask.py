@@ -23,6 +23,7 @@ from roboirg.episode import (
 )
 from roboirg.tasks import geometry
 from roboirg.tasks.placement import Circle, Footprint, Rectangle, Region, place
+from roboirg.tasks.task import Commands, Wording
 
 APPEAR_STEP = 32
 """Containers are away until this step, then stand over the cubes at once."""
@@ -135,4 +136,15 @@ def hold_still(steps: int) -> Stage:
         primitive=Primitive("hold", "robot", steps=steps),
         subgoal="static",
         lasting=steps,
+    )
+
+
+def commands(*wordings: Wording) -> Commands:
+    """The commands of an Unmask task: what its sentences tell is the container over a cube."""
+    return Commands(
+        thing="container",
+        by_colour="the container that hides {cube}",
+        by_place="the container {place}",
+        patterns=("colour exclusion",),
+        wordings=wordings,
     )

@@ -13,7 +13,7 @@ from roboirg.episode import Difficulty, Goal, Scene, Stage
 from roboirg.errors import SceneRejectedError
 from roboirg.tasks import unmask
 from roboirg.tasks.placement import Region
-from roboirg.tasks.task import Task
+from roboirg.tasks.task import Task, Wording
 
 CONTAINERS: dict[Difficulty, int] = {"easy": 3, "medium": 5, "hard": 15}
 """Upper bounds: placement ends at the first container that fits nowhere."""
@@ -40,6 +40,27 @@ def demonstration(_scene: Scene) -> tuple[Stage, ...]:
     return (unmask.hold_still(HOLD_STEPS),)
 
 
+COMMANDS = unmask.commands(
+    Wording("Think back to the video and lift {colours.0}."),
+    Wording("Going by what the video showed, pick up {colours.0}."),
+    Wording("Remember what you saw in the video, then lift {colours.0}."),
+    Wording(
+        "Think back to the video and lift {colours.0}, put it back down, "
+        "and then lift {colours.1}.",
+        parts=2,
+    ),
+    Wording(
+        "Going by what the video showed, pick up {colours.0}, set it down again, "
+        "and after that pick up {colours.1}.",
+        parts=2,
+    ),
+    Wording(
+        "Remember what you saw in the video, then lift {colours.0}, put it down, "
+        "and finally lift {colours.1}.",
+        parts=2,
+    ),
+)
+
 TASK = Task(
     name="VideoUnmask",
     suite="permanence",
@@ -48,6 +69,7 @@ TASK = Task(
     sample=sample,
     goals=unmask.goals,
     stages=unmask.pick_stages,
+    commands=COMMANDS,
     demonstration=demonstration,
     motions=unmask.appearing,
 )

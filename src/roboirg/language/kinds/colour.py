@@ -1,0 +1,64 @@
+"""Colours: which cube, or the container over which cube."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from roboirg.episode import COLOURS
+from roboirg.language import templates
+from roboirg.language.instruction import Expression
+from roboirg.language.kinds.kind import Kind
+from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed
+from roboirg.language.request import Part, Request
+
+REDUCED: Mapping[int, tuple[tuple[str, Expression], ...]] = {
+    1: (("it", "it"),),
+    2: (("the former", "former"), ("the latter", "latter")),
+    3: (("the first", "first"), ("the second", "second"), ("the third", "third")),
+}
+"""What points back at one, two or three introduced cubes."""
+
+
+def named(request: Request, part: Part) -> Phrase:
+    """``the red cube``, or the container that hides it."""
+    return request.by_colour(cube(part))
+
+
+def cube(part: Part) -> Phrase:
+    """``the red cube``."""
+    return antecedent(f"the {part.colour} cube", part.slot, part.value)
+
+
+def reduced(request: Request, parts: tuple[Part, ...]) -> dict[str, Phrase]:
+    """``it``; ``the former`` and ``the latter``; ..."""
+    return {
+        part.field: request.by_colour(anaphor(words, expression, part.slot, part.value))
+        for part, (words, expression) in zip(parts, REDUCED[len(parts)], strict=True)
+    }
+
+
+def introduce(request: Request, parts: tuple[Part, ...]) -> Phrase:
+    """A sentence that names the cubes."""
+    template = request.chooser.template("colour introduction", templates.COLOUR_INTRODUCTIONS)
+    things = listed([cube(part) for part in parts])
+    return fill(template, {"things": things}, plural=len(parts) > 1)
+
+
+def _pointing(parts: tuple[Part, ...]) -> Phrase:
+    if len(parts) == 1:
+        return anaphor("that cube", "that", parts[0].slot, parts[0].value)
+    values = " and ".join(part.colour for part in parts)
+    return anaphor("those cubes", "them", parts[0].slot, values)
+
+
+KIND = Kind(
+    name="colour",
+    named=named,
+    reduced=reduced,
+    introduce=introduce,
+    pointing=_pointing,
+    reinforcements=templates.COLOUR_REINFORCEMENTS,
+    competitors=templates.COMPETING_COLOUR_DISTRACTORS,
+    values=COLOURS,
+    word=str,
+)

@@ -1,0 +1,110 @@
+"""Phrases that know which of their words refer: filling templates, and exact mention spans.
+
+A template is a sentence with fields and alternatives: ``{cube}`` takes a phrase, and
+``[was|were]`` takes its first form in the singular and its second in the plural.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+from roboirg.language.instruction import Expression, Mention, Role, Utterance, UtteranceStage
+
+_MARK = re.compile(r"\{(?P<field>[a-z_.0-9]+)\}|\[(?P<one>[^\[\]|]*)\|(?P<many>[^\[\]|]*)\]")
+
+
+class Tag(NamedTuple):
+    """What a piece of text refers to; see `Mention`."""
+
+    role: Role
+    expression: Expression | None
+    slot: str
+    value: str | int
+
+
+class Piece(NamedTuple):
+    """A run of characters that is one mention (with a tag) or none."""
+
+    text: str
+    tag: Tag | None = None
+
+
+Phrase = tuple[Piece, ...]
+
+
+def plain(text: str) -> Phrase:
+    """Words that refer to nothing."""
+    return (Piece(text),)
+
+
+def antecedent(text: str, slot: str, value: str | int) -> Phrase:
+    """Words that introduce a slot value."""
+    return (Piece(text, Tag("antecedent", None, slot, value)),)
+
+
+def anaphor(text: str, expression: Expression, slot: str, value: str | int) -> Phrase:
+    """Words that point back at a slot value."""
+    return (Piece(text, Tag("anaphor", expression, slot, value)),)
+
+
+def fill(template: str, fields: Mapping[str, Phrase], *, plural: bool = False) -> Phrase:
+    """The template with its fields filled and its alternatives decided.
+
+    Raises:
+        KeyError: the template has a field that is not given.
+    """
+    pieces: list[Piece] = []
+    end = 0
+    for mark in _MARK.finditer(template):
+        pieces.append(Piece(template[end : mark.start()]))
+        name = mark["field"]
+        if name is not None:
+            pieces.extend(fields[name])
+        else:
+            pieces.append(Piece(mark["many"] if plural else mark["one"]))
+        end = mark.end()
+    pieces.append(Piece(template[end:]))
+    return tuple(piece for piece in pieces if piece.text)
+
+
+def listed(phrases: Sequence[Phrase]) -> Phrase:
+    """``a``, ``a and b``, ``a, b and c``."""
+    pieces: list[Piece] = []
+    for position, phrase in enumerate(phrases):
+        if position:
+            last = position == len(phrases) - 1
+            pieces.append(Piece(" and " if last else ", "))
+        pieces.extend(phrase)
+    return tuple(pieces)
+
+
+def sentences(phrases: Iterable[Phrase]) -> Phrase:
+    """Complete sentences one after the other, with a space in between."""
+    pieces: list[Piece] = []
+    for phrase in phrases:
+        if pieces:
+            pieces.append(Piece(" "))
+        pieces.extend(phrase)
+    return tuple(pieces)
+
+
+def speak(
+    index: int, stage: UtteranceStage, phrase: Phrase
+) -> tuple[Utterance, tuple[Mention, ...]]:
+    """The utterance that a phrase becomes as number `index`, and where its mentions are."""
+    mentions: list[Mention] = []
+    start = 0
+    for piece in phrase:
+        end = start + len(piece.text)
+        if piece.tag is not None:
+            mentions.append(Mention(index, start, end, *piece.tag))
+        start = end
+    text = "".join(piece.text for piece in phrase)
+    return Utterance(stage, _capitalised(text)), tuple(mentions)
+
+
+def _capitalised(text: str) -> str:
+    """A capital at the start of every sentence; no character is added or removed."""
+    return re.sub(r"(^|[.!?] )([a-z])", lambda found: found[1] + found[2].upper(), text)

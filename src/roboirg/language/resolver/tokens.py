@@ -1,0 +1,42 @@
+"""Text into sentences of lower-case words, and words into numbers."""
+
+from __future__ import annotations
+
+import re
+
+Sentence = tuple[str, ...]
+
+_WORD = re.compile(r"[a-z]+(?:'[a-z]+)?|[0-9]+|[,;:]")
+_SENTENCE_END = re.compile(r"[.!?\n]+")
+
+_NUMBERS = {
+    "zero": 0, "one": 1, "two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "seven": 7,
+    "eight": 8, "nine": 9, "ten": 10, "eleven": 11, "twelve": 12,
+}  # fmt: skip
+_ORDINALS = {
+    "first": 1, "second": 2, "third": 3, "fourth": 4, "fifth": 5,
+    "1st": 1, "2nd": 2, "3rd": 3, "4th": 4, "5th": 5,
+}  # fmt: skip
+
+
+def word_set(words: str) -> frozenset[str]:
+    """The words of a string, for membership tests."""
+    return frozenset(words.split())
+
+
+def split_sentences(text: str) -> tuple[Sentence, ...]:
+    """The sentences of a text as words and commas; empty ones are left out."""
+    parts = (tuple(_WORD.findall(part)) for part in _SENTENCE_END.split(text.lower()))
+    return tuple(part for part in parts if part)
+
+
+def number_of(word: str) -> int | None:
+    """The number that a word or a string of digits names."""
+    if word.isascii() and word.isdigit():
+        return int(word) if len(word) <= 3 else None  # noqa: PLR2004 (nobody counts higher)
+    return _NUMBERS.get(word)
+
+
+def ordinal_of(word: str) -> int | None:
+    """1 for ``first``, 2 for ``second``, ..."""
+    return _ORDINALS.get(word)

@@ -1,0 +1,42 @@
+"""The settings, one file each; a file that defines ``SETTING`` is a setting of the language."""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import pkgutil
+from collections.abc import Mapping
+
+from roboirg.errors import InvalidValueError, UnknownNameError
+from roboirg.language.instruction import SETTINGS
+from roboirg.language.request import SettingRule
+from roboirg.tasks import Task
+
+__all__ = ["all_settings", "get_setting"]
+
+
+@functools.cache
+def all_settings() -> Mapping[str, SettingRule]:
+    """Every setting by name, explicit first."""
+    modules = (
+        importlib.import_module(f"{__name__}.{found.name}")
+        for found in pkgutil.iter_modules(__path__)
+    )
+    rules = [module.SETTING for module in modules if hasattr(module, "SETTING")]
+    return {rule.name: rule for rule in sorted(rules, key=lambda rule: SETTINGS.index(rule.name))}
+
+
+def get_setting(name: str, task: Task) -> SettingRule:
+    """The setting of that name.
+
+    Raises:
+        UnknownNameError: there is none.
+        InvalidValueError: it is not defined for the task.
+    """
+    if name not in all_settings():
+        raise UnknownNameError("setting", name, all_settings())
+    if name not in task.settings:
+        raise InvalidValueError(
+            f"{task.name} has no {name} setting; its settings are {', '.join(task.settings)}."
+        )
+    return all_settings()[name]

@@ -1,0 +1,73 @@
+"""Contextual: direct, with reinforcement, distractors and a cue before the command."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from roboirg.language import templates
+from roboirg.language.kinds import Kind, kinds_in
+from roboirg.language.phrases import Phrase, fill, plain, sentences
+from roboirg.language.request import Draft, Part, Request, Said, SettingRule
+from roboirg.language.settings import direct
+
+REINFORCE, DISTRACT, ANNOUNCE = 2, 3, 4
+"""Numbers of the stages between introduction and command."""
+
+
+def say(request: Request) -> Draft:
+    """The stages that were asked for; 1 and 5 alone are the direct instruction."""
+    said = [direct.introduction(request)]
+    if REINFORCE in request.stages:
+        said.append(reinforcement(request))
+    if DISTRACT in request.stages:
+        said += [Said("distractor", phrase) for phrase in distractors(request)]
+    if ANNOUNCE in request.stages:
+        cue = request.chooser.template("cue", templates.CUES)
+        said.append(Said("cue", plain(cue)))
+    said.append(direct.command(request))
+    notes: dict[str, object] = {"stages": list(request.stages)}
+    if DISTRACT in request.stages:
+        notes |= {"distractor": request.distractor, "distractors": request.distractors}
+    return Draft(tuple(said), notes)
+
+
+def reinforcement(request: Request) -> Said:
+    """A further remark on each referent, in the order of the introduction."""
+    remarks: list[Phrase] = []
+    for kind, parts in kinds_in(request):
+        template = request.chooser.template(f"{kind.name} reinforcement", kind.reinforcements)
+        remarks.append(fill(template, {"ref": kind.pointing(parts)}, plural=len(parts) > 1))
+    return Said("reinforcement", sentences(remarks))
+
+
+def distractors(request: Request) -> tuple[Phrase, ...]:
+    """As many remarks as asked for; fewer of them are always the beginning of more."""
+    source = _competing(request) if request.distractor == "competing" else _neutral(request)
+    return tuple(next(source) for _ in range(request.distractors))
+
+
+def _neutral(request: Request) -> Iterator[Phrase]:
+    # One order, gone through again and again: the same remark returns as late as possible.
+    order = request.chooser.shuffled("distractor", templates.NEUTRAL_DISTRACTORS)
+    while True:
+        yield from (plain(sentence) for sentence in order)
+
+
+def _competing(request: Request) -> Iterator[Phrase]:
+    rivals = [
+        fill(template, {"other": plain(kind.word(value))}, plural=value != 1)
+        for kind, parts in kinds_in(request)
+        for value in _rival_values(kind, parts)
+        for template in kind.competitors
+    ]
+    order = request.chooser.shuffled("competing distractor", rivals)
+    while True:
+        yield from order
+
+
+def _rival_values(kind: Kind, parts: tuple[Part, ...]) -> list[str | int]:
+    taken = {part.value for part in parts}
+    return [value for value in kind.values if value not in taken]
+
+
+SETTING = SettingRule("contextual", say)

@@ -1,0 +1,80 @@
+"""Spatial: the colour is told by a place, which the introduction names and the command points at.
+
+Counts stay explicit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from roboirg.language import templates
+from roboirg.language.instruction import Expression
+from roboirg.language.landmarks import Landmark, landmarks
+from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain
+from roboirg.language.request import Draft, Part, Request, Said, SettingRule
+from roboirg.language.settings.explicit import stated
+
+POINTING: Mapping[int, tuple[tuple[str, Expression], ...]] = {
+    1: (("there", "there"),),
+    2: (("at the former place", "former"), ("at the latter place", "latter")),
+    3: (
+        ("at the first place", "first"),
+        ("at the second place", "second"),
+        ("at the third place", "third"),
+    ),
+}
+
+
+def usable(request: Request, part: Part) -> tuple[Landmark, ...]:
+    """The landmarks that could tell where the thing of this part is."""
+    thing = request.task.commands.thing
+    return landmarks(request.episode.scene, thing, request.target(part), request.frame)
+
+
+def can_say(request: Request) -> bool:
+    """Whether every target has a landmark."""
+    return all(usable(request, part) for part in request.parts_of("colour"))
+
+
+def say(request: Request) -> Draft:
+    """An introduction with a landmark for each target, and a command that points there."""
+    parts = request.parts_of("colour")
+    chosen = [
+        request.chooser.pick(f"landmark-{part.field}", usable(request, part)) for part in parts
+    ]
+    fields = stated(request)
+    pointing = POINTING[len(parts)]
+    for part, landmark, (words, expression) in zip(parts, chosen, pointing, strict=True):
+        place = (
+            antecedent(landmark.phrase, part.slot, part.value)
+            if request.resolved
+            else anaphor(words, expression, part.slot, part.value)
+        )
+        fields[part.field] = request.by_place(place)
+    said = (introduction(request, parts, chosen), Said("command", request.command(fields)))
+    notes = {
+        "landmarks": [landmark.phrase for landmark in chosen],
+        "landmark_classes": [landmark.level for landmark in chosen],
+        "frame": request.frame,
+    }
+    return Draft(said, notes)
+
+
+def introduction(request: Request, parts: Sequence[Part], chosen: Sequence[Landmark]) -> Said:
+    """A sentence that names the places, and whose left and right is meant where it matters."""
+    noun = plain(f"the {request.task.commands.thing} ")
+    things: list[Phrase] = [
+        (*noun, *antecedent(landmark.phrase, part.slot, part.value))
+        for part, landmark in zip(parts, chosen, strict=True)
+    ]
+    if not any(landmark.sided for landmark in chosen):
+        purpose, options = "place introduction", templates.PLACE_INTRODUCTIONS
+    elif request.frame == "robot":
+        purpose, options = "sided place introduction", templates.SIDED_PLACE_INTRODUCTIONS
+    else:
+        purpose, options = "camera place introduction", templates.CAMERA_PLACE_INTRODUCTIONS
+    template = request.chooser.template(purpose, options)
+    return Said("introduction", fill(template, {"things": listed(things)}, plural=len(things) > 1))
+
+
+SETTING = SettingRule("spatial", say, can_say)

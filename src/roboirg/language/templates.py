@@ -1,0 +1,157 @@
+"""The wordings that all tasks share. Changing any of them needs a new `LANGUAGE_VERSION`.
+
+Fields and alternatives are explained in `phrases`. American spelling, as in the data that
+policies are trained on. Neutral distractors and cues must name no colour, number, ordinal, side
+or place; a test reads them.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+LANGUAGE_VERSION = "1.0.0"
+
+COLOUR_INTRODUCTIONS = (
+    "I have always had a soft spot for {things}.",
+    "{things} [is|are] the nicest [thing|things] on this table.",
+    "My daughter keeps talking about {things}.",
+    "I was just thinking about {things}.",
+)
+NUMBER_INTRODUCTIONS = (
+    "My lucky number is {number}.",
+    "{number} is the number of the day.",
+    "If you asked me for a number, I would say {number}.",
+    "The number on my jersey is {number}.",
+)
+PAIR_INTRODUCTIONS = (
+    "{first} and {second} are the colors of my soccer team.",
+    "My kitchen is painted {first} and {second}.",
+    "I think that {first} and {second} go well together.",
+    "The flag of my home town is {first} and {second}.",
+)
+SINGLED_INTRODUCTIONS = (
+    "Of the two, I see {single} more often.",
+    "Of the two, I would rather wear {single}.",
+    "My son likes {single} better.",
+)
+PLACE_INTRODUCTIONS = (
+    "Have a look at {things}.",
+    "My eyes keep going back to {things}.",
+    "Something about {things} caught my eye.",
+)
+SIDED_PLACE_INTRODUCTIONS = (
+    "Have a look at {things}, as seen from where you stand.",
+    "From where you stand, {things} [is|are] hard to miss.",
+    "I am looking at {things}, going by your left and right.",
+)
+CAMERA_PLACE_INTRODUCTIONS = (
+    "Have a look at {things}, as seen in the picture of the front camera.",
+    "In the picture of the front camera, {things} [is|are] hard to miss.",
+    "I am looking at {things}, going by left and right in the front camera.",
+)
+"""The same with the sides of the camera, which faces the robot."""
+
+COLOUR_REINFORCEMENTS = (
+    "{ref} [was a present|were presents] from my aunt.",
+    "I would recognize {ref} anywhere.",
+    "I could not do without {ref}.",
+    "I took a photo of {ref} yesterday.",
+)
+NUMBER_REINFORCEMENTS = (
+    "I have liked {ref} ever since I was a child.",
+    "{ref} has always brought me luck.",
+    "{ref} seems to follow me everywhere.",
+)
+
+NEUTRAL_DISTRACTORS = (
+    "The coffee machine is making a strange noise.",
+    "I slept really well last night.",
+    "It has been raining since this morning.",
+    "My phone needs charging again.",
+    "Somebody should water the plants.",
+    "The neighbors are playing music.",
+    "Lunch was delicious today.",
+    "I still have to call my dentist.",
+    "The bus was late again this morning.",
+    "A bird is singing outside the window.",
+    "My shoes are still wet from the walk.",
+    "The radio says the weekend will be sunny.",
+    "I forgot my umbrella on the train.",
+    "The printer is out of paper.",
+    "Grandma sends her love.",
+    "The dog is barking at the mailman.",
+    "I should really clean these windows.",
+    "The elevator is being repaired.",
+    "Traffic was terrible on the way to work.",
+    "I have a meeting later today.",
+    "My cousin is learning to play the violin.",
+    "The soup needs a pinch of salt.",
+    "We ran out of milk at breakfast.",
+    "The movie last night was much too long.",
+)
+COMPETING_COLOUR_DISTRACTORS = (
+    "My neighbor prefers {other}, but that does not matter here.",
+    "My friend painted his door {other}, but never mind that.",
+    "There is a {other} car outside, which has nothing to do with your task.",
+)
+COMPETING_NUMBER_DISTRACTORS = (
+    "My neighbor has {other} [cat|cats], but that does not matter here.",
+    "The bus was {other} [minute|minutes] late, but never mind that.",
+    "I have {other} [meeting|meetings] today, which has nothing to do with your task.",
+)
+
+CUES = (
+    "Here is what I would like you to do.",
+    "Now, please do the following.",
+    "All right, this is your task.",
+    "Okay, let us get to work.",
+    "Please listen, because this is what I need from you.",
+)
+
+EXCLUSIONS = (
+    "the cube of a color other than {pair}",
+    "the cube whose color is different from {pair}",
+)
+PAIR_ANAPHORS = ("that pair", "those two")
+COMPLEMENTS = (
+    "the cube in {other}, not in {single}",
+    "the cube that has {other} and not {single}",
+)
+"""The second pick: of the two excluded colours, the one that was not singled out."""
+
+
+class Relation(NamedTuple):
+    """A number told by another one.
+
+    Attributes:
+        name: for records.
+        times: how often, told by a reference quantity.
+        offset: the result is ``factor * reference + offset``.
+        factor: see `offset`.
+        spells: the number that the words themselves contain; a result of this value would be
+            given away.
+    """
+
+    name: str
+    times: str
+    offset: int = 0
+    factor: float = 1.0
+    spells: int | None = None
+
+    def reference(self, result: int) -> int | None:
+        """The quantity to introduce, or None if there is no whole one."""
+        reference = (result - self.offset) / self.factor
+        return int(reference) if reference.is_integer() else None
+
+
+MAX_REFERENCE = 10
+"""The largest number that is introduced."""
+
+RELATIONS = (
+    Relation("one fewer", "one time fewer than {number}", offset=-1, spells=1),
+    Relation("one more", "one more time than {number}", offset=1, spells=1),
+    Relation("two fewer", "two fewer times than {number}", offset=-2, spells=2),
+    Relation("two more", "two more times than {number}", offset=2, spells=2),
+    Relation("twice", "twice as many times as {number}", factor=2.0, spells=2),
+    Relation("half", "half as many times as {number}", factor=0.5),
+)

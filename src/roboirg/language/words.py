@@ -1,0 +1,18 @@
+"""Numbers in words."""
+
+from __future__ import annotations
+
+CARDINALS = (
+    "zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten",
+)  # fmt: skip
+ADVERBS = {1: "once", 2: "twice"}
+
+
+def cardinal(number: int) -> str:
+    """A number from 0 to 10 as a word."""
+    return CARDINALS[number]
+
+
+def times(number: int) -> str:
+    """How often: ``once``, ``twice``, ``three times``, ..."""
+    return ADVERBS.get(number, f"{cardinal(number)} times")
