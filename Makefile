@@ -1,0 +1,28 @@
+# The daily commands. `make` alone lists them.
+
+PYTHON := .venv/bin/python
+
+.DEFAULT_GOAL := help
+.PHONY: help setup test lint demo clean
+
+help: ## list the targets
+	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
+
+setup: ## make .venv and see to a Vulkan driver; quick when there is nothing to do
+	@scripts/setup
+
+lint: setup ## ruff and mypy
+	$(PYTHON) -m ruff check .
+	$(PYTHON) -m ruff format --check .
+	$(PYTHON) -m mypy
+
+# Two workers: every one that renders takes a core and 0.5 GiB.
+test: lint ## lint, then every test
+	$(PYTHON) -m pytest -n 2
+
+demo: setup ## play one episode and write its video to runs/demo
+	.venv/bin/roboirg demo --out runs/demo
+
+clean: ## remove what the tools left behind; .venv and runs stay
+	rm -rf build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +

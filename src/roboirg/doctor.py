@@ -1,0 +1,312 @@
+"""`roboirg doctor`: is everything here that playing an episode needs, and does it work?
+
+Nothing heavy is imported in this process. The renderer is tried in a process of its own
+(``python -m roboirg.doctor --frame``), because a bad graphics driver can crash Python; then the
+crash is a failed check and not a dead doctor.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import os
+import platform
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+from roboirg.errors import RenderDeviceError, RoboIRGError
+
+DISTRIBUTION = "roboirgbench"
+FRAME_TIMEOUT = 120.0
+"""Seconds that the test frame may take."""
+
+OLDEST_PYTHON = (3, 11)
+MODEL_FILES = (
+    "assets/robots/panda/panda_v3.urdf",
+    "utils/scene_builder/table/assets/table.glb",
+)
+
+_EXTRAS = ("world", "sim", "report")
+_GIB = 1024**3
+_LEAST_MEMORY = 2 * _GIB
+_RENDER_REMEDY = (
+    "run `make setup`, or install Mesa >= 23.2: apt-get install mesa-vulkan-drivers libvulkan1 "
+    "libegl1 (see docs/install.md)"
+)
+# The lines by which the child process reports how far it came.
+_DEVICE_PREFIX = "device: "
+_FRAME_PREFIX = "frame: "
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing that was looked at.
+
+    Attributes:
+        name: what was looked at.
+        ok: it is as it has to be.
+        found: what is there.
+        remedy: what to do about it; empty when ``ok``.
+    """
+
+    name: str
+    ok: bool
+    found: str
+    remedy: str = ""
+
+
+def examine() -> list[Check]:
+    """Look at everything and return one check for each; takes a few seconds, raises nothing."""
+    return [
+        _check_python(),
+        *_check_packages(),
+        _check_opencv(),
+        _check_model_files(),
+        *_check_rendering(),
+        _check_processors(),
+        _check_memory(),
+    ]
+
+
+def report(checks: Sequence[Check]) -> str:
+    """Return a line for each check, and below every failure a line that says what to do."""
+    width = max((len(check.name) for check in checks), default=0)
+    lines: list[str] = []
+    for check in checks:
+        lines.append(f"{'ok  ' if check.ok else 'FAIL'}  {check.name:<{width}}  {check.found}")
+        if not check.ok:
+            lines.append(f"      {'':<{width}}  -> {check.remedy}")
+    failures = sum(not check.ok for check in checks)
+    lines.append(f"{failures} of {len(checks)} checks failed." if failures else "All is well.")
+    return "\n".join(lines)
+
+
+def run_doctor() -> int:
+    """Print the report and return the exit code: 0 if every check passed, otherwise 1."""
+    checks = examine()
+    sys.stdout.write(report(checks) + "\n")
+    return 0 if all(check.ok for check in checks) else 1
+
+
+def _check_python() -> Check:
+    wanted = ".".join(map(str, OLDEST_PYTHON))
+    return Check(
+        "Python",
+        sys.version_info >= OLDEST_PYTHON,
+        f"{platform.python_version()} ({sys.executable})",
+        f"install Python {wanted} or newer and run `make setup` again",
+    )
+
+
+def _check_packages() -> Iterator[Check]:
+    try:
+        requirements = metadata.requires(DISTRIBUTION) or []
+    except metadata.PackageNotFoundError:
+        remedy = f"run `make setup`, or: pip install '{DISTRIBUTION}[sim]'"
+        yield Check(DISTRIBUTION, False, "not installed", remedy)
+        return
+    yield Check(DISTRIBUTION, True, metadata.version(DISTRIBUTION))
+    wanted: dict[str, str] = {}  # a package may be in several extras
+    for requirement in requirements:
+        name, specifier, extra = _read_requirement(requirement)
+        if extra in ("", *_EXTRAS) and name != DISTRIBUTION:
+            wanted[name] = specifier
+    for name, specifier in wanted.items():
+        yield _check_package(name, specifier)
+
+
+def _check_package(name: str, specifier: str) -> Check:
+    # --no-deps for ManiSkill: only its model files are read, and its dependencies are large.
+    option = "--no-deps " if _normal(name) == "mani-skill" else ""
+    remedy = f"pip install {option}'{name}{specifier}'"
+    try:
+        version = metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return Check(name, False, f"not installed, {specifier} is needed", remedy)
+    if not _satisfies(version, specifier):
+        return Check(name, False, f"{version}, {specifier} is needed", remedy)
+    return Check(name, True, version)
+
+
+def _read_requirement(requirement: str) -> tuple[str, str, str]:
+    """Split ``"av>=12; extra == 'world'"`` into name, specifier and extra."""
+    wanted, _, marker = requirement.partition(";")
+    name = re.match(r"[\w.-]+", wanted)
+    specifier = re.search(r"[<>=!~].*", wanted)
+    extra = re.search(r"extra\s*==\s*['\"]([\w-]+)['\"]", marker)
+    return (
+        name.group() if name else wanted.strip(),
+        specifier.group().strip() if specifier else "",
+        extra.group(1) if extra else "",
+    )
+
+
+def _satisfies(version: str, specifier: str) -> bool:
+    """Check ``>=`` and ``==``, the only operators in this project's own requirements."""
+    operator, wanted = specifier[:2], specifier[2:]
+    if operator == "==":
+        return version == wanted
+    return operator != ">=" or _numbers(version) >= _numbers(wanted)
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    leading = re.match(r"[\d.]*\d", version)
+    return tuple(map(int, leading.group().split("."))) if leading else ()
+
+
+def _normal(name: str) -> str:
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def _check_model_files() -> Check:
+    name, remedy = "ManiSkill model files", "pip install --no-deps 'mani_skill==3.0.1'"
+    spec = importlib.util.find_spec("mani_skill")
+    if spec is None or not spec.submodule_search_locations:
+        return Check(name, False, "the package mani_skill is not installed", remedy)
+    folder = Path(spec.submodule_search_locations[0])
+    missing = [file for file in MODEL_FILES if not (folder / file).is_file()]
+    if missing:
+        return Check(name, False, f"{', '.join(missing)} missing in {folder}", remedy)
+    return Check(name, True, str(folder))
+
+
+def _check_opencv() -> Check:
+    """Load OpenCV in a child process: its wheel needs two libraries of the system."""
+    command = [sys.executable, "-c", "import cv2; print(cv2.__version__)"]
+    child = subprocess.run(  # noqa: S603 - a constant command in our own interpreter
+        command, capture_output=True, text=True, check=False, timeout=FRAME_TIMEOUT
+    )
+    words = (child.stdout + child.stderr).strip().splitlines() or [f"exit code {child.returncode}"]
+    return Check(
+        "OpenCV libraries",
+        child.returncode == 0,
+        "loaded" if child.returncode == 0 else words[-1],
+        "run `make setup`, or: apt-get install libgl1 libglib2.0-0",
+    )
+
+
+def _check_rendering() -> tuple[Check, Check]:
+    """Try the renderer in a child process and say how far it came."""
+    code, output, fault = _run_frame_process()
+    said = {
+        prefix: line.removeprefix(prefix)
+        for line in output.splitlines()
+        for prefix in (_DEVICE_PREFIX, _FRAME_PREFIX)
+        if line.startswith(prefix)
+    }
+    device, frame = said.get(_DEVICE_PREFIX), said.get(_FRAME_PREFIX)
+    drawn = frame is not None and code == 0
+    return (
+        Check("render device", device is not None, device or fault, _RENDER_REMEDY),
+        Check(
+            "test frame",
+            drawn,
+            (frame or "") if drawn else (fault if device else "not tried, there is no device"),
+            _RENDER_REMEDY,
+        ),
+    )
+
+
+def _run_frame_process() -> tuple[int, str, str]:
+    """Return the child's exit code, its output, and a sentence that says what went wrong."""
+    command = [sys.executable, "-m", "roboirg.doctor", "--frame"]
+    try:
+        child = subprocess.run(  # noqa: S603 - our own module in our own interpreter
+            command, capture_output=True, text=True, check=False, timeout=FRAME_TIMEOUT
+        )
+    except subprocess.TimeoutExpired as error:
+        output = error.stdout.decode() if isinstance(error.stdout, bytes) else error.stdout or ""
+        return 1, output, f"no picture within {FRAME_TIMEOUT:.0f} s"
+    if child.returncode < 0:
+        number = -child.returncode
+        return child.returncode, child.stdout, f"the driver crashed ({signal.strsignal(number)})"
+    last_words = child.stderr.strip().splitlines() or [f"exit code {child.returncode}"]
+    return child.returncode, child.stdout, last_words[-1]
+
+
+def _check_processors() -> Check:
+    # os.cpu_count() would count processors that a container may not use.
+    count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return Check("processors", bool(count), f"{count}", "")
+
+
+def _check_memory() -> Check:
+    total = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    limit = Path("/sys/fs/cgroup/memory.max")  # a container's own limit
+    if limit.is_file() and (text := limit.read_text().strip()).isdigit():
+        total = min(total, int(text))
+    return Check(
+        "memory",
+        total >= _LEAST_MEMORY,
+        f"{total / _GIB:.1f} GiB",
+        f"give it at least {_LEAST_MEMORY // _GIB} GiB; every worker process takes about 0.5 GiB",
+    )
+
+
+def _render_test_frame() -> str:
+    """Draw a lit red box and return what was seen, or raise a RoboIRGError.
+
+    Raises:
+        MissingDependencyError: SAPIEN is not installed.
+        RenderDeviceError: no device can render, or the picture is wrong.
+    """
+    # Named here and not at the top: only the child process may load them.
+    devices = importlib.import_module("roboirg.simulation.device")
+    device = devices.describe(devices.find_render_device())
+    kind = "drawn by the processor" if device.is_software else "GPU"
+    # Flushed at once: the next lines may crash this process.
+    sys.stdout.write(f"{_DEVICE_PREFIX}{device.name} at {device.alias} ({kind})\n")
+    sys.stdout.flush()
+
+    start = time.perf_counter()
+    sapien, np = importlib.import_module("sapien"), importlib.import_module("numpy")
+    scene = sapien.Scene([sapien.physx.PhysxCpuSystem(), devices.render_system()])
+    scene.set_ambient_light([0.3, 0.3, 0.3])
+    scene.add_directional_light([1.0, 0.2, -1.0], [1.0, 1.0, 1.0])
+    builder = scene.create_actor_builder()
+    red = sapien.render.RenderMaterial(base_color=[0.9, 0.05, 0.05, 1.0])
+    builder.add_box_visual(half_size=[0.1, 0.1, 0.1], material=red)
+    builder.set_initial_pose(sapien.Pose([1.0, 0.0, 0.0]))
+    builder.build_static()
+    sapien.render.set_camera_shader_dir("minimal")
+    camera = scene.add_camera("camera", 64, 64, 1.0, 0.01, 10.0)
+    # Without it SAPIEN computes a light table that this picture does not need, for seconds.
+    table = sapien.render.RenderTexture(np.zeros((2, 2, 4), np.uint8), 2, "r8g8b8a8unorm")
+    camera.set_texture("BRDFLUT", table)
+    scene.update_render()
+    camera.take_picture()
+    picture = camera.get_picture("Color")
+    middle, corner = picture[32, 32, :3], picture[0, 0, :3]
+    if not _is_reddish(middle) or _is_reddish(corner):
+        raise RenderDeviceError(
+            f"the picture of a red box has the colour {np.round(middle, 2).tolist()} in the "
+            f"middle and {np.round(corner, 2).tolist()} in the corner."
+        )
+    return f"64 x 64 pixels in {time.perf_counter() - start:.1f} s"
+
+
+def _is_reddish(colour: Sequence[float]) -> bool:
+    red, green, blue = (float(part) for part in colour)
+    return red > 0.2 and red > 2 * max(green, blue)  # noqa: PLR2004 - in units of full brightness
+
+
+def _main() -> int:
+    if "--frame" not in sys.argv[1:]:
+        return run_doctor()
+    try:
+        sys.stdout.write(f"{_FRAME_PREFIX}{_render_test_frame()}\n")
+    except RoboIRGError as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(_main())
