@@ -13,7 +13,7 @@ from gymnasium.utils.env_checker import check_env
 import roboirg
 from roboirg.errors import InvalidActionError, InvalidValueError, UnknownNameError
 from roboirg.gym import environment_id
-from roboirg.policies import make_policy
+from roboirg.policies import make_policy, play
 from roboirg.policies.handed import HandedPolicy
 from roboirg.simulation.settings import HOME_ACTION
 from roboirg.splits import get_episode
@@ -79,7 +79,7 @@ def test_tasks_without_a_video_have_an_empty_demonstration():
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_the_oracle_succeeds_and_is_rewarded_once(task, play):
+def test_the_oracle_succeeds_and_is_rewarded_once(task):
     env = roboirg.make(task, episode=2, cameras=())
     rewards = []
     step = env.step
@@ -98,7 +98,7 @@ def test_the_oracle_succeeds_and_is_rewarded_once(task, play):
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_every_other_goal_of_the_scene_fails(task, play):
+def test_every_other_goal_of_the_scene_fails(task):
     episode = get_episode(task, "test", 2)
     for goal in get_task(task).goals(episode.scene):
         info = play(roboirg.make(task, episode=2, cameras=(), max_steps=700), Wrong(goal))
@@ -109,7 +109,7 @@ def test_every_other_goal_of_the_scene_fails(task, play):
         assert (info["cause"] is not None) == (info["status"] == "failure")
 
 
-def test_drawing_changes_nothing_that_happens(play):
+def test_drawing_changes_nothing_that_happens():
     def story(hooked):
         env = roboirg.make("VideoUnmask", episode=3, cameras=())
         if hooked:
@@ -120,7 +120,7 @@ def test_drawing_changes_nothing_that_happens(play):
     assert story(hooked=False) == story(hooked=True)
 
 
-def test_the_frame_hook_is_called_at_its_period_and_at_the_end(play):
+def test_the_frame_hook_is_called_at_its_period_and_at_the_end():
     env = roboirg.make("VideoUnmask", cameras=())
     calls = []
     env.set_frame_hook(

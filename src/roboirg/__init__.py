@@ -8,16 +8,17 @@ from roboirg.errors import MissingDependencyError
 
 if TYPE_CHECKING:
     from roboirg.environment import RoboIRGEnv
+    from roboirg.episode import Episode
 
 __version__ = "0.1.0"
 __all__ = ["__version__", "make"]
 
 
-def make(task: str, **options: Any) -> RoboIRGEnv:  # noqa: ANN401 - RoboIRGEnv's own options
+def make(task: str | Episode, **options: Any) -> RoboIRGEnv:  # noqa: ANN401 - RoboIRGEnv's own options
     """The Gymnasium environment of one episode.
 
     Args:
-        task: name of the task, for example ``"PickXtimes"``.
+        task: name of the task, for example ``"PickXtimes"``, or an episode made by hand.
         **options: setting, form, split, episode and more, see
             `roboirg.environment.RoboIRGEnv`.
 

@@ -11,6 +11,7 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from roboirg.actions import ACTION_HIGH, ACTION_LOW, ARM_JOINTS, JOINT_HIGH, JOINT_LOW, check_action
+from roboirg.episode import Episode
 from roboirg.errors import InvalidValueError, UnknownNameError
 from roboirg.judging import Event, Status, plain_subgoal
 from roboirg.language import instruct
@@ -49,7 +50,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     reset `demonstration`, arrays as in the observation with a leading axis T.
 
     Args:
-        task: name of the task.
+        task: name of the task, or an episode made by hand (then `split` and `episode` are its own).
         setting: explicit, direct, reasoning, contextual or spatial.
         form: implicit, or resolved for its paired explicit counterpart.
         split: train, val or test.
@@ -75,7 +76,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
 
     def __init__(
         self,
-        task: str,
+        task: str | Episode,
         setting: str = "explicit",
         form: str = "implicit",
         split: str = "test",
@@ -89,7 +90,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         max_steps: int = MAX_STEPS,
         render_mode: str | None = None,
     ) -> None:
-        self.episode = get_episode(task, split, episode)
+        self.episode = task if isinstance(task, Episode) else get_episode(task, split, episode)
         self.instruction = instruct(
             self.episode,
             setting,

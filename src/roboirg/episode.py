@@ -210,6 +210,11 @@ class Motion:
     keys: tuple[KeyPose, ...]
 
 
+def episode_key(task: str, split: Split, index: int) -> str:
+    """The name of an episode, for example ``"PickXtimes/test/3"``."""
+    return f"{task}/{split}/{index}"
+
+
 @dataclass(frozen=True, slots=True)
 class Episode:
     """One episode: everything that determines it and everything it determines.
@@ -240,5 +245,5 @@ class Episode:
 
     @property
     def key(self) -> str:
-        """A short unique name, for example ``"PickXtimes/test/3"``."""
-        return f"{self.task}/{self.split}/{self.index}"
+        """The episode's short unique name."""
+        return episode_key(self.task, self.split, self.index)

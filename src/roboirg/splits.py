@@ -1,25 +1,31 @@
 """Train, validation and test episodes: which seeds, which difficulty.
 
 An episode's seed is ``base + 100 * index + rejected``, where the base depends on split and task
-and `rejected` counts the seeds that were passed over because they give no valid scene.
-Difficulties repeat easy, easy, medium, hard (RoboMME's cycle).
+and `rejected` counts the seeds that were passed over: those that give no valid scene, those with a
+setting that cannot be expressed, and those that the oracle does not solve. The counts are shipped
+in ``rejected_seeds.json``; ``roboirg build-splits`` finds them anew. Difficulties repeat easy,
+easy, medium, hard (RoboMME's cycle).
 """
 
 from __future__ import annotations
 
 import functools
+import json
 from collections.abc import Mapping
+from importlib import resources
 
 import numpy as np
 
-from roboirg.episode import SPLITS, Difficulty, Episode, Split
-from roboirg.errors import InvalidValueError, SceneRejectedError, UnknownNameError
+from roboirg.episode import SPLITS, Difficulty, Episode, Split, episode_key
+from roboirg.errors import InvalidValueError, UnknownNameError
 from roboirg.tasks import Task, get_task
 
 SIZES: Mapping[Split, int] = {"train": 100, "val": 50, "test": 50}
 CYCLE: tuple[Difficulty, ...] = ("easy", "easy", "medium", "hard")
 SEED_STRIDE = 100
 MAX_REJECTED = 30
+"""Seeds that are tried for an episode."""
+REJECTIONS_FILE = "rejected_seeds.json"
 
 
 def base_seed(task: Task, split: Split) -> int:
@@ -66,6 +72,19 @@ def make_episode(
     )
 
 
+def slot_seed(task: Task, split: Split, index: int) -> int:
+    """The first seed that is tried for an episode."""
+    return base_seed(task, split) + SEED_STRIDE * index
+
+
+@functools.cache
+def rejections() -> Mapping[str, int]:
+    """How many seeds were passed over, by episode key; episodes with none are left out."""
+    text = resources.files("roboirg").joinpath(REJECTIONS_FILE).read_text(encoding="utf-8")
+    counts: Mapping[str, int] = json.loads(text)
+    return counts
+
+
 @functools.lru_cache(maxsize=4096, typed=True)
 def get_episode(task_name: str, split: str, index: int) -> Episode:
     """Episode number `index` (from 0) of a split of a task.
@@ -80,11 +99,6 @@ def get_episode(task_name: str, split: str, index: int) -> Episode:
         raise InvalidValueError(
             f"There is no episode {index!r}: split {split!r} has episodes 0 to {size - 1}."
         )
-    difficulty = CYCLE[index % len(CYCLE)]
-    first = base_seed(task, split_name) + SEED_STRIDE * index
-    for seed in range(first, first + MAX_REJECTED):
-        try:
-            return make_episode(task_name, seed, difficulty, split_name, index)
-        except SceneRejectedError:
-            continue
-    raise SceneRejectedError(f"{MAX_REJECTED} seeds from {first} gave no scene of {task_name}")
+    passed_over = rejections().get(episode_key(task_name, split_name, index), 0)
+    seed = slot_seed(task, split_name, index) + passed_over
+    return make_episode(task_name, seed, CYCLE[index % len(CYCLE)], split_name, index)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import roboirg
-from roboirg.policies import make_policy
+from roboirg.policies import make_policy, play
 from roboirg.simulation.cameras import CAMERAS
 from roboirg.simulation.settings import HOME_ACTION
 from roboirg.simulation.world import World
@@ -40,15 +40,7 @@ def film(task: str, index: int, steps: set[int]) -> dict[tuple[int, str], np.nda
             taken.update({(elapsed, camera): env.picture(camera) for camera in CAMERAS})
 
     env.set_frame_hook(shoot)
-    policy = make_policy("oracle", 0)
-    policy.attach(env)
-    observation, info = env.reset()
-    policy.reset("", info["demonstration"])
-    while info["status"] == "ongoing":
-        for action in policy.act(observation):
-            observation, _, ended, _, info = env.step(action)
-            if ended:
-                break
+    info = play(env, make_policy("oracle", 0))
     assert info["status"] == "success"
     return taken
 

@@ -2,6 +2,7 @@
 
 from roboirg.policies.base import Demonstration, Observation, Policy, PrivilegedPolicy
 from roboirg.policies.loading import load_policy_class, make_policy
+from roboirg.policies.playing import play
 
 __all__ = [
     "Demonstration",
@@ -10,4 +11,5 @@ __all__ = [
     "PrivilegedPolicy",
     "load_policy_class",
     "make_policy",
+    "play",
 ]

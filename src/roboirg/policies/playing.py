@@ -1,0 +1,32 @@
+"""Playing one episode by hand, without a run around it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, cast
+
+from roboirg.actions import check_chunk
+from roboirg.policies.base import Observation, Policy, PrivilegedPolicy
+
+if TYPE_CHECKING:
+    from roboirg.environment import RoboIRGEnv
+
+
+def play(env: RoboIRGEnv, policy: Policy) -> dict[str, Any]:
+    """Let a policy play an environment's episode from its beginning to its end.
+
+    Returns:
+        The last step's info; its ``status`` is success, failure or timeout.
+
+    Raises:
+        InvalidActionError: the policy gave an action of a wrong shape or not finite.
+    """
+    observation, info = env.reset()
+    if isinstance(policy, PrivilegedPolicy):
+        policy.attach(env)
+    policy.reset(env.instruction.text, info["demonstration"])
+    while info["status"] == "ongoing":
+        for action in check_chunk(policy.act(cast("Observation", observation))):
+            observation, _, terminated, truncated, info = env.step(action)
+            if terminated or truncated:
+                break
+    return info
