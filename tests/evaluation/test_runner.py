@@ -146,6 +146,16 @@ def test_a_second_run_in_the_same_folder_is_refused(tmp_path: Path) -> None:
         run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
 
 
+def test_words_of_two_versions_are_not_mixed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run_plan(small_plan(1), tmp_path, FakePlay(), InProcess())
+    monkeypatch.setattr("roboirg.evaluation.runner.LANGUAGE_VERSION", "99.0")
+    with pytest.raises(StoreError, match=r"language version .*, but this roboirg speaks 99\.0"):
+        run_plan(small_plan(2), tmp_path, FakePlay(), InProcess())
+    assert len(read_records(tmp_path)) == 2
+
+
 def test_workers_are_counted() -> None:
     assert choose_executor(0) == InProcess()
     assert choose_executor(3) == LocalProcesses(3)

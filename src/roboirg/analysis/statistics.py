@@ -1,0 +1,250 @@
+"""Success rates and their gaps to the explicit setting. Functions of records alone."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from roboirg.evaluation.record import (
+    ALL_STAGES,
+    DEFAULT_DISTRACTOR,
+    DEFAULT_FRAME,
+    Job,
+    Record,
+)
+
+Z_95 = 1.959963984540054
+"""Two-sided 95 % quantile of the normal distribution."""
+
+SETTING_ORDER = ("explicit", "direct", "reasoning", "contextual", "spatial")
+
+
+class Interval(NamedTuple):
+    """A 95 % confidence interval of a rate."""
+
+    low: float
+    high: float
+
+
+def wilson_interval(successes: int, trials: int, z: float = Z_95) -> Interval:
+    """Wilson's score interval of a binomial proportion.
+
+    Raises:
+        ValueError: not 0 <= successes <= trials, or no trial.
+    """
+    if not 0 <= successes <= trials or trials == 0:
+        raise ValueError(f"{successes} successes of {trials} trials are not a proportion")
+    rate, weight = successes / trials, z * z / trials
+    centre = (rate + weight / 2) / (1 + weight)
+    half = z * math.sqrt(rate * (1 - rate) / trials + weight / (4 * trials)) / (1 + weight)
+    # At the ends the formula gives 0 and 1 exactly; floating point need not.
+    low = 0.0 if successes == 0 else centre - half
+    high = 1.0 if successes == trials else centre + half
+    return Interval(low, high)
+
+
+class Variant(NamedTuple):
+    """A way of telling: a setting, its form, and what was not said in the usual way."""
+
+    setting: str
+    form: str = "implicit"
+    stages: tuple[int, ...] = ALL_STAGES
+    distractor: str = DEFAULT_DISTRACTOR
+    frame: str = DEFAULT_FRAME
+
+    @classmethod
+    def of(cls, job: Job) -> Variant:
+        """How a job was told."""
+        return cls(job.setting, job.form, job.stages, job.distractor, job.frame)
+
+    @property
+    def label(self) -> str:
+        """The setting, and in brackets what is unusual."""
+        unusual = []
+        if self.form != "implicit":
+            unusual.append(self.form)
+        if self.stages != ALL_STAGES:
+            unusual.append("stages " + ",".join(map(str, self.stages)))
+        if self.distractor != DEFAULT_DISTRACTOR:
+            unusual.append(f"{self.distractor} distractor")
+        if self.frame != DEFAULT_FRAME:
+            unusual.append(f"{self.frame} frame")
+        return f"{self.setting} ({', '.join(unusual)})" if unusual else self.setting
+
+    def sort_key(self) -> tuple[object, ...]:
+        """Settings from explicit to spatial, the usual form first."""
+        known = self.setting in SETTING_ORDER
+        place = SETTING_ORDER.index(self.setting) if known else len(SETTING_ORDER)
+        return (place, self.setting, self.label != self.setting, self.label)
+
+
+EXPLICIT = Variant("explicit")
+
+
+class Condition(NamedTuple):
+    """Who played under which rules: what one table is about."""
+
+    policy: str
+    split: str
+    max_steps: int
+
+    @classmethod
+    def of(cls, job: Job) -> Condition:
+        """The condition of a job."""
+        return cls(job.policy, job.split, job.max_steps)
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """What came of one task (or all of them) told in one way.
+
+    Attributes:
+        successes: episodes.
+        failures: episodes.
+        errors: episodes that say nothing about the policy; in no rate.
+        missing: episodes of the plan that have no record yet.
+        pairs: episodes that have a verdict both here and in the explicit setting.
+        gap: mean over those pairs of success here less success there, -1 to 1; None without
+            pairs.
+    """
+
+    successes: int = 0
+    failures: int = 0
+    errors: int = 0
+    missing: int = 0
+    pairs: int = 0
+    gap: float | None = None
+
+    @property
+    def trials(self) -> int:
+        """Episodes with a verdict."""
+        return self.successes + self.failures
+
+    @property
+    def rate(self) -> float | None:
+        """Success rate, 0 to 1; None without a verdict."""
+        return self.successes / self.trials if self.trials else None
+
+    @property
+    def interval(self) -> Interval | None:
+        """Wilson's 95 % interval of the rate; None without a verdict."""
+        return wilson_interval(self.successes, self.trials) if self.trials else None
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every episode of the plan has a verdict."""
+        return not self.errors and not self.missing
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """All that one policy did under the same rules.
+
+    Attributes:
+        label: the policy, and the rules where there are several.
+        condition: policy and rules.
+        tasks: the rows.
+        variants: the columns.
+        cells: by task (None: all tasks together) and variant.
+    """
+
+    label: str
+    condition: Condition
+    tasks: tuple[str, ...]
+    variants: tuple[Variant, ...]
+    cells: Mapping[tuple[str | None, Variant], Cell]
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every episode of the plan has a verdict."""
+        return all(cell.is_complete for cell in self.cells.values())
+
+
+def make_panels(records: Sequence[Record], planned: Sequence[Job] = ()) -> tuple[Panel, ...]:
+    """One panel for each policy (and split and limit), in the order in which they appear.
+
+    Args:
+        records: one for each identity.
+        planned: jobs that should have a record; those without one are counted as missing.
+    """
+    have = {record.identity for record in records}
+    missing = [job for job in planned if job not in have]
+    everything: list[Job] = [*records, *missing]
+    conditions = list(dict.fromkeys(Condition.of(job) for job in [*planned, *everything]))
+    tasks = tuple(dict.fromkeys(job.task for job in [*planned, *everything]))
+    variants = tuple(sorted({Variant.of(job) for job in everything}, key=Variant.sort_key))
+    return tuple(
+        _make_panel(
+            condition,
+            [record for record in records if Condition.of(record) == condition],
+            [job for job in missing if Condition.of(job) == condition],
+            label=_label(condition, conditions),
+            tasks=tasks,
+            variants=variants,
+        )
+        for condition in conditions
+    )
+
+
+def _make_panel(
+    condition: Condition,
+    records: Sequence[Record],
+    missing: Sequence[Job],
+    *,
+    label: str,
+    tasks: tuple[str, ...],
+    variants: tuple[Variant, ...],
+) -> Panel:
+    explicit = {
+        _pair_key(record): record.outcome == "success"
+        for record in records
+        if record.setting == "explicit" and record.outcome != "error"
+    }
+    groups: dict[tuple[str | None, Variant], list[Record]] = defaultdict(list)
+    lacking: dict[tuple[str | None, Variant], int] = defaultdict(int)
+    for record in records:
+        for row in (record.task, None):
+            groups[row, Variant.of(record)].append(record)
+    for job in missing:
+        for row in (job.task, None):
+            lacking[row, Variant.of(job)] += 1
+    cells = {key: _make_cell(groups[key], lacking[key], explicit) for key in {*groups, *lacking}}
+    own_tasks = tuple(task for task in tasks if any(row == task for row, _ in cells))
+    own_variants = tuple(variant for variant in variants if (None, variant) in cells)
+    return Panel(label, condition, own_tasks, own_variants, cells)
+
+
+def _make_cell(
+    records: Sequence[Record], missing: int, explicit: Mapping[tuple[object, ...], bool]
+) -> Cell:
+    outcomes = [record.outcome for record in records]
+    differences = [
+        (record.outcome == "success") - explicit[_pair_key(record)]
+        for record in records
+        if record.outcome != "error" and _pair_key(record) in explicit
+    ]
+    return Cell(
+        successes=outcomes.count("success"),
+        failures=outcomes.count("failure"),
+        errors=outcomes.count("error"),
+        missing=missing,
+        pairs=len(differences),
+        gap=sum(differences) / len(differences) if differences else None,
+    )
+
+
+def _pair_key(record: Record) -> tuple[object, ...]:
+    """Same world, same policy, same luck: only the words differ."""
+    return (record.task, record.episode, record.policy_seed)
+
+
+def _label(condition: Condition, conditions: Sequence[Condition]) -> str:
+    label = condition.policy
+    if len({other.split for other in conditions}) > 1:
+        label += f" · {condition.split}"
+    if len({other.max_steps for other in conditions}) > 1:
+        label += f" · at most {condition.max_steps} steps"
+    return label

@@ -1,0 +1,87 @@
+"""The table on the terminal: tasks × settings, one for each policy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from roboirg.analysis.statistics import EXPLICIT, Cell, Panel
+
+MINIMUM_WIDTH = 100
+"""Columns to use where the output is not a terminal."""
+
+ERROR_MARK = "!"
+MISSING_MARK = "…"
+ALL_TASKS = "all tasks"
+
+_GOOD, _FAIR = 0.75, 0.4
+
+
+def make_table(panel: Panel) -> Table:
+    """Tasks × settings of one policy: success rate and, in brackets, the gap to explicit."""
+    table = Table(title=panel.label, title_justify="left", title_style="bold")
+    table.add_column("task")
+    for variant in panel.variants:
+        table.add_column(variant.label, justify="right")
+    rows: list[tuple[str, str | None]] = [(task, task) for task in panel.tasks]
+    if len(panel.tasks) > 1:
+        rows.append((ALL_TASKS, None))
+    for name, task in rows:
+        if task is None:
+            table.add_section()
+        cells = [
+            _text(panel.cells.get((task, variant)), is_reference=variant == EXPLICIT)
+            for variant in panel.variants
+        ]
+        table.add_row(Text(name, "bold" if task is None else ""), *cells)
+    return table
+
+
+def print_tables(panels: Sequence[Panel], console: Console) -> None:
+    """Print every policy's table and, below, what the signs mean."""
+    if not console.is_terminal:
+        console.width = max(console.width, MINIMUM_WIDTH)
+    for panel in panels:
+        console.print(make_table(panel))
+    legend = "success rate in %, in brackets the gap to explicit on the same episodes in points"
+    cells = [cell for panel in panels for cell in panel.cells.values()]
+    if any(cell.errors for cell in cells):
+        legend += f"; {ERROR_MARK} episodes ended in an error and are in no rate"
+    if any(cell.missing for cell in cells):
+        legend += f"; {MISSING_MARK} episodes are still to be played"
+    console.print(legend, style="dim", highlight=False)
+
+
+def percent(rate: float) -> str:
+    """A rate as a whole per cent."""
+    return f"{100 * rate:.0f}"
+
+
+def points(gap: float) -> str:
+    """A gap in signed percentage points, with a proper minus."""
+    value = round(100 * gap)
+    return f"{value:+d}".replace("-", "−") if value else "±0"
+
+
+def _text(cell: Cell | None, *, is_reference: bool) -> Text:
+    if cell is None:
+        return Text("–", "dim")
+    text = Text()
+    if cell.rate is None:
+        text.append("–", "dim")
+    else:
+        text.append(percent(cell.rate), _colour(cell.rate))
+        if cell.gap is not None and not is_reference:
+            text.append(f" ({points(cell.gap)})", "dim" if cell.gap >= 0 else "red")
+    if cell.errors:
+        text.append(f" {cell.errors}{ERROR_MARK}", "bold yellow")
+    if cell.missing:
+        text.append(f" {cell.missing}{MISSING_MARK}", "yellow")
+    return text
+
+
+def _colour(rate: float) -> str:
+    return "green" if rate >= _GOOD else "yellow" if rate >= _FAIR else "red"

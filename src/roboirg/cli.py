@@ -1,0 +1,247 @@
+"""The ``roboirg`` command: parses, calls, prints.
+
+Exit codes: 0 all went well; 2 something was asked for that cannot be, or episodes ended in
+errors (one sentence on stderr); 130 stopped by Ctrl-C, 143 by SIGTERM.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from roboirg.errors import RoboIRGError
+
+if TYPE_CHECKING:
+    from roboirg.evaluation.plan import Plan
+    from roboirg.evaluation.runner import Summary
+
+# Everything heavy is imported inside the commands, so that --help answers at once.
+
+USAGE_ERROR, INTERRUPTED, TERMINATED = 2, 130, 143
+
+DEMO_POLICIES = ("oracle", "listener", "forgetful")
+
+app = typer.Typer(
+    name="roboirg",
+    help="RoboIRGBench: does a robot policy understand people who do not spell everything out?",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+Policies = Annotated[
+    list[str], typer.Option("--policy", help="Built-in name or package.module:Class; repeatable.")
+]
+Tasks = Annotated[str, typer.Option(help="Names separated by commas, or all.")]
+Settings = Annotated[str, typer.Option(help="Names separated by commas, or all that a task has.")]
+Forms = Annotated[str, typer.Option(help="implicit, resolved, or both with a comma.")]
+Split = Annotated[str, typer.Option(help="train, val or test.")]
+Episodes = Annotated[str, typer.Option(help="4: the first four; or a list such as 0,3,5-9.")]
+PolicySeeds = Annotated[str, typer.Option(help="A list of numbers; each plays every episode.")]
+Stages = Annotated[str, typer.Option(help="Stages of the contextual setting, such as 1,5.")]
+Distractor = Annotated[str, typer.Option(help="Kind of distractor in the contextual setting.")]
+Frame = Annotated[str, typer.Option(help="Frame of reference in the spatial setting.")]
+MaxSteps = Annotated[int, typer.Option(help="The policy's limit in control steps (20 a second).")]
+Video = Annotated[str, typer.Option(help="Which episodes to film: off, failures or all.")]
+Workers = Annotated[
+    int | None,
+    typer.Option(help="Processes; by default one per core. 0 plays in this process."),
+]
+RetryErrors = Annotated[
+    bool, typer.Option(help="Play episodes again whose newest record is an error.")
+]
+Out = Annotated[Path, typer.Option(help="Folder of the run; give the same again to go on.")]
+Folder = Annotated[Path, typer.Argument(help="The --out folder of a run.")]
+
+
+@app.command()
+def run(
+    policy: Policies,
+    out: Out,
+    tasks: Tasks = "all",
+    settings: Settings = "all",
+    forms: Forms = "implicit",
+    split: Split = "test",
+    episodes: Episodes = "4",
+    policy_seeds: PolicySeeds = "0",
+    stages: Stages = "1-5",
+    distractor: Distractor = "neutral",
+    frame: Frame = "robot",
+    max_steps: MaxSteps = 1300,
+    video: Video = "off",
+    workers: Workers = None,
+    retry_errors: RetryErrors = True,
+) -> None:
+    """Play episodes and append one record for each to OUT/records.jsonl; resumes by itself."""
+    from roboirg.evaluation.plan import make_plan
+
+    # As `python -m` has it: policies in the working directory can be named.
+    sys.path.insert(0, str(Path.cwd()))
+    plan = make_plan(
+        policy,
+        tasks=tasks,
+        settings=settings,
+        forms=forms,
+        split=split,
+        episodes=episodes,
+        policy_seeds=policy_seeds,
+        stages=stages,
+        distractor=distractor,
+        frame=frame,
+        max_steps=max_steps,
+        video=video,
+    )
+    summary = _run(plan, out, workers, retry_errors=retry_errors)
+    _print_tables(out)
+    _complain_of_errors(summary)
+
+
+@app.command()
+def report(
+    folder: Folder,
+    videos: Annotated[bool, typer.Option(help="Put the films into the page.")] = True,
+) -> None:
+    """Print the table of a run and write FOLDER/report.html, one self-contained page."""
+    _print_tables(folder)
+    typer.echo(_write_page(folder, videos=videos))
+
+
+@app.command()
+def demo(
+    out: Out = Path("runs/demo"),
+    episodes: Episodes = "4",
+    workers: Workers = None,
+) -> None:
+    """Oracle, listener and forgetful on every task and setting, filmed; ends with a page."""
+    from roboirg.evaluation.plan import make_plan
+
+    plan = make_plan(DEMO_POLICIES, episodes=episodes, video="all")
+    summary = _run(plan, out, workers, retry_errors=True)
+    _print_tables(out)
+    typer.echo(_write_page(out, videos=True))
+    _complain_of_errors(summary)
+
+
+@app.command()
+def doctor() -> None:
+    """Check that episodes can be played here, and say what is missing."""
+    from roboirg.doctor import run_doctor
+
+    raise typer.Exit(run_doctor())
+
+
+@app.command("tasks")
+def list_tasks() -> None:
+    """List the tasks, their suites and their settings."""
+    from roboirg.tasks import all_tasks
+
+    for task in all_tasks().values():
+        typer.echo(f"{task.name:<16} {task.suite:<12} {', '.join(task.settings)}")
+
+
+@app.command()
+def instruct(
+    task: Annotated[str, typer.Argument(help="Name of the task.")],
+    episode: Annotated[int, typer.Argument(help="0-based position in the split.")],
+    setting: Annotated[str, typer.Option(help="One of the settings, or all.")] = "all",
+    form: Annotated[str, typer.Option(help="implicit or resolved.")] = "implicit",
+    split: Split = "test",
+    stages: Stages = "1-5",
+    distractor: Distractor = "neutral",
+    frame: Frame = "robot",
+) -> None:
+    """Print what is said to the robot, turn by turn."""
+    from roboirg.evaluation.plan import parse_numbers
+    from roboirg.language import instruct as make_instruction
+    from roboirg.splits import get_episode
+    from roboirg.tasks import get_task
+
+    spoken = parse_numbers("stage", stages)
+    found = get_episode(task, split, episode)
+    for name in get_task(task).settings if setting == "all" else (setting,):
+        instruction = make_instruction(
+            found, name, form, stages=spoken, distractor=distractor, frame=frame
+        )
+        typer.echo(typer.style(f"{name}:", bold=True))
+        for utterance in instruction.utterances:
+            typer.echo(f"  {utterance.stage:<13} {utterance.text}")
+
+
+def main() -> None:
+    """The console script: errors are one sentence on stderr, never a traceback."""
+    try:
+        app()
+    except RoboIRGError as error:
+        typer.echo(f"roboirg: {error}", err=True)
+        sys.exit(USAGE_ERROR)
+
+
+def _run(plan: Plan, out: Path, workers: int | None, *, retry_errors: bool) -> Summary:
+    from rich.console import Console
+
+    from roboirg.evaluation.executors import choose_executor
+    from roboirg.evaluation.progress import ConsoleReporter
+    from roboirg.evaluation.rollout import Player
+    from roboirg.evaluation.runner import Terminated, run_plan, torn_notice
+    from roboirg.evaluation.video import check_video_support
+
+    if plan.video != "off":
+        check_video_support()
+    executor = choose_executor(workers)
+    try:
+        with ConsoleReporter(Console()) as reporter:
+            summary = run_plan(
+                plan,
+                out,
+                Player(out, plan.video),
+                executor,
+                retry_errors=retry_errors,
+                reporter=reporter,
+            )
+    except KeyboardInterrupt as interrupt:
+        typer.echo(
+            f"Stopped; {out} keeps what ended. The same command goes on from there.", err=True
+        )
+        sys.exit(TERMINATED if isinstance(interrupt, Terminated) else INTERRUPTED)
+    notice = torn_notice(summary, out)
+    if notice:
+        typer.echo(notice, err=True)
+    return summary
+
+
+def _print_tables(folder: Path) -> None:
+    from rich.console import Console
+
+    from roboirg.analysis.statistics import make_panels
+    from roboirg.analysis.tables import print_tables
+    from roboirg.evaluation.plan import read_plan
+    from roboirg.evaluation.store import read_records
+
+    plan = read_plan(folder)
+    panels = make_panels(read_records(folder), plan.jobs() if plan else ())
+    print_tables(panels, Console())
+
+
+def _write_page(folder: Path, *, videos: bool) -> Path:
+    from roboirg.analysis.report import write_report
+    from roboirg.evaluation.plan import read_plan
+
+    plan = read_plan(folder)
+    return write_report(folder, planned=plan.jobs() if plan else (), videos=videos)
+
+
+def _complain_of_errors(summary: Summary) -> None:
+    if not summary.errors:
+        return
+    first = summary.errors[0]
+    typer.echo(
+        f"roboirg: {len(summary.errors)} of {len(summary.records)} episodes ended in an error "
+        f"and are in no rate; the first ({first.task} {first.split}/{first.episode} "
+        f"{first.setting}): {first.cause}",
+        err=True,
+    )
+    sys.exit(USAGE_ERROR)

@@ -1,0 +1,173 @@
+"""What was to be played (`Job`) and what came of it (`Record`), one JSON object each.
+
+A record says everything that the report and the statistics need, so that they never open the
+simulator. It depends on its job alone: not on the worker, the order, or what ran before.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict
+
+SCHEMA_VERSION: Literal[1] = 1
+
+Outcome = Literal["success", "failure", "error"]
+
+ALL_STAGES = (1, 2, 3, 4, 5)
+DEFAULT_DISTRACTOR = "neutral"
+DEFAULT_FRAME = "robot"
+DEFAULT_MAX_STEPS = 1300
+
+INCIDENTALS = frozenset({"started_at", "duration_s", "video", "details"})
+"""Times and paths: all that may differ between two runs of the same command."""
+
+
+class _Data(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Job(_Data):
+    """One episode to play: the identity of its record. Jobs are hashable and compare by value.
+
+    Attributes:
+        policy: built-in name or ``package.module:Class``.
+        task: name of the task.
+        split: train, val or test.
+        episode: 0-based position in the split.
+        setting: explicit, direct, reasoning, contextual or spatial.
+        form: implicit or resolved. The explicit setting is its own resolved form and is always
+            played as ``implicit``.
+        stages: which stages of the discourse are spoken (contextual setting; else all).
+        distractor: kind of distractor (contextual setting; else the default).
+        frame: frame of reference (spatial setting; else the default).
+        policy_seed: chosen for the run; the policy gets a seed made of it and the episode's.
+        max_steps: the policy's limit, control steps.
+    """
+
+    policy: str
+    task: str
+    split: str
+    episode: int
+    setting: str
+    form: str = "implicit"
+    stages: tuple[int, ...] = ALL_STAGES
+    distractor: str = DEFAULT_DISTRACTOR
+    frame: str = DEFAULT_FRAME
+    policy_seed: int = 0
+    max_steps: int = DEFAULT_MAX_STEPS
+
+    @property
+    def slug(self) -> str:
+        """A short name, unique for the job and good as a file name."""
+        words = (self.policy, self.task, self.split, str(self.episode), self.setting, self.form)
+        readable = re.sub(r"[^A-Za-z0-9]+", "-", "-".join(words)).strip("-")[:100]
+        # Of the fields alone, so that a record (which is a job) has its job's slug.
+        identity = repr([(name, getattr(self, name)) for name in Job.model_fields])
+        return f"{readable}-{hashlib.sha256(identity.encode()).hexdigest()[:8]}"
+
+
+class Turn(_Data):
+    """One utterance and its stage in the discourse."""
+
+    stage: str
+    text: str
+
+
+class MentionSpan(_Data):
+    """A span of an utterance that introduces a slot value or points back at one.
+
+    Attributes:
+        utterance: index of the utterance.
+        start: first character of the span.
+        end: one past the last.
+        role: ``antecedent`` or ``anaphor``.
+        expression: class of an anaphor, else None.
+        slot: name of the goal slot.
+        value: what it stands for.
+    """
+
+    utterance: int
+    start: int
+    end: int
+    role: str
+    expression: str | None
+    slot: str
+    value: str | int
+
+
+class EventRecord(_Data):
+    """A fact that became true, or ceased to be, in the world.
+
+    Attributes:
+        step: control steps since the policy's turn began; at most 0 in the demonstration.
+        kind: as in `roboirg.episode.Fact`.
+        subject: name of the object.
+        place: name of the place, if the kind has one.
+        holds: whether it became true.
+    """
+
+    step: int
+    kind: str
+    subject: str
+    place: str | None = None
+    holds: bool = True
+
+
+class Record(Job):
+    """What came of a job.
+
+    Attributes:
+        schema_version: of this table of fields.
+        seed: of the episode's scene.
+        difficulty: easy, medium or hard.
+        outcome: success, failure (the policy's doing) or error (nobody knows what the policy
+            would have done; never counted as a failure).
+        cause: why it failed, or ``policy: …``, ``invalid action: …``, ``environment: …``.
+        steps: control steps that the policy played.
+        demonstration_steps: frames, one per control step, of the video that was shown before;
+            0 without one.
+        instruction: the utterances that the policy was given.
+        mentions: the referring expressions in them.
+        command: the same task in plain words (the explicit setting).
+        goal: what the instruction conveys, a value for each slot.
+        events: what happened, in order.
+        video: path relative to the records file, or None.
+        details: the traceback of an error, or None.
+        render_device: the driver's name of the device that drew the pictures, or None.
+        language_version: version of the instruction generator.
+        package_version: version of roboirg.
+        started_at: ISO 8601, UTC.
+        duration_s: wall-clock seconds.
+    """
+
+    schema_version: Literal[1] = SCHEMA_VERSION
+    seed: int
+    difficulty: str
+    outcome: Outcome
+    cause: str | None = None
+    steps: int = 0
+    demonstration_steps: int = 0
+    instruction: tuple[Turn, ...]
+    mentions: tuple[MentionSpan, ...] = ()
+    command: str
+    goal: dict[str, str | int | tuple[str, ...]]
+    events: tuple[EventRecord, ...] = ()
+    video: str | None = None
+    details: str | None = None
+    render_device: str | None = None
+    language_version: str
+    package_version: str
+    started_at: str
+    duration_s: float
+
+    @property
+    def identity(self) -> Job:
+        """The job this is the record of."""
+        return Job(**{name: getattr(self, name) for name in Job.model_fields})
+
+    def comparable(self) -> dict[str, object]:
+        """All fields that depend on the job alone: everything but times and paths."""
+        return self.model_dump(mode="json", exclude=set(INCIDENTALS))

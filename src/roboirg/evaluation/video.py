@@ -1,0 +1,168 @@
+"""Films of episodes: small H.264 files that appear under their name only when complete."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.errors import MissingDependencyError
+
+if TYPE_CHECKING:
+    from av.container import OutputContainer
+    from av.video.stream import VideoStream
+
+Frame = NDArray[np.uint8]
+
+DEMONSTRATION_COLOUR = (255, 176, 32)
+"""RGB of the border around what was shown before the policy's turn."""
+
+BORDER = 6
+LAST_FRAME_REPEATS = 8
+"""The end is what one wants to see: it stays for most of a second."""
+
+POSTER_SUFFIX = ".jpg"
+
+
+@dataclass(frozen=True, slots=True)
+class VideoOptions:
+    """How episodes are filmed.
+
+    Attributes:
+        every: control steps between two frames (20 control steps are one second).
+        rate: frames per second in the film; 10 with every 8th step is fourfold speed.
+        cameras: drawn side by side, 256 pixels each.
+        quality: x264's constant rate factor; higher is smaller.
+    """
+
+    every: int = 8
+    rate: int = 10
+    cameras: tuple[str, ...] = ("front", "wrist")
+    quality: int = 28
+
+
+class Pictured(Protocol):
+    """Whatever draws a picture on request, as the environment does."""
+
+    def picture(self, camera: str) -> Frame:
+        """The camera's picture now, uint8 (256, 256, 3)."""
+
+
+def check_video_support() -> None:
+    """Complain now if films cannot be written.
+
+    Raises:
+        MissingDependencyError: PyAV is not installed.
+    """
+    try:
+        import av  # noqa: F401 - an extra, and slow to import
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"Films need PyAV, which is not installed ({error}); run: "
+            "pip install 'roboirgbench[sim]', or use --video off."
+        ) from error
+
+
+def compose(pictures: Sequence[Frame], *, is_demonstration: bool) -> Frame:
+    """Pictures side by side; what was shown before has a coloured border."""
+    frame: Frame = np.concatenate(list(pictures), axis=1)
+    if is_demonstration:
+        colour = np.array(DEMONSTRATION_COLOUR, np.uint8)
+        frame[:BORDER] = frame[-BORDER:] = colour
+        frame[:, :BORDER] = frame[:, -BORDER:] = colour
+    return frame
+
+
+@dataclass
+class Film:
+    """A film in the making. Nothing exists under `path` until `finish`.
+
+    Args:
+        path: of the finished MP4; a poster of the last frame gets the same name with ``.jpg``.
+        options: how to film.
+    """
+
+    path: Path
+    options: VideoOptions = field(default_factory=VideoOptions)
+    _container: OutputContainer | None = field(default=None, init=False, repr=False)
+    _stream: VideoStream | None = field(default=None, init=False, repr=False)
+    _last: Frame | None = field(default=None, init=False, repr=False)
+
+    @property
+    def partial(self) -> Path:
+        """Where the film grows; a later film of the same name overwrites what a kill left."""
+        return self.path.with_name(f".{self.path.name}.part")
+
+    def shoot(self, world: Pictured, is_demonstration: bool = False) -> None:
+        """Add the world as it looks now."""
+        pictures = [world.picture(camera) for camera in self.options.cameras]
+        self.add(compose(pictures, is_demonstration=is_demonstration))
+
+    def add(self, frame: Frame) -> None:
+        """Add a frame, uint8 (height, width, 3), both even; all of one size."""
+        container, stream = self._open(frame)
+        import av
+
+        self._last = frame
+        container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="rgb24")))
+
+    def finish(self) -> bool:
+        """Complete the film and give it its name; False if it has no frame."""
+        if self._last is None:
+            return False
+        for _ in range(LAST_FRAME_REPEATS):
+            self.add(self._last)
+        self._close()
+        write_poster(self._last, self.path.with_suffix(POSTER_SUFFIX))
+        self.partial.replace(self.path)
+        return True
+
+    def discard(self) -> None:
+        """Throw away an unfinished film."""
+        if self._container is not None:
+            self._container.close()
+        self._container = self._stream = self._last = None
+        self.partial.unlink(missing_ok=True)
+
+    def _open(self, frame: Frame) -> tuple[OutputContainer, VideoStream]:
+        if self._container is not None and self._stream is not None:
+            return self._container, self._stream
+        import av
+
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        # The index goes to the front, so that a player can start before it has read everything.
+        container = av.open(
+            str(self.partial), "w", format="mp4", options={"movflags": "+faststart"}
+        )
+        stream = container.add_stream("libx264", rate=Fraction(self.options.rate))
+        stream.height, stream.width = frame.shape[:2]
+        stream.pix_fmt = "yuv420p"
+        stream.options = {"crf": str(self.options.quality), "preset": "veryfast"}
+        stream.codec_context.thread_count = 1
+        self._container, self._stream = container, stream
+        return container, stream
+
+    def _close(self) -> None:
+        if self._container is not None and self._stream is not None:
+            self._container.mux(self._stream.encode(None))
+            self._container.close()
+        self._container = self._stream = None
+
+
+def write_poster(frame: Frame, path: Path) -> None:
+    """Write one frame as a JPEG."""
+    import av
+
+    options: dict[str, Any] = {"update": "1"}
+    with av.open(str(path), "w", format="image2", options=options) as container:
+        stream = container.add_stream("mjpeg", rate=1)
+        stream.height, stream.width = frame.shape[:2]
+        stream.pix_fmt = "yuvj420p"
+        picture = av.VideoFrame.from_ndarray(frame, format="rgb24")
+        container.mux(stream.encode(picture))
+        container.mux(stream.encode(None))

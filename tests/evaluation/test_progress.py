@@ -1,0 +1,46 @@
+from __future__ import annotations
+
+import io
+
+from evaluation_fakes import FakePlay, small_plan
+from rich.console import Console
+
+from roboirg.evaluation.progress import ConsoleReporter, Score
+
+RECORDS = [FakePlay()(job) for job in small_plan(2).jobs()]
+
+
+def report(*, terminal: bool) -> str:
+    console = Console(file=io.StringIO(), force_terminal=terminal, width=80)
+    with ConsoleReporter(console) as reporter:
+        reporter.begin(6, 2)
+        for record in RECORDS:
+            reporter.advance(record)
+    return console.file.getvalue()  # type: ignore[attr-defined]
+
+
+def test_a_terminal_sees_pace_time_left_and_score_in_80_columns() -> None:
+    text = report(terminal=True)
+    last = text[text.rindex("episodes") :]
+    assert "6/6" in last
+    assert "0:00 left" in last
+    assert "/min" in last
+    assert "explicit 2/2 · direct " in last
+
+
+def test_elsewhere_every_episode_is_one_plain_line() -> None:
+    lines = report(terminal=False).splitlines()
+    assert lines[0] == "2 of 6 episodes are already there."
+    assert lines[1].startswith("[3/6] random PickXtimes test/0 explicit: success")
+    assert len(lines) == 5
+    assert "\x1b" not in "".join(lines)
+
+
+def test_errors_are_in_the_score_but_in_no_rate() -> None:
+    score = Score()
+    for record in RECORDS[:1]:
+        score.add(record)
+        score.add(record.model_copy(update={"outcome": "error"}))
+    assert score.line() == "explicit 1/1 · errors 1"
+    assert score.time_left(0) == "0:00"
+    assert Score().time_left(5) == "-:--"
