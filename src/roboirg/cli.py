@@ -143,6 +143,18 @@ def list_tasks() -> None:
         typer.echo(f"{task.name:<16} {task.suite:<12} {', '.join(task.settings)}")
 
 
+@app.command("build-splits")
+def build_splits() -> None:
+    """Find anew which seeds the splits pass over and print them; takes a second per episode."""
+    import json
+
+    from roboirg.evaluation.acceptance import find_rejections
+    from roboirg.tasks import all_tasks
+
+    found = {key: rejected for key, rejected in find_rejections(list(all_tasks())) if rejected}
+    typer.echo(json.dumps(found, indent=2))
+
+
 @app.command()
 def instruct(
     task: Annotated[str, typer.Argument(help="Name of the task.")],

@@ -71,6 +71,13 @@ def test_wrong_specs_are_explained(spec, error, words):
         load_policy_class(spec)
 
 
+def test_a_module_that_breaks_is_named_with_what_broke(tmp_path, monkeypatch):
+    (tmp_path / "broken_policy.py").write_text("1 / 0\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(InvalidValueError, match=r"broken_policy.*ZeroDivisionError"):
+        load_policy_class("broken_policy:It")
+
+
 def decided(policy_class, task, setting, episode, seed=0):
     env = roboirg.make(task, setting=setting, episode=episode, cameras=())
     return policy_class(seed).decide(env, env.instruction.text), env.episode.goal

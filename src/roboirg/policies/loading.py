@@ -59,7 +59,8 @@ def make_policy(spec: str, seed: int) -> Policy:
 def _module(spec: str, name: str) -> ModuleType:
     try:
         return importlib.import_module(name)
-    except ImportError as error:
+    except Exception as error:
         raise InvalidValueError(
-            f"Policy {spec!r}: module {name!r} cannot be imported ({error})."
+            f"Policy {spec!r}: module {name!r} cannot be imported "
+            f"({type(error).__name__}: {error})."
         ) from error
