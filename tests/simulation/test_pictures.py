@@ -8,6 +8,7 @@ import pytest
 
 import roboirg
 from roboirg.policies import make_policy, play
+from roboirg.simulation import camera_mesh
 from roboirg.simulation.cameras import CAMERAS
 from roboirg.simulation.settings import HOME_ACTION
 from roboirg.simulation.world import World
@@ -95,3 +96,15 @@ def test_a_kept_picture_is_drawn_anew_when_something_moves():
     cube = next(body for body in world.bodies.values() if body.item.kind == "cube")
     cube.put(cube.item.position._replace(x=0.1))
     assert not np.array_equal(world.picture("front"), still)
+
+
+def test_the_camera_s_visible_triangles_look_like_all_of_them(monkeypatch):
+    task, index = "PickXtimes", 2
+    steps = set(range(40, 300, 20))
+    pruned = film(task, index, steps)
+    monkeypatch.setattr(camera_mesh, "visible_mask", lambda count: np.ones(count, dtype=bool))
+    camera_mesh._visible_triangles.cache_clear()
+    whole = film(task, index, steps)
+    camera_mesh._visible_triangles.cache_clear()
+    different = sum((pruned[key] != whole[key]).any(axis=2).sum() for key in whole)
+    assert different <= 1e-5 * sum(picture[..., 0].size for picture in whole.values())

@@ -37,11 +37,13 @@ class ModelFiles:
 
     Attributes:
         robot: URDF of the Panda with a wrist camera.
+        wrist_camera: the camera's mesh, binary STL.
         table: the table's mesh.
         ground_texture: the grid on the floor.
     """
 
     robot: Path
+    wrist_camera: Path
     table: Path
     ground_texture: Path
 
@@ -63,8 +65,12 @@ def find_model_files() -> ModelFiles:
             f"ManiSkill's model files (SHA-256 {digest[:12]}...) are not those of version 3.0.1 "
             f"({_SHA256[:12]}...); {REMEDY}"
         )
-    robot, table, texture = root / _FILES[0], root / _FILES[-2], root / _FILES[-1]
-    return ModelFiles(robot, table, texture)
+    return ModelFiles(
+        robot=root / _FILES[0],
+        wrist_camera=root / _FILES[2],
+        table=root / _FILES[-2],
+        ground_texture=root / _FILES[-1],
+    )
 
 
 def _package_folder() -> Path:

@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 import sapien
 import sapien.physx
+import sapien.render
 from numpy.typing import NDArray
 from sapien.wrapper.urdf_loader import URDFLoader
 
 from roboirg.episode import ROBOT_BASE
 from roboirg.simulation import settings
 from roboirg.simulation.assets import find_model_files
+from roboirg.simulation.camera_mesh import visible_shape
 
 ARM_JOINTS = 7
 FINGERS = ("panda_leftfinger", "panda_rightfinger")
@@ -38,7 +40,8 @@ class Robot:
     """
 
     def __init__(self, scene: sapien.Scene, *, visible: bool) -> None:
-        builder = _builder(visible)
+        loader = _loader(visible)
+        builder = loader.builder
         builder.set_scene(scene)
         builder.initial_pose = sapien.Pose(ROBOT_BASE)
         self.articulation = builder.build()
@@ -50,10 +53,19 @@ class Robot:
             )
             joint.set_friction(0.0)
         self.links = {link.name: link for link in self.articulation.links}
+        if visible:
+            self._add_wrist_camera_mesh(loader.camera_visual)
         self.tool = self.links[TOOL_LINK]
         self._joints = list(self.articulation.active_joints)
         self._fingers = [self.links[name] for name in FINGERS]
         self.reset()
+
+    def _add_wrist_camera_mesh(self, visual: Any) -> None:  # noqa: ANN401
+        shape = visible_shape(find_model_files().wrist_camera, visual.material)
+        shape.local_pose = visual.pose
+        component = sapien.render.RenderBodyComponent()
+        component.attach(shape)
+        self.links[CAMERA_LINK].entity.add_component(component)
 
     def reset(self) -> None:
         """Put the robot at home, at rest."""
@@ -134,25 +146,39 @@ def _force_on(
     return impulse * settings.PHYSICS_RATE
 
 
-class _InvisibleLoader(URDFLoader):  # type: ignore[misc]  # SAPIEN's wrappers have no types
-    """Leaves the visual meshes out, so that no Vulkan device is needed."""
+class _Loader(URDFLoader):  # type: ignore[misc]  # SAPIEN's wrappers have no types
+    """Reads the robot's description; leaves out what is not to be drawn.
+
+    Attributes:
+        builder: builds the robot, any number of times.
+        camera_visual: how the description wants the wrist camera's mesh shown; None if nothing
+            is drawn.
+    """
+
+    def __init__(self, *, visible: bool) -> None:
+        super().__init__()
+        self._visible = visible
+        self.camera_visual: Any = None
+        self.fix_root_link = True
+        # The loader wants a scene even to parse; the one to build in is set later.
+        self.set_scene(sapien.Scene([sapien.physx.PhysxCpuSystem()]))
+        for finger in FINGERS:
+            self.set_link_material(finger, 2.0, 2.0, 0.0)
+            self.set_link_patch_radius(finger, 0.1)
+            self.set_link_min_patch_radius(finger, 0.1)
+        urdf = find_model_files().robot
+        builders, _, _ = self.parse(str(urdf), str(urdf.with_suffix(".srdf")))
+        self.builder = builders[0]
 
     def _build_link(self, link: Any, link_builder: Any) -> None:  # noqa: ANN401
-        link.visuals.clear()
+        if not self._visible:
+            link.visuals.clear()
         super()._build_link(link, link_builder)
+        if link.name == CAMERA_LINK and self._visible:
+            self.camera_visual = link_builder.visual_records.pop()
 
 
 @functools.cache
-def _builder(visible: bool) -> Any:  # noqa: ANN401 - SAPIEN's builders have no types
+def _loader(visible: bool) -> _Loader:
     """The parsed robot description; parsing takes longer than building."""
-    loader = URDFLoader() if visible else _InvisibleLoader()
-    loader.fix_root_link = True
-    # The loader wants a scene even to parse; the one to build in is set later.
-    loader.set_scene(sapien.Scene([sapien.physx.PhysxCpuSystem()]))
-    for finger in FINGERS:
-        loader.set_link_material(finger, 2.0, 2.0, 0.0)
-        loader.set_link_patch_radius(finger, 0.1)
-        loader.set_link_min_patch_radius(finger, 0.1)
-    urdf = find_model_files().robot
-    builders, _, _ = loader.parse(str(urdf), str(urdf.with_suffix(".srdf")))
-    return builders[0]
+    return _Loader(visible=visible)

@@ -1,0 +1,63 @@
+"""The wrist camera's mesh without the triangles that nobody can ever see.
+
+The installed model of the camera is a full CAD model with lenses, threads and screws inside:
+425,160 triangles, three quarters of all that a picture of the arm would draw. Which of them can be
+seen from outside is shipped as a bit mask over the installed file's triangles; the mesh itself is
+read from where it is installed (`roboirg.simulation.assets` checks that it is the right one). The
+mask is made by ``scripts/visible-triangles``.
+"""
+
+from __future__ import annotations
+
+import functools
+import zlib
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import sapien
+import sapien.render
+from numpy.typing import NDArray
+
+MASK_FILE = "wrist_camera_visible.bin"
+
+STL_HEADER = 80
+STL_TRIANGLE = np.dtype(
+    [("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attributes", "<u2")]
+)
+
+
+def read_stl(path: Path) -> NDArray[np.void]:
+    """The triangles of a binary STL file: records with a normal and three corners, metres."""
+    data = path.read_bytes()
+    count = int.from_bytes(data[STL_HEADER : STL_HEADER + 4], "little")
+    return np.frombuffer(data, STL_TRIANGLE, count, offset=STL_HEADER + 4)
+
+
+def visible_mask(count: int) -> NDArray[np.bool_]:
+    """For each of the file's triangles whether it can be seen from outside."""
+    packed = resources.files("roboirg.simulation").joinpath(MASK_FILE).read_bytes()
+    bits = np.unpackbits(np.frombuffer(zlib.decompress(packed), np.uint8), count=count)
+    return bits.astype(bool)
+
+
+def visible_shape(
+    stl: Path, material: sapien.render.RenderMaterial
+) -> sapien.render.RenderShapeTriangleMesh:
+    """The visible part of the camera, flat-shaded as in the whole."""
+    vertices, normals = _visible_triangles(stl)
+    return sapien.render.RenderShapeTriangleMesh(
+        vertices=vertices,
+        triangles=np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3),
+        normals=normals,
+        uvs=np.zeros((len(vertices), 2), np.float32),
+        material=material,
+    )
+
+
+@functools.cache
+def _visible_triangles(stl: Path) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Corners and normals (3 n, 3), three of each for a triangle."""
+    triangles = read_stl(stl)
+    seen = triangles[visible_mask(len(triangles))]
+    return seen["corners"].reshape(-1, 3), np.repeat(seen["normal"], 3, axis=0)
