@@ -15,7 +15,7 @@ from roboirg.episode import Episode
 from roboirg.errors import InvalidValueError, UnknownNameError
 from roboirg.judging import Event, Status, plain_subgoal
 from roboirg.language import instruct
-from roboirg.policies.base import Demonstration
+from roboirg.observations import Demonstration
 from roboirg.simulation.cameras import CAMERAS, SIZE
 from roboirg.simulation.device import describe, find_render_device
 from roboirg.simulation.proprioception import Proprioception

@@ -37,7 +37,8 @@ from roboirg.errors import (
 from roboirg.evaluation.plan import VideoMode, say
 from roboirg.evaluation.record import EventRecord, Job, MentionSpan, Outcome, Record, Turn
 from roboirg.evaluation.video import Film, VideoOptions
-from roboirg.policies.base import Observation, Policy, PrivilegedPolicy
+from roboirg.observations import Observation
+from roboirg.policies.base import Policy, PrivilegedPolicy
 from roboirg.splits import get_episode
 
 if TYPE_CHECKING:

@@ -1,6 +1,7 @@
 """Policies: the contract, the built-in ones, and how a name becomes one."""
 
-from roboirg.policies.base import Demonstration, Observation, Policy, PrivilegedPolicy
+from roboirg.observations import Demonstration, Observation
+from roboirg.policies.base import Policy, PrivilegedPolicy
 from roboirg.policies.loading import load_policy_class, make_policy
 from roboirg.policies.playing import play
 

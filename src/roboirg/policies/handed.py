@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.episode import Fact, Goal, Stage
-from roboirg.policies.base import Demonstration, Observation
+from roboirg.observations import Demonstration, Observation
 from roboirg.tasks import get_task
 
 if TYPE_CHECKING:

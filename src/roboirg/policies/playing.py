@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, cast
 
 from roboirg.actions import check_chunk
-from roboirg.policies.base import Observation, Policy, PrivilegedPolicy
+from roboirg.observations import Observation
+from roboirg.policies.base import Policy, PrivilegedPolicy
 
 if TYPE_CHECKING:
     from roboirg.environment import RoboIRGEnv

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.actions import ARM_JOINTS, JOINT_HIGH, JOINT_LOW
-from roboirg.policies.base import Demonstration, Observation
+from roboirg.observations import Demonstration, Observation
 
 CHUNK = 16
 LARGEST_STEP = 0.045
