@@ -20,7 +20,7 @@ lint: setup ## ruff and mypy
 test: lint ## lint, then every test
 	$(PYTHON) -m pytest -n 2
 
-demo: setup ## play one episode and write its video to runs/demo
+demo: setup ## the main job: three policies, every task and setting; ends with a table and a page
 	.venv/bin/roboirg demo --out runs/demo
 
 clean: ## remove what the tools left behind; .venv and runs stay
