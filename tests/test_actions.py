@@ -48,7 +48,10 @@ def test_values_that_are_not_finite_are_named(bad, column):
         check_chunk(chunk)
 
 
-@pytest.mark.parametrize("bad", ["open", None, {"a": 1}, [[1, 2], [3]], np.zeros((0, 8))])
+@pytest.mark.parametrize(
+    "bad",
+    ["open", [["1"] * 8], np.zeros(8, complex), None, {"a": 1}, [[1, 2], [3]], np.zeros((0, 8))],
+)
 def test_what_is_not_an_array_of_numbers_is_refused(bad):
     with pytest.raises(InvalidActionError):
         check_chunk(bad)

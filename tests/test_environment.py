@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import warnings
+import weakref
 
 import gymnasium
 import numpy as np
@@ -82,14 +83,14 @@ def test_tasks_without_a_video_have_an_empty_demonstration():
 def test_the_oracle_succeeds_and_is_rewarded_once(task):
     env = roboirg.make(task, episode=2, cameras=())
     rewards = []
-    step = env.step
+    step_chunk = env.step_chunk
 
-    def counting(action):
-        result = step(action)
+    def counting(actions):
+        result = step_chunk(actions)
         rewards.append(result[1])
         return result
 
-    env.step = counting
+    env.step_chunk = counting
     info = play(env, make_policy("oracle", 0))
     assert info["status"] == "success"
     assert sum(rewards) == rewards[-1] == 1.0
@@ -133,6 +134,36 @@ def test_the_frame_hook_is_called_at_its_period_and_at_the_end():
     assert [demonstration for step, demonstration in calls] == [step <= 66 for step in expected]
 
 
+def test_a_chunk_does_what_its_rows_do_and_stops_with_the_episode():
+    rng = np.random.default_rng(0)
+    actions = HOME_ACTION + np.append(rng.normal(0, 0.3, (40, 7)), rng.normal(0, 1, (40, 1)), 1)
+    single, chunked = (roboirg.make("PickXtimes", cameras=(), max_steps=35) for _ in range(2))
+    single.reset()
+    chunked.reset()
+    for action in actions[:35]:
+        last = single.step(action)
+    first, *_, begun = chunked.step_chunk(actions[:20])
+    both = chunked.step_chunk(actions[20:])
+    assert (begun["status"], begun["steps"]) == ("ongoing", 20)
+    assert first["joint_positions"].tolist() != both[0]["joint_positions"].tolist()
+    assert both[1:4] == last[1:4]
+    assert both[4]["status"] == last[4]["status"] == "timeout"
+    for key, value in last[0].items():
+        assert np.array_equal(both[0][key], value), key
+    assert chunked.events == single.events
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_a_closed_environment_lets_go_of_its_world(task):
+    env = roboirg.make(task, cameras=())
+    policy = make_policy("oracle", 0)
+    play(env, policy)
+    world = weakref.ref(env.session.world)
+    env.close()
+    del policy
+    assert world() is None
+
+
 def test_time_is_up_after_max_steps():
     env = roboirg.make("PickXtimes", cameras=(), max_steps=3)
     env.reset()
@@ -166,8 +197,12 @@ def test_names_and_numbers_are_checked_before_anything_is_built():
         roboirg.make("PickXtimes", cameras=("side",))
     with pytest.raises(InvalidValueError, match="episodes 0 to 49"):
         roboirg.make("PickXtimes", episode=50)
-    with pytest.raises(InvalidValueError, match="max_steps is 0"):
-        roboirg.make("PickXtimes", max_steps=0)
+    for wrong in (0, 2.5, "3", None):
+        with pytest.raises(InvalidValueError, match=f"max_steps is {wrong!r}"):
+            roboirg.make("PickXtimes", max_steps=wrong)
+    for wrong in ("front", None):
+        with pytest.raises(InvalidValueError, match=r"cameras is .*\('front',\)"):
+            roboirg.make("PickXtimes", cameras=wrong)
     with pytest.raises(gymnasium.error.ResetNeeded):
         roboirg.make("PickXtimes").step(HOME_ACTION)
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -43,14 +41,16 @@ def check_chunk(actions: ArrayLike) -> NDArray[np.float64]:
     return _finite(chunk, (len(chunk), ACTION_SIZE))
 
 
-def _numbers(action: ArrayLike) -> NDArray[Any]:
+def _numbers(action: ArrayLike) -> NDArray[np.float64]:
     try:
-        numbers = np.asarray(action, dtype=np.float64)
-    except (TypeError, ValueError):
+        numbers = np.asarray(action)
+    except ValueError:  # rows of different lengths
+        numbers = np.asarray(None)
+    if numbers.dtype.kind not in "biuf":
         raise InvalidActionError(
-            f"An action is an array of {ACTION_SIZE} numbers; got {type(action).__name__}."
-        ) from None
-    return numbers
+            f"An action is an array of {ACTION_SIZE} real numbers; got {type(action).__name__}."
+        )
+    return numbers.astype(np.float64)
 
 
 def _finite(numbers: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -10,7 +10,15 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
-from roboirg.actions import ACTION_HIGH, ACTION_LOW, ARM_JOINTS, JOINT_HIGH, JOINT_LOW, check_action
+from roboirg.actions import (
+    ACTION_HIGH,
+    ACTION_LOW,
+    ARM_JOINTS,
+    JOINT_HIGH,
+    JOINT_LOW,
+    check_action,
+    check_chunk,
+)
 from roboirg.episode import Episode
 from roboirg.errors import InvalidValueError, UnknownNameError
 from roboirg.judging import Event, Status, plain_subgoal
@@ -101,8 +109,10 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
             frame=frame,
         )
         self.cameras = _check_cameras(cameras)
-        if max_steps < 1:
-            raise InvalidValueError(f"max_steps is {max_steps}; it has to be at least 1.")
+        if not isinstance(max_steps, int) or max_steps < 1:
+            raise InvalidValueError(
+                f"max_steps is {max_steps!r}; it has to be a whole number of at least 1."
+            )
         if render_mode not in (None, "rgb_array"):
             raise UnknownNameError("render mode", render_mode, ["rgb_array"])
         self.max_steps = max_steps
@@ -126,6 +136,17 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         if self._session is None:
             raise gymnasium.error.ResetNeeded("Call reset() before anything else.")
         return self._session
+
+    @property
+    def proprioception(self) -> Proprioception:
+        """What the robot feels.
+
+        Raises:
+            ResetNeeded: `reset` has not been called yet.
+        """
+        if self._feeling is None:
+            raise gymnasium.error.ResetNeeded("Call reset() before anything else.")
+        return self._feeling
 
     @property
     def status(self) -> str:
@@ -155,10 +176,12 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         frames: list[dict[str, Any]] = []
 
         def record() -> None:
+            self.proprioception.follow()
             frames.append(self._sense())
             self._call_hook(demonstration=True)
 
         self._session.play_demonstration(record)
+        self._feeling.follow()
         observation = self._observe()
         self._call_hook(demonstration=False)
         return observation, {**self._info(), "demonstration": self._stack(frames)}
@@ -170,17 +193,36 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
             InvalidActionError: wrong shape, not numeric or not finite; nothing has moved.
             ResetNeeded: the episode is over or has not begun.
         """
-        checked = check_action(action)
+        return self.step_chunk(check_action(action)[None])
+
+    def step_chunk(
+        self, actions: ArrayLike
+    ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        """Execute several actions, as far as the episode lasts, and observe once at the end.
+
+        Like so many calls of `step`, without the pictures that nobody would look at.
+
+        Args:
+            actions: (n, 8), n >= 1.
+
+        Raises:
+            InvalidActionError: wrong shape, not numeric or not finite; nothing has moved.
+            ResetNeeded: the episode is over or has not begun.
+        """
+        chunk = check_chunk(actions)
         if self.status != "ongoing":
             raise gymnasium.error.ResetNeeded(f"The episode is over ({self.status}); call reset().")
-        self.session.step(checked)
-        self._steps += 1
-        observation = self._observe()
-        self._call_hook(demonstration=False)
+        for action in chunk:
+            self.session.step(action)
+            self.proprioception.follow()
+            self._steps += 1
+            self._call_hook(demonstration=False)
+            if self.status != "ongoing":
+                break
         status = self.status
         terminated = status in {Status.SUCCESS, Status.FAILURE}
         reward = float(status == Status.SUCCESS)
-        return observation, reward, terminated, status == "timeout", self._info()
+        return self._observe(), reward, terminated, status == "timeout", self._info()
 
     def render(self) -> NDArray[np.uint8] | None:
         """Front and wrist picture side by side, uint8 (256, 512, 3); None without render mode."""
@@ -220,10 +262,8 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
 
     def _sense(self) -> dict[str, Any]:
         """The observation without the instruction."""
-        if self._feeling is None:
-            raise gymnasium.error.ResetNeeded("Call reset() before anything else.")
         pictures = {f"{camera}_rgb": self.picture(camera) for camera in self.cameras}
-        return {**pictures, **self._feeling.read()}
+        return {**pictures, **self.proprioception.read()}
 
     def _observe(self) -> dict[str, Any]:
         return {**self._sense(), "instruction": self.instruction.text}
@@ -250,10 +290,14 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
 
 
 def _check_cameras(cameras: Sequence[str]) -> tuple[str, ...]:
+    if isinstance(cameras, str) or not isinstance(cameras, Sequence):
+        raise InvalidValueError(
+            f"cameras is {cameras!r}; it has to be a sequence of names such as ('front',) or ()."
+        )
     for camera in cameras:
         if camera not in CAMERAS:
             raise UnknownNameError("camera", camera, CAMERAS)
-    return tuple(cameras)
+    return tuple(dict.fromkeys(cameras))
 
 
 def _observation_space(cameras: Sequence[str]) -> spaces.Dict:

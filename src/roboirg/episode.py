@@ -25,6 +25,9 @@ COLOURS: tuple[Colour, ...] = ("red", "green", "blue")
 DIFFICULTIES: tuple[Difficulty, ...] = ("easy", "medium", "hard")
 SPLITS: tuple[Split, ...] = ("train", "val", "test")
 
+ENVIRONMENT_VERSION = 0
+"""Goes up whenever scores could change: scenes, rules, physics, observations."""
+
 ROBOT_BASE = (-0.615, 0.0, 0.0)
 """Position of the Panda's base link in the world frame, metres; its rotation is the identity."""
 

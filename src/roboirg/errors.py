@@ -41,7 +41,7 @@ class UnknownNameError(InvalidValueError):
         )
         nearest = [known_name for known_name in names if known_name.lower() in close]
         hint = f" Did you mean {nearest[0]!r}?" if nearest else ""
-        super().__init__(f"There is no {kind} {name!r}; the {kind}s are {', '.join(names)}.{hint}")
+        super().__init__(f"There is no {kind} {name!r}; known: {', '.join(names)}.{hint}")
 
 
 class InvalidActionError(RoboIRGError, ValueError):

@@ -7,16 +7,15 @@ from __future__ import annotations
 
 import gymnasium
 
+from roboirg.episode import ENVIRONMENT_VERSION
 from roboirg.tasks import all_tasks
 
 NAMESPACE = "RoboIRG"
-VERSION = 0
-"""Goes up whenever scores could change."""
 
 
 def environment_id(task: str) -> str:
     """The registered id of a task's environment."""
-    return f"{NAMESPACE}/{task}-v{VERSION}"
+    return f"{NAMESPACE}/{task}-v{ENVIRONMENT_VERSION}"
 
 
 for _task in all_tasks():

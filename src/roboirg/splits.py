@@ -9,10 +9,13 @@ easy, medium, hard (RoboMME's cycle).
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import json
+import operator
 from collections.abc import Mapping
 from importlib import resources
+from typing import SupportsIndex
 
 import numpy as np
 
@@ -85,8 +88,7 @@ def rejections() -> Mapping[str, int]:
     return counts
 
 
-@functools.lru_cache(maxsize=4096, typed=True)
-def get_episode(task_name: str, split: str, index: int) -> Episode:
+def get_episode(task_name: str, split: str, index: SupportsIndex) -> Episode:
     """Episode number `index` (from 0) of a split of a task.
 
     Raises:
@@ -94,11 +96,24 @@ def get_episode(task_name: str, split: str, index: int) -> Episode:
         InvalidValueError: the split has no episode of that number.
     """
     task, split_name = get_task(task_name), check_split(split)
-    size = SIZES[split_name]
-    if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < size:
+    return _episode(task.name, split_name, _check_index(split_name, index))
+
+
+def _check_index(split: Split, index: SupportsIndex) -> int:
+    size = SIZES[split]
+    number = -1
+    if not isinstance(index, bool):
+        with contextlib.suppress(TypeError):
+            number = operator.index(index)
+    if not 0 <= number < size:
         raise InvalidValueError(
             f"There is no episode {index!r}: split {split!r} has episodes 0 to {size - 1}."
         )
-    passed_over = rejections().get(episode_key(task_name, split_name, index), 0)
-    seed = slot_seed(task, split_name, index) + passed_over
-    return make_episode(task_name, seed, CYCLE[index % len(CYCLE)], split_name, index)
+    return number
+
+
+@functools.lru_cache(maxsize=4096)
+def _episode(task: str, split: Split, index: int) -> Episode:
+    seed = slot_seed(get_task(task), split, index)
+    seed += rejections().get(episode_key(task, split, index), 0)
+    return make_episode(task, seed, CYCLE[index % len(CYCLE)], split, index)

@@ -166,6 +166,7 @@ def test_wrong_names_and_numbers_are_named_with_what_would_be_right():
         get_episode("PickXTime", "test", 0)
     with pytest.raises(UnknownNameError, match=r"no split 'dev'.*train, val, test"):
         get_episode("PickXtimes", "dev", 0)
+    assert get_episode("PickXtimes", "test", np.int64(3)) == get_episode("PickXtimes", "test", 3)
     for wrong in (-1, 50, 1.0, "0", True):
         with pytest.raises(InvalidValueError, match="has episodes 0 to 49"):
             get_episode("PickXtimes", "test", wrong)

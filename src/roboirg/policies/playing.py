@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, cast
 
-from roboirg.actions import check_chunk
 from roboirg.observations import Observation
 from roboirg.policies.base import Policy, PrivilegedPolicy
 
@@ -26,8 +25,6 @@ def play(env: RoboIRGEnv, policy: Policy) -> dict[str, Any]:
         policy.attach(env)
     policy.reset(env.instruction.text, info["demonstration"])
     while info["status"] == "ongoing":
-        for action in check_chunk(policy.act(cast("Observation", observation))):
-            observation, _, terminated, truncated, info = env.step(action)
-            if terminated or truncated:
-                break
+        actions = policy.act(cast("Observation", observation))
+        observation, *_, info = env.step_chunk(actions)
     return info

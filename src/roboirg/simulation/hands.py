@@ -50,14 +50,6 @@ class Hands:
         self._world = world
         self._planner = Planner(world.robot)
         self._gripper = OPEN
-        self._routines: dict[str, Callable[[Primitive], Iterator[Piece]]] = {
-            "pick_cube": self._pick_cube,
-            "place_on": self._place_on,
-            "press": self._press,
-            "pick_container": self._pick_container,
-            "put_down": self._put_down,
-            "hold": self._hold,
-        }
 
     def perform(self, primitive: Primitive) -> Iterator[Piece]:
         """The pieces of a primitive; take the next one when the last has been executed.
@@ -65,7 +57,7 @@ class Hands:
         Raises:
             MotionPlanningError: a way point cannot be reached.
         """
-        return self._routines[primitive.kind](primitive)
+        return _ROUTINES[primitive.kind](self, primitive)
 
     def _pick_cube(self, primitive: Primitive) -> Iterator[Piece]:
         yield self._grip(OPEN)
@@ -151,6 +143,16 @@ class Hands:
         approach = np.array([0.0, 0.0, -1.0])
         columns = [np.cross(closing, approach), closing, approach]
         return Rotation.from_matrix(np.stack(columns, axis=1))
+
+
+_ROUTINES: dict[str, Callable[[Hands, Primitive], Iterator[Piece]]] = {
+    "pick_cube": Hands._pick_cube,  # noqa: SLF001 - the table belongs to the class
+    "place_on": Hands._place_on,  # noqa: SLF001
+    "press": Hands._press,  # noqa: SLF001
+    "pick_container": Hands._pick_container,  # noqa: SLF001
+    "put_down": Hands._put_down,  # noqa: SLF001
+    "hold": Hands._hold,  # noqa: SLF001
+}
 
 
 def _above(place: Point, height: float) -> Point:

@@ -20,22 +20,31 @@ class Feeling(TypedDict):
 
 
 class Proprioception:
-    """Reads a robot; remembers the last angles, so that they never jump by a full turn."""
+    """Reads a robot; follows the tool's angles, so that they never jump by a full turn.
+
+    Args:
+        robot: to be followed from now on.
+    """
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-        self._angles: NDArray[np.float64] | None = None
+        self._angles = self._principal_angles()
+
+    def follow(self) -> None:
+        """To be called after every control step, whether or not anybody reads."""
+        pair = np.stack([self._angles, self._principal_angles()])
+        self._angles = np.unwrap(pair, axis=0)[1]
 
     def read(self) -> Feeling:
-        """The robot's state now."""
-        pose = self._robot.tool_pose
-        w, x, y, z = np.asarray(pose.q, dtype=np.float64)
-        angles = np.asarray(Rotation.from_quat([x, y, z, w]).as_euler("xyz"))
-        if self._angles is not None:
-            angles = np.unwrap(np.stack([self._angles, angles]), axis=0)[1]
-        self._angles = angles
+        """The robot's state at the last step that was followed."""
+        position = np.asarray(self._robot.tool_pose.p, dtype=np.float64)
         return {
             "joint_positions": self._robot.arm_positions.astype(np.float32),
             "gripper": self._robot.finger_positions.astype(np.float32),
-            "end_effector": np.concatenate([np.asarray(pose.p, dtype=np.float64), angles]),
+            "end_effector": np.concatenate([position, self._angles]),
         }
+
+    def _principal_angles(self) -> NDArray[np.float64]:
+        """Roll, pitch and yaw of the tool, extrinsic x-y-z, rad."""
+        w, x, y, z = np.asarray(self._robot.tool_pose.q, dtype=np.float64)
+        return np.asarray(Rotation.from_quat([x, y, z, w]).as_euler("xyz"))
