@@ -32,6 +32,6 @@ def make(task: str | Episode, **options: Any) -> RoboIRGEnv:  # noqa: ANN401 - R
     except ModuleNotFoundError as error:
         raise MissingDependencyError(
             f"Playing episodes needs the package {error.name!r}; "
-            "run: pip install 'roboirgbench[sim]'"
+            "run: pip install 'roboirgbench[sim]' (in a checkout: make setup)"
         ) from error
     return RoboIRGEnv(task, **options)

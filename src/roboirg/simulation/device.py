@@ -128,7 +128,8 @@ def _sapien() -> ModuleType:
         sapien = importlib.import_module("sapien")
     except ImportError as error:
         raise MissingDependencyError(
-            f"The simulator is not installed ({error}); run: pip install 'roboirgbench[sim]'"
+            f"The simulator is not installed ({error}); "
+            "run: pip install 'roboirgbench[sim]' (in a checkout: make setup)"
         ) from error
     # Below "error" SAPIEN speaks of extensions that only its own viewer window needs.
     sapien.set_log_level("error")
