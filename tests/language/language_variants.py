@@ -35,12 +35,14 @@ def random_episodes(task: str, count: int, base: int = 7_000_000) -> Iterator[Ep
         index += 1
 
 
-def options_of(setting: str) -> Iterator[dict[str, Any]]:
+def options_of(setting: str, episode: Episode) -> Iterator[dict[str, Any]]:
     if setting == "contextual":
         for stages, distractor in itertools.product(STAGE_SETS, ("neutral", "competing")):
             yield {"stages": stages, "distractor": distractor}
     elif setting == "spatial":
-        yield from ({"frame": frame} for frame in ("robot", "camera"))
+        for frame in ("robot", "camera"):
+            if setting in expressible(episode, frame=frame):
+                yield {"frame": frame}
     else:
         yield {}
 
@@ -48,8 +50,16 @@ def options_of(setting: str) -> Iterator[dict[str, Any]]:
 def variants(episode: Episode) -> Iterator[Variant]:
     """Every setting, form, stage set, distractor level and frame of an episode."""
     for setting, form in itertools.product(expressible(episode), FORMS):
-        for options in options_of(setting):
+        for options in options_of(setting, episode):
             yield setting, form, options
+
+
+def rotating_variants(episode: Episode) -> Iterator[Variant]:
+    """Every setting and form; the options take turns from one block of episodes to the next."""
+    for setting in expressible(episode):
+        options = list(options_of(setting, episode))
+        for form in FORMS:
+            yield setting, form, options[episode.index // len(CYCLE) % len(options)]
 
 
 def default_variants(episode: Episode) -> Iterator[Variant]:

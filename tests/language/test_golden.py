@@ -8,18 +8,18 @@ from language_variants import PAIRS, options_of
 from roboirg.language import FORMS, LANGUAGE_VERSION, expressible, instruct
 from roboirg.splits import get_episode
 
-GOLDEN_VERSION = "1.0.0"
+GOLDEN_VERSION = "1.1.0"
 GOLDEN: dict[tuple[str, str], str] = {
-    ("PickXtimes", "explicit"): "f989e5a11f2b49e2",
-    ("PickXtimes", "direct"): "ea4d7319aa90fcbe",
-    ("PickXtimes", "reasoning"): "0707f0defd0b147b",
-    ("PickXtimes", "contextual"): "fbf5b00dd4e54656",
-    ("PickXtimes", "spatial"): "97d469d65e98a593",
-    ("VideoUnmask", "explicit"): "e5fa41c98b9e25ba",
-    ("VideoUnmask", "direct"): "32c8afe733306a06",
-    ("VideoUnmask", "reasoning"): "ba65cd3ec5db4c72",
-    ("VideoUnmask", "contextual"): "764bcbf8e3e0acfb",
-    ("VideoUnmask", "spatial"): "c984b925f0b92fac",
+    ("PickXtimes", "explicit"): "7660bcbba2968860",
+    ("PickXtimes", "direct"): "80c4f4565f0ca64e",
+    ("PickXtimes", "reasoning"): "5aac0eda7945823d",
+    ("PickXtimes", "contextual"): "91325a2801c37694",
+    ("PickXtimes", "spatial"): "f3979e732d077d38",
+    ("VideoUnmask", "explicit"): "7b9ce982218780a8",
+    ("VideoUnmask", "direct"): "011d360751b00eb0",
+    ("VideoUnmask", "reasoning"): "cd3590ba6777ecc4",
+    ("VideoUnmask", "contextual"): "8339af50b3911423",
+    ("VideoUnmask", "spatial"): "51592a25c01c5673",
 }
 
 
@@ -31,7 +31,7 @@ def digest(task, setting):
         if setting not in expressible(episode):
             continue
         for form in FORMS:
-            for options in options_of(setting):
+            for options in options_of(setting, episode):
                 instruction = instruct(episode, setting, form, **options)
                 sha.update("\n".join((episode.key, form, *instruction.turns)).encode())
                 sha.update(repr(instruction.mentions).encode())

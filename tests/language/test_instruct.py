@@ -16,14 +16,20 @@ from roboirg.tasks import all_tasks
 EPISODE = get_episode("PickXtimes", "test", 2)
 
 
-def test_settings_come_from_the_registry():
-    assert tuple(all_settings()) == SETTINGS
-    variants = [pair for pair in PAIRS if pair[1] != "explicit"]
-    spatial = sum(task.spatial for task in all_tasks().values())
-    assert len(variants) == 3 * len(all_tasks()) + spatial
-    for task in all_tasks().values():
-        assert set(task.settings) <= set(all_settings())
-        assert set(task.commands.patterns)
+WITHOUT_SPATIAL = ("StopCube", "VideoRepick", "VideoPlaceButton", "VideoPlaceOrder")
+
+
+def test_every_task_has_the_settings_of_the_paper():
+    four = ["explicit", "direct", "reasoning", "contextual"]
+    assert [*all_settings()] == [*SETTINGS] == [*four, "spatial"]
+    expected = {
+        (name, setting)
+        for name in all_tasks()
+        for setting in (four if name in WITHOUT_SPATIAL else [*four, "spatial"])
+    }
+    assert set(PAIRS) == expected
+    for name, setting in PAIRS:
+        assert instruct(get_episode(name, "test", 0), setting).setting == setting
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,10 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from language_variants import TASKS, random_episodes
 
 from roboirg.episode import COLOURS, Point, Scene, SceneObject
+from roboirg.language import FORMS, expressible, instruct, resolve
 from roboirg.language.landmarks import MARGIN, landmarks, selectors
 from roboirg.language.resolver.places import find, read_places
 from roboirg.language.resolver.tokens import split_sentences
@@ -69,7 +71,7 @@ def check_reader(scene, thing, landmark, target, frame):
     (sentence,) = split_sentences(f"the {thing} {landmark.phrase}")
     (place,) = read_places(sentence)
     mirrored = frame == "camera"
-    assert find(place, scene, thing, mirrored=mirrored) is target, landmark
+    assert find(place, scene, thing, mirrored=mirrored) == (target,), landmark
 
 
 @settings(max_examples=200, deadline=None)
@@ -117,8 +119,67 @@ def test_left_is_the_robots_and_mirrored_for_the_camera():
 
 def test_near_and_far_are_the_robots_in_both_frames():
     scene = containers([(-0.15, 0.0), (0.15, 0.0)])
-    for frame in ("robot", "camera"):
-        assert phrases(scene, "container_0", frame=frame) == {"closest to you"}
+    assert phrases(scene, "container_0") == {"closest to you"}
+    assert phrases(scene, "container_0", frame="camera") == {"closest to the robot"}
+
+
+def test_sides_of_the_camera_are_those_of_its_picture():
+    # The second one stands farther to the side, but so far from the camera that the picture shows
+    # it farther in.
+    near_camera, far_away = (0.2, 0.135), (-0.2, 0.165)
+    scene = containers([near_camera, far_away])
+    assert phrases(scene, "container_1") >= {"at the far left"}
+    assert phrases(scene, "container_0", frame="camera") >= {"at the far right"}
+    assert "at the far right" not in phrases(scene, "container_1", frame="camera")
+
+
+def test_a_corner_is_used_only_if_it_does_not_matter_which_one_is_meant():
+    # Extremes are blocked by ties; seen from the work area's corner (-0.3, 0.25) container_0 is the
+    # nearest, seen from the table's (-0.74, 1.20) it is container_1.
+    scene = containers([(-0.11, 0.06), (0.0, 0.17), (-0.11, -0.2), (0.0, -0.2), (0.1, 0.17)])
+    words = "closest to the near left corner of the table"
+    corner = next(one for one in selectors(scene, "container", "robot") if one.landmark[0] == words)
+    work_area, table = (one.selected(corner.candidates, 0) for one in corner.readings)
+    assert work_area is scene["container_0"]
+    assert table is scene["container_1"]
+    assert corner.selected() is None
+    clear = containers([(-0.15, 0.15), (-0.15, -0.15), (0.15, 0.15), (0.15, -0.15)])
+    assert phrases(clear, "container_0") == {words}
+
+
+@pytest.mark.parametrize(
+    ("words", "places"),
+    [
+        ("at the far left", [(0.1, 0.1), (-0.1, 0.105), (0.0, 0.0)]),
+        ("closest to you", [(-0.1, 0.1), (-0.105, -0.1), (0.0, 0.0)]),
+        ("second from the left", [(0.1, 0.1), (-0.1, 0.105), (0.0, 0.0)]),
+        ("closest to the near left corner of the table", [(-0.1, 0.1), (-0.098, 0.1), (0.0, 0.0)]),
+        ("farthest from the container at the far right", [(0.1, 0.0), (-0.1, 0.0), (0.0, -0.1)]),
+        ("closest to the container at the far left", [(0.1, 0.0), (-0.1, 0.0), (0.0, 0.1)]),
+    ],
+)
+def test_the_reader_reports_near_ties(words, places):
+    scene = containers(places)
+    (place,) = read_places(*split_sentences(f"the container {words}"))
+    assert find(place, scene, "container", mirrored=False) == scene.objects[:2]
+
+
+def test_a_place_of_two_things_makes_two_goals():
+    scene = cubes([(0.1, 0.1), (-0.1, 0.105), (0.0, 0.0)])
+    text = "Take the cube at the far left and place it on the target once."
+    goals = resolve(text, scene, "PickXtimes").goals
+    assert {goal.text("colour") for goal in goals} == {"red", "green"}
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_the_camera_frame_mixes_no_points_of_view(task):
+    for episode in random_episodes(task, 200):
+        if "spatial" in expressible(episode, frame="camera"):
+            for form in FORMS:
+                text = instruct(episode, "spatial", form, frame="camera").text
+                places = text.replace("I want you to", "").replace("you are done", "")
+                places = places.replace("what you saw", "")
+                assert not {"you", "your"} & set(places.replace(",", " ").split())
 
 
 @pytest.mark.parametrize("gap", [0.0, MARGIN / 2, math.nextafter(MARGIN, 0.0), MARGIN])

@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from roboirg.episode import COLOURS, Goal, Point, Scene, SceneObject
 from roboirg.errors import UnknownNameError
 from roboirg.language import instruct, resolve, resolver
+from roboirg.language.resolver.places import Beside, Towards, read_places
+from roboirg.language.resolver.tokens import split_sentences
 from roboirg.splits import get_episode
 from roboirg.tasks import all_tasks
 
@@ -61,7 +63,13 @@ def test_arbitrary_text_never_raises(text):
 
 def test_endless_places_are_given_up():
     text = "Take the cube " + "closest to the cube " * 5000 + "at the far left."
-    assert resolve(text, PICK, "PickXtimes").not_understood is not None
+    (place,) = read_places(*split_sentences(text))
+    depth = 0
+    while isinstance(place, Beside):
+        place, depth = place.anchor, depth + 1
+    assert depth == 4
+    assert place == Towards("left", 0)
+    assert len(resolve(text, PICK, "PickXtimes").goals) < len(all_tasks()["PickXtimes"].goals(PICK))
 
 
 def test_nothing_said_leaves_everything_open():
@@ -93,6 +101,10 @@ SCENE = Scene(
         ("GRAB   THE RED CUBE , put it on the target TWICE and press the button", "red", 2),
         ("I adore the blue cube. The magic number: 4! Move it to the target that often", "blue", 4),
         ("Red and green are taken. Fetch a cube that is neither of those, once.", "blue", 1),
+        ("Red or blue? I did not choose red. Fetch the one of these two that is not red, once.",
+         "blue", 1),
+        ("Take the cube closest to the left corner far from the robot, put it on the target twice.",
+         "red", 2),
         ("Look at the leftmost cube. Take the cube there and put it on the target once.", "red", 1),
         ("Watch the cube nearest to the robot. Put the cube there on the target once.", "green", 1),
         ("My number is two. Take the red cube and drop it on the target two more times than that.",

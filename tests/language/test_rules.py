@@ -113,8 +113,69 @@ def test_mention_spans_are_exact(task):
                 assert (mention.expression is None) == (mention.role == "antecedent")
                 if mention.role == "anaphor":
                     assert not set(words_of(span)) & set(COLOURS)
-                if mention.expression in ("it", "there", "former", "latter", "other", "that"):
+                if mention.expression in ("it", "there", "former", "latter", "that"):
                     assert mention.expression in span.lower()
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_mentions_hold_the_goals_values_and_point_at_something(task):
+    for episode in split_episodes(task):
+        for setting, form, options in variants(episode):
+            instruction = instruct(episode, setting, form, **options)
+            introduced = set()
+            for mention in instruction.mentions:
+                values = values_of(episode.goal, mention)
+                assert mention.slot == "reference" or mention.value in values, mention
+                if mention.role == "antecedent":
+                    introduced.add((mention.slot, mention.value))
+                else:
+                    assert referents(mention) <= introduced, (instruction.text, mention)
+                if mention.expression == "other":
+                    check_other(instruction, mention)
+
+
+def values_of(goal, mention):
+    value = goal.as_mapping().get(mention.slot)
+    values = value if isinstance(value, tuple) else (value,)
+    return (" and ".join(values),) if mention.expression == "them" else values
+
+
+def referents(mention):
+    """What an anaphor needs to have been introduced."""
+    if mention.expression == "other":
+        return set()  # derived: the goal's value itself never was
+    values = mention.value.split(" and ") if mention.expression == "them" else [mention.value]
+    return {(mention.slot, value) for value in values}
+
+
+def check_other(instruction, mention):
+    pair, chosen = (one.value for one in instruction.mentions[:2])
+    assert {chosen, mention.value} == set(pair.split(" and "))
+    assert {one.slot for one in instruction.mentions[:2]} == {"reference"}
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_every_choice_is_noted(task):
+    for episode in itertools.islice(split_episodes(task), 24):
+        said = instruct(episode, "contextual", distractors=30)
+        chosen = [int(one.split("/")[1]) for one in noted(said, "distractor/")]
+        remarks = [one.text for one in said.utterances if one.stage == "distractor"]
+        assert [templates.NEUTRAL_DISTRACTORS[index] for index in chosen] == remarks
+        rivals = instruct(episode, "contextual", distractor="competing", distractors=5)
+        assert len(noted(rivals, "competing distractor/")) == 5
+        derived = instruct(episode, "reasoning")
+        if derived.metadata["pattern"] == "colour exclusion":
+            (index,) = (int(one[-1]) for one in noted(derived, "pair anaphor/"))
+            assert templates.PAIR_ANAPHORS[index] in derived.command
+        else:
+            assert len(noted(derived, "relation/")) == 1
+        if "spatial" in get_task(task).settings:
+            placed = instruct(episode, "spatial")
+            assert len(noted(placed, "landmark-")) == len(placed.metadata["landmarks"])
+
+
+def noted(instruction, purpose):
+    return [one for one in instruction.metadata["templates"] if one.startswith(purpose)]
 
 
 @pytest.mark.parametrize("task", TASKS)

@@ -3,13 +3,20 @@
 import os
 
 import pytest
-from language_variants import TASKS, default_variants, random_episodes, split_episodes, variants
+from language_variants import (
+    TASKS,
+    default_variants,
+    random_episodes,
+    rotating_variants,
+    split_episodes,
+    variants,
+)
 
-from roboirg.episode import Episode, Scene
-from roboirg.language import instruct, resolve
+from roboirg.episode import Episode
+from roboirg.language import expressible, instruct, resolve
 from roboirg.tasks import get_task
 
-PROOF_SEEDS = int(os.environ.get("ROBOIRG_PROOF_SEEDS", "1000"))
+PROOF_SEEDS = int(os.environ.get("ROBOIRG_PROOF_SEEDS", "2000"))
 """Random seeds per task; 10,000 before a release."""
 
 
@@ -30,7 +37,7 @@ def test_every_variant_of_every_split_is_read_back(task):
 @pytest.mark.parametrize("task", TASKS)
 def test_random_seeds_are_read_back(task):
     for episode in random_episodes(task, PROOF_SEEDS):
-        for setting, form, options in default_variants(episode):
+        for setting, form, options in rotating_variants(episode):
             check_reads_back(episode, setting, form, options)
 
 
@@ -43,13 +50,9 @@ def test_long_contexts_are_read_back(task, distractor, distractors):
         check_reads_back(episode, "contextual", "implicit", options)
 
 
-def candidates(scene: Scene, task: str) -> int:
-    return len(scene.of_kind(get_task(task).commands.thing))
-
-
 @pytest.mark.parametrize("task", TASKS)
 def test_without_its_introduction_the_goal_is_open(task):
-    exceptions = 0
+    exceptions, expected = set(), set()
     for episode in split_episodes(task):
         for setting, form, options in default_variants(episode):
             if setting == "explicit" or form == "resolved":
@@ -57,12 +60,13 @@ def test_without_its_introduction_the_goal_is_open(task):
             instruction = instruct(episode, setting, form, **options)
             left = resolve(instruction.command, episode.scene, task).goals
             assert episode.goal in left, instruction.command
-            if len(left) < 2:
-                # With one candidate in the scene there is nothing to tell apart.
-                assert candidates(episode.scene, task) == 1, instruction.command
-                exceptions += 1
-    easy = sum(candidates(episode.scene, task) == 1 for episode in split_episodes(task))
-    assert exceptions <= 2 * easy
+            if len(left) == 1:
+                exceptions.add((episode.key, setting))
+            # There is one cube in the scene and the command tells how often.
+            told = setting == "spatial" or instruction.metadata["pattern"] == "colour exclusion"
+            if task == "PickXtimes" and episode.difficulty == "easy" and told:
+                expected.add((episode.key, setting))
+    assert exceptions == expected
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -71,10 +75,10 @@ def test_hardly_any_episode_lacks_a_landmark(task):
         pytest.skip("no spatial setting")
     by_difficulty: dict[str, list[bool]] = {}
     for episode in random_episodes(task, 400):
-        told = any(setting == "spatial" for setting, _, _ in variants(episode))
+        told = "spatial" in expressible(episode)
         by_difficulty.setdefault(episode.difficulty, []).append(told)
     everywhere = [told for values in by_difficulty.values() for told in values]
     assert everywhere.count(False) < 0.05 * len(everywhere)
     for values in by_difficulty.values():
-        # 4.4 % of hard VideoUnmask scenes on 3,000 seeds; leave room for chance on few.
+        # 4.8 % of hard VideoUnmask scenes on 10,000 seeds; leave room for chance on few.
         assert values.count(False) < 0.10 * len(values)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -21,7 +22,7 @@ class Chooser:
 
     Attributes:
         key: language version, task and seed.
-        log: ``purpose/index`` of every template that was chosen, in order.
+        log: ``purpose/index`` of everything that was chosen, in order.
     """
 
     key: str
@@ -34,15 +35,14 @@ class Chooser:
 
     def pick(self, purpose: str, options: Sequence[Option]) -> Option:
         """One of the options, all equally likely."""
-        return options[int(self.generator(purpose).integers(len(options)))]
+        return self._take(purpose, options, int(self.generator(purpose).integers(len(options))))
 
-    def template(self, purpose: str, templates: Sequence[Option]) -> Option:
-        """One of the templates; its id is noted in the log."""
-        index = int(self.generator(purpose).integers(len(templates)))
+    def endless(self, purpose: str, options: Sequence[Option]) -> Iterator[Option]:
+        """All the options in random order, again and again; what is taken is logged."""
+        order: list[int] = self.generator(purpose).permutation(len(options)).tolist()
+        for index in itertools.cycle(order):
+            yield self._take(purpose, options, index)
+
+    def _take(self, purpose: str, options: Sequence[Option], index: int) -> Option:
         self.log.append(f"{purpose}/{index}")
-        return templates[index]
-
-    def shuffled(self, purpose: str, options: Sequence[Option]) -> tuple[Option, ...]:
-        """All the options in random order."""
-        order = self.generator(purpose).permutation(len(options))
-        return tuple(options[index] for index in order.tolist())
+        return options[index]

@@ -73,9 +73,14 @@ def instruct(
     return _instruction(request, rule.name, rule.say(request))
 
 
-def expressible(episode: Episode) -> tuple[str, ...]:
-    """The settings in which this episode can be told; all of its task's, or all but spatial."""
-    request = _request(episode, "implicit", STAGE_SETS[-1], "neutral", 1, "robot")
+def expressible(episode: Episode, *, frame: str = "robot") -> tuple[str, ...]:
+    """The settings in which this episode can be told; all of its task's, or all but spatial.
+
+    Args:
+        episode: what is to be said.
+        frame: whose left and right the spatial setting would mean, ``robot`` or ``camera``.
+    """
+    request = _request(episode, "implicit", STAGE_SETS[-1], "neutral", 1, frame)
     return tuple(
         name for name in get_task(episode.task).settings if all_settings()[name].can_say(request)
     )

@@ -37,8 +37,10 @@ class Mention:
         end: one past the last character.
         role: antecedent or anaphor.
         expression: class of an anaphor; None for an antecedent.
-        slot: name of the goal slot.
-        value: what it stands for, as in the goal.
+        slot: name of the goal slot, or ``reference`` for what only leads to the goal: the two
+            excluded colours, the one of them that was chosen, the quantity to count from.
+        value: what it stands for: of a goal slot one of the goal's values, or all of them
+            (``red and green``) for a plural.
     """
 
     utterance: int

@@ -1,7 +1,8 @@
 """Places in words: landmarks that pick one object out of its like, by a clear margin.
 
-Left and right are the robot's unless the frame is ``camera``: the front camera looks at the
-robot, so it sees them mirrored. Near and far are always told from the robot ("you").
+Left and right are the robot's unless the frame is ``camera``: then they are those of the picture
+of the front camera, which looks at the robot. Near and far are always told from the robot: "you",
+or "the robot" in the camera frame, so that one instruction has one point of view.
 """
 
 from __future__ import annotations
@@ -14,6 +15,13 @@ from roboirg.episode import Scene, SceneObject
 
 MARGIN = 0.03
 """Metres by which a landmark's object must win over any other in the quantity compared."""
+COLUMN_MARGIN = 6.0
+"""The same in columns of the front camera's picture (256 pixels wide)."""
+
+WORK_AREA = {"near": -0.3, "far": 0.2, "left": 0.25, "right": -0.25}
+"""World x of its near and far edge, y of its left and right one."""
+TABLE = {"near": -0.7402, "far": 0.4689, "left": 1.2030, "right": -1.2149}
+"""The same of the table's top."""
 
 Frame = Literal["robot", "camera"]
 FRAMES: tuple[Frame, ...] = ("robot", "camera")
@@ -28,7 +36,7 @@ class Landmark(NamedTuple):
         phrase: what follows the noun: "the cube *at the far left*".
         level: class, in the order of preference: 1 extremes, 2 corners, 3 ranks, 4 fixtures,
             5 cubes of another colour, 6 nearest to an object of class 1 or 2, 7 to one of
-            class 3, 8 second nearest to one of class 1 or 2.
+            class 3, 8 second nearest to one of class 1 or 2, 9 third nearest to one of those.
         sided: whether the words name left or right, so that it matters whose.
     """
 
@@ -37,25 +45,40 @@ class Landmark(NamedTuple):
     sided: bool = False
 
 
+class Reading(NamedTuple):
+    """A way to compare: large quantities first, clear from `margin` on."""
+
+    quantity: Callable[[SceneObject], float]
+    margin: float = MARGIN
+
+    def selected(self, candidates: Sequence[SceneObject], rank: int) -> SceneObject | None:
+        """The candidate of that rank (from 0), or None if it is not clear which."""
+        if rank >= len(candidates):
+            return None
+        values = [(self.quantity(item), position) for position, item in enumerate(candidates)]
+        order = sorted(values, reverse=True)
+        value, position = order[rank]
+        neighbours = order[max(rank - 1, 0) : rank] + order[rank + 1 :][:1]
+        if any(abs(value - other) < self.margin for other, _ in neighbours):
+            return None
+        return candidates[position]
+
+
 class Selector(NamedTuple):
-    """A landmark and how it selects: the `rank`-th largest quantity among the candidates."""
+    """A landmark and how it selects: the `rank`-th of the candidates.
+
+    Words that can be read in several ways select only what all readings agree on.
+    """
 
     landmark: Landmark
-    quantity: Callable[[SceneObject], float]
+    readings: tuple[Reading, ...]
     candidates: tuple[SceneObject, ...]
     rank: int = 0
 
     def selected(self) -> SceneObject | None:
         """The object it picks out, or None if it is not clear which."""
-        if self.rank >= len(self.candidates):
-            return None
-        values = [(self.quantity(item), position) for position, item in enumerate(self.candidates)]
-        order = sorted(values, reverse=True)
-        value, position = order[self.rank]
-        neighbours = order[max(self.rank - 1, 0) : self.rank] + order[self.rank + 1 :][:1]
-        if any(abs(value - other) < MARGIN for other, _ in neighbours):
-            return None
-        return self.candidates[position]
+        first, *others = (reading.selected(self.candidates, self.rank) for reading in self.readings)
+        return first if all(other is first for other in others) else None
 
 
 def landmarks(
@@ -91,47 +114,57 @@ def selectors(
     yield from _chains(thing, candidates, named, level=6)
     yield from _chains(thing, candidates, ranked, level=7)
     yield from _chains(thing, candidates, named, level=8, rank=1)
+    yield from _chains(thing, candidates, named, level=9, rank=2)
 
 
 class _Direction(NamedTuple):
     extreme: str
-    rank: str | None
-    quantity: Callable[[SceneObject], float]
-    sided: bool
+    rank: str
+    reading: Reading
+    sided: bool = False
 
 
 def _directions(frame: Frame) -> tuple[_Direction, ...]:
-    left, right = ("left", "right") if frame == "robot" else ("right", "left")
+    if frame == "robot":
+        robot = "you"
+        left = Reading(lambda item: item.position.y)
+    else:
+        robot = "the robot"
+        left = Reading(lambda item: -_column(item), COLUMN_MARGIN)
+    right = Reading(_negated(left.quantity), left.margin)
+    near, far = f"closest to {robot}", f"farthest from {robot}"
     return (
-        _Direction(f"at the far {left}", f"from the {left}", lambda item: item.position.y, True),
-        _Direction(f"at the far {right}", f"from the {right}", lambda item: -item.position.y, True),
-        _Direction("closest to you", "closest to you", lambda item: -item.position.x, False),
-        _Direction("farthest from you", "farthest from you", lambda item: item.position.x, False),
+        _Direction("at the far left", "from the left", left, sided=True),
+        _Direction("at the far right", "from the right", right, sided=True),
+        _Direction(near, near, Reading(lambda item: -item.position.x)),
+        _Direction(far, far, Reading(lambda item: item.position.x)),
     )
+
+
+def _column(item: SceneObject) -> float:
+    """Where the front camera sees an object: it stands at (0.3, 0, 0.4), looks at (0, 0, -0.2)."""
+    x, y, z = item.position.x, item.position.y, 0.02
+    depth = 0.49194 - 0.44721 * x - 0.89443 * z
+    return 128.0 + 128.0 * y / depth
 
 
 def _extremes(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
     for way in _directions(frame):
-        yield Selector(Landmark(way.extreme, 1, way.sided), way.quantity, candidates)
+        yield Selector(Landmark(way.extreme, 1, way.sided), (way.reading,), candidates)
 
 
 def _corners(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
-    # How far an object lies towards a corner is measured along the diagonal: no listener needs
-    # to know where the work area ends.
-    for side, y in (("left", 1.0), ("right", -1.0)):
-        for depth, x in (("near", -1.0), ("far", 1.0)):
-            sign = y if frame == "robot" else -y
-            # A corner that is near the robot is far from the camera: then say near to whom.
-            phrase = f"closest to the {depth} {side} corner"
-            if frame == "camera":
-                reach = "close to" if depth == "near" else "far from"
-                phrase = f"closest to the {side} corner {reach} you"
-            landmark = Landmark(phrase, 2, sided=True)
-            yield Selector(landmark, _diagonal(x, sign), candidates)
-
-
-def _diagonal(x: float, y: float) -> Callable[[SceneObject], float]:
-    return lambda item: (x * item.position.x + y * item.position.y) / math.sqrt(2.0)
+    # The words leave open which corner is meant: of the table, or of the part that is in use.
+    for side, mirrored in (("left", "right"), ("right", "left")):
+        for depth, reach in (("near", "near"), ("far", "far from")):
+            if frame == "robot":
+                phrase, y = f"closest to the {depth} {side} corner of the table", side
+            else:
+                phrase = f"closest to the {side} corner of the table that is {reach} the robot"
+                y = mirrored
+            corners = [(area[depth], area[y]) for area in (WORK_AREA, TABLE)]
+            readings = tuple(_nearness(corner) for corner in corners)
+            yield Selector(Landmark(phrase, 2, sided=True), readings, candidates)
 
 
 def _ranks(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
@@ -141,7 +174,7 @@ def _ranks(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Select
             continue
         for way in _directions(frame):
             landmark = Landmark(f"{ordinal} {way.rank}", 3, way.sided)
-            yield Selector(landmark, way.quantity, candidates, rank)
+            yield Selector(landmark, (way.reading,), candidates, rank)
 
 
 def _fixtures(scene: Scene, candidates: tuple[SceneObject, ...]) -> Iterator[Selector]:
@@ -149,10 +182,10 @@ def _fixtures(scene: Scene, candidates: tuple[SceneObject, ...]) -> Iterator[Sel
         fixtures = [item for item in scene.objects if item.kind == kind]
         if len(fixtures) != 1:
             continue
-        away = _distance(fixtures[0])
+        away = _distance(fixtures[0].position)
         near = Landmark(f"closest to the {kind}", 4)
-        yield Selector(near, _negated(away), candidates)
-        yield Selector(Landmark(f"farthest from the {kind}", 4), away, candidates)
+        yield Selector(near, (Reading(_negated(away)),), candidates)
+        yield Selector(Landmark(f"farthest from the {kind}", 4), (Reading(away),), candidates)
 
 
 def _other_colours(candidates: Sequence[SceneObject]) -> Iterator[Selector]:
@@ -161,7 +194,7 @@ def _other_colours(candidates: Sequence[SceneObject]) -> Iterator[Selector]:
         if anchor.colour is None or len(like) != 1:
             continue
         landmark = Landmark(f"closest to the {anchor.colour} cube", 5)
-        yield Selector(landmark, _negated(_distance(anchor)), _without(candidates, anchor))
+        yield Selector(landmark, (_nearness(anchor.position),), _without(candidates, anchor))
 
 
 def _chains(
@@ -179,18 +212,22 @@ def _chains(
         # The last of a row is not "second nearest" to anybody.
         if rank and rank >= len(others) - 1:
             continue
-        nearness = f"{ORDINALS[rank]} nearest" if rank else "nearest"
-        phrase = f"{nearness} to the {thing} {selector.landmark.phrase}"
+        nearest = f"{ORDINALS[rank]} nearest" if rank else "nearest"
+        phrase = f"{nearest} to the {thing} {selector.landmark.phrase}"
         landmark = Landmark(phrase, level, selector.landmark.sided)
-        yield Selector(landmark, _negated(_distance(anchor)), others, rank)
+        yield Selector(landmark, (_nearness(anchor.position),), others, rank)
 
 
 def _without(candidates: Sequence[SceneObject], anchor: SceneObject) -> tuple[SceneObject, ...]:
     return tuple(item for item in candidates if item is not anchor)
 
 
-def _distance(anchor: SceneObject) -> Callable[[SceneObject], float]:
-    x, y, _ = anchor.position
+def _nearness(place: Sequence[float]) -> Reading:
+    return Reading(_negated(_distance(place)))
+
+
+def _distance(place: Sequence[float]) -> Callable[[SceneObject], float]:
+    x, y = place[:2]
     return lambda item: math.hypot(item.position.x - x, item.position.y - y)
 
 

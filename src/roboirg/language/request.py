@@ -105,7 +105,7 @@ class Request:
         """The task's command with its fields filled; the same wording in all settings."""
         handled = max(1, sum(1 for part in self.parts if part.field.rpartition(".")[2].isdigit()))
         wordings = [one for one in self.task.commands.wordings if one.parts == handled]
-        return fill(self.chooser.template(f"command-{handled}", wordings).text, fields)
+        return fill(self.chooser.pick(f"command-{handled}", wordings).text, fields)
 
 
 class Said(NamedTuple):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-LANGUAGE_VERSION = "1.0.0"
+LANGUAGE_VERSION = "1.1.0"
 
 COLOUR_INTRODUCTIONS = (
     "I have always had a soft spot for {things}.",
@@ -24,15 +24,15 @@ NUMBER_INTRODUCTIONS = (
     "The number on my jersey is {number}.",
 )
 PAIR_INTRODUCTIONS = (
-    "{first} and {second} are the colors of my soccer team.",
-    "My kitchen is painted {first} and {second}.",
-    "I think that {first} and {second} go well together.",
-    "The flag of my home town is {first} and {second}.",
+    "{pair} are the colors of my soccer team.",
+    "My kitchen is painted {pair}.",
+    "I think that {pair} go well together.",
+    "The flag of my home town is {pair}.",
 )
 SINGLED_INTRODUCTIONS = (
-    "Of the two, I see {single} more often.",
-    "Of the two, I would rather wear {single}.",
-    "My son likes {single} better.",
+    "Of the two, I would choose {single}.",
+    "If I had to choose between the two, it would be {single}.",
+    "Asked to choose, I would go for {single}.",
 )
 PLACE_INTRODUCTIONS = (
     "Have a look at {things}.",
@@ -113,11 +113,8 @@ EXCLUSIONS = (
     "the cube whose color is different from {pair}",
 )
 PAIR_ANAPHORS = ("that pair", "those two")
-COMPLEMENTS = (
-    "the cube in {other}, not in {single}",
-    "the cube that has {other} and not {single}",
-)
-"""The second pick: of the two excluded colours, the one that was not singled out."""
+COMPLEMENTS = ("the cube in {other}", "the cube with {other}")
+"""The second pick: of the two excluded colours, the one that was not chosen."""
 
 
 class Relation(NamedTuple):

@@ -39,7 +39,7 @@ def reduced(request: Request, parts: tuple[Part, ...]) -> dict[str, Phrase]:
 
 def introduce(request: Request, parts: tuple[Part, ...]) -> Phrase:
     """A sentence that names the cubes."""
-    template = request.chooser.template("colour introduction", templates.COLOUR_INTRODUCTIONS)
+    template = request.chooser.pick("colour introduction", templates.COLOUR_INTRODUCTIONS)
     things = listed([cube(part) for part in parts])
     return fill(template, {"things": things}, plural=len(parts) > 1)
 

@@ -26,7 +26,7 @@ def introduce(request: Request, parts: tuple[Part, ...]) -> Phrase:
 
 def introduce_quantity(request: Request, slot: str, quantity: int) -> Phrase:
     """A sentence that names any quantity."""
-    template = request.chooser.template("number introduction", templates.NUMBER_INTRODUCTIONS)
+    template = request.chooser.pick("number introduction", templates.NUMBER_INTRODUCTIONS)
     return fill(template, {"number": antecedent(cardinal(quantity), slot, quantity)})
 
 

@@ -154,11 +154,10 @@ class _Reader:
 
     def _at(self, place: Place) -> set[str]:
         found = find(place, self._scene, self._kind, mirrored=self._context.mirrored)
-        cube = found if found is None or found.colour else self._scene.hidden_in(found.name)
-        if cube is None:
+        cubes = [item if item.colour else self._scene.hidden_in(item.name) for item in found]
+        if None in cubes or not cubes:
             self._complaints.append(f"nothing to handle at {place}")
-            return set()
-        return {str(cube.colour)}
+        return {str(cube.colour) for cube in cubes if cube is not None}
 
     def _cubes(self) -> Iterator[SceneObject]:
         return (item for item in self._scene.objects if item.colour is not None)

@@ -85,7 +85,10 @@ _THAN = re.compile(
     r"\b(other than|different from|not (in|of|among|one of)|neither|except|apart from|outside)\b"
 )
 _OTHER_OF = re.compile(r"\bthe other (?:one |colou?r )?(?:of|in|from)\b")
-_NOT = re.compile(r"\bnot (?:in )?(\w+)\b")
+_ONE_NOT = re.compile(
+    r"\bthe (?:one|colou?r) (?:of|in|from)\b.*\b(?:not|didn't|isn't|other than|except)\b"
+)
+_NOT = re.compile(r"\b(?:not|other than|except) (?:in |for )?(red|green|blue)\b")
 _FORMER = {"former": 0, "latter": -1}
 
 
@@ -95,7 +98,7 @@ def _describe(words: Sentence) -> Description:
     places = read_places(words)
     if places:
         return Description("place", place=places[0])
-    if _OTHER_OF.search(text):
+    if _OTHER_OF.search(text) or _ONE_NOT.search(text):
         return _complement(text, colours)
     if _THAN.search(text):
         return Description("not", colours)
@@ -109,8 +112,9 @@ def _describe(words: Sentence) -> Description:
 
 def _complement(text: str, colours: tuple[str, ...]) -> Description:
     found = _NOT.search(text)
-    minus = found[1] if found and found[1] in COLOURS else None
-    return Description("other", tuple(dict.fromkeys(colours)), minus)
+    minus = found[1] if found else None
+    among = tuple(dict.fromkeys(colours))
+    return Description("other", () if among == (minus,) else among, minus)
 
 
 def _pointer(words: Sentence) -> Description | None:

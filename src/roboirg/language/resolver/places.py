@@ -7,6 +7,7 @@ from something, and means the first, second, ... of that order.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -22,15 +23,28 @@ _LEAST = frozenset({"closest", "nearest"})
 _UTMOST = frozenset({"farthest", "furthest"})
 _LISTENER = frozenset({"you", "robot", "yourself"})
 _FILLERS = frozenset({"the", "to", "from", "a", "on", "at"})
+_CORNER_FILLERS = frozenset({"of", "the", "table", "that", "is"})
 _COLOURS = frozenset({"red", "green", "blue"})
 
 _MAX_DEPTH = 4
 """Places told by places told by ...: further down nobody follows."""
 
+_TABLE_FRONT, _TABLE_BACK = -0.7402, 0.4689
+_TABLE_RIGHT, _TABLE_LEFT = -1.2149, 1.2030
+"""Edges of the table's top, x and y in the world frame."""
+_CAMERA = (0.3, 0.0, 0.4)
+_VIEW = (-0.3, 0.0, -0.6)
+"""The front camera's eye and where it looks from there."""
+_CUBE_HEIGHT = 0.02
+_TIE = 0.01
+"""Metres; what differs by less could be meant by the same words."""
+_TANGENT_TIE = 2 / 128
+"""Two pixels, as a tangent: the picture is 256 pixels wide and 90 degrees."""
+
 
 @dataclass(frozen=True, slots=True)
 class Towards:
-    """Along a direction of the table: the sum of a side and a depth.
+    """Along a direction of the table, or towards a corner if there are both a side and a depth.
 
     Attributes:
         side: to that side of the listener, or None.
@@ -100,14 +114,17 @@ def _read_extreme(words: Sentence, at: int) -> tuple[Place, int] | None:
 
 
 def _read_corner(words: Sentence, at: int) -> tuple[Place, int] | None:
-    """``near left corner``, ``left corner far from you``, whatever leads up to it."""
+    """``near left corner``, ``left corner that is far from you``, whatever leads up to it."""
     start = at
     if _word(words, at) in _LEAST:
         start = _skip(words, at + 1)
     word = _word(words, start)
     if word in _SIDES and _word(words, start + 1) == "corner":
-        depth = _depth(_word(words, start + 2))
-        listener = _skip(words, start + 3)
+        after = start + 2
+        while _word(words, after) in _CORNER_FILLERS:
+            after += 1
+        depth = _depth(_word(words, after))
+        listener = _skip(words, after + 1)
         if depth and _word(words, listener) in _LISTENER:
             return Towards(_SIDES[word], depth), listener + 1
     side, depth = _SIDES.get(_word(words, start + 1)), _depth(word)
@@ -164,34 +181,65 @@ def _depth(word: str) -> int:
     return -1 if word in _NEAR else 1 if word in _FAR else 0
 
 
-def find(place: Place, scene: Scene, kind: str, *, mirrored: bool) -> SceneObject | None:
-    """What stands at a place, among the things of one kind.
+def find(place: Place, scene: Scene, kind: str, *, mirrored: bool) -> tuple[SceneObject, ...]:
+    """What stands at a place, among the things of one kind: several if it is nearly a tie.
 
     Args:
         place: where.
         scene: everything on the table.
         kind: of the things that are compared.
-        mirrored: whether left and right are those of somebody who faces the robot.
+        mirrored: whether left and right are those of the front camera's picture.
     """
     candidates = [item for item in scene.objects if item.kind == kind]
-    if isinstance(place, Beside):
-        anchor = _anchor(place, scene, mirrored=mirrored)
-        if anchor is None:
-            return None
+    if isinstance(place, Towards):
+        return _ranked(candidates, place.rank, *_measure(place, mirrored=mirrored))
+    found: list[SceneObject] = []
+    for anchor in _anchors(place, scene, mirrored=mirrored):
         sign = 1.0 if place.nearest else -1.0
-        candidates = [item for item in candidates if item is not anchor]
-        candidates.sort(key=lambda item: sign * math.dist(item.position[:2], anchor.position[:2]))
-    else:
-        y = {"left": 1.0, "right": -1.0, None: 0.0}[place.side] * (-1.0 if mirrored else 1.0)
-        x = float(place.depth)
-        candidates.sort(key=lambda item: -(x * item.position.x + y * item.position.y))
-    return candidates[place.rank - 1] if place.rank <= len(candidates) else None
+        away = _distance_to(*anchor.position[:2], sign)
+        others = [item for item in candidates if item is not anchor]
+        found += _ranked(others, place.rank, away, _TIE)
+    return tuple(dict.fromkeys(found))
 
 
-def _anchor(place: Beside, scene: Scene, *, mirrored: bool) -> SceneObject | None:
+def _ranked(
+    items: list[SceneObject], rank: int, measure: Callable[[SceneObject], float], tie: float
+) -> tuple[SceneObject, ...]:
+    """The items that could be meant by the one of that rank, small measures first."""
+    if rank > len(items):
+        return ()
+    wanted = sorted(map(measure, items))[rank - 1]
+    return tuple(item for item in items if abs(measure(item) - wanted) <= tie)
+
+
+def _measure(place: Towards, *, mirrored: bool) -> tuple[Callable[[SceneObject], float], float]:
+    """What a direction compares, the smallest first, and how much is a tie."""
+    if place.side is None:
+        return lambda item: -place.depth * item.position.x, _TIE
+    robots_left = (place.side == "left") != mirrored
+    if place.depth:
+        x = _TABLE_FRONT if place.depth < 0 else _TABLE_BACK
+        return _distance_to(x, _TABLE_LEFT if robots_left else _TABLE_RIGHT, 1.0), _TIE
+    if not mirrored:
+        return lambda item: -item.position.y if robots_left else item.position.y, _TIE
+    return lambda item: _tangent(item) * (-1.0 if robots_left else 1.0), _TANGENT_TIE
+
+
+def _distance_to(x: float, y: float, sign: float) -> Callable[[SceneObject], float]:
+    return lambda item: sign * math.dist(item.position[:2], (x, y))
+
+
+def _tangent(item: SceneObject) -> float:
+    """Tangent of the angle by which the front camera sees something beside the picture's middle."""
+    offset = [part - eye for part, eye in zip(item.position[:2], _CAMERA[:2], strict=True)]
+    ahead = offset[0] * _VIEW[0] + offset[1] * _VIEW[1] + (_CUBE_HEIGHT - _CAMERA[2]) * _VIEW[2]
+    return item.position.y * math.hypot(*_VIEW) / ahead
+
+
+def _anchors(place: Beside, scene: Scene, *, mirrored: bool) -> tuple[SceneObject, ...]:
     if not isinstance(place.anchor, str):
         return find(place.anchor, scene, place.kind, mirrored=mirrored)
     like = [item for item in scene.objects if item.kind == place.kind]
     if place.anchor in _COLOURS:
         like = [item for item in like if item.colour == place.anchor]
-    return like[0] if len(like) == 1 else None
+    return tuple(like) if len(like) == 1 else ()

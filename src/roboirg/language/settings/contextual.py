@@ -22,7 +22,7 @@ def say(request: Request) -> Draft:
     if DISTRACT in request.stages:
         said += [Said("distractor", phrase) for phrase in distractors(request)]
     if ANNOUNCE in request.stages:
-        cue = request.chooser.template("cue", templates.CUES)
+        cue = request.chooser.pick("cue", templates.CUES)
         said.append(Said("cue", plain(cue)))
     said.append(direct.command(request))
     notes: dict[str, object] = {"stages": list(request.stages)}
@@ -35,7 +35,7 @@ def reinforcement(request: Request) -> Said:
     """A further remark on each referent, in the order of the introduction."""
     remarks: list[Phrase] = []
     for kind, parts in kinds_in(request):
-        template = request.chooser.template(f"{kind.name} reinforcement", kind.reinforcements)
+        template = request.chooser.pick(f"{kind.name} reinforcement", kind.reinforcements)
         remarks.append(fill(template, {"ref": kind.pointing(parts)}, plural=len(parts) > 1))
     return Said("reinforcement", sentences(remarks))
 
@@ -48,9 +48,8 @@ def distractors(request: Request) -> tuple[Phrase, ...]:
 
 def _neutral(request: Request) -> Iterator[Phrase]:
     # One order, gone through again and again: the same remark returns as late as possible.
-    order = request.chooser.shuffled("distractor", templates.NEUTRAL_DISTRACTORS)
-    while True:
-        yield from (plain(sentence) for sentence in order)
+    remarks = [plain(sentence) for sentence in templates.NEUTRAL_DISTRACTORS]
+    return request.chooser.endless("distractor", remarks)
 
 
 def _competing(request: Request) -> Iterator[Phrase]:
@@ -60,9 +59,7 @@ def _competing(request: Request) -> Iterator[Phrase]:
         for value in _rival_values(kind, parts)
         for template in kind.competitors
     ]
-    order = request.chooser.shuffled("competing distractor", rivals)
-    while True:
-        yield from order
+    return request.chooser.endless("competing distractor", rivals)
 
 
 def _rival_values(kind: Kind, parts: tuple[Part, ...]) -> list[str | int]:

@@ -6,6 +6,7 @@ cover is stated explicitly in the command.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -15,6 +16,9 @@ from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, sentence
 from roboirg.language.request import Draft, Part, Request, Said, SettingRule, other_colours
 from roboirg.language.settings.explicit import stated
 from roboirg.language.words import cardinal
+
+REFERENCE = "reference"
+"""Slot of the mentions that stand for what the goal is derived from, not for the goal."""
 
 BLOCK = 4
 """Difficulties repeat after so many episodes; see `pattern_of`."""
@@ -58,16 +62,14 @@ def say(request: Request) -> Draft:
 def _exclude(request: Request) -> tuple[Phrase, dict[str, Phrase], dict[str, object]]:
     """The colour that is not among two; a second target is the other one of the two."""
     target, *rest = request.parts_of("colour")
-    pair = request.chooser.shuffled("pair", other_colours(target.colour))
-    slot, both = target.slot, " and ".join(pair)
-    first, second = (antecedent(colour, slot, colour) for colour in pair)
-    template = request.chooser.template("pair introduction", templates.PAIR_INTRODUCTIONS)
-    context = [fill(template, {"first": first, "second": second})]
+    pair = request.chooser.pick("pair", list(itertools.permutations(other_colours(target.colour))))
+    both = " and ".join(pair)
+    named = antecedent(both, REFERENCE, both)
+    template = request.chooser.pick("pair introduction", templates.PAIR_INTRODUCTIONS)
+    context = [fill(template, {"pair": named})]
     word = request.chooser.pick("pair anaphor", templates.PAIR_ANAPHORS)
-    reference = (
-        antecedent(both, slot, both) if request.resolved else anaphor(word, "pair", slot, both)
-    )
-    exclusion = request.chooser.template("exclusion", templates.EXCLUSIONS)
+    reference = named if request.resolved else anaphor(word, "pair", REFERENCE, both)
+    exclusion = request.chooser.pick("exclusion", templates.EXCLUSIONS)
     fields = {target.field: request.by_colour(fill(exclusion, {"pair": reference}))}
     patterns = ["colour exclusion"]
     if rest:
@@ -80,24 +82,19 @@ def _exclude(request: Request) -> tuple[Phrase, dict[str, Phrase], dict[str, obj
 def _other_one(
     request: Request, part: Part, pair: tuple[str, ...], word: str
 ) -> tuple[Phrase, Phrase]:
-    """A remark that singles out one of the pair, and the command's words for the other one."""
-    slot, both = part.slot, " and ".join(pair)
-    singled = next(colour for colour in pair if colour != part.value)
-    remark = request.chooser.template("singled introduction", templates.SINGLED_INTRODUCTIONS)
-    sentence = fill(remark, {"single": antecedent(singled, slot, singled)})
-    fields = (
-        {
-            "single": antecedent(singled, slot, singled),
-            "other": antecedent(f"the other color of {both}", slot, both),
-        }
-        if request.resolved
-        else {
-            "single": anaphor("that one", "that", slot, singled),
-            "other": anaphor(f"the other color of {word}", "other", slot, both),
-        }
-    )
-    complement = request.chooser.template("complement", templates.COMPLEMENTS)
-    return sentence, request.by_colour(fill(complement, fields))
+    """A remark that chooses one of the pair, and the command's words for the other one."""
+    both = " and ".join(pair)
+    chosen = next(colour for colour in pair if colour != part.value)
+    remark = request.chooser.pick("singled introduction", templates.SINGLED_INTRODUCTIONS)
+    sentence = fill(remark, {"single": antecedent(chosen, REFERENCE, chosen)})
+    if request.resolved:
+        words = f"the color of {both} that is not {chosen}"
+        other = antecedent(words, part.slot, part.value)
+    else:
+        words = f"the color of {word} that I did not choose"
+        other = anaphor(words, "other", part.slot, part.value)
+    complement = request.chooser.pick("complement", templates.COMPLEMENTS)
+    return sentence, request.by_colour(fill(complement, {"other": other}))
 
 
 def _relations(result: int) -> list[tuple[templates.Relation, int]]:
@@ -117,9 +114,9 @@ def _deduce(request: Request) -> tuple[Phrase, dict[str, Phrase], dict[str, obje
     (part,) = request.parts_of("number")
     relation, number = request.chooser.pick("relation", _relations(part.number))
     reference = (
-        antecedent(cardinal(number), part.slot, number)
+        antecedent(cardinal(number), REFERENCE, number)
         if request.resolved
-        else anaphor("that", "that", part.slot, number)
+        else anaphor("that", "that", REFERENCE, number)
     )
     fields = {part.field: fill(relation.times, {"number": reference})}
     notes: dict[str, object] = {
@@ -127,7 +124,7 @@ def _deduce(request: Request) -> tuple[Phrase, dict[str, Phrase], dict[str, obje
         "relation": relation.name,
         "reference": number,
     }
-    return introduce_quantity(request, part.slot, number), fields, notes
+    return introduce_quantity(request, REFERENCE, number), fields, notes
 
 
 PATTERNS: Mapping[str, Pattern] = {

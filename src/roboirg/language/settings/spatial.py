@@ -73,7 +73,7 @@ def introduction(request: Request, parts: Sequence[Part], chosen: Sequence[Landm
         purpose, options = "sided place introduction", templates.SIDED_PLACE_INTRODUCTIONS
     else:
         purpose, options = "camera place introduction", templates.CAMERA_PLACE_INTRODUCTIONS
-    template = request.chooser.template(purpose, options)
+    template = request.chooser.pick(purpose, options)
     return Said("introduction", fill(template, {"things": listed(things)}, plural=len(things) > 1))
 
 
