@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -61,7 +62,14 @@ def canned(monkeypatch: pytest.MonkeyPatch) -> type[CannedPlayer]:
     [
         (("--tasks", "PickXtime"), "There is no task 'PickXtime'"),
         (("--settings", "spatail"), "Did you mean 'spatial'?"),
-        (("--split", "dev"), "There is no split 'dev'; the splits are train, val, test."),
+        (("--split", "dev"), "There is no split 'dev'"),
+        (("--episodes", "300000000"), "split 'test' has episodes 0 to 49."),
+        (("--episodes", "9" * 5000), "has 5000 digits"),
+        (("--max-steps", "9" * 5000), "'--max-steps'"),
+        (("--stages", "5-1"), "the four are 1,5;"),
+        (("--worker", "1"), "No such option: --worker"),
+        (("--workers", "many"), "Invalid value for '--workers'"),
+        (("--out", ""), "is an empty text"),
         (("--episodes", "50,"), "There is no episode 50: split 'test' has episodes 0 to 49."),
         (("--episodes", "four"), "'four' is no episode"),
         (("--policy", "listner"), "Did you mean 'listener'?"),
@@ -80,12 +88,67 @@ def test_what_is_wrong_is_one_sentence_and_exit_code_2(
 
 
 @pytest.mark.parametrize(
-    "words", [("run",), ("play",), ("report",), ("report", "nowhere"), ("instruct", "PickXtimes")]
-)
-def test_wrong_usage_is_exit_code_2(roboirg, words: tuple[str, ...]) -> None:
+    "words",
+    [
+        ("run",), ("play",), ("report",), ("report", "nowhere"), ("report", ""),
+        ("instruct", "PickXtimes"), ("instruct", "PickXtimes", "-1"), ("demo", "--out", " "),
+    ],
+)  # fmt: skip
+def test_wrong_usage_is_one_sentence_and_exit_code_2(roboirg, words: tuple[str, ...]) -> None:
     said = roboirg(*words)
     assert said.code == 2
-    assert "Traceback" not in said.err
+    assert said.err.startswith("roboirg: ")
+    assert said.err.count("\n") == 1
+    assert said.out == ""
+
+
+def test_help_and_version_are_answered(roboirg) -> None:
+    assert roboirg("--version").out == f"roboirg {version('roboirgbench')}\n"
+    for words in (("--help",), ("run", "-h")):
+        said = roboirg(*words)
+        assert (said.code, said.err) == (0, "")
+        assert "Usage" in said.out
+    assert roboirg().code in {0, 2}  # Click before 8.2 sees no fault in it
+
+
+@pytest.mark.parametrize("command", ["demo", "report"])
+def test_a_missing_jinja_is_told_before_anything_is_played(
+    roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    words = ("demo", "--out", tmp_path / "out") if command == "demo" else ("report", tmp_path)
+    said = roboirg(*words)
+    assert (said.code, said.out, said.err.count("\n")) == (2, "", 1)
+    assert "pip install 'roboirgbench[report]'" in said.err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.usefixtures("canned")
+def test_a_missing_pyav_can_be_done_without(
+    roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "av", None)
+    words = ("demo", "--out", tmp_path / "out", "--episodes", "1", "--workers", "0")
+    said = roboirg(*words)
+    assert said.code == 2
+    assert "--video off" in said.err
+    assert roboirg(*words, "--video", "off").code == 0
+
+
+def test_lost_films_are_told_once(
+    roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, canned: type[CannedPlayer]
+) -> None:
+    def play(_self: CannedPlayer, job: Job):
+        return describe(job, canned.course, started_at="now", film_lost="OSError: disk full")
+
+    monkeypatch.setattr(CannedPlayer, "__call__", play)
+    words = (*RUN, "--episodes", "2", "--workers", "0", "--video", "all", "--out", tmp_path)
+    said = roboirg(*words)
+    assert said.code == 0
+    assert said.err == (
+        "10 of 10 films could not be written, the verdicts stand; the first: OSError: disk full\n"
+    )
+    assert roboirg(*words).err == ""
 
 
 def test_a_second_run_in_the_folder_is_told_so(roboirg, tmp_path: Path) -> None:

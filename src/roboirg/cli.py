@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboirg.errors import RoboIRGError
+import roboirg
+from roboirg.errors import InvalidValueError, RoboIRGError
 
 if TYPE_CHECKING:
     from roboirg.evaluation.plan import Plan
@@ -21,6 +22,14 @@ if TYPE_CHECKING:
 # Everything heavy is imported inside the commands, so that --help answers at once.
 
 USAGE_ERROR, INTERRUPTED, TERMINATED = 2, 130, 143
+
+# The base of all that typer raises about the command line has moved between its versions.
+_WrongUsage: type[Exception] = next(
+    kind
+    for kind in typer.BadParameter.__mro__
+    if kind.__name__ == "ClickException" and issubclass(kind, Exception)
+)
+_LONGEST_COMPLAINT = 300
 
 DEMO_POLICIES = ("oracle", "listener", "forgetful")
 
@@ -54,8 +63,26 @@ Workers = Annotated[
 RetryErrors = Annotated[
     bool, typer.Option(help="Play episodes again whose newest record is an error.")
 ]
-Out = Annotated[Path, typer.Option(help="Folder of the run; give the same again to go on.")]
-Folder = Annotated[Path, typer.Argument(help="The --out folder of a run.")]
+Out = Annotated[str, typer.Option(help="Folder of the run; give the same again to go on.")]
+Folder = Annotated[str, typer.Argument(help="The --out folder of a run.")]
+
+
+def _say_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"roboirg {roboirg.__version__}")
+        raise typer.Exit
+
+
+# Eager: asked for the version, the command wants no subcommand.
+_Version = Annotated[
+    bool,
+    typer.Option("--version", callback=_say_version, is_eager=True, help="Say the version."),
+]
+
+
+@app.callback()
+def _options(*, version: _Version = False) -> None:
+    del version
 
 
 @app.command()
@@ -79,6 +106,7 @@ def run(
     """Play episodes and append one record for each to OUT/records.jsonl; resumes by itself."""
     from roboirg.evaluation.plan import make_plan
 
+    folder = _folder(out)
     # As `python -m` has it: policies in the working directory can be named.
     sys.path.insert(0, str(Path.cwd()))
     plan = make_plan(
@@ -95,8 +123,8 @@ def run(
         max_steps=max_steps,
         video=video,
     )
-    summary = _run(plan, out, workers, retry_errors=retry_errors)
-    _print_tables(out)
+    summary = _run(plan, folder, workers, retry_errors=retry_errors)
+    _print_tables(folder)
     _complain_of_errors(summary)
 
 
@@ -106,23 +134,31 @@ def report(
     videos: Annotated[bool, typer.Option(help="Put the films into the page.")] = True,
 ) -> None:
     """Print the table of a run and write FOLDER/report.html, one self-contained page."""
-    _print_tables(folder)
-    typer.echo(_write_page(folder, videos=videos))
+    from roboirg.analysis.report import check_report_support
+
+    path = _folder(folder)
+    check_report_support()
+    _print_tables(path)
+    typer.echo(_write_page(path, videos=videos))
 
 
 @app.command()
 def demo(
-    out: Out = Path("runs/demo"),
+    out: Out = "runs/demo",
     episodes: Episodes = "4",
+    video: Video = "all",
     workers: Workers = None,
 ) -> None:
     """Oracle, listener and forgetful on every task and setting, filmed; ends with a page."""
+    from roboirg.analysis.report import check_report_support
     from roboirg.evaluation.plan import make_plan
 
-    plan = make_plan(DEMO_POLICIES, episodes=episodes, video="all")
-    summary = _run(plan, out, workers, retry_errors=True)
-    _print_tables(out)
-    typer.echo(_write_page(out, videos=True))
+    folder = _folder(out)
+    plan = make_plan(DEMO_POLICIES, episodes=episodes, video=video)
+    check_report_support()
+    summary = _run(plan, folder, workers, retry_errors=True)
+    _print_tables(folder)
+    typer.echo(_write_page(folder, videos=True))
     _complain_of_errors(summary)
 
 
@@ -167,14 +203,14 @@ def instruct(
     frame: Frame = "robot",
 ) -> None:
     """Print what is said to the robot, turn by turn."""
-    from roboirg.evaluation.plan import parse_numbers
+    from roboirg.evaluation.plan import parse_stages, says_all
     from roboirg.language import instruct as make_instruction
     from roboirg.splits import get_episode
     from roboirg.tasks import get_task
 
-    spoken = parse_numbers("stage", stages)
+    spoken = parse_stages(stages)
     found = get_episode(task, split, episode)
-    for name in get_task(task).settings if setting == "all" else (setting,):
+    for name in get_task(task).settings if says_all(setting) else (setting,):
         instruction = make_instruction(
             found, name, form, stages=spoken, distractor=distractor, frame=frame
         )
@@ -186,10 +222,38 @@ def instruct(
 def main() -> None:
     """The console script: errors are one sentence on stderr, never a traceback."""
     try:
-        app()
+        code = app(prog_name="roboirg", standalone_mode=False)
     except RoboIRGError as error:
         typer.echo(f"roboirg: {error}", err=True)
         sys.exit(USAGE_ERROR)
+    except _WrongUsage as error:
+        sys.exit(_explain(error))
+    except typer.Abort:
+        sys.exit(INTERRUPTED)
+    # What `typer.Exit` was raised with; commands themselves return nothing.
+    sys.exit(code)
+
+
+def _explain(error: Exception) -> int:
+    """Tell what was wrong with the words of the command line; the exit code."""
+    # By name, for the same reason.
+    message = str(getattr(error, "format_message", error.__str__)())
+    if type(error).__name__ == "NoArgsIsHelpError":
+        typer.echo(message.rstrip(), err=True)
+        return USAGE_ERROR
+    words = " ".join(message.split()).rstrip(".")
+    if len(words) > _LONGEST_COMPLAINT:
+        words = f"{words[:_LONGEST_COMPLAINT]}…"
+    context = getattr(error, "ctx", None)
+    command = getattr(context, "command_path", "roboirg")
+    typer.echo(f"roboirg: {words}; see {command} --help.", err=True)
+    return USAGE_ERROR
+
+
+def _folder(text: str) -> Path:
+    if not text.strip():
+        raise InvalidValueError("The folder of the run is an empty text; give it a name.")
+    return Path(text)
 
 
 def _run(plan: Plan, out: Path, workers: int | None, *, retry_errors: bool) -> Summary:
@@ -198,7 +262,7 @@ def _run(plan: Plan, out: Path, workers: int | None, *, retry_errors: bool) -> S
     from roboirg.evaluation.executors import choose_executor
     from roboirg.evaluation.progress import ConsoleReporter
     from roboirg.evaluation.rollout import Player
-    from roboirg.evaluation.runner import Terminated, run_plan, torn_notice
+    from roboirg.evaluation.runner import Terminated, run_plan
     from roboirg.evaluation.video import check_video_support
 
     if plan.video != "off":
@@ -219,9 +283,12 @@ def _run(plan: Plan, out: Path, workers: int | None, *, retry_errors: bool) -> S
             f"Stopped; {out} keeps what ended. The same command goes on from there.", err=True
         )
         sys.exit(TERMINATED if isinstance(interrupt, Terminated) else INTERRUPTED)
-    notice = torn_notice(summary, out)
-    if notice:
-        typer.echo(notice, err=True)
+    if summary.unfilmed:
+        typer.echo(
+            f"{len(summary.unfilmed)} of {summary.played} films could not be written, the verdicts "
+            f"stand; the first: {summary.unfilmed[0].film_lost}",
+            err=True,
+        )
     return summary
 
 

@@ -30,6 +30,8 @@ class Page(HTMLParser):
         self.marks: list[str] = []
         self.videos: list[dict[str, str | None]] = []
         self.links: list[str] = []
+        self.selects: list[str | None] = []
+        self.cells: list[dict[str, str | None]] = []
         self.feed(text)
         assert self.open == []
 
@@ -39,6 +41,10 @@ class Page(HTMLParser):
             self.open.append(tag)
         if tag == "article":
             self.cards.append(fields)
+        if tag == "select":
+            self.selects.append(fields["name"])
+        if str(fields.get("class", "")).startswith("cell"):
+            self.cells.append(fields)
         if tag == "video":
             self.videos.append(fields)
         self.links += [str(fields[name]) for name in ("src", "href", "poster") if name in fields]
@@ -75,6 +81,37 @@ def test_every_episode_is_there_and_nothing_comes_from_outside() -> None:
         )
     assert all(link.startswith(("#", "data:")) for link in page.links)
     assert not re.search(r"https?:|@import|url\(", text)
+
+
+def test_the_rules_are_filters_only_where_there_are_several() -> None:
+    one = render(records())
+    assert Page(one).selects == ["policy", "task", "setting", "outcome", "difficulty"]
+    assert "policy seed" not in one
+
+    jobs = [
+        job.model_copy(update={"split": split, "policy_seed": seed, "max_steps": 100 + seed})
+        for job in PLAN.jobs()[:2]
+        for split in ("test", "val")
+        for seed in (0, 7)
+    ]
+    many = [describe(job, Course("success", None), started_at="now") for job in jobs]
+    page = Page(render(many))
+    assert page.selects == [
+        "policy", "task", "setting", "split", "seed", "limit", "outcome", "difficulty",
+    ]  # fmt: skip
+    assert {(card["data-split"], card["data-seed"], card["data-limit"]) for card in page.cards} == {
+        ("test", "0", "100"), ("test", "7", "107"), ("val", "0", "100"), ("val", "7", "107"),
+    }  # fmt: skip
+    assert {(cell["data-split"], cell["data-limit"]) for cell in page.cells} == {
+        ("test", "100"), ("test", "107"), ("val", "100"), ("val", "107"),
+    }  # fmt: skip
+    assert "policy seed 7" in render(many)
+
+
+def test_privileged_policies_are_marked() -> None:
+    assert "listener (privileged)" in render(records())
+    job = PLAN.jobs()[0].model_copy(update={"policy": "random"})
+    assert "rivileged" not in render([describe(job, Course("success", None), started_at="now")])
 
 
 def test_words_are_escaped() -> None:

@@ -121,12 +121,12 @@ def test_unusual_tellings_have_columns_of_their_own() -> None:
 
 def test_policies_and_rules_have_panels_of_their_own() -> None:
     records = [record("success", split=split) for split in ("test", "val")]
-    records += [record("success", policy="oracle"), record("success", max_steps=200)]
+    records += [record("success", policy="random"), record("success", max_steps=200)]
     assert [panel.label for panel in make_panels(records)] == [
-        "listener · test · at most 1300 steps",
-        "listener · val · at most 1300 steps",
-        "oracle · test · at most 1300 steps",
-        "listener · test · at most 200 steps",
+        "listener (privileged) · test · at most 1300 steps",
+        "listener (privileged) · val · at most 1300 steps",
+        "random · test · at most 1300 steps",
+        "listener (privileged) · test · at most 200 steps",
     ]
 
 

@@ -30,6 +30,24 @@ def test_the_table_says_rates_gaps_and_what_is_amiss() -> None:
     assert "ended in an error" in text
     assert "still to be played" in text
     assert "all tasks" not in text  # there is only one
+    assert "in brackets the gap" in text
+    assert "privileged" not in text
+
+
+def test_the_legend_says_nothing_about_what_is_not_there() -> None:
+    panel = Panel(
+        "oracle (privileged)",
+        Condition("oracle", "test", 1300),
+        ("PickXtimes",),
+        (EXPLICIT,),
+        {("PickXtimes", EXPLICIT): Cell(4, 0, pairs=4, gap=0.0)},
+        privileged=True,
+    )
+    console = Console(file=io.StringIO(), width=100)
+    print_tables([panel], console)
+    text = " ".join(console.file.getvalue().split())  # type: ignore[attr-defined]
+    assert "in brackets" not in text
+    assert "privileged policies look behind the scenes" in text
 
 
 def test_points_have_a_sign() -> None:

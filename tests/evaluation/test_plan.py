@@ -10,6 +10,7 @@ from roboirg.evaluation.plan import (
     make_plan,
     parse_episodes,
     parse_numbers,
+    parse_stages,
     read_plan,
     write_plan,
 )
@@ -26,11 +27,35 @@ def test_a_number_is_the_first_episodes_and_a_list_is_a_list() -> None:
     assert parse_numbers("stage", "1,5,1") == (1, 5)
 
 
-@pytest.mark.parametrize("text", ["0", "-3", "a", "3-1", "1.5", "", ",", "1,,b"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0", "-3", "a", "3-1", "1.5", "", ",", "1,,b", "300000000", "0-999999999",
+        "9" * 5000, "0," + "9" * 5000, "a" * 5000,
+    ],
+)  # fmt: skip
 def test_what_is_no_list_is_one_sentence(text: str) -> None:
     with pytest.raises(InvalidValueError) as caught:
         parse_episodes(text)
     assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 200
+
+
+def test_sentences_about_numbers_say_what_would_be_right() -> None:
+    with pytest.raises(InvalidValueError, match=r"for episode 0 alone write '0,'\.$"):
+        parse_episodes("0")
+    with pytest.raises(InvalidValueError, match="split 'train' has episodes 0 to 99"):
+        parse_episodes("0-999999999", "train")
+    with pytest.raises(InvalidValueError, match="1,5; 1,2,5; 1,2,3,5; 1,2,3,4,5"):
+        parse_stages("5-1")
+    with pytest.raises(InvalidValueError, match="1000000000 numbers is too long"):
+        parse_numbers("policy seed", "0-999999999")
+
+
+@pytest.mark.parametrize("text", ["all", "ALL", "all,explicit", "direct, All"])
+def test_all_means_all_wherever_it_stands(text: str) -> None:
+    assert make_plan(["random"], settings=text, episodes="1").settings == "all"
+    assert make_plan(["random"], tasks=text, episodes="1").tasks == tuple(all_tasks())
 
 
 def test_all_settings_are_those_that_each_episode_can_be_told_in() -> None:

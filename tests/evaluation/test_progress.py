@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import io
 
+import pytest
 from evaluation_fakes import FakePlay, small_plan
 from rich.console import Console
 
@@ -34,6 +35,11 @@ def test_elsewhere_every_episode_is_one_plain_line() -> None:
     assert lines[1].startswith("[3/6] random PickXtimes test/0 explicit: success")
     assert len(lines) == 5
     assert "\x1b" not in "".join(lines)
+
+
+def test_a_notice_is_said_at_once_on_stderr(capsys: pytest.CaptureFixture[str]) -> None:
+    ConsoleReporter(Console(file=io.StringIO())).notice("Mind the gap.")
+    assert capsys.readouterr().err == "Mind the gap.\n"
 
 
 def test_errors_are_in_the_score_but_in_no_rate() -> None:

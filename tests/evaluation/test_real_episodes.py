@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
 from roboirg.evaluation.plan import read_plan
-from roboirg.evaluation.store import read_records
+from roboirg.evaluation.store import RECORDS_FILE, read_records
 
 pytestmark = pytest.mark.sim
 
@@ -73,3 +74,44 @@ def test_missing_vulkan_is_one_sentence_and_loses_nothing(tmp_path: Path) -> Non
     assert said.stderr.count("\n") == 1
     assert len(read_records(tmp_path / "o")) == 1
     assert read_plan(tmp_path / "o") is not None
+
+
+SMALL_RUN = (
+    "run", "--policy", "forgetful", "--policy", "listener", "--tasks", "VideoUnmask",
+    "--settings", "direct,contextual", "--episodes", "2",
+)  # fmt: skip
+
+
+def comparable(folder: Path) -> list[dict[str, object]]:
+    records = sorted(read_records(folder), key=lambda record: record.slug)
+    return [record.comparable() for record in records]
+
+
+def kill_in_the_middle(folder: Path, *words: str) -> None:
+    """Begin the small run and SIGKILL it when two of its eight records are there."""
+    child = subprocess.Popen([sys.executable, "-m", "roboirg", *words], stdout=subprocess.DEVNULL)
+    path, deadline = folder / RECORDS_FILE, time.monotonic() + 60
+    while not path.exists() or path.read_bytes().count(b"\n") < 2:
+        assert child.poll() is None
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    child.kill()
+    child.wait()
+
+
+def test_workers_and_kills_leave_no_trace_in_the_records(tmp_path: Path) -> None:
+    folders = [tmp_path / name for name in ("one", "two", "killed")]
+    words = [
+        (*SMALL_RUN, "--workers", str(min(number, 2)), "--out", str(folder))
+        for number, folder in enumerate(folders, start=1)
+    ]
+    kill_in_the_middle(folders[2], *words[2])
+    assert 2 <= len(read_records(folders[2])) < 8
+    for run in words:
+        said = command(*run, cwd=tmp_path)
+        assert said.returncode == 0, said.stderr
+    one, two, killed = map(comparable, folders)
+    assert len(one) == 8
+    assert {record["outcome"] for record in one} == {"success", "failure"}
+    assert two == one
+    assert killed == one

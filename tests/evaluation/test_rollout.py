@@ -19,7 +19,7 @@ from roboirg.errors import (
 from roboirg.evaluation import rollout
 from roboirg.evaluation.record import Job
 from roboirg.evaluation.rollout import Player, load_policy, one_line, play_episode
-from roboirg.evaluation.video import VideoOptions
+from roboirg.evaluation.video import Film, VideoOptions
 
 JOB = Job(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
 
@@ -56,18 +56,20 @@ class PaperWorld:
         shown = {"joint_positions": np.zeros((3, 7))}
         return {}, {"demonstration": shown, "elapsed_steps": 4, "events": [first]}
 
-    def step(self, action: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        assert action.shape == (8,)
+    def step_chunk(self, actions: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        assert actions.shape[1:] == (8,)
         if self.trouble:
             raise self.trouble
-        self.steps += 1
-        if self.hook:
-            self.hook(self, False)
+        for _ in actions[: self.length - self.steps]:
+            self.steps += 1
+            if self.hook:
+                self.hook(self, False)
         over = self.steps == self.length
         event = {"step": 4 + self.steps, "kind": "picked", "subject": "cube", "place": None}
         info = {
             "status": self.status if over else "ongoing",
             "cause": self.cause if over else None,
+            "steps": self.steps,
             "events": [{**event, "holds": True}] if over else [],
         }
         return {}, 0.0, over and self.status != "timeout", over and self.status == "timeout", info
@@ -88,7 +90,7 @@ class PaperPolicy:
 
     def act(self, observation: Any) -> Any:
         del observation
-        if isinstance(self.answer, Exception):
+        if isinstance(self.answer, BaseException):
             raise self.answer
         return self.answer
 
@@ -152,6 +154,7 @@ def test_the_judge_decides(
     [
         (ValueError("bad weights"), "policy: ValueError: bad weights"),
         (MotionPlanningError("no path to the cube"), "policy: no path to the cube"),
+        (SystemExit(3), "policy: SystemExit: 3"),
         (np.zeros((2, 7)), "invalid action: .*shape"),
         (np.zeros((0, 8)), "invalid action: .*shape"),
         (np.full((2, 8), np.nan), "invalid action: .*nan"),
@@ -231,3 +234,67 @@ def test_films_are_kept_as_asked(
     assert files == ([".jpg", ".mp4"] if filmed else [])
     if record.video:
         assert record.video == f"videos/{JOB.slug}.mp4"
+
+
+class Broken:
+    """A container that can be written to no longer, as on a full disk."""
+
+    def mux(self, packets: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    def close(self) -> None:
+        raise OSError(28, "No space left on device")
+
+
+@pytest.mark.parametrize("after", [1, 3, 8])
+def test_a_film_that_cannot_be_written_does_not_touch_the_verdict(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, after: int
+) -> None:
+    real, count = Film._add, 0
+
+    def add(film: Film, frame: np.ndarray) -> None:
+        nonlocal count
+        if count == after:
+            film._container = Broken()  # type: ignore[assignment]
+        count += 1
+        real(film, frame)
+
+    monkeypatch.setattr(Film, "_add", add)
+    monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: PaperWorld(5))
+    monkeypatch.setattr(rollout, "load_policy", lambda _job: PaperPolicy())
+    film = VideoOptions(cameras=("front",))
+    record = Player(tmp_path, "all", film)(JOB)
+    assert (record.outcome, record.steps, record.video) == ("success", 5, None)
+    assert "No space left on device" in str(record.film_lost)
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+def test_a_folder_of_films_that_is_a_file_does_not_touch_the_verdict(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "videos").touch()
+    monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: PaperWorld(5))
+    monkeypatch.setattr(rollout, "load_policy", lambda _job: PaperPolicy())
+    record = Player(tmp_path, "all", VideoOptions(cameras=("front",)))(JOB)
+    assert (record.outcome, record.video) == ("success", None)
+    assert "FileExistsError" in str(record.film_lost)
+    assert "film_lost" not in record.comparable()
+
+
+def test_wrong_cameras_of_an_object_are_the_policys_fault(
+    stage: Callable[..., rollout.Course],
+) -> None:
+    policy = PaperPolicy()
+    policy.cameras = "front"  # type: ignore[assignment]
+    course = stage(PaperWorld(), policy)
+    assert course.cause == "policy: cameras is the text 'front'; write ('front',)."
+
+
+def test_a_record_says_what_is_in_the_words_and_who_cheats() -> None:
+    job = JOB.model_copy(update={"setting": "reasoning", "policy": "oracle"})
+    record = rollout.describe(job, rollout.Course("success", None), started_at="now")
+    assert record.metadata["pattern"]
+    assert record.metadata["templates"]
+    assert record.privileged
+    assert not rollout.describe(JOB, rollout.Course(), started_at="now").privileged
+    assert type(record).model_validate_json(record.model_dump_json()) == record

@@ -16,7 +16,8 @@ from evaluation_fakes import FakePlay, is_alive, small_plan, starts, worker_pids
 from roboirg.errors import InvalidValueError, RenderDeviceError
 from roboirg.evaluation.executors import InProcess, LocalProcesses, choose_executor
 from roboirg.evaluation.plan import read_plan
-from roboirg.evaluation.record import Record
+from roboirg.evaluation.progress import Silent
+from roboirg.evaluation.record import Job, Record
 from roboirg.evaluation.runner import Summary, run_plan
 from roboirg.evaluation.store import RECORDS_FILE, RecordStore, StoreError, read_records
 
@@ -154,6 +155,60 @@ def test_words_of_two_versions_are_not_mixed(
     with pytest.raises(StoreError, match=r"language version .*, but this roboirg speaks 99\.0"):
         run_plan(small_plan(2), tmp_path, FakePlay(), InProcess())
     assert len(read_records(tmp_path)) == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "sentence"),
+    [
+        ("seed", 7, r"PickXtimes test/0 with the scene of seed 7, but .* has \d+; choose another"),
+        ("environment_version", 99, "of environment version 99, but this roboirg has version 0;"),
+        ("task", "Gone", r"Gone test/0 .* no such episode"),
+    ],
+)
+def test_worlds_of_two_versions_are_not_mixed(
+    tmp_path: Path, name: str, value: object, sentence: str
+) -> None:
+    record = FakePlay()(small_plan(1).jobs()[0]).model_copy(update={name: value})
+    with RecordStore(tmp_path) as store:
+        store.append(record)
+    with pytest.raises(StoreError, match=sentence):
+        run_plan(small_plan(2), tmp_path, FakePlay(), InProcess())
+    assert len(read_records(tmp_path)) == 1
+    assert read_plan(tmp_path) is None
+
+
+class Ears(Silent):
+    """Hears notices, and how many episodes had been played before the last one."""
+
+    def __init__(self) -> None:
+        self.notices: list[str] = []
+        self.played = 0
+
+    def advance(self, record: Record) -> None:
+        self.played += 1
+
+    def notice(self, text: str) -> None:
+        assert self.played == 0
+        self.notices.append(text)
+
+
+def test_a_torn_line_is_told_before_anything_is_played(tmp_path: Path) -> None:
+    (tmp_path / RECORDS_FILE).write_bytes(b'{"policy":"random","ta')
+    ears = Ears()
+    run_plan(small_plan(1), tmp_path, FakePlay(), InProcess(), reporter=ears)
+    (notice,) = ears.notices
+    assert "22 bytes were moved to" in notice
+    assert "again" not in notice
+    assert ears.played == 2
+
+
+def test_films_that_were_lost_are_counted(tmp_path: Path) -> None:
+    def play(job: Job) -> Record:
+        return FakePlay()(job).model_copy(update={"film_lost": "OSError: disk full"})
+
+    summary = run_plan(small_plan(1), tmp_path, play, InProcess())
+    assert len(summary.unfilmed) == 2
+    assert not run_plan(small_plan(1), tmp_path, play, InProcess()).unfilmed
 
 
 def test_workers_are_counted() -> None:

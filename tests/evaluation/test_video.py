@@ -44,6 +44,20 @@ def test_a_film_thrown_away_leaves_nothing(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+class Broken:
+    def close(self) -> None:
+        raise OSError("disk full")
+
+
+def test_throwing_away_never_raises(tmp_path: Path) -> None:
+    film = Film(tmp_path / "x.mp4", VideoOptions(cameras=("front",)))
+    film._container = Broken()  # type: ignore[assignment]
+    film.partial.mkdir()  # cannot be unlinked
+    film.discard()
+    assert film._container is None
+    assert not film.finish()
+
+
 def test_only_the_demonstration_has_a_border() -> None:
     pictures = [Grey().picture("front"), Grey().picture("wrist")]
     assert tuple(compose(pictures, is_demonstration=True)[0, 0]) == DEMONSTRATION_COLOUR

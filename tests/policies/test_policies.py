@@ -8,7 +8,7 @@ from roboirg.actions import ACTION_HIGH, ACTION_LOW, check_chunk
 from roboirg.errors import InvalidValueError, UnknownNameError
 from roboirg.policies import Policy, PrivilegedPolicy, load_policy_class, make_policy
 from roboirg.policies.listeners import ForgetfulPolicy, ListenerPolicy
-from roboirg.policies.loading import BUILTIN
+from roboirg.policies.loading import BOTH_CAMERAS, BUILTIN, is_privileged, wanted_cameras
 from roboirg.tasks import all_tasks
 
 
@@ -52,6 +52,19 @@ class Deaf:
         pass
 
 
+class Needy(Silent):
+    """Cannot be made without an argument."""
+
+    def __init__(self, weights, seed):
+        self.weights, self.seed = weights, seed
+
+
+class Numb(Silent):
+    """Cannot be asked to act."""
+
+    act = 3
+
+
 def test_own_policies_are_named_by_import_path():
     assert isinstance(make_policy(f"{__name__}:Silent", 0), Silent)
 
@@ -63,12 +76,72 @@ def test_own_policies_are_named_by_import_path():
         ("no_such_package.policy:It", InvalidValueError, "cannot be imported"),
         ("roboirg.policies.random:Missing", InvalidValueError, "no class 'Missing'"),
         (f"{__name__}:Deaf", InvalidValueError, r"no method act\(\)"),
-        (f"{__name__}:pytest", InvalidValueError, "no class 'pytest'"),
+        ("roboirg.policies.random:", InvalidValueError, "no class ''"),
+        (
+            "json:loads",
+            InvalidValueError,
+            "'loads' in module json is no class but of type function",
+        ),
+        (f"{__name__}:pytest", InvalidValueError, "'pytest' .* of type module"),
+        (
+            f"{__name__}:Needy",
+            InvalidValueError,
+            r"Needy\(\) .* needs 'weights'; give it a default",
+        ),
+        (f"{__name__}:Numb", InvalidValueError, "act of class Numb is no method"),
+        ("roboirg.policies.handed:HandedPolicy", InvalidValueError, "is abstract; it lacks decide"),
     ],
 )
 def test_wrong_specs_are_explained(spec, error, words):
     with pytest.raises(error, match=words):
         load_policy_class(spec)
+
+
+@pytest.mark.parametrize(
+    ("cameras", "words"),
+    [
+        ("front", r"write \('front',\)"),
+        (("front", "wirst"), r"Did you mean 'wrist'\?"),
+        ({"front"}, "of type set; it has to be a tuple"),
+        (None, "of type NoneType"),
+        (("front", "front"), "names 'front' twice"),
+    ],
+)
+def test_wrong_cameras_are_told_before_anything_starts(monkeypatch, cameras, words):
+    monkeypatch.setattr(Silent, "cameras", cameras, raising=False)
+    with pytest.raises(InvalidValueError, match=f"{__name__}:Silent'.*{words}"):
+        load_policy_class(f"{__name__}:Silent")
+
+
+def test_cameras_may_be_a_list_or_a_property(monkeypatch):
+    monkeypatch.setattr(Silent, "cameras", ["wrist"], raising=False)
+    assert wanted_cameras(load_policy_class(f"{__name__}:Silent")) == ("wrist",)
+    monkeypatch.setattr(Silent, "cameras", property(lambda _self: ("front",)))
+    assert wanted_cameras(make_policy(f"{__name__}:Silent", 0)) == ("front",)
+    assert wanted_cameras(Deaf) == BOTH_CAMERAS
+
+
+@pytest.mark.sim
+def test_cameras_are_those_of_the_world():
+    from roboirg.simulation.cameras import CAMERAS
+
+    assert tuple(CAMERAS) == BOTH_CAMERAS
+
+
+def test_whoever_looks_behind_the_scenes_is_known():
+    assert [is_privileged(name) for name in ("oracle", "forgetful", "random", "nobody")] == [
+        True, True, False, False,
+    ]  # fmt: skip
+
+
+def test_a_module_that_exits_or_complains_at_length_is_one_sentence(tmp_path, monkeypatch):
+    (tmp_path / "exiting_policy.py").write_text("raise SystemExit('no GPU')\n")
+    (tmp_path / "wordy_policy.py").write_text("raise RuntimeError('one\\n  two\\n\\nthree')\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(InvalidValueError, match=r"\(SystemExit: no GPU\)"):
+        load_policy_class("exiting_policy:It")
+    with pytest.raises(InvalidValueError, match=r"\(RuntimeError: one two three\)"):
+        load_policy_class("wordy_policy:It")
 
 
 def test_a_module_that_breaks_is_named_with_what_broke(tmp_path, monkeypatch):

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, get_args
 
 from roboirg.analysis.statistics import EXPLICIT, Cell, Panel, Variant, make_panels
 from roboirg.analysis.tables import ALL_TASKS, percent, points
+from roboirg.episode import DIFFICULTIES, SPLITS
 from roboirg.errors import MissingDependencyError
-from roboirg.evaluation.record import EventRecord, Job, MentionSpan, Record
+from roboirg.evaluation.record import EventRecord, Job, MentionSpan, Outcome, Record
 from roboirg.evaluation.store import read_records, write_atomically
 
 if TYPE_CHECKING:
@@ -40,6 +41,14 @@ class Line(NamedTuple):
 
     stage: str
     segments: tuple[Segment, ...]
+
+
+class Choice(NamedTuple):
+    """A filter: its name in the page's data, what it is called, and what it offers."""
+
+    name: str
+    label: str
+    values: tuple[str, ...]
 
 
 class Mark(NamedTuple):
@@ -74,6 +83,8 @@ class HeatCell:
     policy: str
     task: str | None
     setting: str
+    split: str
+    max_steps: int
     rate: float | None
     text: str
     gap: str
@@ -135,6 +146,16 @@ def render(
             rows=[row for panel in panels for row in _heat_rows(panel, variants)],
             cards=[_card(number, record, folder) for number, record in enumerate(ordered, 1)],
             choices=_choices(ordered),
+            several={
+                name: len({getattr(record, name) for record in records}) > 1
+                for name in ("policy_seed", "max_steps")
+            },
+            has_privileged=any(record.privileged for record in records),
+            has_gaps=any(
+                cell.gap is not None and variant != EXPLICIT
+                for panel in panels
+                for (_, variant), cell in panel.cells.items()
+            ),
             counts={
                 outcome: sum(record.outcome == outcome for record in records)
                 for outcome in ("success", "failure", "error")
@@ -146,14 +167,25 @@ def render(
     )
 
 
-def _environment() -> jinja2.Environment:
+def check_report_support() -> None:
+    """Complain now if the page cannot be made.
+
+    Raises:
+        MissingDependencyError: Jinja is not installed.
+    """
     try:
-        import jinja2
+        import jinja2  # noqa: F401 - an extra
     except ImportError as error:
         raise MissingDependencyError(
             f"The report needs Jinja, which is not installed ({error}); run: "
             "pip install 'roboirgbench[report]'"
         ) from error
+
+
+def _environment() -> jinja2.Environment:
+    check_report_support()
+    import jinja2
+
     return jinja2.Environment(
         loader=jinja2.PackageLoader("roboirg.analysis"),
         autoescape=True,
@@ -169,21 +201,32 @@ def _order(record: Record) -> tuple[object, ...]:
     return (record.task, record.split, record.episode, told, record.policy_seed, record.policy)
 
 
-def _choices(records: Sequence[Record]) -> dict[str, list[str]]:
-    """What each filter offers."""
+def _choices(records: Sequence[Record]) -> list[Choice]:
+    """The filters; of the rules under which was played only those of which there are several."""
     variants = sorted({Variant.of(record) for record in records}, key=Variant.sort_key)
-    return {
-        "policy": list(dict.fromkeys(record.policy for record in records)),
-        "task": list(dict.fromkeys(record.task for record in records)),
-        "setting": [variant.label for variant in variants],
-        "outcome": _present(records, "outcome", ("success", "failure", "error")),
-        "difficulty": _present(records, "difficulty", ("easy", "medium", "hard")),
-    }
+    settings = tuple(variant.label for variant in variants)
+    rules = (
+        Choice("split", "split", _present(records, "split", SPLITS)),
+        Choice("seed", "policy seed", _numbers(record.policy_seed for record in records)),
+        Choice("limit", "step limit", _numbers(record.max_steps for record in records)),
+    )
+    return [
+        Choice("policy", "policy", tuple(dict.fromkeys(record.policy for record in records))),
+        Choice("task", "task", tuple(dict.fromkeys(record.task for record in records))),
+        Choice("setting", "setting", settings),
+        *(rule for rule in rules if len(rule.values) > 1),
+        Choice("outcome", "outcome", _present(records, "outcome", get_args(Outcome))),
+        Choice("difficulty", "difficulty", _present(records, "difficulty", DIFFICULTIES)),
+    ]
 
 
-def _present(records: Sequence[Record], name: str, order: Sequence[str]) -> list[str]:
+def _present(records: Sequence[Record], name: str, order: Sequence[str]) -> tuple[str, ...]:
     values = {str(getattr(record, name)) for record in records}
-    return [value for value in order if value in values]
+    return tuple(value for value in order if value in values)
+
+
+def _numbers(values: Iterable[int]) -> tuple[str, ...]:
+    return tuple(map(str, sorted(set(values))))
 
 
 def _heat_rows(panel: Panel, variants: Sequence[Variant]) -> list[HeatRow]:
@@ -206,6 +249,8 @@ def _heat_cell(panel: Panel, task: str | None, variant: Variant) -> HeatCell | N
         policy=panel.condition.policy,
         task=task,
         setting=variant.label,
+        split=panel.condition.split,
+        max_steps=panel.condition.max_steps,
         rate=cell.rate,
         text="–" if cell.rate is None else percent(cell.rate),
         gap=points(cell.gap) if has_gap and cell.gap is not None else "",
@@ -310,6 +355,6 @@ def _data_uri(path: Path | None, kind: str) -> str | None:
         return None
     try:
         data = path.read_bytes()
-    except FileNotFoundError:
+    except OSError:
         return None
     return f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"

@@ -144,11 +144,12 @@ class Panel:
     """All that one policy did under the same rules.
 
     Attributes:
-        label: the policy, and the rules where there are several.
+        label: the policy, whether it is privileged, and the rules where there are several.
         condition: policy and rules.
         tasks: the rows.
         variants: the columns.
         cells: by task (None: all tasks together) and variant.
+        privileged: whether the policy looks behind the scenes.
     """
 
     label: str
@@ -156,6 +157,7 @@ class Panel:
     tasks: tuple[str, ...]
     variants: tuple[Variant, ...]
     cells: Mapping[tuple[str | None, Variant], Cell]
+    privileged: bool = False
 
     @property
     def is_complete(self) -> bool:
@@ -176,12 +178,14 @@ def make_panels(records: Sequence[Record], planned: Sequence[Job] = ()) -> tuple
     conditions = list(dict.fromkeys(Condition.of(job) for job in [*planned, *everything]))
     tasks = tuple(dict.fromkeys(job.task for job in [*planned, *everything]))
     variants = tuple(sorted({Variant.of(job) for job in everything}, key=Variant.sort_key))
+    privileged = {record.policy for record in records if record.privileged}
     return tuple(
         _make_panel(
             condition,
             [record for record in records if Condition.of(record) == condition],
             [job for job in missing if Condition.of(job) == condition],
-            label=_label(condition, conditions),
+            label=_label(condition, conditions, privileged=condition.policy in privileged),
+            privileged=condition.policy in privileged,
             tasks=tasks,
             variants=variants,
         )
@@ -195,6 +199,7 @@ def _make_panel(
     missing: Sequence[Job],
     *,
     label: str,
+    privileged: bool,
     tasks: tuple[str, ...],
     variants: tuple[Variant, ...],
 ) -> Panel:
@@ -214,7 +219,7 @@ def _make_panel(
     cells = {key: _make_cell(groups[key], lacking[key], explicit) for key in {*groups, *lacking}}
     own_tasks = tuple(task for task in tasks if any(row == task for row, _ in cells))
     own_variants = tuple(variant for variant in variants if (None, variant) in cells)
-    return Panel(label, condition, own_tasks, own_variants, cells)
+    return Panel(label, condition, own_tasks, own_variants, cells, privileged)
 
 
 def _make_cell(
@@ -241,8 +246,8 @@ def _pair_key(record: Record) -> tuple[object, ...]:
     return (record.task, record.episode, record.policy_seed)
 
 
-def _label(condition: Condition, conditions: Sequence[Condition]) -> str:
-    label = condition.policy
+def _label(condition: Condition, conditions: Sequence[Condition], *, privileged: bool) -> str:
+    label = f"{condition.policy} (privileged)" if privileged else condition.policy
     if len({other.split for other in conditions}) > 1:
         label += f" · {condition.split}"
     if len({other.max_steps for other in conditions}) > 1:

@@ -46,12 +46,20 @@ def print_tables(panels: Sequence[Panel], console: Console) -> None:
         console.width = max(console.width, MINIMUM_WIDTH)
     for panel in panels:
         console.print(make_table(panel))
-    legend = "success rate in %, in brackets the gap to explicit on the same episodes in points"
+    legend = "success rate in %"
     cells = [cell for panel in panels for cell in panel.cells.values()]
+    if any(
+        cell.gap is not None and cell.rate is not None and variant != EXPLICIT
+        for panel in panels
+        for (_, variant), cell in panel.cells.items()
+    ):
+        legend += ", in brackets the gap to explicit on the same episodes in points"
     if any(cell.errors for cell in cells):
         legend += f"; {ERROR_MARK} episodes ended in an error and are in no rate"
     if any(cell.missing for cell in cells):
         legend += f"; {MISSING_MARK} episodes are still to be played"
+    if any(panel.privileged for panel in panels):
+        legend += "; privileged policies look behind the scenes"
     console.print(legend, style="dim", highlight=False)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -20,6 +20,12 @@ from roboirg.evaluation.record import (
 )
 from roboirg.evaluation.store import write_atomically
 from roboirg.language.instruction import FORMS, SETTINGS, Instruction
+
+_MOST_NUMBERS = 10_000
+_MOST_DIGITS = 18
+_LONGEST_WORD = 40
+_NUMBERS_HINT = "write numbers and ranges such as 0,3,5-9"
+_WHOLE: Literal["all"] = "all"
 
 PLAN_FILE = "plan.json"
 
@@ -146,8 +152,8 @@ def make_plan(
 
     Args:
         policies: names.
-        tasks: names separated by commas, or ``all``.
-        settings: names separated by commas, or ``all``.
+        tasks: names separated by commas, or ``all``, alone or among them.
+        settings: names separated by commas, or ``all``, alone or among them.
         forms: names separated by commas.
         episodes: ``4`` for the first four, or a list such as ``0,3,5-9``.
         policy_seeds: a list of numbers.
@@ -158,18 +164,18 @@ def make_plan(
         UnknownNameError: something does not exist; names the nearest.
         InvalidValueError: a number or combination is out of range.
     """
-    video = options.get("video", "off")
+    video, split = options.get("video", "off"), str(options.get("split", "test"))
     if video not in VIDEO_MODES:
         raise UnknownNameError("video mode", video, VIDEO_MODES)
     try:
         plan = Plan(
             policies=parse_names("policy", ",".join(policies)),
             tasks=_task_names(tasks),
-            settings="all" if settings == "all" else parse_names("setting", settings),
+            settings=_WHOLE if says_all(settings) else parse_names("setting", settings),
             forms=parse_names("form", forms),
-            episodes=parse_episodes(episodes),
+            episodes=parse_episodes(episodes, split),
             policy_seeds=parse_numbers("policy seed", policy_seeds),
-            stages=parse_numbers("stage", stages),
+            stages=parse_stages(stages),
             **options,  # type: ignore[arg-type]
         )
     except ValidationError as error:
@@ -204,38 +210,96 @@ def parse_names(kind: str, text: str) -> tuple[str, ...]:
     return names
 
 
-def parse_episodes(text: str) -> tuple[int, ...]:
+def says_all(text: str) -> bool:
+    """Whether a list of names is, or contains, the word for all of them."""
+    return _WHOLE in (word.strip().lower() for word in text.split(","))
+
+
+def parse_episodes(text: str, split: str = "test") -> tuple[int, ...]:
     """``4`` is the first four episodes; with a comma or a dash it is a list of positions.
 
     Raises:
-        InvalidValueError: it is neither, or no episode at all.
+        UnknownNameError: there is no such split.
+        InvalidValueError: it is neither, no episode at all, or the split has fewer.
     """
-    if not re.fullmatch(r"\s*-?\d+\s*", text):
-        return parse_numbers("episode", text)
-    if int(text) < 1:
-        raise InvalidValueError(f"The number of episodes is {int(text)}; it must be at least 1.")
-    return tuple(range(int(text)))
+    size = splits.SIZES[splits.check_split(split)]
+    found = re.fullmatch(r"\s*(-?)(\d+)\s*", text)
+    if found is None:
+        ranges = _parse_ranges("episode", text, _NUMBERS_HINT)
+    else:
+        count = _number("number of episodes", found[2])
+        if found[1] or count == 0:
+            alone = "" if count else "; for episode 0 alone write '0,'"
+            raise InvalidValueError(
+                f"The number of episodes is {text.strip()}; it must be at least 1{alone}."
+            )
+        ranges = [range(count)]
+    for numbers in ranges:
+        if numbers[-1] >= size:
+            raise InvalidValueError(
+                f"There is no episode {numbers[-1]}: split {split!r} has episodes 0 to {size - 1}."
+            )
+    return _union(ranges)
+
+
+def parse_stages(text: str) -> tuple[int, ...]:
+    """Stages of the contextual setting, such as ``1,5``.
+
+    Raises:
+        InvalidValueError: it is no list of numbers.
+    """
+    sets = "; ".join(",".join(map(str, stages)) for stages in language.STAGE_SETS)
+    return _union(_parse_ranges("list of stages", text, f"the four are {sets}"))
 
 
 def parse_numbers(kind: str, text: str) -> tuple[int, ...]:
     """Numbers and ranges separated by commas, such as ``0,3,5-9``, each once, in order.
 
     Raises:
-        InvalidValueError: it is something else.
+        InvalidValueError: it is something else, or a very long list.
     """
-    numbers: list[int] = []
+    return _union(_parse_ranges(kind, text, _NUMBERS_HINT))
+
+
+def _parse_ranges(kind: str, text: str, hint: str) -> list[range]:
+    ranges = []
     for part in parse_names(kind, text):
         found = re.fullmatch(r"(\d+)(?:\s*-\s*(\d+))?", part)
-        if found is None or (found[2] and int(found[2]) < int(found[1])):
-            raise InvalidValueError(
-                f"{part!r} is no {kind}; write numbers and ranges such as 0,3,5-9."
-            )
-        numbers += range(int(found[1]), int(found[2] or found[1]) + 1)
-    return tuple(dict.fromkeys(numbers))
+        first, last = (-1, -2) if found is None else _ends(kind, found[1], found[2])
+        if last < first:
+            raise InvalidValueError(f"{_short(part)!r} is no {kind}; {hint}.")
+        ranges.append(range(first, last + 1))
+    return ranges
+
+
+def _ends(kind: str, first: str, last: str | None) -> tuple[int, int]:
+    return _number(kind, first), _number(kind, last or first)
+
+
+def _number(kind: str, digits: str) -> int:
+    if len(digits) > _MOST_DIGITS:
+        raise InvalidValueError(
+            f"The {kind} {_short(digits)} has {len(digits)} digits; "
+            f"it must have at most {_MOST_DIGITS}."
+        )
+    return int(digits)
+
+
+def _union(ranges: Sequence[range]) -> tuple[int, ...]:
+    count = sum(map(len, ranges))
+    if count > _MOST_NUMBERS:
+        raise InvalidValueError(
+            f"A list of {count} numbers is too long; at most {_MOST_NUMBERS} are allowed."
+        )
+    return tuple(dict.fromkeys(number for numbers in ranges for number in numbers))
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _LONGEST_WORD else f"{text[:_LONGEST_WORD]}…"
 
 
 def _task_names(text: str) -> tuple[str, ...]:
-    return tuple(tasks.all_tasks()) if text == "all" else parse_names("task", text)
+    return tuple(tasks.all_tasks()) if says_all(text) else parse_names("task", text)
 
 
 def say(job: Job) -> Instruction:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections import Counter
 from types import TracebackType
@@ -27,6 +28,9 @@ class Reporter(Protocol):
     def advance(self, record: Record) -> None:
         """This record is stored."""
 
+    def notice(self, text: str) -> None:
+        """A sentence that a person should read now."""
+
 
 class Silent:
     """Says nothing."""
@@ -35,6 +39,9 @@ class Silent:
         """Nothing."""
 
     def advance(self, record: Record) -> None:
+        """Nothing."""
+
+    def notice(self, text: str) -> None:
         """Nothing."""
 
 
@@ -121,6 +128,10 @@ class ConsoleReporter:
             soft_wrap=True,
             highlight=False,
         )
+
+    def notice(self, text: str) -> None:
+        """A line on stderr; a bar that is being drawn stays below it."""
+        sys.stderr.write(f"{text}\n")
 
     def __enter__(self) -> Self:
         if self._console.is_terminal:

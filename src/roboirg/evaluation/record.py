@@ -10,7 +10,7 @@ import hashlib
 import re
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, JsonValue
 
 SCHEMA_VERSION: Literal[1] = 1
 
@@ -21,8 +21,8 @@ DEFAULT_DISTRACTOR = "neutral"
 DEFAULT_FRAME = "robot"
 DEFAULT_MAX_STEPS = 1300
 
-INCIDENTALS = frozenset({"started_at", "duration_s", "video", "details"})
-"""Times and paths: all that may differ between two runs of the same command."""
+INCIDENTALS = frozenset({"started_at", "duration_s", "video", "film_lost", "details"})
+"""Times, paths and lost films: all that may differ between two runs of the same command."""
 
 
 class _Data(BaseModel):
@@ -133,11 +133,16 @@ class Record(Job):
         mentions: the referring expressions in them.
         command: the same task in plain words (the explicit setting).
         goal: what the instruction conveys, a value for each slot.
+        metadata: of the instruction: reasoning pattern, relation, stages, landmarks, template
+            ids and the like.
+        privileged: whether the policy looks behind the scenes (it has ``attach``).
         events: what happened, in order.
         video: path relative to the records file, or None.
+        film_lost: why the film that was asked for could not be written, or None.
         details: the traceback of an error, or None.
         render_device: the driver's name of the device that drew the pictures, or None.
         language_version: version of the instruction generator.
+        environment_version: version of scenes, rules and physics.
         package_version: version of roboirg.
         started_at: ISO 8601, UTC.
         duration_s: wall-clock seconds.
@@ -154,11 +159,15 @@ class Record(Job):
     mentions: tuple[MentionSpan, ...] = ()
     command: str
     goal: dict[str, str | int | tuple[str, ...]]
+    metadata: dict[str, JsonValue]
+    privileged: bool
     events: tuple[EventRecord, ...] = ()
     video: str | None = None
+    film_lost: str | None = None
     details: str | None = None
     render_device: str | None = None
     language_version: str
+    environment_version: int
     package_version: str
     started_at: str
     duration_s: float
@@ -169,5 +178,5 @@ class Record(Job):
         return Job(**{name: getattr(self, name) for name in Job.model_fields})
 
     def comparable(self) -> dict[str, object]:
-        """All fields that depend on the job alone: everything but times and paths."""
+        """All fields that depend on the job alone: everything but `INCIDENTALS`."""
         return self.model_dump(mode="json", exclude=set(INCIDENTALS))

@@ -3,16 +3,18 @@
 | what goes wrong | outcome | cause |
 | --- | --- | --- |
 | the task's rules are broken, or time is up | failure | the judge's words |
-| the policy raises | error | ``policy: …`` |
+| the policy raises, or wants to exit | error | ``policy: …`` |
 | the policy's action cannot be executed | error | ``invalid action: …`` |
 | the world or the demonstration raises | error | ``environment: …`` |
 | no Vulkan device, a missing dependency | none: the run stops | |
+| a film cannot be written | as without it | |
 """
 
 from __future__ import annotations
 
 import datetime as dt
 import importlib.metadata
+import json
 import re
 import time
 import traceback
@@ -27,7 +29,7 @@ from numpy.typing import NDArray
 
 from roboirg import language, policies
 from roboirg.actions import check_chunk
-from roboirg.episode import Episode
+from roboirg.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.errors import (
     InvalidActionError,
     MissingDependencyError,
@@ -39,6 +41,7 @@ from roboirg.evaluation.record import EventRecord, Job, MentionSpan, Outcome, Re
 from roboirg.evaluation.video import Film, VideoOptions
 from roboirg.observations import Observation
 from roboirg.policies.base import Policy, PrivilegedPolicy
+from roboirg.policies.loading import is_privileged, wanted_cameras
 from roboirg.splits import get_episode
 
 if TYPE_CHECKING:
@@ -49,7 +52,6 @@ if TYPE_CHECKING:
 Play = Callable[[Job], Record]
 """Plays one job. Executors send it to other processes, so it must pickle."""
 
-BOTH_CAMERAS = ("front", "wrist")
 VIDEO_FOLDER = "videos"
 NOTHING_DRAWN = "none"
 
@@ -82,10 +84,13 @@ class Player:
         if self.video != "off":
             film = Film(self.folder / VIDEO_FOLDER / f"{job.slug}.mp4", self.options)
         course = play_episode(job, film)
+        video = self._keep(film, course)
+        lost = None if film is None or film.trouble is None else one_line(film.trouble)
         return describe(
             job,
             course,
-            video=self._keep(film, course),
+            video=video,
+            film_lost=lost,
             started_at=started_at,
             duration_s=round(time.monotonic() - start, 3),
         )
@@ -94,12 +99,9 @@ class Player:
         if film is None:
             return None
         wanted = self.video == "all" or course.outcome != "success"
-        try:
-            if wanted and film.finish():
-                return film.path.relative_to(self.folder).as_posix()
-            film.discard()
-        except Exception:  # noqa: BLE001 - whatever FFmpeg or the disk does, the verdict stands
-            film.discard()
+        if wanted and film.finish():
+            return film.path.relative_to(self.folder).as_posix()
+        film.discard()
         return None
 
 
@@ -162,8 +164,9 @@ def play_episode(job: Job, film: Film | None = None) -> Course:
     try:
         with _blame("policy"):
             policy = load_policy(job)
+            cameras = wanted_cameras(policy)
         with _blame("environment"):
-            env = make_env(job, tuple(getattr(policy, "cameras", BOTH_CAMERAS)))
+            env = make_env(job, cameras)
         _play(job, env, policy, film, course)
     except _Fault as fault:
         course.outcome, course.cause, course.details = "error", fault.cause, fault.details
@@ -225,14 +228,13 @@ def _play(
         policy.reset(instruction, info["demonstration"])
     status, cause = "ongoing", None
     while status == "ongoing":
-        for action in _next_actions(policy, observation):
-            with _blame("environment"):
-                observation, _, terminated, truncated, info = env.step(action)
-            course.steps += 1
-            course.note(info)
-            status, cause = info["status"], info.get("cause")
-            if terminated or truncated:
-                break
+        actions = _next_actions(policy, observation)
+        with _blame("environment"):
+            seen, *_, info = world.step_chunk(actions)
+        observation = cast("Observation", seen)
+        course.steps = int(info["steps"])
+        course.note(info)
+        status, cause = info["status"], info.get("cause")
     _judge(job, status, cause, course)
 
 
@@ -264,7 +266,7 @@ def _blame(whom: str) -> Iterator[None]:
         raise
     except InvalidActionError as error:
         raise _Fault(f"invalid action: {error}", traceback.format_exc()) from error
-    except Exception as error:  # the boundary: anything is possible in there
+    except (Exception, SystemExit) as error:  # the boundary: anything is possible in there
         raise _Fault(f"{whom}: {one_line(error)}", traceback.format_exc()) from error
 
 
@@ -282,6 +284,7 @@ def describe(
     started_at: str,
     duration_s: float = 0.0,
     video: str | None = None,
+    film_lost: str | None = None,
 ) -> Record:
     """The record of a job that went so. Needs no simulator."""
     episode = _episode(job)
@@ -309,11 +312,16 @@ def describe(
         ),
         command=plain.text,
         goal=dict(episode.goal.as_mapping()),
+        # Exactly what a reader of the file will find.
+        metadata=json.loads(json.dumps(dict(instruction.metadata))),
+        privileged=is_privileged(job.policy),
         events=tuple(course.events),
         video=video,
+        film_lost=film_lost,
         details=course.details,
         render_device=course.render_device,
         language_version=str(language.LANGUAGE_VERSION),
+        environment_version=ENVIRONMENT_VERSION,
         package_version=importlib.metadata.version("roboirgbench"),
         started_at=started_at,
         duration_s=duration_s,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.errors import MissingDependencyError
+from roboirg.errors import MissingDependencyError, RenderDeviceError
 
 if TYPE_CHECKING:
     from av.container import OutputContainer
@@ -64,7 +65,7 @@ def check_video_support() -> None:
     except ImportError as error:
         raise MissingDependencyError(
             f"Films need PyAV, which is not installed ({error}); run: "
-            "pip install 'roboirgbench[sim]', or use --video off."
+            "pip install 'roboirgbench[sim]', or play with --video off."
         ) from error
 
 
@@ -82,13 +83,20 @@ def compose(pictures: Sequence[Frame], *, is_demonstration: bool) -> Frame:
 class Film:
     """A film in the making. Nothing exists under `path` until `finish`.
 
+    A film that cannot be written is given up, whatever FFmpeg or the disk does: what is filmed
+    goes on as if there were no film.
+
     Args:
         path: of the finished MP4; a poster of the last frame gets the same name with ``.jpg``.
         options: how to film.
+
+    Attributes:
+        trouble: why it was given up, or None.
     """
 
     path: Path
     options: VideoOptions = field(default_factory=VideoOptions)
+    trouble: Exception | None = field(default=None, init=False)
     _container: OutputContainer | None = field(default=None, init=False, repr=False)
     _stream: VideoStream | None = field(default=None, init=False, repr=False)
     _last: Frame | None = field(default=None, init=False, repr=False)
@@ -99,35 +107,62 @@ class Film:
         return self.path.with_name(f".{self.path.name}.part")
 
     def shoot(self, world: Pictured, is_demonstration: bool = False) -> None:
-        """Add the world as it looks now."""
-        pictures = [world.picture(camera) for camera in self.options.cameras]
-        self.add(compose(pictures, is_demonstration=is_demonstration))
+        """Add the world as it looks now.
 
-    def add(self, frame: Frame) -> None:
+        Raises:
+            RenderDeviceError: no Vulkan device can render.
+            MissingDependencyError: something has to be installed first.
+        """
+        if self.trouble is not None:
+            return
+        try:
+            pictures = [world.picture(camera) for camera in self.options.cameras]
+            self._add(compose(pictures, is_demonstration=is_demonstration))
+        except (RenderDeviceError, MissingDependencyError):
+            raise
+        except Exception as error:  # noqa: BLE001 - see the class
+            self._give_up(error)
+
+    def finish(self) -> bool:
+        """Complete the film and give it its name; False if it has no frame or was given up."""
+        if self._last is None:
+            return False
+        poster = self.path.with_suffix(POSTER_SUFFIX)
+        try:
+            for _ in range(LAST_FRAME_REPEATS):
+                self._add(self._last)
+            last = self._last
+            self._close()
+            write_poster(last, poster)
+            self.partial.replace(self.path)
+        except Exception as error:  # noqa: BLE001 - see the class
+            self._give_up(error)
+            with contextlib.suppress(OSError):
+                poster.unlink(missing_ok=True)
+            return False
+        return True
+
+    def discard(self) -> None:
+        """Throw away an unfinished film; never raises."""
+        container = self._container
+        self._container = self._stream = self._last = None
+        if container is not None:
+            with contextlib.suppress(Exception):
+                container.close()
+        with contextlib.suppress(OSError):
+            self.partial.unlink(missing_ok=True)
+
+    def _give_up(self, error: Exception) -> None:
+        self.trouble = error
+        self.discard()
+
+    def _add(self, frame: Frame) -> None:
         """Add a frame, uint8 (height, width, 3), both even; all of one size."""
         container, stream = self._open(frame)
         import av
 
         self._last = frame
         container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="rgb24")))
-
-    def finish(self) -> bool:
-        """Complete the film and give it its name; False if it has no frame."""
-        if self._last is None:
-            return False
-        for _ in range(LAST_FRAME_REPEATS):
-            self.add(self._last)
-        self._close()
-        write_poster(self._last, self.path.with_suffix(POSTER_SUFFIX))
-        self.partial.replace(self.path)
-        return True
-
-    def discard(self) -> None:
-        """Throw away an unfinished film."""
-        if self._container is not None:
-            self._container.close()
-        self._container = self._stream = self._last = None
-        self.partial.unlink(missing_ok=True)
 
     def _open(self, frame: Frame) -> tuple[OutputContainer, VideoStream]:
         if self._container is not None and self._stream is not None:
@@ -148,9 +183,10 @@ class Film:
         return container, stream
 
     def _close(self) -> None:
-        if self._container is not None and self._stream is not None:
-            self._container.mux(self._stream.encode(None))
-            self._container.close()
+        container, stream = self._container, self._stream
+        if container is not None and stream is not None:
+            container.mux(stream.encode(None))
+            container.close()
         self._container = self._stream = None
 
 

@@ -18,6 +18,9 @@ BUILTIN: Mapping[str, str] = {
     "random": "roboirg.policies.random:RandomPolicy",
 }
 
+BOTH_CAMERAS = ("front", "wrist")
+"""What a policy sees that does not say what it wants to see."""
+
 
 def load_policy_class(spec: str) -> type[Any]:
     """The class that a spec names: a built-in name, or ``package.module:Class``.
@@ -29,12 +32,16 @@ def load_policy_class(spec: str) -> type[Any]:
     if spec not in BUILTIN and ":" not in spec:
         raise UnknownNameError("policy", spec, [*BUILTIN, "package.module:Class"])
     module_name, _, name = BUILTIN.get(spec, spec).partition(":")
-    found = getattr(_module(spec, module_name), name, None)
-    if not inspect.isclass(found):
+    module = _module(spec, module_name)
+    if not hasattr(module, name):
         raise InvalidValueError(f"Policy {spec!r}: module {module_name} has no class {name!r}.")
-    missing = [method for method in ("reset", "act") if not hasattr(found, method)]
-    if missing:
-        raise InvalidValueError(f"Policy {spec!r}: class {name} has no method {missing[0]}().")
+    found = getattr(module, name)
+    if not inspect.isclass(found):
+        raise InvalidValueError(
+            f"Policy {spec!r}: {name!r} in module {module_name} is no class but of type "
+            f"{type(found).__name__}."
+        )
+    _check_class(spec, found)
     return found
 
 
@@ -51,16 +58,83 @@ def make_policy(spec: str, seed: int) -> Policy:
         InvalidValueError: the module or the class cannot be imported, or is not a policy.
     """
     policy_class = load_policy_class(spec)
-    takes_seed = "seed" in inspect.signature(policy_class).parameters
-    policy: Policy = policy_class(seed=seed) if takes_seed else policy_class()
+    policy: Policy = policy_class(seed=seed) if "seed" in _takes(policy_class) else policy_class()
     return policy
+
+
+def is_privileged(spec: str) -> bool:
+    """Whether a spec names a policy that looks behind the scenes."""
+    try:
+        return hasattr(load_policy_class(spec), "attach")
+    except InvalidValueError:
+        return False
+
+
+def wanted_cameras(policy: object) -> tuple[str, ...]:
+    """The pictures that a policy, or a class of policies, asks for.
+
+    Raises:
+        InvalidValueError: its ``cameras`` are not different names of cameras in a tuple or list.
+    """
+    cameras = getattr(policy, "cameras", BOTH_CAMERAS)
+    if isinstance(cameras, str):
+        raise InvalidValueError(f"cameras is the text {cameras!r}; write ({cameras!r},).")
+    if not isinstance(cameras, (tuple, list)):
+        raise InvalidValueError(
+            f"cameras is of type {type(cameras).__name__}; it has to be a tuple such as "
+            "('front',) or ()."
+        )
+    for camera in cameras:
+        if camera not in BOTH_CAMERAS:
+            raise UnknownNameError("camera", camera, BOTH_CAMERAS)
+        if cameras.count(camera) > 1:
+            raise InvalidValueError(f"cameras names {camera!r} twice.")
+    return tuple(cameras)
+
+
+def _check_class(spec: str, policy_class: type[Any]) -> None:
+    """Complain of what would otherwise end every episode."""
+    name = policy_class.__name__
+    for method in ("reset", "act"):
+        if not hasattr(policy_class, method):
+            raise InvalidValueError(f"Policy {spec!r}: class {name} has no method {method}().")
+        if not callable(getattr(policy_class, method)):
+            raise InvalidValueError(f"Policy {spec!r}: {method} of class {name} is no method.")
+    if inspect.isabstract(policy_class):
+        lacking = sorted(policy_class.__abstractmethods__)
+        raise InvalidValueError(
+            f"Policy {spec!r}: class {name} is abstract; it lacks {', '.join(lacking)}."
+        )
+    for parameter in _takes(policy_class).values():
+        optional = parameter.default is not parameter.empty or parameter.kind in (
+            parameter.VAR_POSITIONAL,
+            parameter.VAR_KEYWORD,
+        )
+        if not optional and parameter.name != "seed":
+            raise InvalidValueError(
+                f"Policy {spec!r}: {name}() is called with seed= at most, but needs "
+                f"{parameter.name!r}; give it a default."
+            )
+    # What a property says is known when there is an object.
+    if not hasattr(inspect.getattr_static(policy_class, "cameras", ()), "__get__"):
+        try:
+            wanted_cameras(policy_class)
+        except InvalidValueError as error:
+            raise InvalidValueError(f"Policy {spec!r}: {error}") from error
+
+
+def _takes(policy_class: type[Any]) -> Mapping[str, inspect.Parameter]:
+    try:
+        return inspect.signature(policy_class).parameters
+    except (TypeError, ValueError):  # a class written in C need not tell
+        return {}
 
 
 def _module(spec: str, name: str) -> ModuleType:
     try:
         return importlib.import_module(name)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
+        words = " ".join(f"{type(error).__name__}: {error}".split())
         raise InvalidValueError(
-            f"Policy {spec!r}: module {name!r} cannot be imported "
-            f"({type(error).__name__}: {error})."
+            f"Policy {spec!r}: module {name!r} cannot be imported ({words})."
         ) from error

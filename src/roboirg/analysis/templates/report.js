@@ -2,7 +2,7 @@
 (() => {
   const form = document.getElementById("filters");
   const cards = [...document.querySelectorAll(".card")];
-  const names = ["policy", "task", "setting", "outcome", "difficulty"];
+  const names = [...form.querySelectorAll("select")].map((choice) => choice.name);
   const texts = new Map(cards.map((card) => [card, card.textContent.toLowerCase()]));
 
   const apply = () => {
@@ -38,7 +38,7 @@
   for (const cell of document.querySelectorAll("button.cell")) {
     cell.addEventListener("click", () => {
       form.reset();
-      for (const name of ["policy", "task", "setting"]) form.elements[name].value = cell.dataset[name];
+      for (const name of names) form.elements[name].value = cell.dataset[name] ?? "";
       apply();
       remember();
       document.getElementById("episodes").scrollIntoView();
