@@ -163,6 +163,7 @@ def test_words_of_two_versions_are_not_mixed(
         ("seed", 7, r"PickXtimes test/0 with the scene of seed 7, but .* has \d+; choose another"),
         ("environment_version", 99, "of environment version 99, but this roboirg has version 0;"),
         ("task", "Gone", r"Gone test/0 .* no such episode"),
+        ("policy_version", "old", r"version old, but it has changed since \(now built-in\)"),
     ],
 )
 def test_worlds_of_two_versions_are_not_mixed(

@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from roboirg.episode import Fact, Primitive, Stage
 from roboirg.judging import Judge, Status, changes, plain_subgoal
+from roboirg.judging.judge import describe_object
 from roboirg.splits import get_episode
 from roboirg.tasks import all_tasks
 
@@ -110,14 +111,33 @@ def test_every_forbidden_fact_of_every_stage_fails(task, index):
     tested = 0
     for number, due in enumerate(episode.stages):
         for wrong in due.forbids:
-            judge = Judge(episode.stages)
+            judge = Judge(episode.stages, episode.scene)
             judge.index = number
             judge.update(0, frozenset([wrong, due.expects]))
             assert judge.status is Status.FAILURE
-            assert wrong.subject in str(judge.cause)
+            assert describe_object(wrong.subject, episode.scene) in str(judge.cause)
             assert plain_subgoal(due) in str(judge.cause)
             tested += 1
     assert tested > 0
+
+
+def test_causes_call_things_by_what_they_are():
+    episode = get_episode("VideoUnmask", "test", 3)
+    first, second = episode.goal.texts("colours")
+    covers = {str(cube.colour): str(cube.inside) for cube in episode.scene.of_kind("hidden_cube")}
+    judge = Judge(episode.stages, episode.scene)
+    judge.update(0, frozenset([Fact("lifted", covers[second])]))
+    assert judge.cause == (
+        f"lifted the container over the {second} cube while due: "
+        f"pick up the container that hides the {first} cube"
+    )
+    empty = next(
+        item.name
+        for item in episode.scene.of_kind("container")
+        if episode.scene.hidden_in(item.name) is None
+    )
+    assert describe_object(empty, episode.scene) == "an empty container"
+    assert describe_object("button", get_episode("PickXtimes", "test", 0).scene) == "the button"
 
 
 def test_pick_x_times_rules():

@@ -8,7 +8,13 @@ from roboirg.actions import ACTION_HIGH, ACTION_LOW, check_chunk
 from roboirg.errors import InvalidValueError, UnknownNameError
 from roboirg.policies import Policy, PrivilegedPolicy, load_policy_class, make_policy
 from roboirg.policies.listeners import ForgetfulPolicy, ListenerPolicy
-from roboirg.policies.loading import BOTH_CAMERAS, BUILTIN, is_privileged, wanted_cameras
+from roboirg.policies.loading import (
+    BOTH_CAMERAS,
+    BUILTIN,
+    is_privileged,
+    policy_version,
+    wanted_cameras,
+)
 from roboirg.tasks import all_tasks
 
 
@@ -63,6 +69,21 @@ class Numb(Silent):
     """Cannot be asked to act."""
 
     act = 3
+
+
+def test_an_edited_policy_has_another_version(tmp_path, monkeypatch):
+    file = tmp_path / "edited_policy.py"
+    monkeypatch.syspath_prepend(tmp_path)
+    body = "class It:\n    def reset(self, a, b): pass\n    def act(self, o): pass\n"
+    file.write_text(body)
+    first = policy_version("edited_policy:It")
+    assert policy_version("edited_policy:It") == first
+    file.write_text(body + "    gain = 2\n")
+    assert policy_version("edited_policy:It") != first
+    monkeypatch.setattr(load_policy_class("edited_policy:It"), "version", "step-7", raising=False)
+    assert policy_version("edited_policy:It") == "step-7"
+    assert policy_version("oracle") == "built-in"
+    assert policy_version("no_such_module:It") == "unknown"
 
 
 def test_own_policies_are_named_by_import_path():

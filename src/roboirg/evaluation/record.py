@@ -136,6 +136,7 @@ class Record(Job):
         metadata: of the instruction: reasoning pattern, relation, stages, landmarks, template
             ids and the like.
         privileged: whether the policy looks behind the scenes (it has ``attach``).
+        policy_version: tells a policy from an earlier one of the same name.
         events: what happened, in order.
         video: path relative to the records file, or None.
         film_lost: why the film that was asked for could not be written, or None.
@@ -161,6 +162,7 @@ class Record(Job):
     goal: dict[str, str | int | tuple[str, ...]]
     metadata: dict[str, JsonValue]
     privileged: bool
+    policy_version: str = "unknown"
     events: tuple[EventRecord, ...] = ()
     video: str | None = None
     film_lost: str | None = None

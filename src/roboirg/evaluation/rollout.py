@@ -41,7 +41,7 @@ from roboirg.evaluation.record import EventRecord, Job, MentionSpan, Outcome, Re
 from roboirg.evaluation.video import Film, VideoOptions
 from roboirg.observations import Observation
 from roboirg.policies.base import Policy, PrivilegedPolicy
-from roboirg.policies.loading import is_privileged, wanted_cameras
+from roboirg.policies.loading import is_privileged, policy_version, wanted_cameras
 from roboirg.splits import get_episode
 
 if TYPE_CHECKING:
@@ -315,6 +315,7 @@ def describe(
         # Exactly what a reader of the file will find.
         metadata=json.loads(json.dumps(dict(instruction.metadata))),
         privileged=is_privileged(job.policy),
+        policy_version=policy_version(job.policy),
         events=tuple(course.events),
         video=video,
         film_lost=film_lost,

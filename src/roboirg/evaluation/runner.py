@@ -19,6 +19,7 @@ from roboirg.evaluation.record import Job, Record
 from roboirg.evaluation.rollout import Play
 from roboirg.evaluation.store import TORN_FILE, RecordStore, StoreError, latest
 from roboirg.language import LANGUAGE_VERSION
+from roboirg.policies.loading import policy_version
 from roboirg.splits import get_episode
 
 
@@ -68,7 +69,7 @@ def run_plan(
 
     Raises:
         StoreError: another run writes there, the records cannot be read or written, or they
-            are of another language, environment or scene than this version's.
+            are of another language, environment, scene or policy than today's.
         RoboIRGError: what would end every episode (no Vulkan device, …).
         KeyboardInterrupt: Ctrl-C, or SIGTERM as `Terminated`; all that ended is stored.
     """
@@ -81,6 +82,7 @@ def run_plan(
                 f"were moved to {folder / TORN_FILE}."
             )
         _check_versions(store.records, folder)
+        _check_policies(plan, store.records, folder)
         write_plan(plan, folder)
         stored = latest(store.records)
         todo = [
@@ -123,6 +125,18 @@ def _check_versions(records: Sequence[Record], folder: Path) -> None:
             raise StoreError(
                 f"{folder} holds {task} {split}/{episode} with the scene of seed {seed}, but in "
                 f"this roboirg it has {expected}; choose another --out."
+            )
+
+
+def _check_policies(plan: Plan, records: Sequence[Record], folder: Path) -> None:
+    """Refuse to mix what two policies of the same name did."""
+    versions = {name: policy_version(name) for name in plan.policies}
+    for record in records:
+        now = versions.get(record.policy, record.policy_version)
+        if record.policy_version != now:
+            raise StoreError(
+                f"{folder} holds episodes of {record.policy} in version {record.policy_version}, "
+                f"but it has changed since (now {now}); choose another --out."
             )
 
 

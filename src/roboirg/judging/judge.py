@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from enum import StrEnum
 
-from roboirg.episode import Fact, Stage
+from roboirg.episode import Fact, Scene, Stage
 
 
 class Status(StrEnum):
@@ -27,6 +27,7 @@ class Judge:
 
     Args:
         stages: what has to happen, in order, the demonstration's stages included.
+        scene: lets the cause call things by what they are instead of by their names.
 
     Attributes:
         status: success and failure are final.
@@ -34,8 +35,9 @@ class Judge:
         cause: why the episode failed; None before that.
     """
 
-    def __init__(self, stages: Sequence[Stage]) -> None:
+    def __init__(self, stages: Sequence[Stage], scene: Scene | None = None) -> None:
         self.stages = tuple(stages)
+        self._scene = scene or Scene(())
         self.status = Status.SUCCESS if not self.stages else Status.ONGOING
         self.index = 0
         self.cause: str | None = None
@@ -62,7 +64,7 @@ class Judge:
         broken = next((fact for fact in stage.forbids if fact in facts), None)
         if broken is not None:
             self.status = Status.FAILURE
-            self.cause = describe_violation(broken, stage)
+            self.cause = describe_violation(broken, stage, self._scene)
         elif self._completed(step, stage, facts):
             self.index += 1
             self._held_since = None
@@ -78,10 +80,26 @@ class Judge:
         return step - self._held_since >= stage.lasting
 
 
-def describe_violation(fact: Fact, stage: Stage) -> str:
-    """One line that says what happened and what was due, for example for a record's cause."""
-    what = f"{fact.kind} {fact.subject}" + (f" on {fact.place}" if fact.place else "")
-    return f"{what} while due: {plain_subgoal(stage)}"
+_VERBS = {"picked": "picked up", "lifted": "lifted", "pressed": "pressed"}
+
+
+def describe_violation(fact: Fact, stage: Stage, scene: Scene) -> str:
+    """What happened and what was due, in one line, for example for a record's cause."""
+    verb = _VERBS.get(fact.kind, fact.kind.replace("_", " "))
+    place = f" on {describe_object(fact.place, scene)}" if fact.place else ""
+    thing = describe_object(fact.subject, scene)
+    return f"{verb} {thing}{place} while due: {plain_subgoal(stage)}"
+
+
+def describe_object(name: str, scene: Scene) -> str:
+    """An object as a person would point it out; its bare name if the scene does not have it."""
+    item = next((item for item in scene.objects if item.name == name), None)
+    if item is None:
+        return name
+    if item.kind != "container":
+        return f"the {item.colour} cube" if item.colour else f"the {item.kind}"
+    hidden = scene.hidden_in(name)
+    return f"the container over the {hidden.colour} cube" if hidden else "an empty container"
 
 
 def plain_subgoal(stage: Stage) -> str:

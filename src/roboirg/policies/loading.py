@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import inspect
 from collections.abc import Mapping
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -17,6 +19,9 @@ BUILTIN: Mapping[str, str] = {
     "forgetful": "roboirg.policies.listeners:ForgetfulPolicy",
     "random": "roboirg.policies.random:RandomPolicy",
 }
+
+FINGERPRINT_LENGTH = 12
+"""Hexadecimal digits."""
 
 BOTH_CAMERAS = ("front", "wrist")
 """What a policy sees that does not say what it wants to see."""
@@ -68,6 +73,25 @@ def is_privileged(spec: str) -> bool:
         return hasattr(load_policy_class(spec), "attach")
     except InvalidValueError:
         return False
+
+
+def policy_version(spec: str) -> str:
+    """What tells a policy from an earlier one of the same name.
+
+    Its class attribute ``version`` if it has one (a checkpoint's name, say), else a fingerprint of
+    the file that defines it; ``built-in``, or ``unknown`` if nothing can be found out.
+    """
+    if spec in BUILTIN:
+        return "built-in"
+    try:
+        policy_class = load_policy_class(spec)
+        version = getattr(policy_class, "version", None)
+        if version is not None:
+            return str(version)
+        source = Path(inspect.getfile(policy_class)).read_bytes()
+    except (InvalidValueError, OSError, TypeError):
+        return "unknown"
+    return hashlib.sha256(source).hexdigest()[:FINGERPRINT_LENGTH]
 
 
 def wanted_cameras(policy: object) -> tuple[str, ...]:

@@ -34,7 +34,7 @@ class Session:
     def __init__(self, episode: Episode, *, visible: bool) -> None:
         self.episode = episode
         self.world = World(episode.scene, episode.motions, visible=visible)
-        self.judge = Judge((*episode.demonstration, *episode.stages))
+        self.judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
         self.events: list[Event] = list(changes(0, frozenset(), self.world.facts))
         self.judge.update(0, self.world.facts)
 
