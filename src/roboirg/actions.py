@@ -15,6 +15,8 @@ JOINT_LOW = np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8
 JOINT_HIGH = np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973])
 """Joint limits of the Franka Panda, rad. Targets beyond them are accepted; the joints stop."""
 
+_CONTENT = f"shape ({ACTION_SIZE},), seven joint targets in rad and the gripper in [-1, 1]"
+
 ACTION_LOW = np.append(JOINT_LOW, -1.0)
 ACTION_HIGH = np.append(JOINT_HIGH, 1.0)
 
@@ -25,7 +27,10 @@ def check_action(action: ArrayLike) -> NDArray[np.float64]:
     Raises:
         InvalidActionError: it is not numeric, not of shape (8,), or not finite.
     """
-    return _finite(_numbers(action), (ACTION_SIZE,))
+    numbers = _numbers(action)
+    if numbers.shape != (ACTION_SIZE,):
+        raise InvalidActionError(f"An action has {_CONTENT}; got shape {numbers.shape}.")
+    return _finite(numbers)
 
 
 def check_chunk(actions: ArrayLike) -> NDArray[np.float64]:
@@ -36,9 +41,12 @@ def check_chunk(actions: ArrayLike) -> NDArray[np.float64]:
     """
     numbers = _numbers(actions)
     chunk = numbers[None] if numbers.ndim == 1 else numbers
-    if chunk.ndim != 2 or len(chunk) == 0:  # noqa: PLR2004
-        raise InvalidActionError(_shape_message(numbers.shape))
-    return _finite(chunk, (len(chunk), ACTION_SIZE))
+    if chunk.ndim != 2 or chunk.shape[1] != ACTION_SIZE or len(chunk) == 0:  # noqa: PLR2004
+        raise InvalidActionError(
+            f"A chunk of actions has shape (n, {ACTION_SIZE}), n >= 1; an action has {_CONTENT}; "
+            f"got shape {numbers.shape}."
+        )
+    return _finite(chunk)
 
 
 def _numbers(action: ArrayLike) -> NDArray[np.float64]:
@@ -53,9 +61,7 @@ def _numbers(action: ArrayLike) -> NDArray[np.float64]:
     return numbers.astype(np.float64)
 
 
-def _finite(numbers: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float64]:
-    if numbers.shape != shape:
-        raise InvalidActionError(_shape_message(numbers.shape))
+def _finite(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
     bad = np.argwhere(~np.isfinite(numbers))
     if len(bad):
         raise InvalidActionError(
@@ -63,10 +69,3 @@ def _finite(numbers: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.
             "every value has to be a finite number."
         )
     return numbers
-
-
-def _shape_message(shape: tuple[int, ...]) -> str:
-    return (
-        f"An action has shape ({ACTION_SIZE},), seven joint targets in rad and the gripper in "
-        f"[-1, 1], or (n, {ACTION_SIZE}) as a chunk; got shape {shape}."
-    )

@@ -22,6 +22,7 @@ from importlib import metadata
 from pathlib import Path
 
 from roboirg.errors import RenderDeviceError, RoboIRGError
+from roboirg.simulation.device import DEVICE_VARIABLE
 
 DISTRIBUTION = "roboirgbench"
 FRAME_TIMEOUT = 120.0
@@ -203,13 +204,16 @@ def _check_rendering() -> tuple[Check, Check]:
     }
     device, frame = said.get(_DEVICE_PREFIX), said.get(_FRAME_PREFIX)
     drawn = frame is not None and code == 0
+    chosen = os.environ.get(DEVICE_VARIABLE)
+    remedy = f"unset {DEVICE_VARIABLE} (now {chosen!r}), or " if chosen else ""
+    remedy += _RENDER_REMEDY
     return (
-        Check("render device", device is not None, device or fault, _RENDER_REMEDY),
+        Check("render device", device is not None, device or fault, remedy),
         Check(
             "test frame",
             drawn,
             (frame or "") if drawn else (fault if device else "not tried, there is no device"),
-            _RENDER_REMEDY,
+            remedy,
         ),
     )
 
