@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from roboirg.analysis import report
 from roboirg.analysis.report import render, write_report
 from roboirg.evaluation.plan import Plan
 from roboirg.evaluation.record import EventRecord, MentionSpan, Record, Turn
@@ -85,7 +86,9 @@ def test_every_episode_is_there_and_nothing_comes_from_outside() -> None:
 
 def test_the_rules_are_filters_only_where_there_are_several() -> None:
     one = render(records())
-    assert Page(one).selects == ["policy", "task", "setting", "outcome", "difficulty"]
+    filters = ["policy", "task", "setting", "outcome", "difficulty"]
+    assert Page(one).selects == ["level", *filters]
+    assert Page(render(records()[:1])).selects == filters
     assert "policy seed" not in one
 
     jobs = [
@@ -157,6 +160,87 @@ def test_films_are_inside_and_wait_to_be_played(tmp_path: Path) -> None:
     assert video["src"] == "data:video/mp4;base64,ZmlsbQ=="
     assert video["poster"] == "data:image/jpeg;base64,cG9zdGVy"
     assert Page(render([filmed])).videos == []
+
+
+def test_many_films_stay_beside_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "videos").mkdir()
+    (tmp_path / "videos" / "a b.mp4").write_bytes(b"film")
+    (tmp_path / "videos" / "a b.jpg").write_bytes(b"poster")
+    first, second, *_ = records()
+    filmed = first.model_copy(update={"video": "videos/a b.mp4"})
+    lost = second.model_copy(update={"video": "videos/gone.mp4"})
+    assert "they are beside it" not in render([filmed, lost], tmp_path)
+    monkeypatch.setattr(report, "MOST_FILM_BYTES", 3)
+    text = render([filmed, lost], tmp_path)
+    assert "they are beside it" in text
+    (video,) = Page(text).videos
+    assert (video["src"], video["poster"]) == ("videos/a%20b.mp4", "videos/a%20b.jpg")
+
+
+def test_cards_and_filters_have_the_order_of_the_overview() -> None:
+    page = Page(render(records()[::-1], planned=PLAN.jobs()))
+    assert list(dict.fromkeys(card["data-policy"] for card in page.cards)) == list(PLAN.policies)
+    assert list(dict.fromkeys(cell["data-policy"] for cell in page.cells)) == list(PLAN.policies)
+    assert [card["data-setting"] for card in page.cards][:2] == ["explicit", "direct"]
+    assert render(records()[::-1], planned=PLAN.jobs()) == render(records(), planned=PLAN.jobs())
+
+
+def test_each_difficulty_has_its_overview() -> None:
+    cells = Page(render(records(), planned=PLAN.jobs())).cells
+    per_level = {
+        level: sum(cell["data-difficulty"] == level for cell in cells)
+        for level in ("", "easy", "medium")
+    }
+    assert len(cells) == sum(per_level.values())
+    assert all(per_level.values())
+    assert any("listener (privileged), all tasks, easy, direct: " in str(c["title"]) for c in cells)
+
+
+def test_cells_say_how_sure_they_are() -> None:
+    jobs = [job for job in PLAN.jobs() if job.setting in {"explicit", "direct"}]
+    lost = [describe(job, Course("failure", "it fell"), started_at="now") for job in jobs]
+    text = render(lost)
+    assert re.search(r"0/3 · 0–56<", text)
+    assert '<small class="muted">–</small>' in text
+    for cell in Page(text).cells:
+        is_gap = cell["data-setting"] == "direct"
+        assert ("points to explicit" in str(cell["aria-label"])) == is_gap
+        assert ("the gap says nothing" in str(cell["aria-label"])) == is_gap
+
+
+def test_intermediate_references_have_a_colour_of_their_own() -> None:
+    told = next(record for record in records() if record.setting == "explicit")
+    assert "leads to the goal" not in render([told])
+    mention = MentionSpan(
+        utterance=0, start=0, end=3, role="antecedent", expression=None, slot="reference", value=2
+    )
+    text = render([told.model_copy(update={"mentions": (mention,)})])
+    assert "leads to the goal" in text
+    assert 'class="antecedent huereference"' in text
+
+
+def test_the_head_says_which_run_it_was(tmp_path: Path) -> None:
+    folder = tmp_path / "tuesday"
+    folder.mkdir()
+    first, second, *_ = records()
+    with RecordStore(folder) as store:
+        store.append(first.model_copy(update={"started_at": "2026-01-02T03:04:05+00:00"}))
+        store.append(second.model_copy(update={"started_at": "2026-01-02T03:09:05+00:00"}))
+    text = write_report(folder).read_text()
+    assert "<dd>tuesday</dd>" in text
+    assert "<dd>2026-01-02 03:04 to 03:09 UTC</dd>" in text
+    assert "<dt>step limit</dt><dd>1300</dd>" in text
+
+
+@pytest.mark.parametrize(
+    ("steps", "expected"),
+    [(1, [0]), (99, [0, 1, 2, 3, 4]), (245, [0, 5, 10]), (1300, [0, 20, 40, 60])],
+)
+def test_the_time_line_has_a_scale(steps: int, expected: list[int]) -> None:
+    record = records()[0].model_copy(update={"steps": steps, "events": ()})
+    ticks = report._ticks(record)
+    assert [tick.seconds for tick in ticks] == expected
+    assert all(0 <= tick.left <= 100 for tick in ticks)
 
 
 def test_the_page_is_written_whole_and_the_same_again(tmp_path: Path) -> None:

@@ -69,7 +69,10 @@ def test_the_gap_is_over_the_same_episodes() -> None:
     ]
     (panel,) = make_panels(records)
     cell = panel.cells["PickXtimes", DIRECT]
-    assert cell == Cell(successes=2, failures=3, errors=1, pairs=3, gap=0.0)
+    assert cell == Cell(
+        successes=2, failures=3, errors=1, pairs=3, gap=0.0, explicit=pytest.approx(2 / 3)
+    )
+    assert not cell.is_at_floor
     assert cell.rate == 0.4
     assert not cell.is_complete
     explicit = panel.cells["PickXtimes", EXPLICIT]
@@ -113,8 +116,8 @@ def test_unusual_tellings_have_columns_of_their_own() -> None:
     assert [variant.label for variant in panel.variants] == [
         "explicit",
         "contextual",
-        "contextual (resolved)",
         "contextual (stages 1,5)",
+        "contextual (resolved)",
         "spatial (camera frame)",
     ]
 
@@ -133,3 +136,34 @@ def test_policies_and_rules_have_panels_of_their_own() -> None:
 def test_a_cell_without_a_verdict_has_no_rate() -> None:
     empty = replace(Cell(), errors=1)
     assert (empty.rate, empty.interval) == (None, None)
+
+
+def test_where_nothing_succeeds_in_explicit_the_gap_is_at_the_floor() -> None:
+    records = [record("failure"), record("failure", setting="direct")]
+    (panel,) = make_panels(records)
+    cell = panel.cells["PickXtimes", DIRECT]
+    assert (cell.gap, cell.explicit, cell.is_at_floor) == (0.0, 0.0, True)
+    (panel,) = make_panels(records[1:])
+    assert not panel.cells["PickXtimes", DIRECT].is_at_floor  # nobody knows
+
+
+def test_cells_stand_in_the_order_of_the_table() -> None:
+    records = [
+        record("success", setting="direct", form="resolved"),
+        record("success", task="VideoUnmask", setting="direct"),
+        record("success", task="VideoUnmask"),
+        record("success", setting="direct"),
+    ]
+    planned = [record("success", task="VideoUnmask").identity]
+    (panel,) = make_panels(records, planned)
+    assert [(task, variant.label) for task, variant in panel.cells] == [
+        ("VideoUnmask", "explicit"),
+        ("VideoUnmask", "direct"),
+        ("PickXtimes", "direct"),
+        ("PickXtimes", "direct (resolved)"),
+        (None, "explicit"),
+        (None, "direct"),
+        (None, "direct (resolved)"),
+    ]
+    assert panel.trials([None]) == (1, 2)
+    assert panel.trials(panel.tasks) == (1, 1)

@@ -5,7 +5,7 @@ import io
 from rich.console import Console
 
 from roboirg.analysis.statistics import EXPLICIT, Cell, Condition, Panel, Variant
-from roboirg.analysis.tables import points, print_tables
+from roboirg.analysis.tables import NO_GAP, gap_text, points, print_tables
 
 
 def test_the_table_says_rates_gaps_and_what_is_amiss() -> None:
@@ -32,6 +32,8 @@ def test_the_table_says_rates_gaps_and_what_is_amiss() -> None:
     assert "all tasks" not in text  # there is only one
     assert "in brackets the gap" in text
     assert "privileged" not in text
+    assert "n = 3–4 episodes per cell" in text
+    assert "(–)" not in text
 
 
 def test_the_legend_says_nothing_about_what_is_not_there() -> None:
@@ -52,3 +54,27 @@ def test_the_legend_says_nothing_about_what_is_not_there() -> None:
 
 def test_points_have_a_sign() -> None:
     assert [points(gap) for gap in (-0.5, 0.25, 0.0, -0.001)] == ["−50", "+25", "±0", "±0"]
+
+
+def test_the_floor_has_no_gap() -> None:
+    assert gap_text(Cell(0, 4, pairs=4, gap=0.0, explicit=0.0)) == NO_GAP
+    assert gap_text(Cell(1, 3, pairs=4, gap=0.25, explicit=0.0)) == "+25"
+    assert gap_text(Cell(2, 2, pairs=4, gap=0.0, explicit=0.5)) == "±0"
+    assert gap_text(Cell(2, 2)) == ""
+    panel = Panel(
+        "random",
+        Condition("random", "test", 1300),
+        ("PickXtimes", "VideoUnmask"),
+        (EXPLICIT, Variant("direct")),
+        {
+            ("PickXtimes", EXPLICIT): Cell(0, 4, pairs=4, gap=0.0, explicit=0.0),
+            ("PickXtimes", Variant("direct")): Cell(0, 4, pairs=4, gap=0.0, explicit=0.0),
+            (None, EXPLICIT): Cell(0, 4, pairs=4, gap=0.0, explicit=0.0),
+        },
+    )
+    console = Console(file=io.StringIO(), width=100)
+    print_tables([panel], console)
+    text = " ".join(console.file.getvalue().split())  # type: ignore[attr-defined]
+    assert "0 (–)" in text
+    assert "which says nothing" in text
+    assert "n = 4 episodes per cell, 4 for all tasks" in text

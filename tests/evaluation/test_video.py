@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from roboirg.evaluation.video import DEMONSTRATION_COLOUR, Film, VideoOptions, compose
+from roboirg.evaluation.video import DEMONSTRATION_COLOUR, GAP, Film, VideoOptions, compose
 
 av = pytest.importorskip("av")
 
@@ -28,7 +28,7 @@ def test_a_film_is_small_playable_and_appears_when_complete(tmp_path: Path) -> N
         stream = container.streams.video[0]
         assert stream.codec_context.name == "h264"
         assert stream.codec_context.pix_fmt == "yuv420p"
-        assert (stream.width, stream.height, stream.average_rate) == (512, 256, 10)
+        assert (stream.width, stream.height, stream.average_rate) == (512 + GAP, 256, 10)
         frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(stream)]
     assert len(frames) > 21
     assert np.abs(frames[0][1, 100].astype(int) - DEMONSTRATION_COLOUR).max() < 40
@@ -62,3 +62,11 @@ def test_only_the_demonstration_has_a_border() -> None:
     pictures = [Grey().picture("front"), Grey().picture("wrist")]
     assert tuple(compose(pictures, is_demonstration=True)[0, 0]) == DEMONSTRATION_COLOUR
     assert tuple(compose(pictures, is_demonstration=False)[0, 0]) == (90, 90, 90)
+
+
+def test_a_black_line_parts_the_pictures() -> None:
+    frame = compose([Grey().picture("front"), Grey().picture("wrist")], is_demonstration=False)
+    assert frame.shape == (256, 512 + GAP, 3)
+    assert not frame[:, 256 : 256 + GAP].any()
+    assert frame[:, :256].min() == frame[:, :256].max() == 90
+    assert frame[:, 256 + GAP :].min() == 200

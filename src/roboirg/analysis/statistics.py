@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -75,10 +75,10 @@ class Variant(NamedTuple):
         return f"{self.setting} ({', '.join(unusual)})" if unusual else self.setting
 
     def sort_key(self) -> tuple[object, ...]:
-        """Settings from explicit to spatial, the usual form first."""
+        """Settings from explicit to spatial; in each the implicit form first, then the usual."""
         known = self.setting in SETTING_ORDER
         place = SETTING_ORDER.index(self.setting) if known else len(SETTING_ORDER)
-        return (place, self.setting, self.label != self.setting, self.label)
+        return (place, self.setting, self.form != "implicit", self.label)
 
 
 EXPLICIT = Variant("explicit")
@@ -109,6 +109,7 @@ class Cell:
         pairs: episodes that have a verdict both here and in the explicit setting.
         gap: mean over those pairs of success here less success there, -1 to 1; None without
             pairs.
+        explicit: success rate of those pairs in the explicit setting; None without pairs.
     """
 
     successes: int = 0
@@ -117,6 +118,7 @@ class Cell:
     missing: int = 0
     pairs: int = 0
     gap: float | None = None
+    explicit: float | None = None
 
     @property
     def trials(self) -> int:
@@ -134,6 +136,11 @@ class Cell:
         return wilson_interval(self.successes, self.trials) if self.trials else None
 
     @property
+    def is_at_floor(self) -> bool:
+        """Whether nothing succeeded in the explicit setting, so that no words can cost anything."""
+        return self.explicit == 0
+
+    @property
     def is_complete(self) -> bool:
         """Whether every episode of the plan has a verdict."""
         return not self.errors and not self.missing
@@ -148,7 +155,7 @@ class Panel:
         condition: policy and rules.
         tasks: the rows.
         variants: the columns.
-        cells: by task (None: all tasks together) and variant.
+        cells: by task (None: all tasks together) and variant; tasks in order, all together last.
         privileged: whether the policy looks behind the scenes.
     """
 
@@ -163,6 +170,12 @@ class Panel:
     def is_complete(self) -> bool:
         """Whether every episode of the plan has a verdict."""
         return all(cell.is_complete for cell in self.cells.values())
+
+    def trials(self, tasks: Iterable[str | None]) -> tuple[int, int]:
+        """Fewest and most episodes with a verdict in the cells of these rows."""
+        rows = set(tasks)
+        counts = [cell.trials for (task, _), cell in self.cells.items() if task in rows]
+        return min(counts, default=0), max(counts, default=0)
 
 
 def make_panels(records: Sequence[Record], planned: Sequence[Job] = ()) -> tuple[Panel, ...]:
@@ -216,7 +229,12 @@ def _make_panel(
     for job in missing:
         for row in (job.task, None):
             lacking[row, Variant.of(job)] += 1
-    cells = {key: _make_cell(groups[key], lacking[key], explicit) for key in {*groups, *lacking}}
+    cells = {
+        (row, variant): _make_cell(groups[row, variant], lacking[row, variant], explicit)
+        for row in (*tasks, None)
+        for variant in variants
+        if (row, variant) in groups or (row, variant) in lacking
+    }
     own_tasks = tuple(task for task in tasks if any(row == task for row, _ in cells))
     own_variants = tuple(variant for variant in variants if (None, variant) in cells)
     return Panel(label, condition, own_tasks, own_variants, cells, privileged)
@@ -226,18 +244,20 @@ def _make_cell(
     records: Sequence[Record], missing: int, explicit: Mapping[tuple[object, ...], bool]
 ) -> Cell:
     outcomes = [record.outcome for record in records]
-    differences = [
-        (record.outcome == "success") - explicit[_pair_key(record)]
+    pairs = [
+        (record.outcome == "success", explicit[_pair_key(record)])
         for record in records
         if record.outcome != "error" and _pair_key(record) in explicit
     ]
+    count = len(pairs)
     return Cell(
         successes=outcomes.count("success"),
         failures=outcomes.count("failure"),
         errors=outcomes.count("error"),
         missing=missing,
-        pairs=len(differences),
-        gap=sum(differences) / len(differences) if differences else None,
+        pairs=count,
+        gap=sum(here - there for here, there in pairs) / count if pairs else None,
+        explicit=sum(there for _, there in pairs) / count if pairs else None,
     )
 
 

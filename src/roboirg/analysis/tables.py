@@ -16,13 +16,21 @@ MINIMUM_WIDTH = 100
 ERROR_MARK = "!"
 MISSING_MARK = "…"
 ALL_TASKS = "all tasks"
+NO_GAP = "–"
 
 _GOOD, _FAIR = 0.75, 0.4
 
 
 def make_table(panel: Panel) -> Table:
     """Tasks × settings of one policy: success rate and, in brackets, the gap to explicit."""
-    table = Table(title=panel.label, title_justify="left", title_style="bold")
+    table = Table(
+        title=panel.label,
+        title_justify="left",
+        title_style="bold",
+        caption=_numbers(panel),
+        caption_justify="left",
+        caption_style="dim",
+    )
     table.add_column("task")
     for variant in panel.variants:
         table.add_column(variant.label, justify="right")
@@ -54,6 +62,12 @@ def print_tables(panels: Sequence[Panel], console: Console) -> None:
         for (_, variant), cell in panel.cells.items()
     ):
         legend += ", in brackets the gap to explicit on the same episodes in points"
+    if any(
+        gap_text(cell) == NO_GAP and variant != EXPLICIT
+        for panel in panels
+        for (_, variant), cell in panel.cells.items()
+    ):
+        legend += f"; ({NO_GAP}) nothing succeeded in explicit either, which says nothing"
     if any(cell.errors for cell in cells):
         legend += f"; {ERROR_MARK} episodes ended in an error and are in no rate"
     if any(cell.missing for cell in cells):
@@ -74,6 +88,25 @@ def points(gap: float) -> str:
     return f"{value:+d}".replace("-", "−") if value else "±0"
 
 
+def count_text(least: int, most: int) -> str:
+    """A number of episodes, or the range of it."""
+    return f"{most}" if least == most else f"{least}–{most}"
+
+
+def gap_text(cell: Cell) -> str:
+    """The gap to explicit; a dash where explicit itself is at the floor, empty without pairs."""
+    if cell.gap is None:
+        return ""
+    return NO_GAP if cell.is_at_floor and not cell.gap else points(cell.gap)
+
+
+def _numbers(panel: Panel) -> str:
+    text = f"n = {count_text(*panel.trials(panel.tasks))} episodes per cell"
+    if len(panel.tasks) > 1:
+        text += f", {count_text(*panel.trials([None]))} for {ALL_TASKS}"
+    return text
+
+
 def _text(cell: Cell | None, *, is_reference: bool) -> Text:
     if cell is None:
         return Text("–", "dim")
@@ -83,7 +116,7 @@ def _text(cell: Cell | None, *, is_reference: bool) -> Text:
     else:
         text.append(percent(cell.rate), _colour(cell.rate))
         if cell.gap is not None and not is_reference:
-            text.append(f" ({points(cell.gap)})", "dim" if cell.gap >= 0 else "red")
+            text.append(f" ({gap_text(cell)})", "dim" if cell.gap >= 0 else "red")
     if cell.errors:
         text.append(f" {cell.errors}{ERROR_MARK}", "bold yellow")
     if cell.missing:

@@ -24,6 +24,8 @@ DEMONSTRATION_COLOUR = (255, 176, 32)
 """RGB of the border around what was shown before the policy's turn."""
 
 BORDER = 6
+GAP = 4
+"""Pixels of the black line between two pictures; even, as H.264 wants the width."""
 LAST_FRAME_REPEATS = 8
 """The end is what one wants to see: it stays for most of a second."""
 
@@ -37,7 +39,7 @@ class VideoOptions:
     Attributes:
         every: control steps between two frames (20 control steps are one second).
         rate: frames per second in the film; 10 with every 8th step is fourfold speed.
-        cameras: drawn side by side, 256 pixels each.
+        cameras: drawn side by side, 256 pixels each, a black line of `GAP` between them.
         quality: x264's constant rate factor; higher is smaller.
     """
 
@@ -70,8 +72,10 @@ def check_video_support() -> None:
 
 
 def compose(pictures: Sequence[Frame], *, is_demonstration: bool) -> Frame:
-    """Pictures side by side; what was shown before has a coloured border."""
-    frame: Frame = np.concatenate(list(pictures), axis=1)
+    """Pictures side by side, a line between them; what was shown before has a coloured border."""
+    line = np.zeros((pictures[0].shape[0], GAP, 3), np.uint8)
+    parts = [part for picture in pictures for part in (line, picture)][1:]
+    frame: Frame = np.concatenate(parts, axis=1)
     if is_demonstration:
         colour = np.array(DEMONSTRATION_COLOUR, np.uint8)
         frame[:BORDER] = frame[-BORDER:] = colour

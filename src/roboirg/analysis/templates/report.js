@@ -3,7 +3,9 @@
   const form = document.getElementById("filters");
   const cards = [...document.querySelectorAll(".card")];
   const names = [...form.querySelectorAll("select")].map((choice) => choice.name);
-  const texts = new Map(cards.map((card) => [card, card.textContent.toLowerCase()]));
+  const said = (card) => [...card.querySelectorAll(".turns q, .cause")]
+    .map((part) => part.textContent).join("\n").replace(/[^\S\n]+/g, " ").toLowerCase();
+  const texts = new Map(cards.map((card) => [card, said(card)]));
 
   const apply = () => {
     const chosen = new FormData(form);
@@ -20,26 +22,66 @@
     document.getElementById("nothing").hidden = shown > 0;
   };
 
+  // Addresses: #e7 is a card, #?policy=oracle filters, #?policy=oracle&at=e7 is a card among them.
+  const chosenWords = () =>
+    new URLSearchParams([...new FormData(form)].filter(([, value]) => value));
+
   const remember = () => {
-    const chosen = new URLSearchParams([...new FormData(form)].filter(([, value]) => value));
+    const chosen = chosenWords();
     history.replaceState(null, "", chosen.size ? `#?${chosen}` : "#");
   };
 
-  const recall = () => {
-    if (!location.hash.startsWith("#?")) return;
-    for (const [name, value] of new URLSearchParams(location.hash.slice(2))) {
-      if (form.elements[name]) form.elements[name].value = value;
+  const fill = (values) => {
+    for (const name of [...names, "words"]) {
+      const field = form.elements[name];
+      field.value = values.get(name) ?? "";
+      if (field.selectedIndex === -1) field.value = "";
     }
+    apply();
   };
+
+  const aim = (id) => {
+    for (const card of cards) card.classList.toggle("aim", card.id === id);
+    const card = cards.find((other) => other.id === id);
+    if (!card) return;
+    if (card.hidden) fill(new URLSearchParams());
+    card.scrollIntoView();
+    // Cards above may get their true height only now.
+    requestAnimationFrame(() => card.scrollIntoView());
+  };
+
+  const recall = () => {
+    const hash = location.hash.slice(1);
+    const values = new URLSearchParams(hash.startsWith("?") ? hash.slice(1) : "");
+    if (hash.startsWith("?")) fill(values);
+    aim(values.get("at") ?? hash);
+  };
+  addEventListener("hashchange", recall);
+
+  for (const card of cards) {
+    card.querySelector("h3 a").addEventListener("click", (event) => {
+      const chosen = chosenWords();
+      if (!chosen.size || event.ctrlKey || event.metaKey || event.shiftKey) return;
+      event.preventDefault();
+      chosen.set("at", card.id);
+      history.pushState(null, "", `#?${chosen}`);
+      aim(card.id);
+    });
+  }
+
+  const level = document.getElementById("level");
+  level?.addEventListener("input", () => {
+    for (const body of document.querySelectorAll("tbody[data-level]")) {
+      body.hidden = body.dataset.level !== level.value;
+    }
+  });
 
   form.addEventListener("input", () => { apply(); remember(); });
   form.addEventListener("submit", (event) => event.preventDefault());
   form.addEventListener("reset", () => setTimeout(() => { apply(); remember(); }));
   for (const cell of document.querySelectorAll("button.cell")) {
     cell.addEventListener("click", () => {
-      form.reset();
-      for (const name of names) form.elements[name].value = cell.dataset[name] ?? "";
-      apply();
+      fill(new URLSearchParams(Object.entries(cell.dataset)));
       remember();
       document.getElementById("episodes").scrollIntoView();
       document.getElementById("episodes").focus({ preventScroll: true });
@@ -72,6 +114,6 @@
       film.focus();
     });
   }
-  recall();
   apply();
+  recall();
 })();
