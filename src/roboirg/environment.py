@@ -23,8 +23,8 @@ from roboirg.episode import Episode
 from roboirg.errors import InvalidValueError, UnknownNameError
 from roboirg.judging import Event, Status, plain_subgoal
 from roboirg.language import instruct
-from roboirg.observations import Demonstration
-from roboirg.simulation.cameras import CAMERAS, SIZE
+from roboirg.observations import CAMERAS, Demonstration, check_cameras
+from roboirg.simulation.cameras import SIZE
 from roboirg.simulation.device import describe, find_render_device
 from roboirg.simulation.proprioception import Proprioception
 from roboirg.simulation.session import Session
@@ -108,7 +108,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
             distractors=distractors,
             frame=frame,
         )
-        self.cameras = _check_cameras(cameras)
+        self.cameras = check_cameras(cameras)
         if not isinstance(max_steps, int) or max_steps < 1:
             raise InvalidValueError(
                 f"max_steps is {max_steps!r}; it has to be a whole number of at least 1."
@@ -287,17 +287,6 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
             "events": [event.as_dict() for event in fresh],
             "subgoal": plain_subgoal(stage) if stage is not None else "all stages completed",
         }
-
-
-def _check_cameras(cameras: Sequence[str]) -> tuple[str, ...]:
-    if isinstance(cameras, str) or not isinstance(cameras, Sequence):
-        raise InvalidValueError(
-            f"cameras is {cameras!r}; it has to be a sequence of names such as ('front',) or ()."
-        )
-    for camera in cameras:
-        if camera not in CAMERAS:
-            raise UnknownNameError("camera", camera, CAMERAS)
-    return tuple(dict.fromkeys(cameras))
 
 
 def _observation_space(cameras: Sequence[str]) -> spaces.Dict:

@@ -1,4 +1,4 @@
-"""What a policy gets to see: one moment, and what was shown before."""
+"""What a policy gets to see: which pictures, one moment, and what was shown before."""
 
 from __future__ import annotations
 
@@ -6,6 +6,32 @@ from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
+
+from roboirg.errors import InvalidValueError, UnknownNameError
+
+CAMERAS = ("front", "wrist")
+
+
+def check_cameras(cameras: object) -> tuple[str, ...]:
+    """The names of cameras that somebody asks for.
+
+    Raises:
+        InvalidValueError: it is no tuple or list, or names a camera twice.
+        UnknownNameError: there is no such camera.
+    """
+    if isinstance(cameras, str):
+        raise InvalidValueError(f"cameras is the text {cameras!r}; write ({cameras!r},).")
+    if not isinstance(cameras, tuple | list):
+        raise InvalidValueError(
+            f"cameras is of type {type(cameras).__name__}; it has to be a tuple such as "
+            "('front',) or ()."
+        )
+    for camera in cameras:
+        if camera not in CAMERAS:
+            raise UnknownNameError("camera", camera, CAMERAS)
+        if cameras.count(camera) > 1:
+            raise InvalidValueError(f"cameras names {camera!r} twice.")
+    return tuple(cameras)
 
 
 class Observation(TypedDict):

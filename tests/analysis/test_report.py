@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from roboirg.analysis import report
+from roboirg.analysis import cards
 from roboirg.analysis.report import render, write_report
 from roboirg.evaluation.plan import Plan
 from roboirg.evaluation.record import EventRecord, MentionSpan, Record, Turn
@@ -170,7 +170,7 @@ def test_many_films_stay_beside_the_page(tmp_path: Path, monkeypatch: pytest.Mon
     filmed = first.model_copy(update={"video": "videos/a b.mp4"})
     lost = second.model_copy(update={"video": "videos/gone.mp4"})
     assert "they are beside it" not in render([filmed, lost], tmp_path)
-    monkeypatch.setattr(report, "MOST_FILM_BYTES", 3)
+    monkeypatch.setattr(cards, "MOST_FILM_BYTES", 3)
     text = render([filmed, lost], tmp_path)
     assert "they are beside it" in text
     (video,) = Page(text).videos
@@ -238,7 +238,7 @@ def test_the_head_says_which_run_it_was(tmp_path: Path) -> None:
 )
 def test_the_time_line_has_a_scale(steps: int, expected: list[int]) -> None:
     record = records()[0].model_copy(update={"steps": steps, "events": ()})
-    ticks = report._ticks(record)
+    ticks = cards._ticks(record)
     assert [tick.seconds for tick in ticks] == expected
     assert all(0 <= tick.left <= 100 for tick in ticks)
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import roboirg
+from roboirg.observations import CAMERAS
 from roboirg.policies import make_policy, play
 from roboirg.simulation import camera_mesh
-from roboirg.simulation.cameras import CAMERAS
 from roboirg.simulation.settings import HOME_ACTION
 from roboirg.simulation.world import World
 from roboirg.splits import get_episode

@@ -11,6 +11,7 @@ from types import ModuleType
 from typing import Any
 
 from roboirg.errors import InvalidValueError, UnknownNameError
+from roboirg.observations import CAMERAS, check_cameras
 from roboirg.policies.base import Policy
 
 BUILTIN: Mapping[str, str] = {
@@ -22,9 +23,6 @@ BUILTIN: Mapping[str, str] = {
 
 FINGERPRINT_LENGTH = 12
 """Hexadecimal digits."""
-
-BOTH_CAMERAS = ("front", "wrist")
-"""What a policy sees that does not say what it wants to see."""
 
 
 def load_policy_class(spec: str) -> type[Any]:
@@ -100,20 +98,7 @@ def wanted_cameras(policy: object) -> tuple[str, ...]:
     Raises:
         InvalidValueError: its ``cameras`` are not different names of cameras in a tuple or list.
     """
-    cameras = getattr(policy, "cameras", BOTH_CAMERAS)
-    if isinstance(cameras, str):
-        raise InvalidValueError(f"cameras is the text {cameras!r}; write ({cameras!r},).")
-    if not isinstance(cameras, (tuple, list)):
-        raise InvalidValueError(
-            f"cameras is of type {type(cameras).__name__}; it has to be a tuple such as "
-            "('front',) or ()."
-        )
-    for camera in cameras:
-        if camera not in BOTH_CAMERAS:
-            raise UnknownNameError("camera", camera, BOTH_CAMERAS)
-        if cameras.count(camera) > 1:
-            raise InvalidValueError(f"cameras names {camera!r} twice.")
-    return tuple(cameras)
+    return check_cameras(getattr(policy, "cameras", CAMERAS))
 
 
 def _check_class(spec: str, policy_class: type[Any]) -> None:

@@ -28,8 +28,6 @@ FRONT_TARGET = (0.0, 0.0, -0.2)
 CULLING_MARGIN = 0.002
 """Metres by which boxes are grown before the test."""
 
-CAMERAS = ("front", "wrist")
-
 
 class _Drawn(NamedTuple):
     """A picture and the poses of everything when it was drawn."""

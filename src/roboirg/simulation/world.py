@@ -11,9 +11,10 @@ import sapien.physx
 from numpy.typing import NDArray
 
 from roboirg.episode import Fact, Motion, Scene
-from roboirg.errors import InvalidValueError
+from roboirg.errors import InvalidValueError, UnknownNameError
+from roboirg.observations import CAMERAS
 from roboirg.simulation import bodies, detection, settings
-from roboirg.simulation.cameras import CAMERAS, Cameras
+from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.device import render_system
 from roboirg.simulation.robot import CAMERA_LINK, Robot
 from roboirg.simulation.scenery import add_scenery
@@ -84,12 +85,13 @@ class World:
         """What a camera sees now, RGB, shape (256, 256, 3).
 
         Raises:
-            InvalidValueError: there is no such camera, or the world was built invisible.
+            UnknownNameError: there is no such camera.
+            InvalidValueError: the world was built without pictures.
         """
         if self._cameras is None:
             raise InvalidValueError("This world was built without pictures (visible=False).")
         if camera not in CAMERAS:
-            raise InvalidValueError(f"There is no camera {camera!r}; there are {CAMERAS}.")
+            raise UnknownNameError("camera", camera, CAMERAS)
         return self._cameras.picture(camera)
 
     def _move_scripted(self) -> None:
