@@ -21,7 +21,8 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
-from roboirg.errors import RenderDeviceError, RoboIRGError
+from roboirg.errors import MissingDependencyError, RenderDeviceError, RoboIRGError
+from roboirg.simulation.assets import look_for_model_files
 from roboirg.simulation.device import DEVICE_VARIABLE
 
 DISTRIBUTION = "roboirgbench"
@@ -29,11 +30,6 @@ FRAME_TIMEOUT = 120.0
 """Seconds that the test frame may take."""
 
 OLDEST_PYTHON = (3, 11)
-MODEL_FILES = (
-    "assets/robots/panda/panda_v3.urdf",
-    "utils/scene_builder/table/assets/table.glb",
-)
-
 _EXTRAS = ("world", "sim", "report")
 _GIB = 1024**3
 _LEAST_MEMORY = 2 * _GIB
@@ -168,14 +164,11 @@ def _normal(name: str) -> str:
 
 def _check_model_files() -> Check:
     name, remedy = "ManiSkill model files", "pip install --no-deps 'mani_skill==3.0.1'"
-    spec = importlib.util.find_spec("mani_skill")
-    if spec is None or not spec.submodule_search_locations:
-        return Check(name, False, "the package mani_skill is not installed", remedy)
-    folder = Path(spec.submodule_search_locations[0])
-    missing = [file for file in MODEL_FILES if not (folder / file).is_file()]
-    if missing:
-        return Check(name, False, f"{', '.join(missing)} missing in {folder}", remedy)
-    return Check(name, True, str(folder))
+    try:
+        robot = look_for_model_files().robot
+    except MissingDependencyError as error:
+        return Check(name, False, str(error), remedy)
+    return Check(name, True, str(robot.parent))
 
 
 def _check_opencv() -> Check:

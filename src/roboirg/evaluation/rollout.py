@@ -45,8 +45,6 @@ from roboirg.policies.loading import is_privileged, policy_version, wanted_camer
 from roboirg.splits import get_episode
 
 if TYPE_CHECKING:
-    import gymnasium
-
     from roboirg.environment import RoboIRGEnv
 
 Play = Callable[[Job], Record]
@@ -176,7 +174,7 @@ def play_episode(job: Job, film: Film | None = None) -> Course:
     return course
 
 
-def make_env(job: Job, cameras: tuple[str, ...]) -> gymnasium.Env[Any, Any]:
+def make_env(job: Job, cameras: tuple[str, ...]) -> RoboIRGEnv:
     """The environment of a job."""
     import roboirg
 
@@ -206,32 +204,30 @@ def load_policy(job: Job) -> Policy:
 
 def _play(
     job: Job,
-    env: gymnasium.Env[Any, Any],
+    env: RoboIRGEnv,
     policy: Policy,
     film: Film | None,
     course: Course,
 ) -> None:
-    world = cast("RoboIRGEnv", env.unwrapped)
     with _blame("environment"):
         if film is not None:
-            world.set_frame_hook(film.shoot, every=film.options.every)
+            env.set_frame_hook(film.shoot, every=film.options.every)
         observation, info = env.reset()
-        device = str(world.render_device)
+        device = str(env.render_device)
         course.render_device = None if device == NOTHING_DRAWN else device
         course.demonstration_steps = len(info["demonstration"]["joint_positions"])
         course.turn = int(info["elapsed_steps"])
         course.note(info)
-        instruction = world.instruction.text
+        instruction = env.instruction.text
     with _blame("policy"):
         if isinstance(policy, PrivilegedPolicy):
-            policy.attach(world)
+            policy.attach(env)
         policy.reset(instruction, info["demonstration"])
     status, cause = "ongoing", None
     while status == "ongoing":
         actions = _next_actions(policy, observation)
         with _blame("environment"):
-            seen, *_, info = world.step_chunk(actions)
-        observation = cast("Observation", seen)
+            observation, *_, info = env.step_chunk(actions)
         course.steps = int(info["steps"])
         course.note(info)
         status, cause = info["status"], info.get("cause")
@@ -250,10 +246,10 @@ def _judge(job: Job, status: str, cause: str | None, course: Course) -> None:
         course.cause = f"environment: the episode ended with status {status!r}"
 
 
-def _next_actions(policy: Policy, observation: Observation) -> NDArray[np.float64]:
+def _next_actions(policy: Policy, observation: dict[str, Any]) -> NDArray[np.float64]:
     """The policy's next rows, all of them valid."""
     with _blame("policy"):
-        return check_chunk(policy.act(observation))
+        return check_chunk(policy.act(cast("Observation", observation)))
 
 
 @contextmanager

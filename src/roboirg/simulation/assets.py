@@ -55,6 +55,15 @@ def find_model_files() -> ModelFiles:
     Raises:
         MissingDependencyError: ManiSkill is not installed, or its files are not those of 3.0.1.
     """
+    return look_for_model_files()
+
+
+def look_for_model_files() -> ModelFiles:
+    """As `find_model_files`, looking anew.
+
+    Raises:
+        MissingDependencyError: ManiSkill is not installed, or its files are not those of 3.0.1.
+    """
     root = _package_folder()
     missing = [name for name in _FILES if not (root / name).is_file()]
     if missing:

@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from roboirg.episode import Point, Primitive
 from roboirg.errors import MotionPlanningError
 from roboirg.simulation.planning import Planner, ToolPose, timed
+from roboirg.simulation.robot import rotation_of
 from roboirg.simulation.settings import HOME
 from roboirg.simulation.world import World
 
@@ -130,7 +131,7 @@ class Hands:
 
     def _rotation(self) -> Rotation:
         """The tool's present rotation."""
-        return ToolPose.of(self._world.robot.tool_pose).rotation
+        return rotation_of(self._world.robot.tool_pose)
 
     def _grasp_rotation(self, name: str) -> Rotation:
         """Fingers down, closing along the object's side nearest to the present closing axis."""

@@ -19,9 +19,10 @@ import toppra.constraint
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from roboirg.actions import ARM_JOINTS
 from roboirg.episode import ROBOT_BASE
 from roboirg.errors import MotionPlanningError
-from roboirg.simulation.robot import ARM_JOINTS, TOOL_LINK, Robot
+from roboirg.simulation.robot import TOOL_LINK, Robot, rotation_of
 from roboirg.simulation.settings import CONTROL_PERIOD
 
 JOINT_SPEED_LIMIT = 0.9
@@ -51,9 +52,8 @@ class ToolPose(NamedTuple):
 
     @classmethod
     def of(cls, pose: sapien.Pose) -> ToolPose:
-        """From SAPIEN's pose, whose quaternion has the scalar first."""
-        w, x, y, z = np.asarray(pose.q, dtype=np.float64)
-        return cls(np.asarray(pose.p, dtype=np.float64), Rotation.from_quat([x, y, z, w]))
+        """From SAPIEN's pose."""
+        return cls(np.asarray(pose.p, dtype=np.float64), rotation_of(pose))
 
 
 class Planner:

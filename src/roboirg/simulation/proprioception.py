@@ -6,9 +6,8 @@ from typing import TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from roboirg.simulation.robot import Robot
+from roboirg.simulation.robot import Robot, rotation_of
 
 
 class Feeling(TypedDict):
@@ -46,5 +45,4 @@ class Proprioception:
 
     def _principal_angles(self) -> NDArray[np.float64]:
         """Roll, pitch and yaw of the tool, extrinsic x-y-z, rad."""
-        w, x, y, z = np.asarray(self._robot.tool_pose.q, dtype=np.float64)
-        return np.asarray(Rotation.from_quat([x, y, z, w]).as_euler("xyz"))
+        return np.asarray(rotation_of(self._robot.tool_pose).as_euler("xyz"))

@@ -12,13 +12,14 @@ import sapien.physx
 import sapien.render
 from numpy.typing import NDArray
 from sapien.wrapper.urdf_loader import URDFLoader
+from scipy.spatial.transform import Rotation
 
+from roboirg.actions import ARM_JOINTS
 from roboirg.episode import ROBOT_BASE
 from roboirg.simulation import settings
 from roboirg.simulation.assets import find_model_files
 from roboirg.simulation.camera_mesh import visible_shape
 
-ARM_JOINTS = 7
 FINGERS = ("panda_leftfinger", "panda_rightfinger")
 TOOL_LINK = "panda_hand_tcp"
 CAMERA_LINK = "camera_link"
@@ -124,6 +125,12 @@ class Robot:
             if math.acos(min(max(cosine, -1.0), 1.0)) > GRASP_ANGLE:
                 return False
         return True
+
+
+def rotation_of(pose: sapien.Pose) -> Rotation:
+    """The rotation of a pose; SAPIEN's quaternions have the scalar first, SciPy's last."""
+    w, x, y, z = np.asarray(pose.q, dtype=np.float64)
+    return Rotation.from_quat([x, y, z, w])
 
 
 def _force_on(

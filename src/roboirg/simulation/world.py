@@ -10,7 +10,7 @@ import sapien
 import sapien.physx
 from numpy.typing import NDArray
 
-from roboirg.episode import Fact, Motion, Scene
+from roboirg.episode import Fact, KeyPose, Motion, Scene
 from roboirg.errors import InvalidValueError, UnknownNameError
 from roboirg.observations import CAMERAS
 from roboirg.simulation import bodies, detection, settings
@@ -51,12 +51,6 @@ class World:
             item.name: bodies.build(self._scene, item, visible=visible) for item in scene.objects
         }
         self._motions = tuple(motions)
-        # Objects that a motion holds somewhere; nothing is to be concluded from where they are.
-        self._held = {
-            motion.subject
-            for motion in motions
-            if motion.keys[0].step == 0 and motion.keys[0].position is not None
-        }
         self._cameras: Cameras | None = None
         if visible:
             settings.add_lights(self._scene)
@@ -97,18 +91,22 @@ class World:
     def _move_scripted(self) -> None:
         """Hold objects where their motions want them at this step; release them at the end."""
         for motion in self._motions:
-            due = [key for key in motion.keys if key.step <= self.elapsed]
-            if not due:
-                continue
-            body, key = self.bodies[motion.subject], due[-1]
-            if key.position is not None:
+            body, key = self.bodies[motion.subject], _key_at(motion, self.elapsed)
+            if key is not None and key.position is not None:
                 body.put(key.position)
-                self._held.add(motion.subject)
-            elif key.step == self.elapsed:
+            elif key is not None and key.step == self.elapsed:
                 body.put(body.item.position)
-                self._held.discard(motion.subject)
 
     def _detect(self) -> frozenset[Fact]:
         contacts = self._scene.physx_system.get_contacts() if self.elapsed else []
-        free = [body for name, body in self.bodies.items() if name not in self._held]
+        # Nothing is to be concluded from where a motion held an object in the last step.
+        last = max(self.elapsed - 1, 0)
+        keys = {motion.subject: _key_at(motion, last) for motion in self._motions}
+        held = {name for name, key in keys.items() if key is not None and key.position is not None}
+        free = [body for name, body in self.bodies.items() if name not in held]
         return detection.detect(free, self.robot, contacts)
+
+
+def _key_at(motion: Motion, step: int) -> KeyPose | None:
+    """The key of a motion that is in force at a step; None before the first."""
+    return next((key for key in reversed(motion.keys) if key.step <= step), None)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import functools
-import importlib
-import pkgutil
+import sys
 from collections.abc import Mapping
 
+from roboirg.discovery import offered
 from roboirg.errors import UnknownNameError
 from roboirg.tasks.task import Task
 
@@ -16,11 +16,7 @@ __all__ = ["Task", "all_tasks", "get_task"]
 @functools.cache
 def all_tasks() -> Mapping[str, Task]:
     """Every task by name, in the order of their codes."""
-    modules = (
-        importlib.import_module(f"{__name__}.{found.name}")
-        for found in pkgutil.iter_modules(__path__)
-    )
-    tasks = [module.TASK for module in modules if hasattr(module, "TASK")]
+    tasks: list[Task] = offered(sys.modules[__name__], "TASK")
     return {task.name: task for task in sorted(tasks, key=lambda task: task.code)}
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -52,10 +52,7 @@ def draw_cube(
         yaw = 2.0 * math.pi * rng.random()
         return SceneObject(name, "cube", Point(x, y, geometry.CUBE_HALF), yaw, colour)
 
-    cube = place(draw, lambda cube: cube_footprint(cube).grown(gap), obstacles)
-    if cube is None:
-        raise SceneRejectedError(f"no place for {name}")
-    return cube
+    return _placed(name, draw, lambda cube: cube_footprint(cube).grown(gap), obstacles)
 
 
 def draw_target(
@@ -79,7 +76,16 @@ def draw_target(
     def clearance(target: SceneObject) -> Circle:
         return Circle(target.position.x, target.position.y, radius + gap)
 
-    target = place(draw, clearance, obstacles)
-    if target is None:
+    return _placed(name, draw, clearance, obstacles)
+
+
+def _placed(
+    name: str,
+    draw: Callable[[], SceneObject],
+    clearance: Callable[[SceneObject], Footprint],
+    obstacles: Sequence[Footprint],
+) -> SceneObject:
+    item = place(draw, clearance, obstacles)
+    if item is None:
         raise SceneRejectedError(f"no place for {name}")
-    return target
+    return item

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import functools
-import importlib
-import pkgutil
+import sys
 from collections.abc import Mapping
 
+from roboirg.discovery import offered
 from roboirg.errors import InvalidValueError, UnknownNameError
 from roboirg.language.instruction import SETTINGS
 from roboirg.language.request import SettingRule
@@ -18,11 +18,7 @@ __all__ = ["all_settings", "get_setting"]
 @functools.cache
 def all_settings() -> Mapping[str, SettingRule]:
     """Every setting by name, explicit first."""
-    modules = (
-        importlib.import_module(f"{__name__}.{found.name}")
-        for found in pkgutil.iter_modules(__path__)
-    )
-    rules = [module.SETTING for module in modules if hasattr(module, "SETTING")]
+    rules: list[SettingRule] = offered(sys.modules[__name__], "SETTING")
     return {rule.name: rule for rule in sorted(rules, key=lambda rule: SETTINGS.index(rule.name))}
 
 

@@ -1,0 +1,17 @@
+"""Finding what the files of a package offer: adding a thing is adding a file."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from types import ModuleType
+from typing import Any
+
+
+def offered(package: ModuleType, name: str) -> list[Any]:
+    """What the modules of a package call `name`, in the order of the files' names."""
+    modules = (
+        importlib.import_module(f"{package.__name__}.{found.name}")
+        for found in pkgutil.iter_modules(package.__path__)
+    )
+    return [getattr(module, name) for module in modules if hasattr(module, name)]
