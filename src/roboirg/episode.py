@@ -12,14 +12,19 @@ steps (20 per second). Quaternions are (w, x, y, z).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
+
+from roboirg.conditions import Condition, Fact, Rule
+from roboirg.motions import Motion, Point
 
 Colour = Literal["red", "green", "blue"]
 Difficulty = Literal["easy", "medium", "hard"]
 Split = Literal["train", "val", "test"]
 Suite = Literal["counting", "permanence", "reference"]
-ObjectKind = Literal["cube", "hidden_cube", "container", "target", "button"]
+ObjectKind = Literal[
+    "cube", "hidden_cube", "container", "target", "button", "bin", "site", "shuttle", "marker"
+]
 
 COLOURS: tuple[Colour, ...] = ("red", "green", "blue")
 DIFFICULTIES: tuple[Difficulty, ...] = ("easy", "medium", "hard")
@@ -31,15 +36,7 @@ ENVIRONMENT_VERSION = 0
 ROBOT_BASE = (-0.615, 0.0, 0.0)
 """Position of the Panda's base link in the world frame, metres; its rotation is the identity."""
 
-SlotValue = str | int | tuple[str, ...]
-
-
-class Point(NamedTuple):
-    """A position in the world frame, metres."""
-
-    x: float
-    y: float
-    z: float
+SlotValue = str | int | tuple[str, ...] | tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,12 +45,16 @@ class SceneObject:
 
     Attributes:
         name: unique in the scene, for example ``"cube_red"`` or ``"container_2"``.
-        kind: what it is; shape and mass follow from the kind and `radius`.
+        kind: what it is; shape and mass follow from the kind, `radius` and `thickness`. A ``site``
+            is a round place that nobody sees, a ``shuttle`` a cube that runs by itself and touches
+            nothing, a ``marker`` a disc that lights up over a target.
         position: of the object's origin, world frame, metres.
         yaw: rotation about the vertical, radians.
         colour: of a cube; None for things whose colour tells nothing.
         inside: name of the container that stands over this (hidden) cube, else None.
-        radius: of a target disc, metres; None for the other kinds.
+        radius: of a target, site or marker, metres; None for the other kinds.
+        thickness: of a target, metres; None for the usual 0.005.
+        rgb: 0 to 1 each, of a target's rings or a shuttle; None for the usual of the kind.
     """
 
     name: str
@@ -63,13 +64,23 @@ class SceneObject:
     colour: Colour | None = None
     inside: str | None = None
     radius: float | None = None
+    thickness: float | None = None
+    rgb: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """All objects of an episode, in the order in which they were placed."""
+    """What is on the table at the start, and what happens there by itself.
+
+    Attributes:
+        objects: in the order in which they were placed.
+        motions: scripted movements.
+        past: what the video shows being done, in order; empty where it shows nothing done.
+    """
 
     objects: tuple[SceneObject, ...]
+    motions: tuple[Motion, ...] = ()
+    past: tuple[Fact, ...] = ()
 
     def __getitem__(self, name: str) -> SceneObject:
         """The object of that name; KeyError if there is none."""
@@ -91,8 +102,11 @@ class Scene:
 class Goal:
     """What an instruction must convey: a value for each slot. Goals compare by value.
 
-    Slots by task: PickXtimes ``colour`` (str) and ``repeats`` (int); VideoUnmask ``colours``
-    (tuple of one or two colour names, in the order of picking).
+    Slots by task: BinFill ``colours`` (one to three names, in the order red, blue, green) and
+    ``counts`` (a number for each); PickXtimes and SwingXtimes ``colour`` and ``repeats``; StopCube
+    ``visit`` (2 for the second); the four Unmask tasks ``colours`` (one or two names, in the order
+    of picking); VideoRepick ``repeats``; VideoPlaceButton ``colour`` and ``relation`` (before or
+    after); VideoPlaceOrder ``colour`` and ``placement`` (1 for the first).
     """
 
     slots: tuple[tuple[str, SlotValue], ...]
@@ -125,47 +139,66 @@ class Goal:
         value = self[slot]
         if not isinstance(value, tuple):
             raise TypeError(f"slot {slot!r} holds {value!r}, not a sequence of words")
-        return value
+        return tuple(str(word) for word in value)
+
+    def numbers(self, slot: str) -> tuple[int, ...]:
+        """The value of a slot that holds several counts in order."""
+        value = self[slot]
+        if not isinstance(value, tuple):
+            raise TypeError(f"slot {slot!r} holds {value!r}, not a sequence of numbers")
+        return tuple(int(number) for number in value)
 
     def as_mapping(self) -> Mapping[str, SlotValue]:
         """The slots as a dictionary, for records."""
         return dict(self.slots)
 
 
-class Fact(NamedTuple):
-    """Something that is true in the world at one evaluation, one after each control step.
-
-    | kind | true while |
-    | --- | --- |
-    | ``picked`` | the cube is above z 0.05 and grasped |
-    | ``placed`` | the cube lies released (z <= 0.035) within 0.05 of the `place` (xy) |
-    | ``lifted`` | the container's origin is above z 0.15 |
-    | ``put_down`` | the container's origin is at or below z 0.07, released, hand above z 0.05 |
-    | ``pressed`` | the button's cap is more than 0.005 down |
-    | ``still`` | no arm joint moves faster than 0.2 rad/s (subject ``"robot"``) |
-
-    Thresholds: RoboMME, evaluation mode.
-    """
-
-    kind: Literal["picked", "placed", "lifted", "put_down", "pressed", "still"]
-    subject: str
-    place: str | None = None
-
-
 class Primitive(NamedTuple):
     """How the oracle's hands do a stage.
 
+    | kind | subject, place | movement |
+    | --- | --- | --- |
+    | ``pick_cube`` | cube | grasp it and lift it |
+    | ``place_on`` | cube, target or site | put what is held there |
+    | ``drop_into`` | cube, bin | let what is held fall in, and retreat |
+    | ``move_over`` | cube, target | carry what is held over the place |
+    | ``put_down`` | cube or container | straight down, let go at the tool height `height`, up |
+    | ``pick_container`` | container | grasp its knob and lift it |
+    | ``press`` | button | above it, down and up with closed fingers |
+    | ``press_below`` | button | from where the hand is; at `steps` since reset at best |
+    | ``hover`` | button | above it with closed fingers |
+    | ``hold`` | ``"robot"`` | stay for `steps` with an open gripper |
+    | ``hold_until`` | ``"robot"`` | stay until `steps` since reset with closed fingers |
+    | ``retreat`` | ``"robot"`` | away from the table's things, then as ``hold`` |
+    | ``go_home`` | ``"robot"`` | to the home position |
+
     Attributes:
         kind: the movement; its way points are in the simulation room.
-        subject: what is handled (an object's name; ``"robot"`` for ``hold``).
-        place: where it goes, for ``place_on``.
-        steps: how long, in control steps, for ``hold``.
+        subject: what is handled (an object's name).
+        place: where it goes.
+        steps: how long, in control steps.
+        height: of the tool where it lets go, m, for ``put_down``.
     """
 
-    kind: Literal["pick_cube", "place_on", "press", "pick_container", "put_down", "hold"]
+    kind: Literal[
+        "pick_cube",
+        "place_on",
+        "drop_into",
+        "move_over",
+        "put_down",
+        "pick_container",
+        "press",
+        "press_below",
+        "hover",
+        "hold",
+        "hold_until",
+        "retreat",
+        "go_home",
+    ]
     subject: str
     place: str | None = None
     steps: int = 0
+    height: float = 0.07
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,44 +206,25 @@ class Stage:
     """One step of the plan: what must happen next, what must not, how, and how it is called.
 
     Attributes:
-        expects: the fact that completes the stage.
-        forbids: facts any of which fails the episode while this stage is current.
+        expects: the condition that completes the stage.
+        forbids: facts and rules any of which fails the episode while this stage is current.
         primitive: how the oracle does it.
         subgoal: simple subgoal in words, lower case; ``{at}`` marks where the grounded form
             puts ``at <y, x>``.
         points_at: the object whose pixel the grounded form names; None if it has no slot.
         lasting: how many control steps `expects` has to hold before the stage is complete.
+        timer: name of the timer that the stage's first evaluation starts, unless it runs already.
+        recorded: whether the stage is in the video, if it is part of the demonstration.
     """
 
-    expects: Fact
-    forbids: tuple[Fact, ...]
+    expects: Condition
+    forbids: tuple[Fact | Rule, ...]
     primitive: Primitive
     subgoal: str
     points_at: str | None = None
     lasting: int = 0
-
-
-class KeyPose(NamedTuple):
-    """From control step `step` on, the object is held at `position`; None releases it at its place.
-
-    The place is the object's position and yaw in the scene.
-    """
-
-    step: int
-    position: Point | None
-
-
-@dataclass(frozen=True, slots=True)
-class Motion:
-    """Scripted movement of one object, whatever the robot does.
-
-    Attributes:
-        subject: name of the object.
-        keys: in the order of their steps (elapsed control steps before the physics of a step).
-    """
-
-    subject: str
-    keys: tuple[KeyPose, ...]
+    timer: str | None = None
+    recorded: bool = True
 
 
 def episode_key(task: str, split: Split, index: int) -> str:
@@ -228,11 +242,10 @@ class Episode:
         index: 0-based position in the split.
         seed: of the scene sampler.
         difficulty: of the scene sampler.
-        scene: objects at the start.
+        scene: objects at the start and what they do by themselves.
         goal: what the instruction must convey.
         stages: what the policy must do, in order.
         demonstration: stages that the oracle plays before the policy's turn; may be empty.
-        motions: scripted movements, in steps since reset.
     """
 
     task: str
@@ -244,7 +257,6 @@ class Episode:
     goal: Goal
     stages: tuple[Stage, ...]
     demonstration: tuple[Stage, ...] = ()
-    motions: tuple[Motion, ...] = field(default=())
 
     @property
     def key(self) -> str:

@@ -1,8 +1,8 @@
 """The judge: a list of stages and the facts of each step give a status.
 
-The rule is RoboMME's: at each evaluation the current stage's forbidden facts are tested first,
-then the fact that it expects; at most one stage is completed per evaluation, so what ends one
-stage is never held against the next one in the same step.
+The rule is RoboMME's: at each evaluation what the current stage forbids is tested first, then
+what it expects; at most one stage is completed per evaluation, so what ends one stage is never
+held against the next one in the same step.
 """
 
 from __future__ import annotations
@@ -11,7 +11,9 @@ from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from enum import StrEnum
 
-from roboirg.episode import Fact, Scene, Stage
+from roboirg.conditions import Fact, Rule
+from roboirg.episode import Scene, Stage
+from roboirg.judging.history import History
 
 
 class Status(StrEnum):
@@ -32,6 +34,8 @@ class Judge:
     Attributes:
         status: success and failure are final.
         index: number of completed stages.
+        published: the stage that was due when the last evaluation began, or None when all are
+            completed: labels change one step after the stage (RoboMME).
         cause: why the episode failed; None before that.
     """
 
@@ -40,7 +44,9 @@ class Judge:
         self._scene = scene or Scene(())
         self.status = Status.SUCCESS if not self.stages else Status.ONGOING
         self.index = 0
+        self.published = self.current
         self.cause: str | None = None
+        self._history = History()
         self._held_since: int | None = None
 
     @property
@@ -61,21 +67,33 @@ class Judge:
         stage = self.current
         if self.status is not Status.ONGOING or stage is None:
             return self.status
-        broken = next((fact for fact in stage.forbids if fact in facts), None)
+        self.published = stage
+        self._history.follow(step, facts)
+        if stage.timer is not None:
+            self._history.start_timer(stage.timer)
+        broken = next((rule for rule in stage.forbids if self._is_broken(rule)), None)
         if broken is not None:
-            self.status = Status.FAILURE
-            self.cause = describe_violation(broken, stage, self._scene)
-        elif self._completed(step, stage, facts):
+            self.fail(describe_violation(broken, stage, self._scene))
+        elif self._completed(step, stage):
             self.index += 1
             self._held_since = None
             if self.index == len(self.stages):
-                self.status = Status.SUCCESS
+                self.status, self.published = Status.SUCCESS, None
         return self.status
 
-    def _completed(self, step: int, stage: Stage, facts: AbstractSet[Fact]) -> bool:
+    def fail(self, cause: str) -> None:
+        """End the episode as a failure, unless it is over already."""
+        if self.status is Status.ONGOING:
+            self.status, self.cause = Status.FAILURE, cause
+
+    def _is_broken(self, rule: Fact | Rule) -> bool:
+        return self._history.holds(rule.condition if isinstance(rule, Rule) else rule)
+
+    def _completed(self, step: int, stage: Stage) -> bool:
+        met = self._history.holds(stage.expects)
         if stage.lasting == 0:
-            return stage.expects in facts
-        if self._held_since is None or stage.expects not in facts:
+            return met
+        if self._held_since is None or not met:
             self._held_since = step
         return step - self._held_since >= stage.lasting
 
@@ -83,12 +101,16 @@ class Judge:
 _VERBS = {"picked": "picked up", "lifted": "lifted", "pressed": "pressed"}
 
 
-def describe_violation(fact: Fact, stage: Stage, scene: Scene) -> str:
+def describe_violation(broken: Fact | Rule, stage: Stage, scene: Scene) -> str:
     """What happened and what was due, in one line, for example for a record's cause."""
+    what = broken.cause if isinstance(broken, Rule) else _describe_fact(broken, scene)
+    return f"{what} while due: {plain_subgoal(stage)}"
+
+
+def _describe_fact(fact: Fact, scene: Scene) -> str:
     verb = _VERBS.get(fact.kind, fact.kind.replace("_", " "))
     place = f" on {describe_object(fact.place, scene)}" if fact.place else ""
-    thing = describe_object(fact.subject, scene)
-    return f"{verb} {thing}{place} while due: {plain_subgoal(stage)}"
+    return f"{verb} {describe_object(fact.subject, scene)}{place}"
 
 
 def describe_object(name: str, scene: Scene) -> str:

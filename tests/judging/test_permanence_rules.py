@@ -1,0 +1,227 @@
+"""The rules of the four Unmask tasks, driven by synthetic facts."""
+
+import pytest
+
+from roboirg.conditions import Fact
+from roboirg.judging import Judge, Status
+from roboirg.splits import make_episode
+
+STILL = Fact("still", "robot")
+BUTTON, LEFT, RIGHT = (Fact("pressed", name) for name in ("button", "button_left", "button_right"))
+PRESSES = {
+    "VideoUnmask": [],
+    "VideoUnmaskSwap": [],
+    "ButtonUnmask": [[BUTTON], []],
+    "ButtonUnmaskSwap": [[LEFT], [], [RIGHT], []],
+}
+each_task = pytest.mark.parametrize("task", PRESSES)
+each_button_task = pytest.mark.parametrize("task", ["ButtonUnmask", "ButtonUnmaskSwap"])
+
+
+@pytest.fixture(params=[3, 11, 25])
+def seed(request):
+    return request.param
+
+
+def lifted(name):
+    return Fact("lifted", name)
+
+
+def put_down(name):
+    return Fact("put_down", name)
+
+
+def verdict(episode, *steps):
+    """The judge after so many evaluations, one after each of the sets of facts."""
+    judge = Judge(episode.stages, episode.scene)
+    for number, facts in enumerate(steps):
+        judge.update(number, frozenset(facts))
+    return judge
+
+
+def named(episode):
+    """The containers over the named cubes, in order, and all other containers."""
+    wanted = [
+        str(episode.scene[f"cube_{colour}"].inside) for colour in episode.goal.texts("colours")
+    ]
+    names = [item.name for item in episode.scene.of_kind("container")]
+    return wanted, [name for name in names if name not in wanted]
+
+
+def hard(task, seed):
+    """An episode with two picks, its two targets and the other containers."""
+    episode = make_episode(task, seed, "hard")
+    (first, second), others = named(episode)
+    return episode, first, second, others
+
+
+@each_task
+def test_one_pick_succeeds_when_the_container_over_the_cube_is_lifted(task, seed):
+    episode = make_episode(task, seed, "medium")
+    (target,), _ = named(episode)
+    judge = verdict(episode, *PRESSES[task], [], [lifted(target)])
+    assert judge.status is Status.SUCCESS
+    assert judge.cause is None
+
+
+@each_task
+def test_two_picks_succeed_in_order_with_the_first_put_down_between(task, seed):
+    episode, first, second, _ = hard(task, seed)
+    begin = [*PRESSES[task], [lifted(first)], []]
+    end = [[put_down(first)], [], [lifted(second)]]
+    assert verdict(episode, *begin, *end).status is Status.SUCCESS
+    assert verdict(episode, *begin, *end[:-1]).status is Status.ONGOING
+
+
+@each_task
+def test_any_other_container_fails_the_first_pick(task, seed):
+    episode, _, second, others = hard(task, seed)
+    for wrong in (second, *others):
+        judge = verdict(episode, *PRESSES[task], [lifted(wrong)])
+        assert judge.status is Status.FAILURE
+        hidden = episode.scene.hidden_in(wrong)
+        what = f"the container over the {hidden.colour} cube" if hidden else "an empty container"
+        colour = episode.goal.texts("colours")[0]
+        assert judge.cause == (
+            f"lifted {what} while due: pick up the container that hides the {colour} cube"
+        )
+
+
+@each_task
+def test_another_container_lifted_with_the_right_one_fails(task, seed):
+    episode, first, second, _ = hard(task, seed)
+    judge = verdict(episode, *PRESSES[task], [lifted(first), lifted(second)])
+    assert judge.status is Status.FAILURE
+
+
+@each_task
+def test_any_other_container_fails_the_putting_down(task, seed):
+    episode, first, second, others = hard(task, seed)
+    for wrong in (second, *others):
+        judge = verdict(episode, *PRESSES[task], [lifted(first)], [put_down(first), lifted(wrong)])
+        assert judge.status is Status.FAILURE
+        assert str(judge.cause).endswith("while due: put down the container")
+
+
+@each_task
+def test_any_other_container_the_first_included_fails_the_second_pick(task, seed):
+    episode, first, _, others = hard(task, seed)
+    for wrong in (first, *others):
+        judge = verdict(
+            episode, *PRESSES[task], [lifted(first)], [put_down(first)], [lifted(wrong)]
+        )
+        assert judge.status is Status.FAILURE
+
+
+@each_task
+def test_the_container_that_is_held_or_lifted_again_before_it_is_down_is_fine(task, seed):
+    episode, first, second, _ = hard(task, seed)
+    steps = [*PRESSES[task], *[[lifted(first)]] * 5, [], [lifted(first)], []]
+    assert verdict(episode, *steps).status is Status.ONGOING
+    steps += [[put_down(first)], [lifted(second)]]
+    assert verdict(episode, *steps).status is Status.SUCCESS
+
+
+@each_task
+def test_moving_containers_without_lifting_them_is_fine(task, seed):
+    # A container that was raised a little is not lifted, and standing ones count as put down.
+    episode, first, second, others = hard(task, seed)
+    down = [put_down(name) for name in (first, second, *others)]
+    steps = [down, [put_down(first)], [put_down(others[0])], []]
+    judge = verdict(episode, *PRESSES[task], *steps)
+    assert (judge.status, judge.index) == (Status.ONGOING, len(episode.stages) - 3)
+
+
+@each_task
+def test_the_first_container_has_to_be_put_down_and_no_other_will_do(task, seed):
+    episode, first, second, others = hard(task, seed)
+    down = [put_down(name) for name in (second, *others)]
+    judge = verdict(episode, *PRESSES[task], [lifted(first)], down)
+    assert (judge.status, judge.index) == (Status.ONGOING, len(episode.stages) - 2)
+
+
+@each_task
+def test_doing_nothing_neither_succeeds_nor_fails(task, seed):
+    episode = make_episode(task, seed, "medium")
+    judge = verdict(episode, *[[STILL]] * 500)
+    assert (judge.status, judge.index) == (Status.ONGOING, 0)
+
+
+@each_button_task
+def test_the_right_container_before_the_buttons_is_not_enough(task, seed):
+    episode = make_episode(task, seed, "medium")
+    (target,), _ = named(episode)
+    judge = verdict(episode, [lifted(target)], [])
+    assert (judge.status, judge.index) == (Status.ONGOING, 0)
+    assert verdict(episode, [lifted(target)], [], *PRESSES[task]).status is Status.ONGOING
+
+
+@each_button_task
+def test_nothing_fails_while_a_button_is_due(task, seed):
+    episode, first, second, others = hard(task, seed)
+    everything = [lifted(name) for name in (first, second, *others)]
+    looked = [[lifted(name)] for name in (first, second, *others)]
+    pressed = [facts for press in PRESSES[task] if press for facts in (everything, press)]
+    judge = verdict(episode, *looked, *pressed, [lifted(first)], [put_down(first)])
+    assert judge.status is Status.ONGOING
+    judge.update(100, frozenset([lifted(second)]))
+    assert judge.status is Status.SUCCESS
+
+
+@each_button_task
+def test_what_is_up_after_the_last_press_counts_one_step_later(task, seed):
+    episode = make_episode(task, seed, "medium")
+    (target,), others = named(episode)
+    *before, last = [press for press in PRESSES[task] if press]
+    for up, outcome in ((target, Status.SUCCESS), (others[0], Status.FAILURE)):
+        judge = verdict(episode, *before, [*last, lifted(up)])
+        assert judge.status is Status.ONGOING
+        judge.update(100, frozenset([lifted(up)]))
+        assert judge.status is outcome
+
+
+@each_button_task
+def test_pressing_again_later_has_no_effect(task, seed):
+    episode, first, second, _ = hard(task, seed)
+    again = [press for press in PRESSES[task] if press]
+    steps = [*PRESSES[task], *again, [lifted(first)], *again, [put_down(first)], *again]
+    assert verdict(episode, *steps).status is Status.ONGOING
+    assert verdict(episode, *steps, [lifted(second)]).status is Status.SUCCESS
+
+
+@pytest.mark.parametrize("order", [(LEFT, RIGHT), (RIGHT, LEFT)])
+@pytest.mark.parametrize("between", [[], [[]]])
+def test_both_buttons_in_any_order(order, between):
+    episode = make_episode("ButtonUnmaskSwap", 3, "medium")
+    one, other = order
+    assert verdict(episode, [one]).index == 1
+    assert verdict(episode, [one], *between, [other]).index == 2
+    # Already the other one while the first is still down.
+    assert verdict(episode, [one], [one, other]).index == 2
+
+
+@pytest.mark.parametrize("button", [LEFT, RIGHT])
+def test_one_button_twice_or_held_is_not_both(button):
+    episode = make_episode("ButtonUnmaskSwap", 3, "medium")
+    assert verdict(episode, [button], [], [button], [], [button]).index == 1
+    assert verdict(episode, *[[button]] * 10).index == 1
+
+
+def test_both_buttons_at_once_complete_one_stage_per_step():
+    episode = make_episode("ButtonUnmaskSwap", 3, "medium")
+    assert verdict(episode, [LEFT, RIGHT]).index == 1
+    assert verdict(episode, [LEFT, RIGHT], []).index == 2
+
+
+@pytest.mark.parametrize("difficulty", ["easy", "medium", "hard"])
+def test_the_video_ends_no_earlier_than_the_last_exchange(difficulty):
+    episode = make_episode("VideoUnmaskSwap", 3, difficulty)
+    (watch,) = episode.demonstration
+    judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
+    # Containers that are out of the world are high above the table; no harm in the video.
+    away = [lifted(item.name) for item in episode.scene.of_kind("container")]
+    for step in range(watch.lasting):
+        judge.update(step, frozenset([STILL, *(away if step < 32 else ())]))
+    assert (judge.status, judge.index) == (Status.ONGOING, 0)
+    judge.update(watch.lasting, frozenset([STILL]))
+    assert judge.index == 1

@@ -1,0 +1,261 @@
+"""The rules of the three Reference tasks, driven by synthetic facts."""
+
+import contextlib
+import itertools
+
+import numpy as np
+import pytest
+
+from roboirg.conditions import Fact
+from roboirg.episode import DIFFICULTIES, Episode, Goal
+from roboirg.errors import SceneRejectedError
+from roboirg.judging import Judge, Status
+from roboirg.tasks.video_place_button import TASK as VIDEO_PLACE_BUTTON
+from roboirg.tasks.video_place_order import TASK as VIDEO_PLACE_ORDER
+from roboirg.tasks.video_repick import TASK as VIDEO_REPICK
+
+PRESSED = Fact("pressed", "button")
+STILL, HOME = Fact("still", "robot"), Fact("home", "robot")
+TOO_EARLY = "pressed the button too early while due: "
+
+
+def sample(task, difficulty):
+    """Scene and goal of the first seed that gives one."""
+    for seed in itertools.count():
+        with contextlib.suppress(SceneRejectedError):
+            return task.sample(np.random.default_rng(seed), difficulty)
+    raise AssertionError
+
+
+def make(task, difficulty="medium", goal=None):
+    """An episode for the goal of its scene, or another."""
+    scene, own = sample(task, difficulty)
+    goal = goal or own
+    stages, shown = task.stages(scene, goal), task.demonstration(scene)
+    return Episode(task.name, "test", 0, 0, difficulty, scene, goal, stages, shown)
+
+
+def judged(episode, *steps):
+    """The judge after one evaluation for each set of facts."""
+    judge = Judge(episode.stages, episode.scene)
+    for step, facts in enumerate(steps):
+        judge.update(step, frozenset(facts))
+    return judge
+
+
+def verdict(episode, *steps):
+    return judged(episode, *steps).status
+
+
+# VideoRepick
+
+
+def repick(repeats, difficulty="medium"):
+    episode = make(VIDEO_REPICK, difficulty, Goal.of(repeats=repeats))
+    target = episode.scene.past[0].subject
+    other = next(c.name for c in episode.scene.of_kind("cube") if c.name != target)
+    return episode, Fact("picked", target), Fact("lying", target), Fact("picked", other)
+
+
+@pytest.mark.parametrize("repeats", [1, 2, 3])
+def test_repick_as_often_as_wanted_then_press(repeats):
+    episode, picked, lying, _ = repick(repeats)
+    cycle = [[lying], [picked], [], [lying]]
+    assert verdict(episode, *cycle * repeats, [lying, PRESSED]) is Status.SUCCESS
+    assert verdict(episode, *cycle * repeats) is Status.ONGOING
+
+
+def test_repick_with_one_repetition_too_many():
+    episode, picked, lying, _ = repick(2)
+    judge = judged(episode, *[[picked], [lying]] * 3)
+    assert judge.status is Status.FAILURE
+    assert "while due: press the button to finish" in str(judge.cause)
+
+
+@pytest.mark.parametrize("difficulty", DIFFICULTIES)
+@pytest.mark.parametrize("done", [0, 1, 2, 3, 4])
+def test_repick_of_any_other_cube_fails_at_any_time(difficulty, done):
+    episode, picked, lying, _ = repick(2, difficulty)
+    start = [[picked], [lying]] * 2
+    others = {cube.name for cube in episode.scene.of_kind("cube")} - {picked.subject}
+    for other in others:
+        judge = judged(episode, *start[:done], [Fact("picked", other)])
+        assert judge.index == done
+        assert judge.status is Status.FAILURE
+        assert str(judge.cause).startswith("picked up the ")
+        assert verdict(episode, *start[:done], [Fact("lying", other)]) is Status.ONGOING
+
+
+def test_repick_dropping_and_grasping_again_counts_as_what_it_is():
+    episode, picked, lying, _ = repick(1)
+    # Held low or in the air, neither picked nor lying: nothing happens.
+    assert verdict(episode, [picked], [], [], [picked], [lying], [PRESSED]) is Status.SUCCESS
+    episode, picked, lying, _ = repick(2)
+    # Let go is put down, wherever that is: the next lift is the second one.
+    steps = [[picked], [lying], [picked], [lying], [PRESSED]]
+    assert verdict(episode, *steps) is Status.SUCCESS
+
+
+def press_at(episode, steps, press_step):
+    """The judge after some evaluations, and one of a press at a later step."""
+    judge = judged(episode, *steps)
+    judge.update(press_step, frozenset([PRESSED]))
+    return judge
+
+
+WINDOW = [(0, False), (49, False), (50, True), (51, True), (500, True), (501, False), (900, False)]
+
+
+@pytest.mark.parametrize(("elapsed", "fails"), WINDOW)
+@pytest.mark.parametrize("start", [0, 300])
+def test_repick_early_press_while_a_pick_is_due(elapsed, fails, start):
+    episode, *_ = repick(1)
+    judge = Judge(episode.stages, episode.scene)
+    judge.update(start, frozenset())
+    judge.update(start + elapsed, frozenset([PRESSED]))
+    assert judge.status is (Status.FAILURE if fails else Status.ONGOING)
+    assert judge.index == 0
+    if fails:
+        assert judge.cause == f"{TOO_EARLY}pick up the correct cube for the first time"
+
+
+@pytest.mark.parametrize(("elapsed", "fails"), WINDOW)
+def test_repick_early_press_while_a_put_down_is_due(elapsed, fails):
+    episode, picked, *_ = repick(1)
+    # The timer of putting down starts at the evaluation after the one that completes the pick.
+    judge = press_at(episode, [*[[]] * 40, [picked], []], 41 + elapsed)
+    assert judge.status is (Status.FAILURE if fails else Status.ONGOING)
+    assert judge.index == 1
+    assert judge.cause == (f"{TOO_EARLY}put it down" if fails else None)
+
+
+@pytest.mark.parametrize(("press", "fails"), [(49, False), (50, True), (500, True), (501, False)])
+def test_repick_timers_run_on_over_the_repetitions(press, fails):
+    episode, picked, lying, _ = repick(2)
+    judge = press_at(episode, [[picked], [lying]], press)
+    assert judge.index == 2
+    assert judge.status is (Status.FAILURE if fails else Status.ONGOING)
+    # The timer of putting down started one step later than that of picking.
+    judge = press_at(episode, [[picked], [lying], [picked]], press + 1)
+    assert judge.index == 3
+    assert judge.status is (Status.FAILURE if fails else Status.ONGOING)
+
+
+def test_repick_timers_do_not_start_with_the_video():
+    episode, picked, lying, _ = repick(1)
+    judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
+    step = 0
+    while judge.index < len(episode.demonstration):
+        judge.update(step, frozenset([lying if step else picked, STILL, HOME]))
+        step += 1
+    assert step > 100
+    for elapsed in (0, 49):
+        judge.update(step + elapsed, frozenset([PRESSED]))
+        assert judge.status is Status.ONGOING
+    judge.update(step + 50, frozenset([PRESSED]))
+    assert judge.status is Status.FAILURE
+
+
+def test_repick_press_that_is_ignored_does_not_count():
+    episode, picked, lying, _ = repick(1)
+    assert verdict(episode, [PRESSED], [picked], [lying]) is Status.ONGOING
+    assert verdict(episode, [PRESSED], [picked], [lying], [PRESSED]) is Status.SUCCESS
+
+
+# VideoPlaceButton and VideoPlaceOrder
+
+
+PLACE_EPISODES = [
+    make(task, "hard", goal)
+    for task in (VIDEO_PLACE_BUTTON, VIDEO_PLACE_ORDER)
+    for goal in task.goals(sample(task, "hard")[0])
+]
+"""Every goal of a scene with three cubes and four discs, in either task."""
+
+every_place_goal = pytest.mark.parametrize(
+    "episode",
+    PLACE_EPISODES,
+    ids=lambda one: "-".join([one.task, *(str(value) for _, value in one.goal.slots)]),
+)
+
+
+def place_facts(episode):
+    cube = f"cube_{episode.goal.text('colour')}"
+    visits = [fact.place for fact in episode.scene.past if fact.kind == "placed"]
+    if episode.task == "VideoPlaceButton":
+        answer = {"before": visits[0], "after": visits[1]}[episode.goal.text("relation")]
+    else:
+        answer = visits[episode.goal.number("placement") - 1]
+    return Fact("picked", cube), Fact("placed", cube, answer)
+
+
+@every_place_goal
+def test_place_pick_and_place(episode):
+    picked, placed = place_facts(episode)
+    lying = Fact("lying", picked.subject)
+    assert verdict(episode, [lying], [picked], [], [placed, lying]) is Status.SUCCESS
+    assert verdict(episode, [placed]) is Status.ONGOING
+    assert verdict(episode, [picked]) is Status.ONGOING
+
+
+@every_place_goal
+def test_place_on_any_other_disc_fails_even_together_with_the_right_one(episode):
+    picked, placed = place_facts(episode)
+    others = {disc.name for disc in episode.scene.of_kind("target")} - {placed.place}
+    assert len(others) == 3
+    for other in others:
+        wrong = Fact("placed", picked.subject, other)
+        judge = judged(episode, [picked], [], [wrong])
+        assert judge.status is Status.FAILURE
+        assert "while due: place the cube onto the correct target" in str(judge.cause)
+        assert verdict(episode, [picked], [placed, wrong]) is Status.FAILURE
+        # Before it is picked, the cube may be anywhere.
+        assert verdict(episode, [wrong], [picked], [placed]) is Status.SUCCESS
+
+
+@every_place_goal
+def test_place_picking_another_cube_fails_until_the_right_one_is_picked(episode):
+    picked, placed = place_facts(episode)
+    others = {cube.name for cube in episode.scene.of_kind("cube")} - {picked.subject}
+    assert len(others) == 2
+    for other in others:
+        wrong = Fact("picked", other)
+        assert verdict(episode, [wrong]) is Status.FAILURE
+        assert verdict(episode, [wrong, picked]) is Status.FAILURE
+        assert verdict(episode, [picked], [wrong], [placed]) is Status.SUCCESS
+        elsewhere = Fact("placed", other, "target_3")
+        assert verdict(episode, [elsewhere], [picked], [elsewhere, placed]) is Status.SUCCESS
+
+
+@every_place_goal
+def test_place_press_drop_and_site_do_not_matter(episode):
+    picked, placed = place_facts(episode)
+    lying, site = Fact("lying", picked.subject), Fact("placed", picked.subject, "site")
+    steps = [[PRESSED, site, lying], [picked], [PRESSED], [lying], [lying, site], [picked]]
+    assert verdict(episode, *steps) is Status.ONGOING
+    assert verdict(episode, *steps, [placed, PRESSED]) is Status.SUCCESS
+
+
+@pytest.mark.parametrize("task", [VIDEO_PLACE_BUTTON, VIDEO_PLACE_ORDER], ids=lambda t: t.name)
+def test_place_easy_has_no_wrong_cube(task):
+    episode = make(task, "easy")
+    assert episode.stages[0].forbids == ()
+
+
+# The videos
+
+
+@pytest.mark.parametrize("difficulty", DIFFICULTIES)
+@pytest.mark.parametrize(
+    "task", [VIDEO_REPICK, VIDEO_PLACE_BUTTON, VIDEO_PLACE_ORDER], ids=lambda task: task.name
+)
+def test_videos_and_perfect_runs_succeed(task, difficulty):
+    episode = make(task, difficulty)
+    judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
+    step = 0
+    for due in judge.stages:
+        assert judge.status is Status.ONGOING
+        for _ in range(due.lasting + 1):
+            judge.update(step, frozenset([due.expects]))
+            step += 1
+    assert judge.status is Status.SUCCESS
