@@ -1,4 +1,4 @@
-"""Things that several tasks place in the same way: the button, cubes, a target disc."""
+"""Things that several tasks place in the same way: the button, cubes, target discs, the bin."""
 
 from __future__ import annotations
 
@@ -7,24 +7,34 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from roboirg.episode import Colour, Point, SceneObject
+from roboirg.episode import COLOURS, Colour, SceneObject
 from roboirg.errors import SceneRejectedError
+from roboirg.motions import Point
 from roboirg.tasks import geometry
 from roboirg.tasks.placement import Circle, Footprint, Rectangle, Region, place
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth")
 
+BIN_YAW = math.radians(20.0)
+"""The bin is turned by at most so much to either side."""
 
-def draw_button(rng: np.random.Generator, region: Region) -> SceneObject:
+
+def draw_button(rng: np.random.Generator, region: Region, name: str = "button") -> SceneObject:
     """A button anywhere in the region; it is placed first and needs no clearance."""
     x, y = region.draw(rng)
-    return SceneObject("button", "button", Point(x, y, geometry.BUTTON_HEIGHT))
+    return SceneObject(name, "button", Point(x, y, geometry.BUTTON_HEIGHT))
 
 
 def button_keep_out(button: SceneObject) -> Rectangle:
     """The axis-aligned square around a button that stays free."""
     half = geometry.BUTTON_KEEP_OUT_HALF
     return Rectangle(button.position.x, button.position.y, half, half)
+
+
+def button_footprint(button: SceneObject) -> Rectangle:
+    """The square that the base of a button covers."""
+    half_x, half_y, _ = geometry.BUTTON_BASE_HALF
+    return Rectangle(button.position.x, button.position.y, half_x, half_y, button.yaw)
 
 
 def cube_footprint(cube: SceneObject) -> Rectangle:
@@ -55,6 +65,28 @@ def draw_cube(
     return _placed(name, draw, lambda cube: cube_footprint(cube).grown(gap), obstacles)
 
 
+def draw_coloured_cubes(
+    rng: np.random.Generator,
+    count: int,
+    region: Region,
+    gap: float,
+    obstacles: Sequence[Footprint],
+) -> tuple[SceneObject, ...]:
+    """So many cubes of different colours, ``cube_red`` and so on, the colours in random order.
+
+    Raises:
+        SceneRejectedError: a cube found no free place.
+    """
+    taken = list(obstacles)
+    cubes: list[SceneObject] = []
+    for index in rng.permutation(len(COLOURS))[:count]:
+        colour = COLOURS[index]
+        cube = draw_cube(rng, f"cube_{colour}", colour, region, gap, taken)
+        cubes.append(cube)
+        taken.append(cube_footprint(cube))
+    return tuple(cubes)
+
+
 def draw_target(
     rng: np.random.Generator,
     name: str,
@@ -62,6 +94,7 @@ def draw_target(
     region: Region,
     gap: float,
     obstacles: Sequence[Footprint],
+    rgb: tuple[float, float, float] | None = None,
 ) -> SceneObject:
     """A target disc of `radius` metres, at least `gap` metres from all obstacles.
 
@@ -71,12 +104,43 @@ def draw_target(
 
     def draw() -> SceneObject:
         x, y = region.draw(rng, inset=radius)
-        return SceneObject(name, "target", Point(x, y, geometry.TARGET_HEIGHT), radius=radius)
+        place = Point(x, y, geometry.TARGET_HEIGHT)
+        return SceneObject(name, "target", place, radius=radius, rgb=rgb)
 
     def clearance(target: SceneObject) -> Circle:
         return Circle(target.position.x, target.position.y, radius + gap)
 
     return _placed(name, draw, clearance, obstacles)
+
+
+def marker_over(target: SceneObject, name: str) -> SceneObject:
+    """The disc that lights up over a target: a little wider, and high enough to cover it."""
+    x, y, z = target.position
+    radius = geometry.MARKER_RADIUS_SHARE * float(target.radius or 0.0)
+    return SceneObject(name, "marker", Point(x, y, z - geometry.MARKER_DEPTH), radius=radius)
+
+
+def draw_bin(
+    rng: np.random.Generator, region: Region, obstacles: Sequence[Footprint], name: str = "bin"
+) -> SceneObject:
+    """A bin whose centre is anywhere in the region and whose walls touch no obstacle.
+
+    Raises:
+        SceneRejectedError: no free place was found.
+    """
+
+    def draw() -> SceneObject:
+        x, y = region.draw(rng)
+        yaw = (2.0 * rng.random() - 1.0) * BIN_YAW
+        return SceneObject(name, "bin", Point(x, y, geometry.BIN_HEIGHT / 2), yaw)
+
+    return _placed(name, draw, bin_footprint, obstacles)
+
+
+def bin_footprint(item: SceneObject) -> Rectangle:
+    """The square that a bin covers, its hole included."""
+    half = geometry.BIN_HALF
+    return Rectangle(item.position.x, item.position.y, half, half, item.yaw)
 
 
 def _placed(

@@ -8,11 +8,25 @@ CUBE_HALF = 0.02
 HIDDEN_CUBE_HALF = CUBE_HALF / 1.2
 """Half side of a cube that a container can stand over."""
 
-TARGET_HALF_THICKNESS = 0.0025
-"""Half thickness of a target disc; its centre is at twice this, so it floats a little."""
+TARGET_THICKNESS = 0.005
+"""Thickness of a target disc, unless its scene says otherwise."""
 
-TARGET_HEIGHT = 0.005
-"""Height of a target disc's centre above the table."""
+TARGET_HEIGHT = TARGET_THICKNESS
+"""Height of a target disc's centre above the table: it floats by half its thickness."""
+
+MARKER_HALF_THICKNESS = 0.014
+MARKER_DEPTH = 0.01
+"""How far the centre of a marker is below the centre of the target that it lights up."""
+MARKER_RADIUS_SHARE = 1.003
+"""Radius of a marker, in radii of its target."""
+
+BIN_HALF = 0.05
+"""Half the outer side of the bin."""
+BIN_HOLE_HALF = 0.04
+BIN_WALL = BIN_HALF - BIN_HOLE_HALF
+BIN_HEIGHT = 0.05
+BIN_FLOOR_HEIGHT = 0.025
+"""How high the black floor is drawn; things fall through it to the table."""
 
 BUTTON_SCALE = 1.5
 BUTTON_BASE_HALF = (0.025 * BUTTON_SCALE, 0.025 * BUTTON_SCALE, 0.005 * BUTTON_SCALE)

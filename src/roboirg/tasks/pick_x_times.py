@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboirg.episode import COLOURS, Difficulty, Fact, Goal, Primitive, Scene, SceneObject, Stage
+from roboirg.conditions import Fact
+from roboirg.episode import COLOURS, Difficulty, Goal, Primitive, Scene, SceneObject, Stage
 from roboirg.tasks.fixtures import (
     ORDINALS,
     button_keep_out,

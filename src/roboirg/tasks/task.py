@@ -8,14 +8,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from roboirg.episode import Difficulty, Goal, Motion, Scene, Stage, Suite
+from roboirg.episode import Difficulty, Goal, Scene, Stage, Suite
 
 
 def _no_stages(_scene: Scene) -> tuple[Stage, ...]:
-    return ()
-
-
-def _no_motions(_scene: Scene) -> tuple[Motion, ...]:
     return ()
 
 
@@ -24,7 +20,8 @@ class Wording(NamedTuple):
 
     Attributes:
         text: a sentence with a field for each part of the goal: ``{repeats}`` for a slot with one
-            value, ``{colours.0}``, ``{colours.1}`` for a slot with several.
+            value, ``{colours.0}``, ``{colours.1}`` for a slot with several; ``{cubes}`` for all
+            colours together with their counts.
         parts: how many things are handled one after the other in this sentence.
     """
 
@@ -37,19 +34,19 @@ class Commands:
     """How a task is commanded; the settings of the language fill the fields.
 
     Attributes:
+        patterns: reasoning patterns, in the order in which the episodes cycle through them.
+        wordings: at least two for each number of parts.
         thing: what the robot handles, a ``"cube"`` or a ``"container"``; places are told among
             all things of that kind.
         by_colour: the thing told by a colour; ``{cube}`` is the cube of that colour.
-        by_place: the thing told by a place.
-        patterns: reasoning patterns, in the order in which the episodes cycle through them.
-        wordings: at least two for each number of parts.
+        by_place: the thing told by a place, after its count if it has one: ``cube[|s] ...``.
     """
 
-    thing: Literal["cube", "container"]
-    by_colour: str
-    by_place: str
     patterns: tuple[str, ...]
     wordings: tuple[Wording, ...]
+    thing: Literal["cube", "container"] = "cube"
+    by_colour: str = "{cube}"
+    by_place: str = "the cube {place}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +64,6 @@ class Task:
         stages: what must happen, in order, for a goal in a scene.
         commands: how it is commanded in words.
         demonstration: stages the oracle plays before the policy's turn.
-        motions: scripted movements of objects.
     """
 
     name: str
@@ -79,7 +75,6 @@ class Task:
     stages: Callable[[Scene, Goal], tuple[Stage, ...]]
     commands: Commands
     demonstration: Callable[[Scene], tuple[Stage, ...]] = _no_stages
-    motions: Callable[[Scene], tuple[Motion, ...]] = _no_motions
 
     @property
     def settings(self) -> tuple[str, ...]:

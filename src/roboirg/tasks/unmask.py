@@ -2,33 +2,31 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from roboirg.conditions import Condition, Fact
 from roboirg.episode import (
     COLOURS,
     Colour,
-    Fact,
     Goal,
-    KeyPose,
-    Motion,
-    Point,
     Primitive,
     Scene,
     SceneObject,
     Stage,
 )
+from roboirg.errors import SceneRejectedError
+from roboirg.motions import Away, Point
 from roboirg.tasks import geometry
 from roboirg.tasks.placement import Circle, Footprint, Rectangle, Region, place
 from roboirg.tasks.task import Commands, Wording
 
 APPEAR_STEP = 32
 """Containers are away until this step, then stand over the cubes at once."""
-
-AWAY = Point(10.0, 10.0, 10.0)
 
 
 def container_footprint(container: SceneObject) -> Rectangle:
@@ -44,16 +42,26 @@ def draw_containers(
     gap: float,
     obstacles: Sequence[Footprint] = (),
 ) -> list[SceneObject]:
-    """Up to `count` containers, `gap` metres free around each; ends at the first that fits nowhere.
+    """Up to `count` containers in one region; see `draw_containers_in`."""
+    return draw_containers_in(rng, [region] * count, gap, obstacles)
+
+
+def draw_containers_in(
+    rng: np.random.Generator,
+    regions: Iterable[Region],
+    gap: float,
+    obstacles: Sequence[Footprint] = (),
+) -> list[SceneObject]:
+    """A container in each region, `gap` metres free around it; ends at the first that fits nowhere.
 
     As in RoboMME the gap counts on both sides: around the new container and around those placed.
     """
     radius = geometry.CONTAINER_HALF + gap
     taken = list(obstacles)
     containers: list[SceneObject] = []
-    for index in range(count):
+    for index, region in enumerate(regions):
         spot = place(
-            lambda: region.draw(rng, inset=geometry.CONTAINER_HALF),
+            functools.partial(region.draw, rng, inset=geometry.CONTAINER_HALF),
             lambda spot: Circle(*spot, radius),
             taken,
         )
@@ -70,7 +78,13 @@ def draw_containers(
 def hide_cubes(
     rng: np.random.Generator, containers: Sequence[SceneObject]
 ) -> tuple[SceneObject, ...]:
-    """A red, a green and a blue cube, in random order under the first three containers."""
+    """A red, a green and a blue cube, in random order under the first three containers.
+
+    Raises:
+        SceneRejectedError: there are fewer than three containers.
+    """
+    if len(containers) < len(COLOURS):
+        raise SceneRejectedError("fewer than three containers fit")
     order = rng.permutation(len(COLOURS))
     return tuple(
         _hidden_cube(COLOURS[index], container)
@@ -122,20 +136,25 @@ def _put_down(held: str, containers: Sequence[str]) -> Stage:
     )
 
 
-def appearing(scene: Scene) -> tuple[Motion, ...]:
+def appearing(containers: Sequence[SceneObject]) -> tuple[Away, ...]:
     """Every container is away for the first 32 steps and then stands at its place."""
-    keys = (KeyPose(0, AWAY), KeyPose(APPEAR_STEP, None))
-    return tuple(Motion(item.name, keys) for item in scene.of_kind("container"))
+    return tuple(Away(container.name, 0, APPEAR_STEP) for container in containers)
 
 
-def hold_still(steps: int) -> Stage:
-    """The robot stays where it is for so many control steps."""
+def press_stage(expects: Condition, button: str, which: str = "button") -> Stage:
+    """A button is pressed; nothing that happens meanwhile is held against the policy.
+
+    Args:
+        expects: the condition that completes the stage.
+        button: name of the one that the oracle presses.
+        which: what the subgoal calls it.
+    """
     return Stage(
-        expects=Fact("still", "robot"),
+        expects=expects,
         forbids=(),
-        primitive=Primitive("hold", "robot", steps=steps),
-        subgoal="static",
-        lasting=steps,
+        primitive=Primitive("press", button),
+        subgoal=f"press the {which} {{at}}",
+        points_at=button,
     )
 
 

@@ -10,8 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from roboirg.episode import Difficulty, Goal, Scene, Stage
-from roboirg.errors import SceneRejectedError
-from roboirg.tasks import unmask
+from roboirg.tasks import unmask, video
 from roboirg.tasks.placement import Region
 from roboirg.tasks.task import Task, Wording
 
@@ -22,22 +21,20 @@ PICKS: dict[Difficulty, int] = {"easy": 1, "medium": 1, "hard": 2}
 REGION = Region(0.0, 0.0, 0.2, 0.2)
 GAP = 0.04
 HOLD_STEPS = 64
-HIDDEN_CUBES = 3
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
     """Containers at random, three of them over a cube; the first placed are the ones to lift."""
     containers = unmask.draw_containers(rng, CONTAINERS[difficulty], REGION, GAP)
-    if len(containers) < HIDDEN_CUBES:
-        raise SceneRejectedError("fewer than three containers fit")
     cubes = unmask.hide_cubes(rng, containers)
     colours = tuple(str(cube.colour) for cube in cubes[: PICKS[difficulty]])
-    return Scene((*containers, *cubes)), Goal.of(colours=colours)
+    scene = Scene((*containers, *cubes), motions=unmask.appearing(containers))
+    return scene, Goal.of(colours=colours)
 
 
 def demonstration(_scene: Scene) -> tuple[Stage, ...]:
     """The robot watches for 64 steps."""
-    return (unmask.hold_still(HOLD_STEPS),)
+    return (video.hold_still(HOLD_STEPS),)
 
 
 COMMANDS = unmask.commands(
@@ -71,5 +68,4 @@ TASK = Task(
     stages=unmask.pick_stages,
     commands=COMMANDS,
     demonstration=demonstration,
-    motions=unmask.appearing,
 )

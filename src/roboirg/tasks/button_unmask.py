@@ -1,0 +1,70 @@
+"""ButtonUnmask: see containers appear over cubes, press the button, lift the right containers.
+
+Permanence suite. As VideoUnmask, but without a video: the cubes lie open during the policy's
+first steps, whatever it does. In hard episodes one container is put down and a second is lifted.
+Facts: RoboMME.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from roboirg.conditions import Fact
+from roboirg.episode import Difficulty, Goal, Scene, Stage
+from roboirg.tasks import unmask
+from roboirg.tasks.fixtures import button_keep_out, draw_button
+from roboirg.tasks.placement import Region
+from roboirg.tasks.task import Task, Wording
+from roboirg.tasks.video_unmask import CONTAINERS, GAP, PICKS, REGION
+
+BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.05)
+
+
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+    """A button, then containers as in VideoUnmask; the first placed are the ones to lift."""
+    button = draw_button(rng, BUTTON_REGION)
+    obstacles = [button_keep_out(button)]
+    containers = unmask.draw_containers(rng, CONTAINERS[difficulty], REGION, GAP, obstacles)
+    cubes = unmask.hide_cubes(rng, containers)
+    colours = tuple(str(cube.colour) for cube in cubes[: PICKS[difficulty]])
+    scene = Scene((button, *containers, *cubes), motions=unmask.appearing(containers))
+    return scene, Goal.of(colours=colours)
+
+
+def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
+    """Press the button, then lift the containers."""
+    press = unmask.press_stage(Fact("pressed", "button"), "button")
+    return (press, *unmask.pick_stages(scene, goal))
+
+
+COMMANDS = unmask.commands(
+    Wording("Lift {colours.0}, but press the button first."),
+    Wording("Pick up {colours.0}, but make sure to press the button first."),
+    Wording("I want you to lift {colours.0}, but to press the button first."),
+    Wording(
+        "Press the button first, then lift {colours.0}, put it back down, "
+        "and then lift {colours.1}.",
+        parts=2,
+    ),
+    Wording(
+        "First press the button, then pick up {colours.0}, set it down again, "
+        "and after that pick up {colours.1}.",
+        parts=2,
+    ),
+    Wording(
+        "I want you to press the button first, then to lift {colours.0}, "
+        "to put it down, and finally to lift {colours.1}.",
+        parts=2,
+    ),
+)
+
+TASK = Task(
+    name="ButtonUnmask",
+    suite="permanence",
+    code=8,
+    spatial=True,
+    sample=sample,
+    goals=unmask.goals,
+    stages=stages,
+    commands=COMMANDS,
+)

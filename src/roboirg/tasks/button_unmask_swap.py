@@ -1,0 +1,97 @@
+"""ButtonUnmaskSwap: press both buttons while containers change places, then lift the right ones.
+
+Permanence suite. As VideoUnmaskSwap, but without a video: all happens during the policy's first
+steps, whatever it does. Facts: RoboMME.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from roboirg.conditions import All, Began, Count, Fact
+from roboirg.episode import Difficulty, Goal, Scene, Stage
+from roboirg.tasks import unmask, unmask_swap
+from roboirg.tasks.fixtures import button_keep_out, draw_button
+from roboirg.tasks.layouts import PlanePoint
+from roboirg.tasks.placement import Region
+from roboirg.tasks.task import Task, Wording
+
+RIGHT, LEFT = "button_right", "button_left"
+"""On the robot's right (smaller y) and left."""
+RIGHT_REGION = Region(-0.2, -0.1, 0.025, 0.025)
+LEFT_REGION = Region(-0.2, 0.1, 0.025, 0.025)
+
+FOUR: tuple[PlanePoint, ...] = ((0.0, -0.1), (0.0, 0.1), (0.1, 0.1), (0.1, -0.1))
+TRIANGLE: tuple[PlanePoint, ...] = ((-0.05, -0.15), (-0.05, 0.15), (0.05, 0.0))
+LINE: tuple[PlanePoint, ...] = ((-0.05, -0.15), (-0.05, 0.15), (-0.05, 0.0))
+MAX_SHIFT = 0.1
+"""Points are moved by up to so much: two rows of four sideways, each of three away, m."""
+
+
+def shifted_points(rng: np.random.Generator, count: int) -> tuple[PlanePoint, ...]:
+    """Three or four points about which the containers stand; they are not turned."""
+    if count == len(FOUR):
+        near, far = (MAX_SHIFT * rng.random(2)).tolist()
+        shifts = (near, near, far, far)
+        return tuple((x, y + shift) for (x, y), shift in zip(FOUR, shifts, strict=True))
+    pattern = (TRIANGLE, LINE)[int(rng.integers(2))]
+    return tuple((x + MAX_SHIFT * rng.random(), y) for x, y in pattern)
+
+
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+    """Two buttons, and containers near the points of a layout, three of them over a cube."""
+    right = draw_button(rng, RIGHT_REGION, RIGHT)
+    left = draw_button(rng, LEFT_REGION, LEFT)
+    points = shifted_points(rng, unmask_swap.CONTAINERS[difficulty])
+    obstacles = [button_keep_out(button) for button in (right, left)]
+    containers = unmask_swap.draw_containers_about(rng, points, obstacles)
+    return unmask_swap.sample(rng, difficulty, containers, (right, left))
+
+
+def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
+    """Press both buttons, in any order, then lift the containers."""
+    right, left = Fact("pressed", RIGHT), Fact("pressed", LEFT)
+    both = All((Began((left,)), Began((right,))))
+    return (
+        unmask.press_stage(Count((left, right)), LEFT, "first button"),
+        unmask.press_stage(both, RIGHT, "second button"),
+        *unmask.pick_stages(scene, goal),
+    )
+
+
+COMMANDS = replace(
+    unmask.commands(
+        Wording("Lift {colours.0}, but press both buttons first."),
+        Wording("Pick up {colours.0}, but make sure to press both buttons first."),
+        Wording("I want you to lift {colours.0}, but to press both buttons first."),
+        Wording(
+            "Press both buttons first, then lift {colours.0}, put it back down, "
+            "and then lift {colours.1}.",
+            parts=2,
+        ),
+        Wording(
+            "First press both buttons, then pick up {colours.0}, set it down again, "
+            "and after that pick up {colours.1}.",
+            parts=2,
+        ),
+        Wording(
+            "I want you to press both buttons first, then to lift {colours.0}, "
+            "to put it down, and finally to lift {colours.1}.",
+            parts=2,
+        ),
+    ),
+    by_place="the container that was {place} before anything moved",
+)
+
+TASK = Task(
+    name="ButtonUnmaskSwap",
+    suite="permanence",
+    code=7,
+    spatial=True,
+    sample=sample,
+    goals=unmask.goals,
+    stages=stages,
+    commands=COMMANDS,
+)

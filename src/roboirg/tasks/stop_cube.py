@@ -1,0 +1,149 @@
+"""StopCube: press the button so that the running cube stops on the target on its n-th visit.
+
+Counting suite. A cube that nothing touches runs to and fro over a target; every pass is one visit.
+The difficulty changes nothing. Facts: RoboMME, whose path turns with the target's place; here its
+angle is drawn independently.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from roboirg.conditions import All, Began, Elapsed, Fact, Rule, absent
+from roboirg.episode import Difficulty, Goal, Primitive, Scene, SceneObject, Stage
+from roboirg.motions import Point, Shuttle
+from roboirg.tasks.fixtures import ORDINALS, draw_button
+from roboirg.tasks.placement import Region
+from roboirg.tasks.task import Commands, Task, Wording
+
+BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.2)
+TARGET_REGION = Region(0.0, 0.0, 0.1, 0.1)
+TARGET_RADIUS = 0.036
+TARGET_THICKNESS = 0.01
+HEIGHT = 0.01
+"""Of the centres of the target and of the cube, which is half sunk in the table, m."""
+PATH_HALF = 0.3
+"""Half the length of the cube's path, m; the target is in its middle."""
+PATH_ANGLE = math.radians(30.0)
+"""The path is turned away from the y axis by at most so much to either side."""
+INTERVALS = (60, 80, 120)
+"""Control steps of one pass."""
+PASSES = 5
+VISITS = range(2, PASSES + 1)
+"""Which visits can be wanted; never the first."""
+LEAD = 30
+"""How many control steps before the cube is on the target the hand begins to press."""
+CHECKPOINT = 100
+"""Waiting is cut into stages that end at multiples of so many control steps."""
+
+
+def sample(rng: np.random.Generator, _difficulty: Difficulty) -> tuple[Scene, Goal]:
+    """Button, target, cube; speed, wanted visit and direction of the path are uniform."""
+    button = draw_button(rng, BUTTON_REGION)
+    x, y = TARGET_REGION.draw(rng)
+    target = SceneObject(
+        "target",
+        "target",
+        Point(x, y, HEIGHT),
+        radius=TARGET_RADIUS,
+        thickness=TARGET_THICKNESS,
+    )
+    red, green, blue = rng.random(3).tolist()
+    interval = INTERVALS[int(rng.integers(len(INTERVALS)))]
+    visit = int(rng.integers(VISITS.start, VISITS.stop))
+    angle = (2.0 * rng.random() - 1.0) * PATH_ANGLE
+    along_x, along_y = -PATH_HALF * math.sin(angle), PATH_HALF * math.cos(angle)
+    begin = Point(x - along_x, y - along_y, HEIGHT)
+    end = Point(x + along_x, y + along_y, HEIGHT)
+    shuttle = SceneObject("shuttle", "shuttle", begin, rgb=(red, green, blue))
+    run = Shuttle("shuttle", begin, end, interval, PASSES, stopped_by=Fact("pressed", "button"))
+    return Scene((button, target, shuttle), motions=(run,)), Goal.of(visit=visit)
+
+
+def goals(_scene: Scene) -> tuple[Goal, ...]:
+    """The second to the fifth visit."""
+    return tuple(Goal.of(visit=visit) for visit in VISITS)
+
+
+def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
+    """Get ready above the button, wait, press."""
+    visit = goal.number("visit")
+    interval = next(motion.interval for motion in scene.motions if isinstance(motion, Shuttle))
+    stopped = Fact("stopped", "shuttle", "target")
+    wrong = _wrong(interval, visit)
+    hover = Stage(
+        expects=Fact("hovering", "robot", "button"),
+        forbids=wrong,
+        primitive=Primitive("hover", "button"),
+        subgoal="move to the top of the button {at} to prepare",
+        points_at="button",
+    )
+    waits = [
+        Stage(
+            expects=Elapsed(least=checkpoint),
+            forbids=wrong,
+            primitive=Primitive("hold_until", "robot", steps=checkpoint),
+            subgoal="remain static",
+        )
+        for checkpoint in checkpoints(interval, visit)
+    ]
+    too_early = Rule(
+        Began((stopped,), least=1, until=interval * (visit - 1) - 1),
+        "stopped the cube on an earlier visit",
+    )
+    press = Stage(
+        expects=stopped,
+        forbids=(*wrong, too_early),
+        primitive=Primitive("press_below", "button", steps=interval * visit - interval // 2),
+        subgoal="press the button to stop the cube on the target {at}",
+        points_at="target",
+    )
+    return (hover, *waits, press)
+
+
+def checkpoints(interval: int, visit: int) -> tuple[int, ...]:
+    """Control steps since reset at which waiting stages end, the last when it is time to press.
+
+    Args:
+        interval: control steps of one pass.
+        visit: the wanted one, from 1; its middle is half an interval before its pass ends.
+    """
+    press = interval * visit - interval // 2 - LEAD
+    return (*range(CHECKPOINT, press, CHECKPOINT), press)
+
+
+def _wrong(interval: int, visit: int) -> tuple[Rule, ...]:
+    """What fails the episode in every stage."""
+    off_target = All((Fact("pressed", "button"), absent(Fact("near", "shuttle", "target"))))
+    return (
+        Rule(off_target, "pressed the button while the cube was off the target"),
+        Rule(
+            Elapsed(least=interval * visit + 1),
+            f"let the cube's {ORDINALS[visit - 1]} visit pass",
+        ),
+    )
+
+
+COMMANDS = Commands(
+    patterns=("number deduction", "sequential relation"),
+    wordings=(
+        Wording("Press the button so that the cube stops on the target during {visit}."),
+        Wording("Stop the cube on the target during {visit} by pressing the button."),
+        Wording(
+            "I want you to stop the cube on the target during {visit} with a press of the button."
+        ),
+    ),
+)
+
+TASK = Task(
+    name="StopCube",
+    suite="counting",
+    code=2,
+    spatial=False,
+    sample=sample,
+    goals=goals,
+    stages=stages,
+    commands=COMMANDS,
+)

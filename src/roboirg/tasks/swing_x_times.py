@@ -1,0 +1,155 @@
+"""SwingXtimes: carry a cube over the right and the left target so many times, put it down, press.
+
+Counting suite. A disc lights up while the cube is over it and a little longer; nothing shows how
+often that has been. Facts: RoboMME.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from roboirg.conditions import Began, Fact, Rule
+from roboirg.episode import Difficulty, Goal, Primitive, Scene, SceneObject, Stage
+from roboirg.motions import Glow
+from roboirg.tasks.fixtures import (
+    ORDINALS,
+    button_keep_out,
+    cube_footprint,
+    draw_button,
+    draw_coloured_cubes,
+    draw_target,
+    marker_over,
+)
+from roboirg.tasks.placement import Circle, Footprint, Region
+from roboirg.tasks.task import Commands, Task, Wording
+
+CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
+REPEATS: dict[Difficulty, tuple[int, int]] = {"easy": (1, 3), "medium": (1, 2), "hard": (3, 3)}
+MAX_REPEATS = 3
+
+BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.2)
+CUBE_REGION = Region(-0.1, 0.0, 0.25, 0.25)
+CUBE_GAP = 0.02
+SIDES: dict[str, Region] = {
+    "right": Region(-0.1, -0.2, 0.1, 0.1),
+    "left": Region(-0.1, 0.2, 0.1, 0.1),
+}
+"""Where the two targets are, in the order of visiting; sides are the robot's."""
+TARGET_RADIUS = 0.04
+TARGET_GAP = 0.02
+TARGET_RGB = (128 / 255, 128 / 255, 128 / 255)
+LINGER = 20
+"""Control steps for which a target stays lit after the cube has left it."""
+
+
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+    """Button, cubes, a target on either side; target cube and repeats are uniform."""
+    low, high = REPEATS[difficulty]
+    repeats = int(rng.integers(low, high + 1))
+    button = draw_button(rng, BUTTON_REGION)
+    obstacles: list[Footprint] = [button_keep_out(button)]
+    cubes = draw_coloured_cubes(rng, CUBES[difficulty], CUBE_REGION, CUBE_GAP, obstacles)
+    obstacles += [cube_footprint(cube) for cube in cubes]
+    targets: list[SceneObject] = []
+    for side, region in SIDES.items():
+        name = f"target_{side}"
+        target = draw_target(rng, name, TARGET_RADIUS, region, TARGET_GAP, obstacles, TARGET_RGB)
+        targets.append(target)
+        obstacles.append(Circle(target.position.x, target.position.y, TARGET_RADIUS))
+    chosen = cubes[int(rng.integers(len(cubes)))]
+    markers = [
+        marker_over(target, f"marker_{side}") for side, target in zip(SIDES, targets, strict=True)
+    ]
+    motions = tuple(
+        Glow(marker.name, Fact("over", chosen.name, target.name), LINGER)
+        for marker, target in zip(markers, targets, strict=True)
+    )
+    goal = Goal.of(colour=str(chosen.colour), repeats=repeats)
+    return Scene((button, *cubes, *targets, *markers), motions), goal
+
+
+def goals(scene: Scene) -> tuple[Goal, ...]:
+    """Every cube of the scene, one to three times."""
+    return tuple(
+        Goal.of(colour=str(cube.colour), repeats=repeats)
+        for cube in scene.of_kind("cube")
+        for repeats in range(1, MAX_REPEATS + 1)
+    )
+
+
+def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
+    """Pick, over the right and the left target as often as wanted, put down, press: 2 N + 3."""
+    colour, repeats = goal.text("colour"), goal.number("repeats")
+    cube = f"cube_{colour}"
+    pressed = Fact("pressed", "button")
+    visits = tuple(Fact("over", cube, f"target_{side}") for side in SIDES)
+    # Visits in a wrong order complete nothing and still count, so they end here, too.
+    too_often = Rule(Began(visits, least=2 * repeats + 1), "passed over the targets once too often")
+    wrong_cubes = [Fact("picked", item.name) for item in scene.of_kind("cube") if item.name != cube]
+    wrong: tuple[Fact | Rule, ...] = (*wrong_cubes, pressed, too_often)
+    pick = Stage(
+        expects=Fact("picked", cube),
+        forbids=wrong,
+        primitive=Primitive("pick_cube", cube),
+        subgoal=f"pick up the {colour} cube {{at}}",
+        points_at=cube,
+    )
+    swings = [
+        _swing(cube, side, ordinal, wrong) for ordinal in ORDINALS[:repeats] for side in SIDES
+    ]
+    put_down = Stage(
+        expects=Fact("lying", cube),
+        forbids=wrong,
+        primitive=Primitive("put_down", cube),
+        subgoal=f"put the {colour} cube on the table",
+    )
+    press = Stage(
+        expects=pressed,
+        forbids=(*wrong_cubes, too_often),
+        primitive=Primitive("press", "button"),
+        subgoal="press the button {at} to stop",
+        points_at="button",
+    )
+    return (pick, *swings, put_down, press)
+
+
+def _swing(cube: str, side: str, ordinal: str, wrong: tuple[Fact | Rule, ...]) -> Stage:
+    target = f"target_{side}"
+    return Stage(
+        expects=Fact("over", cube, target),
+        forbids=wrong,
+        primitive=Primitive("move_over", cube, target),
+        subgoal=f"move to the top of the {side}-side target {{at}} for the {ordinal} time",
+        points_at=target,
+    )
+
+
+COMMANDS = Commands(
+    patterns=("colour exclusion", "number deduction"),
+    wordings=(
+        Wording(
+            "Take {colour}, carry it over the target on your right and then over the target on "
+            "your left {repeats}, put it down, and press the button to stop."
+        ),
+        Wording(
+            "Grab {colour} and swing it from above the target on your right to above the target "
+            "on your left {repeats}, then put it down and press the button at the end."
+        ),
+        Wording(
+            "I want you to take {colour}, to move it over the target on your right and then over "
+            "the target on your left {repeats}, and to put it down and press the button when you "
+            "are done."
+        ),
+    ),
+)
+
+TASK = Task(
+    name="SwingXtimes",
+    suite="counting",
+    code=3,
+    spatial=True,
+    sample=sample,
+    goals=goals,
+    stages=stages,
+    commands=COMMANDS,
+)

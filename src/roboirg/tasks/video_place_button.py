@@ -1,0 +1,72 @@
+"""VideoPlaceButton: place the cube on the disc where it was right before or after the press.
+
+Reference suite. The video shows a cube placed on a disc, the button pressed, the cube placed on
+another disc and put back; in hard episodes two discs change places at its end. Facts: RoboMME.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from roboirg.conditions import Fact
+from roboirg.episode import Difficulty, Goal, Scene, Stage
+from roboirg.tasks import video_place
+from roboirg.tasks.task import Commands, Task, Wording
+
+DISCS: dict[Difficulty, int] = {"easy": 3, "medium": 4, "hard": 4}
+SITE_RADIUS = 0.06
+RELATIONS = ("before", "after")
+PRESSED = Fact("pressed", "button")
+
+
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+    """The cube goes to ``target_0`` before the press and to ``target_1`` after it."""
+    objects = video_place.draw_table(
+        rng, video_place.CUBES[difficulty], DISCS[difficulty], SITE_RADIUS
+    )
+    table = Scene(objects)
+    cubes, discs = table.of_kind("cube"), table.of_kind("target")
+    cube = cubes[int(rng.integers(len(cubes)))]
+    before, after = (Fact("placed", cube.name, disc.name) for disc in discs[:2])
+    past = (before, PRESSED, after)
+    swaps = (video_place.draw_swap(rng, discs, past),) if difficulty == "hard" else ()
+    relation = RELATIONS[int(rng.integers(len(RELATIONS)))]
+    return Scene(objects, swaps, past), Goal.of(colour=str(cube.colour), relation=relation)
+
+
+def goals(scene: Scene) -> tuple[Goal, ...]:
+    """Any cube, to the disc used before the press or to the one used after it."""
+    return tuple(
+        Goal.of(colour=colour, relation=relation)
+        for colour in video_place.colours_of(scene)
+        for relation in RELATIONS
+    )
+
+
+def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
+    """Pick the cube, and place it where one was placed right before or after the press."""
+    step = -1 if goal.text("relation") == "before" else 1
+    placing = scene.past[scene.past.index(PRESSED) + step]
+    return video_place.place_stages(scene, goal.text("colour"), str(placing.place))
+
+
+COMMANDS = Commands(
+    patterns=("contextual logic", "sequential relation"),
+    wordings=(
+        Wording("Going by the video, take {colour} and put it on {relation}."),
+        Wording("Think back to the video, take {colour} and place it on {relation}."),
+        Wording("Remember what you saw in the video, take {colour} and set it down on {relation}."),
+    ),
+)
+
+TASK = Task(
+    name="VideoPlaceButton",
+    suite="reference",
+    code=10,
+    spatial=False,
+    sample=sample,
+    goals=goals,
+    stages=stages,
+    commands=COMMANDS,
+    demonstration=video_place.demonstration,
+)

@@ -1,0 +1,77 @@
+"""VideoPlaceOrder: place the cube on the disc on which it was first, second, ... placed.
+
+Reference suite. The video shows a cube placed on two to four discs in turn, with a press of the
+button somewhere in between or afterwards, and put back; in hard episodes two discs change places at
+its end. Facts: RoboMME.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from roboirg.conditions import Fact
+from roboirg.episode import Difficulty, Goal, Scene, Stage
+from roboirg.tasks import video_place
+from roboirg.tasks.task import Commands, Task, Wording
+
+DISCS = 4
+PLACEMENTS = (2, 4)
+"""Fewest and most discs that the cube visits."""
+SITE_RADIUS = 0.1
+PRESSED = Fact("pressed", "button")
+
+
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+    """Visited discs, their number and order, the wanted one and the time of the press: uniform."""
+    objects = video_place.draw_table(rng, video_place.CUBES[difficulty], DISCS, SITE_RADIUS)
+    table = Scene(objects)
+    cubes, discs = table.of_kind("cube"), table.of_kind("target")
+    cube = cubes[int(rng.integers(len(cubes)))]
+    low, high = PLACEMENTS
+    placements = int(rng.integers(low, high + 1))
+    order = rng.permutation(DISCS)[:placements]
+    shown = [Fact("placed", cube.name, discs[index].name) for index in order]
+    placement = int(rng.integers(1, placements + 1))
+    pressed_after = int(rng.integers(1, placements + 1))
+    past = (*shown[:pressed_after], PRESSED, *shown[pressed_after:])
+    swaps = (video_place.draw_swap(rng, discs, past),) if difficulty == "hard" else ()
+    return Scene(objects, swaps, past), Goal.of(colour=str(cube.colour), placement=placement)
+
+
+def goals(scene: Scene) -> tuple[Goal, ...]:
+    """Any cube, to any of the discs that were visited."""
+    return tuple(
+        Goal.of(colour=colour, placement=placement)
+        for colour in video_place.colours_of(scene)
+        for placement in range(1, len(video_place.visited(scene)) + 1)
+    )
+
+
+def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
+    """Pick the cube, and place it on the disc of that number in the order of visits."""
+    answer = video_place.visited(scene)[goal.number("placement") - 1]
+    return video_place.place_stages(scene, goal.text("colour"), answer)
+
+
+COMMANDS = Commands(
+    patterns=("sequential relation",),
+    wordings=(
+        Wording("Going by the video, take {colour} and put it on {placement}."),
+        Wording("Think back to the video, take {colour} and place it on {placement}."),
+        Wording(
+            "Remember what you saw in the video, take {colour} and set it down on {placement}."
+        ),
+    ),
+)
+
+TASK = Task(
+    name="VideoPlaceOrder",
+    suite="reference",
+    code=11,
+    spatial=False,
+    sample=sample,
+    goals=goals,
+    stages=stages,
+    commands=COMMANDS,
+    demonstration=video_place.demonstration,
+)

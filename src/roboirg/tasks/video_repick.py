@@ -1,0 +1,183 @@
+"""VideoRepick: pick the cube up again that the video showed, so many times, then press the button.
+
+Reference suite. The video shows one of several cubes picked up and put down. In easy and medium
+episodes all cubes look alike and change places afterwards; in hard ones many stay where they are.
+Facts: RoboMME.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from roboirg.conditions import All, Elapsed, Fact, Rule
+from roboirg.episode import COLOURS, Difficulty, Goal, Primitive, Scene, SceneObject, Stage
+from roboirg.motions import Swap
+from roboirg.tasks import video
+from roboirg.tasks.fixtures import (
+    ORDINALS,
+    button_keep_out,
+    cube_footprint,
+    draw_button,
+    draw_cube,
+)
+from roboirg.tasks.layouts import layout_points
+from roboirg.tasks.placement import Footprint, Region
+from roboirg.tasks.swapping import SWAP_STEPS, plan_swaps
+from roboirg.tasks.task import Commands, Task, Wording
+
+REPEATS = (1, 3)
+SWAPS: dict[Difficulty, tuple[int, int]] = {"easy": (1, 2), "medium": (2, 3), "hard": (0, 0)}
+
+BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.05)
+GAP = 0.02
+LAYOUT_CUBES = 3
+LAYOUT_HALF = 0.07
+"""Half side of the square around a point of the layout in which its cube lies."""
+CLUTTER_REGION = Region(-0.1, 0.0, 0.2, 0.25)
+CLUTTER_ROUNDS = 5
+"""How many cubes of each colour a cluttered table has."""
+
+SWAP_LANE = 0.07
+SWAP_STAGE = 3
+"""Index of the demonstration's stage with which the exchanges begin: the first hold."""
+
+SHOWN_RELEASE, OWN_RELEASE = 0.03, 0.01
+"""Tool heights at which the oracle lets the cube go in the video and afterwards, m."""
+
+EARLY_PRESS = (50, 500)
+"""A press before its time only fails within these steps of its timer."""
+PRESSED = Fact("pressed", "button")
+
+
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+    """Button and cubes; which cube is shown and how often it is wanted are uniform."""
+    low, high = REPEATS
+    repeats = int(rng.integers(low, high + 1))
+    low, high = SWAPS[difficulty]
+    swaps = int(rng.integers(low, high + 1))
+    button = draw_button(rng, BUTTON_REGION)
+    cubes = _draw_clutter(rng, button) if difficulty == "hard" else _draw_layout(rng, button)
+    # The cube that was shown begins the first exchange, the others follow in any order.
+    target, *others = (cubes[index].name for index in rng.permutation(len(cubes)))
+    motions = plan_swaps(
+        cubes, (target, *others)[:swaps], start=0, lane=SWAP_LANE, stage=SWAP_STAGE
+    )
+    past = (Fact("picked", target), Fact("lying", target))
+    return Scene((button, *cubes), motions, past), Goal.of(repeats=repeats)
+
+
+def _draw_layout(rng: np.random.Generator, button: SceneObject) -> list[SceneObject]:
+    """Three cubes of one colour, each near its point of a layout."""
+    colour = COLOURS[int(rng.integers(len(COLOURS)))]
+    obstacles: list[Footprint] = [button_keep_out(button)]
+    cubes: list[SceneObject] = []
+    for number, point in enumerate(layout_points(rng, LAYOUT_CUBES)):
+        region = Region(*point, LAYOUT_HALF, LAYOUT_HALF)
+        cube = draw_cube(rng, f"cube_{colour}_{number}", colour, region, GAP, obstacles)
+        cubes.append(cube)
+        obstacles.append(cube_footprint(cube))
+    return cubes
+
+
+def _draw_clutter(rng: np.random.Generator, button: SceneObject) -> list[SceneObject]:
+    """Five cubes of each colour, anywhere; in each round one of each, in any order."""
+    obstacles: list[Footprint] = [button_keep_out(button)]
+    cubes: list[SceneObject] = []
+    for number in range(CLUTTER_ROUNDS):
+        for index in rng.permutation(len(COLOURS)):
+            colour = COLOURS[index]
+            name = f"cube_{colour}_{number}"
+            cube = draw_cube(rng, name, colour, CLUTTER_REGION, GAP, obstacles)
+            cubes.append(cube)
+            obstacles.append(cube_footprint(cube))
+    return cubes
+
+
+def demonstration(scene: Scene) -> tuple[Stage, ...]:
+    """The cube is picked up and put down; the robot waits while cubes change places."""
+    target = scene.past[0].subject
+    put_down = Stage(
+        expects=Fact("lying", target),
+        forbids=(),
+        primitive=Primitive("put_down", target, height=SHOWN_RELEASE),
+        subgoal="drop the cube on the table",
+    )
+    swaps = [motion for motion in scene.motions if isinstance(motion, Swap)]
+    waiting = [video.retreat()] if swaps else []
+    waiting += [video.hold_still(SWAP_STEPS) for _ in swaps]
+    return (video.show_pick(target), put_down, *waiting, video.go_home())
+
+
+def goals(_scene: Scene) -> tuple[Goal, ...]:
+    """One to three times; the video tells which cube."""
+    low, high = REPEATS
+    return tuple(Goal.of(repeats=repeats) for repeats in range(low, high + 1))
+
+
+def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
+    """Pick up and put down, as often as wanted, then press: 2 N + 1 stages."""
+    target = scene.past[0].subject
+    cubes = tuple(item.name for item in scene.of_kind("cube"))
+    wrong = tuple(Fact("picked", other) for other in cubes if other != target)
+    plan: list[Stage] = []
+    for ordinal in ORDINALS[: goal.number("repeats")]:
+        pick = Stage(
+            expects=Fact("picked", target),
+            forbids=(*wrong, _early_press("pick")),
+            primitive=Primitive("pick_cube", target),
+            subgoal=f"pick up the correct cube {{at}} for the {ordinal} time",
+            points_at=target,
+            timer="pick",
+        )
+        put_down = Stage(
+            expects=Fact("lying", target),
+            forbids=(*wrong, _early_press("put down")),
+            primitive=Primitive("put_down", target, height=OWN_RELEASE),
+            subgoal="put it down",
+            timer="put down",
+        )
+        plan += [pick, put_down]
+    press = Stage(
+        expects=PRESSED,
+        forbids=tuple(Fact("picked", cube) for cube in cubes),
+        primitive=Primitive("press", "button"),
+        subgoal="press the button {at} to finish",
+        points_at="button",
+    )
+    return (*plan, press)
+
+
+def _early_press(timer: str) -> Rule:
+    """A press within the steps of its timer in which it counts as premature."""
+    return Rule(All((PRESSED, Elapsed(*EARLY_PRESS, timer=timer))), "pressed the button too early")
+
+
+COMMANDS = Commands(
+    patterns=("number deduction",),
+    wordings=(
+        Wording(
+            "Take the cube that was picked up in the video, lift it and put it down {repeats}, "
+            "then press the button to stop."
+        ),
+        Wording(
+            "Find the cube that was picked up in the video, raise it and set it back down "
+            "{repeats}, and press the button when you are done."
+        ),
+        Wording(
+            "I want you to raise the cube that was lifted in the video and to lower it back to "
+            "the table {repeats}, and to press the button at the end."
+        ),
+    ),
+)
+
+TASK = Task(
+    name="VideoRepick",
+    suite="reference",
+    code=9,
+    spatial=False,
+    sample=sample,
+    goals=goals,
+    stages=stages,
+    commands=COMMANDS,
+    demonstration=demonstration,
+)
