@@ -76,7 +76,7 @@ def test_pictures_do_not_depend_on_other_worlds_in_the_process():
     first.step(HOME_ACTION)
     alone = [first.picture(camera) for camera in CAMERAS]
     other_episode = get_episode("VideoUnmask", "test", 0)
-    other = World(other_episode.scene, other_episode.motions)
+    other = World(other_episode.scene)
     other.step(HOME_ACTION)
     other.picture("front")
     again = World(episode.scene)

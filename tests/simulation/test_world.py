@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from roboirg.episode import Fact, Motion, Scene
+from roboirg.conditions import Fact
+from roboirg.episode import Scene
 from roboirg.errors import InvalidValueError
+from roboirg.motions import Away
 from roboirg.simulation import settings
 from roboirg.simulation.world import World
 from roboirg.splits import get_episode
@@ -17,7 +19,7 @@ TASKS = tuple(all_tasks())
 
 def world_of(task: str, index: int = 3, *, visible: bool = False) -> World:
     episode = get_episode(task, "test", index)
-    return World(episode.scene, episode.motions, visible=visible)
+    return World(episode.scene, visible=visible)
 
 
 def rest(world: World, steps: int) -> World:
@@ -39,7 +41,8 @@ def test_objects_rest_where_and_weigh_what_the_facts_say():
     assert cube.physics.mass == pytest.approx(0.064)
     assert button.physics.mass == pytest.approx(0.0427, abs=1e-4)
     assert button.pressed_depth == pytest.approx(0.0005, abs=5e-5)
-    assert world.facts == {Fact("still", "robot")}
+    cubes = {Fact("lying", f"cube_{colour}") for colour in ("red", "green", "blue")}
+    assert world.facts == {Fact("still", "robot"), Fact("home", "robot"), *cubes}
 
 
 def test_containers_appear_over_their_cubes_after_32_steps():
@@ -49,7 +52,7 @@ def test_containers_appear_over_their_cubes_after_32_steps():
         body.position.z > 5 for body in world.bodies.values() if body.item.kind == "container"
     )
     # Where they are parked is not a lift.
-    assert world.facts == {Fact("still", "robot")}
+    assert world.facts == {Fact("still", "robot"), Fact("home", "robot")}
     rest(world, 33)
     for body in world.bodies.values():
         if body.item.kind == "container":
@@ -66,9 +69,9 @@ def world_scene(world: World) -> Scene:
 
 def test_a_released_motion_leaves_the_object_alone():
     episode = get_episode("VideoUnmask", "test", 0)
-    moved = World(episode.scene, episode.motions, visible=False)
+    moved = World(episode.scene, visible=False)
     rest(moved, 40)
-    assert {motion.subject for motion in episode.motions if isinstance(motion, Motion)}
+    assert all(isinstance(motion, Away) for motion in episode.scene.motions)
     body = moved.bodies["container_0"]
     body.put(body.item.position._replace(z=0.3))
     rest(moved, 2)

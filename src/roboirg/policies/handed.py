@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.episode import Fact, Goal, Stage
+from roboirg.conditions import Fact
+from roboirg.episode import Goal, Stage
+from roboirg.judging import Judge
 from roboirg.observations import Demonstration, Observation
 from roboirg.tasks import get_task
 
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
 
 MAX_RETRIES = 3
 """How often in an episode the hands try again what did not work."""
-UNDOES_PICK = frozenset({"place_on", "put_down"})
+UNDOES_PICK = frozenset({"place_on", "put_down", "drop_into", "move_over"})
 """Primitives that need the object in the hand: to repeat one, it has to be picked up again."""
 
 
@@ -65,26 +67,50 @@ def _work(env: RoboIRGEnv, stages: tuple[Stage, ...]) -> Iterator[NDArray[np.flo
     """Do one stage after the other; what did not work is tried again."""
     from roboirg.simulation.hands import Hands
 
-    hands = Hands(env.session.world)
+    hands, progress = Hands(env.session.world), _Progress(env, stages)
     index, retries = 0, 0
     while index < len(stages):
-        stage, seen = stages[index], len(env.events)
-        yield from hands.perform(stage.primitive)
-        if _happened(env, stage.expects, seen):
+        primitive = stages[index].primitive
+        yield from hands.perform(primitive)
+        if progress.completed() > index:
             index += 1
         elif retries < MAX_RETRIES:
             retries += 1
-            index -= stage.primitive.kind in UNDOES_PICK and index > 0
+            index -= primitive.kind in UNDOES_PICK and index > 0
         else:
             return
 
 
-def _happened(env: RoboIRGEnv, fact: Fact, since: int) -> bool:
-    """Whether the fact began to hold after the first `since` events, or holds now."""
-    fresh = env.events[since:]
-    return fact in env.session.world.facts or any(
-        event.fact == fact and event.holds for event in fresh
-    )
+class _Progress:
+    """How many of the stages that somebody has in mind are completed.
+
+    Args:
+        env: where they are played; what happened before is not looked at.
+        stages: what is to be completed, in order.
+    """
+
+    def __init__(self, env: RoboIRGEnv, stages: tuple[Stage, ...]) -> None:
+        self._env = env
+        self._judge = Judge(stages)
+        self._facts: frozenset[Fact] = env.session.world.facts
+        self._step = env.session.world.elapsed
+        self._read = len(env.session.events)
+        self._judge.update(self._step, self._facts)
+
+    def completed(self) -> int:
+        """The number of completed stages, now."""
+        session = self._env.session
+        changes = iter(session.events[self._read :])
+        change = next(changes, None)
+        while self._step < session.world.elapsed:
+            self._step += 1
+            while change is not None and change.step <= self._step:
+                fact = frozenset([change.fact])
+                self._facts = self._facts | fact if change.holds else self._facts - fact
+                change = next(changes, None)
+            self._judge.update(self._step, self._facts)
+        self._read = len(session.events)
+        return self._judge.index
 
 
 def _rest(env: RoboIRGEnv) -> NDArray[np.float64]:

@@ -13,7 +13,8 @@ import sapien.render
 from sapien.wrapper.actor_builder import ActorBuilder
 from sapien.wrapper.articulation_builder import ArticulationBuilder
 
-from roboirg.episode import Point, SceneObject
+from roboirg.episode import SceneObject
+from roboirg.motions import Point
 from roboirg.tasks import geometry
 
 Rgba = tuple[float, float, float, float]
@@ -26,6 +27,9 @@ COLOUR_RGBA: dict[str, Rgba] = {
 WHITE: Rgba = (1.0, 1.0, 1.0, 1.0)
 GRAY: Rgba = (0.5, 0.5, 0.5, 1.0)
 PURPLE: Rgba = (160 / 255, 32 / 255, 240 / 255, 1.0)
+RED: Rgba = COLOUR_RGBA["red"]
+WOOD: Rgba = (0.8, 0.6, 0.4, 1.0)
+BLACK: Rgba = (0.0, 0.0, 0.0, 1.0)
 
 UPRIGHT = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
 """Turns SAPIEN's cylinders, which lie along x, upright."""
@@ -43,7 +47,7 @@ class Body:
     Attributes:
         item: the data it was built from.
         entity: what moves (of a button: its base).
-        physics: the component that touches things; None for target discs.
+        physics: the component that touches things.
         joint: of a button: the articulation whose only joint is the cap's.
     """
 
@@ -59,7 +63,11 @@ class Body:
 
     def put(self, position: Point) -> None:
         """Teleport the object, upright and at rest, with its own yaw."""
-        self.entity.set_pose(_pose(self.item, position))
+        self.set_pose(_pose(self.item, position))
+
+    def set_pose(self, pose: sapien.Pose) -> None:
+        """Teleport the object; it is at rest afterwards."""
+        self.entity.set_pose(pose)
         if isinstance(self.physics, sapien.physx.PhysxRigidDynamicComponent):
             self.physics.set_linear_velocity(np.zeros(3))
             self.physics.set_angular_velocity(np.zeros(3))
@@ -83,6 +91,10 @@ def _pose(item: SceneObject, position: Point) -> sapien.Pose:
 
 def _material(rgba: Rgba) -> sapien.render.RenderMaterial:
     return sapien.render.RenderMaterial(base_color=list(rgba))
+
+
+def _rgba(item: SceneObject, usual: Rgba) -> Rgba:
+    return usual if item.rgb is None else (*item.rgb, 1.0)
 
 
 def _finish(builder: ActorBuilder, scene: sapien.Scene, item: SceneObject, kind: str) -> Body:
@@ -127,15 +139,69 @@ def _build_container(scene: sapien.Scene, item: SceneObject, visible: bool) -> B
 
 
 def _build_target(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
-    """Five concentric discs, purple and white in turn; nothing collides with them."""
+    """A ringed disc, purple or as the scene wants it."""
+    half = (item.thickness or geometry.TARGET_THICKNESS) / 2
+    return _ringed_disc(
+        scene, item, PURPLE if item.rgb is None else (*item.rgb, 1.0), half, visible
+    )
+
+
+def _build_marker(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
+    """A ringed disc, red and thick enough to cover a target."""
+    return _ringed_disc(scene, item, RED, geometry.MARKER_HALF_THICKNESS, visible)
+
+
+def _ringed_disc(
+    scene: sapien.Scene, item: SceneObject, rgba: Rgba, half: float, visible: bool
+) -> Body:
+    """Five concentric discs, coloured and white in turn; nothing collides with them."""
     radius = float(item.radius or 0.0)
     builder = ActorBuilder()
     for index, share in enumerate(RING_SHARES if visible else ()):
         builder.add_cylinder_visual(
             sapien.Pose(q=UPRIGHT),
             radius=radius * share,
-            half_length=geometry.TARGET_HALF_THICKNESS + index * 1e-5,
-            material=_material(WHITE if index % 2 else PURPLE),
+            half_length=half + index * 1e-5,
+            material=_material(WHITE if index % 2 else rgba),
+        )
+    return _finish(builder, scene, item, "kinematic")
+
+
+def _build_site(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
+    """A place that is neither seen nor felt."""
+    del visible
+    return _finish(ActorBuilder(), scene, item, "kinematic")
+
+
+def _build_shuttle(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
+    """A cube that is only seen."""
+    builder = ActorBuilder()
+    if visible:
+        material = _material(_rgba(item, WHITE))
+        builder.add_box_visual(half_size=[geometry.CUBE_HALF] * 3, material=material)
+    return _finish(builder, scene, item, "kinematic")
+
+
+def _build_bin(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
+    """Four walls; the black floor is only seen, things fall to the table."""
+    wall, height = geometry.BIN_WALL / 2, geometry.BIN_HEIGHT / 2
+    side = geometry.BIN_HALF - wall
+    builder = ActorBuilder()
+    for sign in (-1.0, 1.0):
+        for centre, half in (
+            ((0.0, sign * side, 0.0), (geometry.BIN_HALF, wall, height)),
+            ((sign * side, 0.0, 0.0), (wall, geometry.BIN_HOLE_HALF, height)),
+        ):
+            builder.add_box_collision(sapien.Pose(centre), half_size=half)
+            if visible:
+                material = _material(WOOD)
+                builder.add_box_visual(sapien.Pose(centre), half_size=half, material=material)
+    if visible:
+        floor = geometry.BIN_FLOOR_HEIGHT / 2
+        builder.add_box_visual(
+            sapien.Pose([0.0, 0.0, floor - height]),
+            half_size=(geometry.BIN_HOLE_HALF, geometry.BIN_HOLE_HALF, floor),
+            material=_material(BLACK),
         )
     return _finish(builder, scene, item, "kinematic")
 
@@ -184,4 +250,8 @@ _BUILDERS: dict[str, Callable[[sapien.Scene, SceneObject, bool], Body]] = {
     "container": _build_container,
     "target": _build_target,
     "button": _build_button,
+    "bin": _build_bin,
+    "site": _build_site,
+    "shuttle": _build_shuttle,
+    "marker": _build_marker,
 }

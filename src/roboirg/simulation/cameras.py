@@ -1,4 +1,4 @@
-"""The front and the wrist camera: pictures drawn on request, of what each camera can see.
+"""The front and the wrist camera: pictures, depth and segmentation, drawn on request.
 
 Drawing is most of the cost of a step on a CPU, and most of that goes into bodies outside the
 picture. Each body's box is tested against the sides of the camera's view and hidden for this
@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import NamedTuple
+from dataclasses import dataclass, field
+from typing import Any
 
 import cv2
 import numpy as np
@@ -29,11 +30,17 @@ CULLING_MARGIN = 0.002
 """Metres by which boxes are grown before the test."""
 
 
-class _Drawn(NamedTuple):
-    """A picture and the poses of everything when it was drawn."""
+COLOUR, GEOMETRY = "Color", "PositionSegmentation"
+"""What the shader writes in one go: RGBA; and x, y, z in mm in the camera's frame (x right, y up,
+z backward) with the id of the entity, int16."""
+
+
+@dataclass
+class _Drawn:
+    """The poses of everything when a camera last drew, and what has been fetched of it."""
 
     state: bytes
-    picture: NDArray[np.uint8]
+    fetched: dict[str, NDArray[np.integer[Any]]] = field(default_factory=dict)
 
 
 class Cameras:
@@ -63,29 +70,57 @@ class Cameras:
 
     def picture(self, camera: str) -> NDArray[np.uint8]:
         """What the camera sees now, RGB, shape (256, 256, 3)."""
+        rgba = self._look(camera, COLOUR)
+        return np.asarray(cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB), dtype=np.uint8)
+
+    def depth(self, camera: str) -> NDArray[np.int16]:
+        """How far in front of the camera things are, mm, shape (256, 256, 1); 0 for nothing."""
+        return np.asarray(-self._look(camera, GEOMETRY)[..., 2:3], dtype=np.int16)
+
+    def segmentation(self, camera: str) -> NDArray[np.int16]:
+        """Which entity each pixel shows, by ``entity.per_scene_id``, shape (256, 256)."""
+        return np.asarray(self._look(camera, GEOMETRY)[..., 3], dtype=np.int16).copy()
+
+    def extrinsic(self, camera: str) -> NDArray[np.float32]:
+        """From the world's frame to the camera's, (3, 4): x right, y down, z forward (OpenCV)."""
+        matrix = self._components[camera].get_extrinsic_matrix()
+        return np.asarray(matrix, dtype=np.float32)[:3].copy()
+
+    def intrinsic(self, camera: str) -> NDArray[np.float32]:
+        """From the camera's frame to pixels, (3, 3), OpenCV."""
+        return np.array(self._components[camera].get_intrinsic_matrix(), dtype=np.float32)
+
+    def _look(self, camera: str, what: str) -> NDArray[np.integer[Any]]:
+        """What the camera's shader writes now; drawn only if something has moved."""
         component = self._components[camera]
         poses = np.stack([body.entity.pose.to_transformation_matrix() for body in self._bodies])
         view = np.asarray(component.get_extrinsic_matrix(), dtype=np.float64)
         state = poses.tobytes() + view.tobytes()
         known = self._last.get(camera)
         if known is None or known.state != state:
-            known = _Drawn(state, self._draw(component, self._visible(poses, view)))
+            known = _Drawn(state, {what: self._draw(component, self._visible(poses, view), what)})
             self._last[camera] = known
-        return known.picture.copy()
+        elif what not in known.fetched:
+            # The last drawing is still there.
+            known.fetched[what] = np.asarray(component.get_picture(what))
+        return known.fetched[what]
 
     def _draw(
-        self, component: sapien.render.RenderCameraComponent, visible: NDArray[np.bool_]
-    ) -> NDArray[np.uint8]:
+        self,
+        component: sapien.render.RenderCameraComponent,
+        visible: NDArray[np.bool_],
+        what: str,
+    ) -> NDArray[np.integer[Any]]:
         """A new picture with the bodies outside the view left out."""
         self._scene.update_render()
         hidden = [body for body, seen in zip(self._bodies, visible, strict=True) if not seen]
         for body in hidden:
             body.visibility = 0.0
         component.take_picture()
-        rgba = component.get_picture("Color")
+        picture = np.asarray(component.get_picture(what))  # waits until it is drawn
         for body in hidden:
             body.visibility = 1.0
-        return np.asarray(cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB), dtype=np.uint8)
+        return picture
 
     def _visible(self, poses: NDArray[np.float64], view: NDArray[np.float64]) -> NDArray[np.bool_]:
         """For each body whether its box reaches into the camera's view."""

@@ -1,21 +1,16 @@
-"""Straight moves of the tool: inverse kinematics along a screw, time-optimal within limits.
+"""Straight moves of the tool, and joint positions for a pose. All of it is deterministic.
 
 A move is a straight line in SE(3) from the present tool pose to the wanted one. It is followed in
-joint space by differential inverse kinematics, then given the fastest timing within joint speed
-and acceleration limits (TOPP-RA), then sampled at the control rate. All of it is deterministic.
+joint space by differential inverse kinematics and then timed.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from typing import NamedTuple
 
 import numpy as np
 import sapien
-import toppra
-import toppra.algorithm
-import toppra.constraint
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -23,12 +18,8 @@ from roboirg.actions import ARM_JOINTS
 from roboirg.episode import ROBOT_BASE
 from roboirg.errors import MotionPlanningError
 from roboirg.simulation.robot import TOOL_LINK, Robot, rotation_of
-from roboirg.simulation.settings import CONTROL_PERIOD
-
-JOINT_SPEED_LIMIT = 0.9
-"""rad/s, every arm joint (RoboMME's planner)."""
-JOINT_ACCELERATION_LIMIT = 0.9
-"""rad/s^2, every arm joint."""
+from roboirg.simulation.settings import HOME
+from roboirg.simulation.timing import timed
 
 WAYPOINT_DISTANCE = 0.02
 """Metres of tool travel between way points of a move."""
@@ -37,12 +28,21 @@ WAYPOINT_ANGLE = 0.05
 POSE_TOLERANCE = 1e-6
 MAX_ITERATIONS = 20
 DAMPING = 1e-6
-SMALLEST_JOINT_STEP = 1e-9
+LONGEST_TRAVEL = 3.0
+"""Metres; nothing that far from the tool can be reached."""
+
+INVERSE_TOLERANCE = 1e-3
+"""Largest error, in metres and radians, of joint positions found for a pose (RoboMME)."""
+INVERSE_ITERATIONS = 100
+INVERSE_STARTS = 20
+"""Joint positions from which a pose is tried: the present ones, home, and fixed others."""
+LARGEST_NEWTON_ERROR = 0.3
+"""Metres or radians of the pose error that one iteration looks at."""
+LARGEST_NEWTON_STEP = 0.3
+"""Radians."""
+
 LARGEST_JOINT_STEP = 0.35
 """Radians between way points above which the arm would swing round: no straight move."""
-
-toppra.setup_logging("ERROR")
-
 
 class ToolPose(NamedTuple):
     """Where the tool centre point is to be, world frame."""
@@ -69,6 +69,8 @@ class Planner:
         self._tool = names.index(TOOL_LINK)
         limits = np.asarray(robot.articulation.get_qlimits(), dtype=np.float64)[:ARM_JOINTS]
         self._low, self._high = limits[:, 0], limits[:, 1]
+        anywhere = np.random.default_rng(0).random((INVERSE_STARTS - 2, ARM_JOINTS))
+        self._other_starts = self._low + anywhere * (self._high - self._low)
 
     def forward(self, arm: NDArray[np.float64]) -> ToolPose:
         """Pose of the tool for arm joint positions (7)."""
@@ -91,9 +93,95 @@ class Planner:
         """
         return timed(self._waypoints(arm, goal))
 
+    def travel(self, arm: NDArray[np.float64], goal: ToolPose) -> NDArray[np.float64]:
+        """As `straight`; by way of home where the straight line is not feasible.
+
+        Raises:
+            MotionPlanningError: the goal cannot be reached from home either.
+        """
+        try:
+            return self.straight(arm, goal)
+        except MotionPlanningError:
+            home = timed(np.linspace(arm, HOME, 10))
+            return np.concatenate([home, self.straight(HOME, goal)])
+
+    def inverse(self, arm: NDArray[np.float64], goal: ToolPose) -> NDArray[np.float64]:
+        """Joint positions (7) within the limits that put the tool at a pose.
+
+        Those found from `arm`, so that a near pose needs small movements; if there are none, those
+        found from home or else from one of eighteen fixed places.
+
+        Args:
+            arm: joint positions (7), rad.
+            goal: where the tool shall be, within 1e-3 m and rad on every axis.
+
+        Raises:
+            MotionPlanningError: none were found.
+        """
+        for start in (arm, HOME, *self._other_starts):
+            found = self._descend(start, goal)
+            if found is not None:
+                return found
+        raise MotionPlanningError(f"No joint positions reach {_where(goal)}.")
+
+    def _descend(self, start: NDArray[np.float64], goal: ToolPose) -> NDArray[np.float64] | None:
+        """Joint positions for a pose by damped Newton steps within the limits; None if it fails."""
+        arm = np.clip(start, self._low, self._high)
+        error = self._error(arm, goal)
+        for _ in range(INVERSE_ITERATIONS):
+            if float(np.abs(error).max()) < POSE_TOLERANCE:
+                break
+            near = np.clip(error, -LARGEST_NEWTON_ERROR, LARGEST_NEWTON_ERROR)
+            step = self._step_within_limits(arm, near)
+            largest = float(np.abs(step).max())
+            if largest > LARGEST_NEWTON_STEP:
+                step *= LARGEST_NEWTON_STEP / largest
+            arm = np.clip(arm + step, self._low, self._high)
+            error = self._error(arm, goal)
+        return arm if float(np.abs(error).max()) <= INVERSE_TOLERANCE else None
+
+    def _step_within_limits(
+        self, arm: NDArray[np.float64], error: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """The step of `_step` made by the joints that are not held back by a limit."""
+        free = np.ones(ARM_JOINTS, dtype=bool)
+        step = self._step(arm, error)
+        for _ in range(ARM_JOINTS):
+            held = ((arm <= self._low) & (step < 0.0)) | ((arm >= self._high) & (step > 0.0))
+            if not bool((held & free).any()):
+                break
+            free &= ~held
+            step = self._step(arm, error, free)
+        return step
+
+    def _step(
+        self,
+        arm: NDArray[np.float64],
+        error: NDArray[np.float64],
+        free: NDArray[np.bool_] | None = None,
+    ) -> NDArray[np.float64]:
+        """The smallest change of the (free) joints that mends a small error of the tool's pose."""
+        jacobian = np.asarray(
+            self._model.compute_single_link_local_jacobian(_with_fingers(arm), self._tool)
+        )[:, :ARM_JOINTS]
+        if free is not None:
+            jacobian = jacobian * free
+        gain = jacobian @ jacobian.T + DAMPING * np.eye(6)
+        return np.asarray(jacobian.T @ np.linalg.solve(gain, error))
+
+    def _error(self, arm: NDArray[np.float64], goal: ToolPose) -> NDArray[np.float64]:
+        """What is missing to a pose (6): metres, then radians, in the tool's frame."""
+        current = self.forward(arm)
+        # Far is far: huge numbers would overflow.
+        offset = np.clip(goal.position - current.position, -LONGEST_TRAVEL, LONGEST_TRAVEL)
+        back = current.rotation.inv()
+        return np.concatenate([back.apply(offset), (back * goal.rotation).as_rotvec()])
+
     def _waypoints(self, arm: NDArray[np.float64], goal: ToolPose) -> NDArray[np.float64]:
         start = self.forward(arm)
         turn = (start.rotation.inv() * goal.rotation).as_rotvec()
+        if float(np.abs(goal.position - start.position).max()) > LONGEST_TRAVEL:
+            raise MotionPlanningError(f"{_where(goal)} is out of reach.")
         travel = float(np.linalg.norm(goal.position - start.position))
         count = max(
             1,
@@ -113,20 +201,10 @@ class Planner:
         """The joint positions nearest to `seed` that put the tool at `pose` (damped Newton)."""
         arm = seed.copy()
         for _ in range(MAX_ITERATIONS):
-            current = self.forward(arm)
-            error = np.concatenate(
-                [
-                    current.rotation.inv().apply(pose.position - current.position),
-                    (current.rotation.inv() * pose.rotation).as_rotvec(),
-                ]
-            )
+            error = self._error(arm, pose)
             if float(np.abs(error).max()) < POSE_TOLERANCE:
                 return self._checked(arm, seed)
-            jacobian = np.asarray(
-                self._model.compute_single_link_local_jacobian(_with_fingers(arm), self._tool)
-            )[:, :ARM_JOINTS]
-            gain = jacobian @ jacobian.T + DAMPING * np.eye(6)
-            arm = arm + jacobian.T @ np.linalg.solve(gain, error)
+            arm = arm + self._step(arm, error)
         raise MotionPlanningError(f"The arm cannot reach {_where(pose)} in a straight move.")
 
     def _checked(self, arm: NDArray[np.float64], seed: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -135,48 +213,6 @@ class Planner:
         if float(np.abs(arm - seed).max()) > LARGEST_JOINT_STEP:
             raise MotionPlanningError("A straight move passes too close to a singularity.")
         return arm
-
-
-def timed(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The fastest motion through way points within the joint limits, at the control rate.
-
-    Args:
-        points: (n, 7) joint positions, rad.
-
-    Returns:
-        (m, 7) joint positions, one per control step, first and last way point included.
-
-    Raises:
-        MotionPlanningError: no timing was found.
-    """
-    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    moving = lengths > SMALLEST_JOINT_STEP
-    if not moving.any():
-        return points[:1]
-    points = points[np.concatenate([[True], moving])]
-    knots = np.concatenate([[0.0], np.cumsum(lengths[moving])])
-    limits = np.ones(ARM_JOINTS)
-    path = toppra.SplineInterpolator(knots, points)
-    constraints = [
-        toppra.constraint.JointVelocityConstraint(limits * JOINT_SPEED_LIMIT),
-        toppra.constraint.JointAccelerationConstraint(limits * JOINT_ACCELERATION_LIMIT),
-    ]
-    solver = toppra.algorithm.TOPPRA(
-        constraints, path, gridpoints=_grid(knots), parametrizer="ParametrizeConstAccel"
-    )
-    trajectory = solver.compute_trajectory()
-    if trajectory is None:
-        raise MotionPlanningError("No timing within the joint limits was found.")
-    count = max(int(trajectory.duration / CONTROL_PERIOD), 2)
-    return np.asarray(trajectory(np.linspace(0.0, trajectory.duration, count)))
-
-
-def _grid(knots: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Where the timing is computed: every way point and nine places between two of them."""
-    return np.concatenate(
-        [np.linspace(low, high, 10, endpoint=False) for low, high in itertools.pairwise(knots)]
-        + [knots[-1:]]
-    )
 
 
 def _with_fingers(arm: NDArray[np.float64]) -> NDArray[np.float64]:

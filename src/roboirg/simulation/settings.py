@@ -24,6 +24,10 @@ HOME = np.array([0.0, 0.0, 0.0, -math.pi / 2, 0.0, math.pi / 2, math.pi / 4])
 HOME_ACTION = np.append(HOME, 1.0)
 """The action (8) that keeps the robot at home with an open gripper."""
 
+OPEN, CLOSED = 1.0, -1.0
+"""Gripper actions."""
+GRIPPER_STEPS = 6
+"""Control steps in which the gripper opens or closes (RoboMME)."""
 FINGER_OPEN = 0.04
 FINGER_SQUEEZE = -0.01
 """Finger targets, m, of gripper actions +1 and -1; the joint limit keeps fingers at or above 0."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,12 +9,15 @@ import sapien
 import sapien.physx
 from numpy.typing import NDArray
 
-from roboirg.episode import Fact, KeyPose, Motion, Scene
+from roboirg.conditions import Fact
+from roboirg.episode import Scene
 from roboirg.errors import InvalidValueError, UnknownNameError
 from roboirg.observations import CAMERAS
-from roboirg.simulation import bodies, detection, settings
+from roboirg.simulation import bodies, settings
 from roboirg.simulation.cameras import Cameras
+from roboirg.simulation.detection import Detector
 from roboirg.simulation.device import render_system
+from roboirg.simulation.motions import Moment, MotionPlayer
 from roboirg.simulation.robot import CAMERA_LINK, Robot
 from roboirg.simulation.scenery import add_scenery
 
@@ -24,8 +26,7 @@ class World:
     """One scene in the simulator, from its first moment on.
 
     Args:
-        scene: the objects.
-        motions: scripted movements of objects.
+        scene: the objects and their scripted movements.
         visible: False leaves out all that is only drawn; pictures are then not to be had, and
             no Vulkan device is needed.
 
@@ -34,9 +35,7 @@ class World:
         facts: all that held at the last evaluation.
     """
 
-    def __init__(
-        self, scene: Scene, motions: Sequence[Motion] = (), *, visible: bool = True
-    ) -> None:
+    def __init__(self, scene: Scene, *, visible: bool = True) -> None:
         settings.apply_physics_settings()
         systems: list[Any] = [sapien.physx.PhysxCpuSystem()]
         if visible:
@@ -50,13 +49,15 @@ class World:
         self.bodies = {
             item.name: bodies.build(self._scene, item, visible=visible) for item in scene.objects
         }
-        self._motions = tuple(motions)
+        self._motions = MotionPlayer(scene.motions, self.bodies)
+        self._detector = Detector(self.bodies, self.robot)
+        self._stages: dict[int, int] = {}
         self._cameras: Cameras | None = None
         if visible:
             settings.add_lights(self._scene)
             self._cameras = Cameras(self._scene, self.robot.links[CAMERA_LINK].entity)
         self.elapsed = 0
-        self.facts: frozenset[Fact] = self._detect()
+        self.facts: frozenset[Fact] = self._detector.detect([], self._motions.absent())
 
     def step(self, action: NDArray[np.floating[Any]]) -> frozenset[Fact]:
         """Execute one action (8) for one control step.
@@ -67,13 +68,20 @@ class World:
         Returns:
             The facts that hold afterwards.
         """
-        self._move_scripted()
+        self._motions.before_step(Moment(self.elapsed, self.facts, self._stages))
         self.robot.set_targets(action)
         for _ in range(settings.PHYSICS_STEPS):
             self._physics.step()
         self.elapsed += 1
-        self.facts = self._detect()
+        self.facts = self._detector.detect(
+            self._physics.get_contacts(), self._motions.absent(), self._motions.stopped()
+        )
+        self._motions.after_step(self.facts)
         return self.facts
+
+    def note_stage(self, index: int) -> None:
+        """Take note that a stage is due, for the motions that wait for it."""
+        self._stages.setdefault(index, self.elapsed)
 
     def picture(self, camera: str) -> NDArray[np.uint8]:
         """What a camera sees now, RGB, shape (256, 256, 3).
@@ -82,31 +90,17 @@ class World:
             UnknownNameError: there is no such camera.
             InvalidValueError: the world was built without pictures.
         """
-        if self._cameras is None:
-            raise InvalidValueError("This world was built without pictures (visible=False).")
         if camera not in CAMERAS:
             raise UnknownNameError("camera", camera, CAMERAS)
-        return self._cameras.picture(camera)
+        return self.cameras.picture(camera)
 
-    def _move_scripted(self) -> None:
-        """Hold objects where their motions want them at this step; release them at the end."""
-        for motion in self._motions:
-            body, key = self.bodies[motion.subject], _key_at(motion, self.elapsed)
-            if key is not None and key.position is not None:
-                body.put(key.position)
-            elif key is not None and key.step == self.elapsed:
-                body.put(body.item.position)
+    @property
+    def cameras(self) -> Cameras:
+        """The cameras.
 
-    def _detect(self) -> frozenset[Fact]:
-        contacts = self._scene.physx_system.get_contacts() if self.elapsed else []
-        # Nothing is to be concluded from where a motion held an object in the last step.
-        last = max(self.elapsed - 1, 0)
-        keys = {motion.subject: _key_at(motion, last) for motion in self._motions}
-        held = {name for name, key in keys.items() if key is not None and key.position is not None}
-        free = [body for name, body in self.bodies.items() if name not in held]
-        return detection.detect(free, self.robot, contacts)
-
-
-def _key_at(motion: Motion, step: int) -> KeyPose | None:
-    """The key of a motion that is in force at a step; None before the first."""
-    return next((key for key in reversed(motion.keys) if key.step <= step), None)
+        Raises:
+            InvalidValueError: the world was built without pictures.
+        """
+        if self._cameras is None:
+            raise InvalidValueError("This world was built without pictures (visible=False).")
+        return self._cameras

@@ -1,0 +1,115 @@
+"""What an observation holds: pictures as asked for, their depth and calibration, proprioception."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from roboirg.actions import JOINT_HIGH, JOINT_LOW, POSE_SIZE
+from roboirg.errors import InvalidValueError
+from roboirg.observations import Demonstration, check_cameras
+from roboirg.simulation.cameras import SIZE
+from roboirg.simulation.proprioception import Proprioception
+from roboirg.simulation.world import World
+
+_SLACK = 0.1
+"""Radians by which joints may pass their limits while they are pushed."""
+
+
+class Wishes(NamedTuple):
+    """Which fields observations have besides proprioception.
+
+    Attributes:
+        cameras: whose pictures.
+        depth: whether with depth.
+        calibration: whether with extrinsic and intrinsic matrices.
+    """
+
+    cameras: Sequence[str]
+    depth: bool = False
+    calibration: bool = False
+
+    def checked(self) -> Wishes:
+        """These wishes, if they can be fulfilled.
+
+        Raises:
+            UnknownNameError: there is no such camera.
+            InvalidValueError: depth or calibration is wanted of no camera.
+        """
+        cameras = check_cameras(self.cameras)
+        for name, wanted in (("depth", self.depth), ("calibration", self.calibration)):
+            if not isinstance(wanted, bool):
+                raise InvalidValueError(f"{name} is {wanted!r}; it has to be True or False.")
+            if wanted and not cameras:
+                raise InvalidValueError(
+                    f"{name}=True is for the cameras asked for, and cameras is (); "
+                    "name one, for example cameras=('front',)."
+                )
+        return self._replace(cameras=cameras)
+
+
+class Senses:
+    """Reads one world.
+
+    Args:
+        world: to be followed from now on.
+        wishes: what is read.
+
+    Attributes:
+        proprioception: what the robot feels.
+    """
+
+    def __init__(self, world: World, wishes: Wishes) -> None:
+        self._world = world
+        self._wishes = wishes
+        self.proprioception = Proprioception(world.robot)
+
+    def read(self) -> dict[str, Any]:
+        """The observation without the instruction."""
+        fields: dict[str, Any] = {
+            f"{camera}_rgb": self._world.picture(camera) for camera in self._wishes.cameras
+        }
+        for camera in self._wishes.cameras if self._wishes.depth else ():
+            fields[f"{camera}_depth"] = self._world.cameras.depth(camera)
+        for camera in self._wishes.cameras if self._wishes.calibration else ():
+            fields[f"{camera}_extrinsic"] = self._world.cameras.extrinsic(camera)
+            fields[f"{camera}_intrinsic"] = self._world.cameras.intrinsic(camera)
+        return {**fields, **self.proprioception.read()}
+
+
+def sensed_space(wishes: Wishes) -> dict[str, spaces.Space[Any]]:
+    """The space of each field that `Senses.read` gives."""
+    fields: dict[str, spaces.Space[Any]] = {
+        f"{camera}_rgb": spaces.Box(0, 255, (SIZE, SIZE, 3), np.uint8) for camera in wishes.cameras
+    }
+    millimetres = np.iinfo(np.int16)
+    for camera in wishes.cameras if wishes.depth else ():
+        fields[f"{camera}_depth"] = spaces.Box(
+            int(millimetres.min), int(millimetres.max), (SIZE, SIZE, 1), np.int16
+        )
+    for camera in wishes.cameras if wishes.calibration else ():
+        fields[f"{camera}_extrinsic"] = spaces.Box(-np.inf, np.inf, (3, 4), np.float32)
+        fields[f"{camera}_intrinsic"] = spaces.Box(-np.inf, np.inf, (3, 3), np.float32)
+    low, high = (JOINT_LOW - _SLACK).astype(np.float32), (JOINT_HIGH + _SLACK).astype(np.float32)
+    return {
+        **fields,
+        "joint_positions": spaces.Box(low, high),
+        "gripper": spaces.Box(-0.01, 0.05, (2,), np.float32),
+        "end_effector": spaces.Box(-np.inf, np.inf, (POSE_SIZE,), np.float64),
+    }
+
+
+def stack(frames: Sequence[dict[str, Any]], wishes: Wishes) -> Demonstration:
+    """Moments of a video as arrays with a leading axis T, which may be 0."""
+    return {
+        key: np.stack([frame[key] for frame in frames]) if frames else _empty(space)
+        for key, space in sensed_space(wishes).items()
+    }
+
+
+def _empty(space: spaces.Space[Any]) -> NDArray[Any]:
+    return np.zeros((0, *(space.shape or ())), dtype=space.dtype)

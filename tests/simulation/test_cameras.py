@@ -1,0 +1,79 @@
+"""Depth, segmentation and calibration fit each other and the scene."""
+
+import numpy as np
+import pytest
+
+from roboirg.observations import CAMERAS
+from roboirg.simulation.cameras import Cameras
+from roboirg.simulation.senses import cameras_of
+from roboirg.simulation.settings import HOME_ACTION
+from roboirg.simulation.world import World
+from roboirg.splits import get_episode
+
+pytestmark = pytest.mark.sim
+
+
+@pytest.fixture(scope="module")
+def world() -> World:
+    world = World(get_episode("PickXtimes", "test", 2).scene)
+    world.step(HOME_ACTION)
+    return world
+
+
+@pytest.fixture(scope="module")
+def cameras(world) -> Cameras:
+    return cameras_of(world)
+
+
+def test_the_front_camera_stands_where_robomme_s_does(cameras):
+    expected = [[0, 1, 0, 0], [0.89443, 0, -0.44721, -0.08944], [-0.44721, 0, -0.89443, 0.49194]]
+    assert cameras.extrinsic("front") == pytest.approx(np.array(expected), abs=1e-5)
+    for camera in CAMERAS:
+        matrix = [[128, 0, 128], [0, 128, 128], [0, 0, 1]]
+        assert cameras.intrinsic(camera) == pytest.approx(np.array(matrix), abs=1e-4)
+
+
+def test_depth_of_the_bare_table_is_as_computed_by_hand(cameras):
+    # A pixel's ray meets z = 0 at a depth of height / slope. Camera axes in the world: down is
+    # (0.894, 0, -0.447), forward (-0.447, 0, -0.894), and the eye is 0.4 above the table.
+    depth = cameras.depth("front")
+    assert (depth.shape, depth.dtype) == ((256, 256, 1), np.int16)
+    for row in (104, 150, 200):
+        slope = 0.894427 + 0.447214 * (row + 0.5 - 128) / 128
+        assert depth[row, 128, 0] == pytest.approx(400 / slope, abs=1)
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_objects_are_seen_where_their_origins_are_projected(world, cameras, camera):
+    pixels = cameras.segmentation(camera)
+    assert (pixels.shape, pixels.dtype) == (cameras.picture(camera).shape[:2], np.int16)
+    for body in world.bodies.values():
+        entity = body.entity if body.button is None else body.button.links[1].entity
+        rows, columns = np.nonzero(pixels == entity.per_scene_id)
+        assert len(rows) > 50
+        place = cameras.extrinsic(camera) @ np.append(entity.pose.p, 1.0)
+        x, y, distance = cameras.intrinsic(camera) @ place
+        assert (columns.mean(), rows.mean()) == pytest.approx((x / distance, y / distance), abs=2)
+        depth = cameras.depth(camera)[rows, columns, 0]
+        assert depth.mean() / 1000 == pytest.approx(distance, abs=0.03)
+
+
+def test_one_drawing_gives_everything(world, cameras, monkeypatch):
+    drawn = []
+    draw = cameras._draw
+    monkeypatch.setattr(cameras, "_draw", lambda *args: (drawn.append(args[-1]), draw(*args))[1])
+    cube = world.bodies["cube_red"]
+    for offset in (0.0, 0.03):
+        place = cube.item.position
+        cube.put(place._replace(x=place.x + offset))
+        before = len(drawn)
+        cameras.segmentation("front")
+        cameras.depth("front")
+        picture = cameras.picture("front")
+        assert len(drawn) <= before + 1
+        seen = cameras.segmentation("front") == cube.entity.per_scene_id
+        # What is the cube's is red, so both are of the same moment.
+        assert (picture[seen][:, 0] > 60).all()
+        assert (picture[seen][:, 1:] < 60).all()
+    assert len(drawn) >= 1
+    cube.put(cube.item.position)

@@ -1,0 +1,176 @@
+"""Scripted motions: where things are at which step, and what the robot cannot change."""
+
+import math
+
+import numpy as np
+import pytest
+
+from roboirg.conditions import Fact
+from roboirg.episode import Scene, SceneObject
+from roboirg.motions import Away, Glow, Point, Shuttle, Swap, Vanish
+from roboirg.simulation import settings
+from roboirg.simulation.motions import shuttle_position
+from roboirg.simulation.world import World
+
+pytestmark = pytest.mark.sim
+
+
+def cube(name: str, x: float, y: float, z: float = 0.02, yaw: float = 0.0) -> SceneObject:
+    return SceneObject(name, "cube", Point(x, y, z), yaw, "red")
+
+
+def rest(world: World, steps: int) -> World:
+    for _ in range(steps):
+        world.step(settings.HOME_ACTION)
+    return world
+
+
+def plane(world: World, name: str) -> tuple[float, float]:
+    return world.bodies[name].position[:2]
+
+
+def turn(world: World, name: str) -> float:
+    w, _, _, z = world.bodies[name].entity.pose.q
+    return 2 * math.atan2(z, w)
+
+
+def test_two_things_change_places_on_opposite_lanes_and_the_others_stay():
+    places = {"a": (0.0, -0.1), "b": (0.0, 0.1), "c": (0.1, 0.15)}
+    objects = tuple(cube(name, *xy, yaw=0.3 * i) for i, (name, xy) in enumerate(places.items()))
+    world = World(Scene(objects, (Swap("a", "b", 10, 50, 0.07, ("c",)),)), visible=False)
+    rest(world, 10)
+    assert plane(world, "a") == pytest.approx(places["a"], abs=1e-4)
+    rest(world, 26)  # the step with k = 35 is half way
+    # a goes towards +y, so its left is -x; b comes the other way on its own left.
+    assert plane(world, "a") == pytest.approx((-0.07, 0.0), abs=2e-3)
+    assert plane(world, "b") == pytest.approx((0.07, 0.0), abs=2e-3)
+    assert turn(world, "a") == pytest.approx(0.15, abs=1e-2)
+    rest(world, 25)
+    assert plane(world, "a") == pytest.approx(places["b"], abs=1e-4)
+    assert plane(world, "b") == pytest.approx(places["a"], abs=1e-4)
+    assert plane(world, "c") == pytest.approx(places["c"], abs=1e-4)
+    assert turn(world, "a") == pytest.approx(0.3, abs=1e-3)
+    rest(world, 5)
+    assert plane(world, "a") == pytest.approx(places["b"], abs=1e-4)
+
+
+def test_swaps_back_to_back_hand_over_and_wait_for_their_stage():
+    places = {"a": (0.0, -0.15), "b": (0.0, 0.0), "c": (0.0, 0.15)}
+    objects = tuple(cube(name, *xy) for name, xy in places.items())
+    swaps = (
+        Swap("a", "b", 0, 50, 0.07, ("c",), stage=2),
+        Swap("a", "c", 50, 50, 0.07, ("b",), stage=2),
+    )
+    world = World(Scene(objects, swaps), visible=False)
+    rest(world, 20)
+    assert plane(world, "a") == pytest.approx(places["a"], abs=1e-4)
+    world.note_stage(2)
+    rest(world, 101)
+    assert plane(world, "a") == pytest.approx(places["c"], abs=1e-4)
+    assert plane(world, "b") == pytest.approx(places["a"], abs=1e-4)
+    assert plane(world, "c") == pytest.approx(places["b"], abs=1e-4)
+
+
+def test_what_is_away_comes_back_to_its_place_or_to_anothers():
+    objects = (cube("a", 0.0, -0.1), cube("b", 0.0, 0.1), cube("c", 0.1, 0.0))
+    motions = (Away("a", 0, 5), Swap("b", "c", 0, 6, 0.0), Away("a", 8, 12, under="b"))
+    world = World(Scene(objects, motions), visible=False)
+    assert Fact("lying", "a") not in world.facts
+    rest(world, 5)
+    assert plane(world, "a")[0] > 5
+    assert Fact("lying", "a") not in world.facts
+    rest(world, 1)
+    assert plane(world, "a") == pytest.approx((0.0, -0.1), abs=1e-4)
+    assert Fact("lying", "a") in world.facts
+    rest(world, 4)
+    assert plane(world, "a")[0] > 5
+    rest(world, 3)
+    # Where b is now, with its own height: they push each other apart afterwards.
+    assert plane(world, "a") == pytest.approx((0.1, 0.0), abs=0.03)
+
+
+def test_a_shuttle_runs_to_and_fro_and_stops_for_good_when_pressed():
+    pressed = Fact("pressed", "button")
+    run = Shuttle("s", Point(0, -0.3, 0.01), Point(0, 0.3, 0.01), 60, 5, pressed)
+    assert shuttle_position(run, 0) == run.begin
+    assert shuttle_position(run, 30).y == pytest.approx(0.0)
+    assert shuttle_position(run, 60) == run.end
+    assert shuttle_position(run, 90).y == pytest.approx(0.0)
+    assert shuttle_position(run, 120) == run.begin
+    assert shuttle_position(run, 300) == shuttle_position(run, 1000) == run.end
+    # Peak speed, from the facts: 0.0150 m a step for 60 steps a pass.
+    assert shuttle_position(run, 31).y - shuttle_position(run, 30).y == pytest.approx(0.015, 1e-2)
+
+    objects = (
+        SceneObject("button", "button", Point(-0.06, 0.0, 0.0075)),
+        SceneObject("target", "target", Point(0.0, 0.0, 0.01), radius=0.036, thickness=0.01),
+        SceneObject("s", "shuttle", run.begin, rgb=(0.2, 0.7, 0.4)),
+    )
+    world = World(Scene(objects, (run,)), visible=False)
+    near, stopped = Fact("near", "s", "target"), Fact("stopped", "s", "target")
+    seen = []
+    for _ in range(33):
+        seen.append(near in world.step(settings.HOME_ACTION))
+        # The step that ends at t shows position t - 1.
+        assert world.bodies["s"].position.y == pytest.approx(
+            shuttle_position(run, world.elapsed - 1).y, abs=1e-6
+        )
+    assert [step for step, is_near in enumerate(seen, 1) if is_near] == [*range(27, 34)]
+    (joint,) = world.bodies["button"].button.active_joints
+    cap = world.bodies["button"].button
+    cap.set_qpos(np.array([-0.012]))
+    joint.set_drive_target(-0.012)
+    world.step(settings.HOME_ACTION)
+    assert pressed in world.facts
+    assert stopped not in world.facts
+    rest(world, 1)
+    assert stopped in world.facts
+    where = world.bodies["s"].position
+    joint.set_drive_target(0.0)
+    rest(world, 30)
+    assert pressed not in world.facts
+    assert world.bodies["s"].position == where
+    assert stopped in world.facts
+
+
+def test_a_light_glows_while_something_is_over_its_target_and_lingers():
+    over = Fact("over", "a", "target")
+    objects = (
+        cube("a", 0.0, 0.0, z=0.1),
+        SceneObject("target", "target", Point(0.0, 0.0, 0.005), radius=0.04),
+        SceneObject("light", "marker", Point(0.0, 0.0, -0.005), radius=0.0401),
+    )
+    world = World(Scene(objects, (Glow("light", over, 20),)), visible=False)
+    light, falling = world.bodies["light"], world.bodies["a"]
+    rest(world, 1)
+    assert over in world.facts
+    rest(world, 1)
+    assert light.position == pytest.approx(light.item.position)
+    falling.put(Point(0.2, 0.2, 0.02))
+    rest(world, 1)
+    assert over not in world.facts
+    rest(world, 20)
+    assert light.position == pytest.approx(light.item.position)
+    rest(world, 1)
+    assert light.position.x > 5
+
+
+def test_a_cube_that_falls_into_the_bin_is_gone_and_stays_counted():
+    binned = Fact("binned", "a", "bin")
+    objects = (
+        SceneObject("bin", "bin", Point(0.1, 0.0, 0.025), yaw=0.2),
+        cube("a", 0.1, 0.0, z=0.15),
+        cube("b", 0.1, 0.2),
+    )
+    world = World(Scene(objects, (Vanish("a", binned),)), visible=False)
+    steps = 0
+    while binned not in world.facts:
+        rest(world, 1)
+        steps += 1
+        assert steps < 20
+    assert world.bodies["a"].position.x > 5
+    rest(world, 10)
+    assert binned in world.facts
+    assert Fact("lying", "a") not in world.facts
+    assert Fact("lying", "b") in world.facts
+    assert world.bodies["a"].position.z == pytest.approx(10.0, abs=0.02)
