@@ -6,8 +6,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from roboirg.actions import ACTION_HIGH, ACTION_LOW, check_action, check_chunk
-from roboirg.errors import InvalidActionError
+from roboirg.actions import (
+    ACTION_SPACES,
+    EE_POSE,
+    JOINT_ANGLE,
+    WAYPOINT,
+    check_action,
+    check_chunk,
+    find_action_space,
+)
+from roboirg.errors import InvalidActionError, UnknownNameError
 
 finite = st.floats(-10, 10)
 
@@ -57,6 +65,32 @@ def test_what_is_not_an_array_of_numbers_is_refused(bad):
         check_chunk(bad)
 
 
+@pytest.mark.parametrize("space", ACTION_SPACES.values(), ids=ACTION_SPACES)
+def test_each_space_takes_its_own_size_and_names_itself_when_it_refuses(space):
+    assert find_action_space(space.name) is space
+    assert np.array_equal(check_chunk(space.low, space), space.low[None])
+    assert (space.low < space.high).all()
+    for check, wrong in ((check_action, space.size + 1), (check_chunk, space.size - 1)):
+        with pytest.raises(InvalidActionError) as caught:
+            check(np.zeros(wrong), space)
+        for words in (f"({space.name})", f"{space.size}", space.describe, f"shape ({wrong},)"):
+            assert words in str(caught.value)
+    with pytest.raises(InvalidActionError, match=rf"\({space.name}\) is an array of {space.size}"):
+        check_action("up", space)
+
+
+def test_sizes_are_robomme_s():
+    assert [space.size for space in (JOINT_ANGLE, EE_POSE, WAYPOINT)] == [8, 7, 7]
+
+
+@pytest.mark.parametrize("name", ["waypoints", "", None, ["ee_pose"]])
+def test_unknown_action_spaces_are_named(name):
+    with pytest.raises(UnknownNameError, match=r"There is no action space .*joint_angle, ee_pose"):
+        find_action_space(name)
+
+
 def test_limits_enclose_home():
     home = np.array([0, 0, 0, -np.pi / 2, 0, np.pi / 2, np.pi / 4, 1])
-    assert ((home >= ACTION_LOW) & (home <= ACTION_HIGH)).all()
+    assert ((home >= JOINT_ANGLE.low) & (home <= JOINT_ANGLE.high)).all()
+    tool_at_home = np.array([-0.0605, 0.0, 0.5211, -np.pi, 0.0, 0.0, 1.0])
+    assert ((tool_at_home >= EE_POSE.low) & (tool_at_home <= EE_POSE.high)).all()

@@ -1,6 +1,7 @@
 """The Gymnasium environment: contract, verdicts, limits, and bad input."""
 
 import os
+import re
 import subprocess
 import sys
 import warnings
@@ -12,7 +13,10 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import roboirg
+from roboirg.actions import ACTION_SPACES
 from roboirg.errors import InvalidActionError, InvalidValueError, UnknownNameError
+from roboirg.evaluation.record import Job
+from roboirg.evaluation.rollout import Needs, make_env
 from roboirg.gym import environment_id
 from roboirg.policies import make_policy, play
 from roboirg.policies.handed import HandedPolicy
@@ -63,6 +67,97 @@ def test_observations_hold_what_they_promise():
     observation, reward, terminated, truncated, info = env.step(HOME_ACTION)
     assert observation in env.observation_space
     assert (reward, terminated, truncated, info["steps"]) == (0.0, False, False, 1)
+
+
+def test_depth_and_calibration_are_there_for_the_cameras_asked_for():
+    env = roboirg.make(
+        "VideoUnmask", episode=1, cameras=("front",), depth=True, calibration=True, grounded=True
+    )
+    observation, info = env.reset()
+    assert observation in env.observation_space
+    fields = {
+        "front_depth": ((256, 256, 1), np.int16),
+        "front_extrinsic": ((3, 4), np.float32),
+        "front_intrinsic": ((3, 3), np.float32),
+    }
+    for key, (shape, kind) in fields.items():
+        assert (observation[key].shape, observation[key].dtype) == (shape, kind)
+        video = info["demonstration"][key]
+        assert (video.shape, video.dtype) == ((66, *shape), kind)
+    assert not any(key.startswith("wrist") for key in observation)
+    plain = roboirg.make("VideoUnmask", episode=1, cameras=("front",)).reset()[0]
+    assert set(observation) - set(plain) == set(fields)
+    assert np.array_equal(plain["front_rgb"], observation["front_rgb"])
+
+
+def test_subgoals_are_grounded_once_their_object_is_seen_and_then_frozen():
+    env = roboirg.make("VideoUnmask", episode=1, cameras=(), grounded=True)
+    _, info = env.reset()
+    assert info["demonstration_subgoals"] == ["static"] * 66
+    stage = env.episode.stages[0]
+    name = env.episode.scene.hidden_in(stage.points_at).colour
+    assert info["subgoal"] == f"pick up the container that hides the {name} cube"
+    found = re.fullmatch(
+        rf"pick up the container at <(\d+), (\d+)> that hides the {name} cube",
+        info["grounded_subgoal"],
+    )
+    x, y, _ = env.episode.scene[stage.points_at].position
+    # Projected by hand; the middle of a container is some 4 cm above the table.
+    z = 0.04
+    distance = -0.44721 * x - 0.89443 * z + 0.49194
+    row = 128 + 128 * (0.89443 * x - 0.44721 * z - 0.08944) / distance
+    column = 128 + 128 * y / distance
+    assert (int(found[1]), int(found[2])) == pytest.approx((row, column), abs=6)
+    texts = {(info["subgoal"], info["grounded_subgoal"])}
+    policy = make_policy("oracle", 0)
+    policy.attach(env)
+    policy.reset(env.instruction.text, info["demonstration"])
+    while info["status"] == "ongoing":
+        before = info
+        *_, info = env.step_chunk(policy.act({}))
+        texts.add((info["subgoal"], info["grounded_subgoal"]))
+    # Lifting moves the container, not its pixel; after the end the last one stays.
+    assert info["status"] == "success"
+    assert info["subgoal"] == "all tasks completed"
+    assert info["grounded_subgoal"] == before["grounded_subgoal"]
+    assert len(texts) == len(env.episode.stages) + 1
+
+
+def test_subgoals_change_one_step_after_their_stage_and_only_pointing_ones_are_grounded():
+    env = roboirg.make("PickXtimes", episode=2, cameras=(), grounded=True)
+    changes = []
+
+    def note(env, _demonstration):
+        info = env._info()
+        pair = (info["subgoal"], info["grounded_subgoal"])
+        if not changes or changes[-1][1] != pair:
+            changes.append((env.session.world.elapsed, pair))
+
+    env.set_frame_hook(note)
+    assert play(env, make_policy("oracle", 0))["status"] == "success"
+    happened = [
+        next(event.step for event in env.events if event.fact == stage.expects)
+        for stage in env.episode.stages
+    ]
+    assert [step for step, _ in changes[1:-1]] == [step + 1 for step in happened[:-1]]
+    assert changes[-1][0] == happened[-1]
+    for stage, (_, (simple, grounded)) in zip(env.episode.stages, changes, strict=False):
+        assert re.sub(r"at <\d+, \d+> ?", "", grounded).strip() == simple
+        assert ("<" in grounded) == (stage.points_at is not None)
+
+
+def test_an_environment_of_another_action_space_is_refused():
+    env = roboirg.make("PickXtimes", cameras=(), actions="ee_pose")
+    with pytest.raises(InvalidValueError, match="make it with actions='joint_angle'"):
+        play(env, make_policy("oracle", 0))
+
+
+def test_runs_give_policies_their_action_space():
+    job = Job(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
+    for space in ACTION_SPACES.values():
+        env = make_env(job, Needs((), space))
+        assert env.actions == space.name
+        assert np.array_equal(env.action_space.low, space.low)
 
 
 def test_tasks_without_a_video_have_an_empty_demonstration():
@@ -200,6 +295,13 @@ def test_names_and_numbers_are_checked_before_anything_is_built():
     for wrong in (0, 2.5, "3", None):
         with pytest.raises(InvalidValueError, match=f"max_steps is {wrong!r}"):
             roboirg.make("PickXtimes", max_steps=wrong)
+    with pytest.raises(UnknownNameError, match=r"no action space 'pose'.*ee_pose"):
+        roboirg.make("PickXtimes", actions="pose")
+    for option in ("depth", "calibration"):
+        with pytest.raises(InvalidValueError, match=f"{option}=True is for the cameras asked for"):
+            roboirg.make("PickXtimes", cameras=(), **{option: True})
+        with pytest.raises(InvalidValueError, match=f"{option} is 1; it has to be True or False"):
+            roboirg.make("PickXtimes", **{option: 1})
     for wrong in ("front", None):
         with pytest.raises(InvalidValueError, match=r"cameras is .*\('front',\)"):
             roboirg.make("PickXtimes", cameras=wrong)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import gymnasium
@@ -10,23 +11,16 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
-from roboirg.actions import (
-    ACTION_HIGH,
-    ACTION_LOW,
-    ARM_JOINTS,
-    JOINT_HIGH,
-    JOINT_LOW,
-    check_action,
-    check_chunk,
-)
-from roboirg.episode import Episode
-from roboirg.errors import InvalidValueError, UnknownNameError
+from roboirg.actions import JOINT_ANGLE, check_action, check_chunk, find_action_space
+from roboirg.episode import Episode, Stage
+from roboirg.errors import InvalidValueError, MotionPlanningError, UnknownNameError
 from roboirg.judging import Event, Status, plain_subgoal
 from roboirg.language import instruct
-from roboirg.observations import CAMERAS, Demonstration, check_cameras
-from roboirg.simulation.cameras import SIZE
+from roboirg.observations import CAMERAS
+from roboirg.simulation.controllers import Controller, make_controller
 from roboirg.simulation.device import describe, find_render_device
-from roboirg.simulation.proprioception import Proprioception
+from roboirg.simulation.grounding import Grounding
+from roboirg.simulation.senses import Senses, Wishes, sensed_space, stack
 from roboirg.simulation.session import Session
 from roboirg.splits import get_episode
 
@@ -34,6 +28,8 @@ MAX_STEPS = 1300
 """Control steps a policy has, as in RoboMME's published experiments."""
 LONGEST_INSTRUCTION = 100_000
 PRINTABLE = "".join(chr(code) for code in range(32, 127))
+COMPLETED = "all tasks completed"
+"""The subgoal after the last stage."""
 
 FrameHook = Callable[["RoboIRGEnv", bool], None]
 
@@ -44,18 +40,24 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     Observation: `front_rgb` and `wrist_rgb` uint8 (256, 256, 3) for the cameras asked for;
     `joint_positions` float32 (7,) rad; `gripper` float32 (2,) m; `end_effector` float64 (6,)
     position (m) and extrinsic x-y-z angles (rad) of the tool centre in the world frame;
-    `instruction` text.
+    `instruction` text. With `depth`, `front_depth` and `wrist_depth` int16 (256, 256, 1) mm; with
+    `calibration`, `front_extrinsic` float32 (3, 4), `front_intrinsic` (3, 3), and of the wrist.
 
-    Action: (8,) absolute joint targets in rad and the gripper, +1 open to -1 closed; one control
-    step of 0.05 s.
+    Action: of the space that `actions` names. `joint_angle` (8,): absolute joint targets in rad
+    and the gripper, +1 open to -1 closed; one control step of 0.05 s. `ee_pose` (7,): position (m)
+    and extrinsic x-y-z angles (rad) of the tool centre in the world frame and the gripper; one
+    control step. `waypoint` (7,): the same pose, reached in a straight move of many control steps;
+    there -1 closes the gripper and +1 opens it in six more, anything else leaves it. The episode
+    fails at a pose that cannot be reached.
 
     Reward: 1 at the step that completes the task, else 0.
 
     Episode end: terminated on success or failure, truncated after `max_steps`.
 
     Info: `status` (ongoing, success, failure, timeout), `cause`, `steps` of the policy,
-    `elapsed_steps` since the world began, `events` since the last call, `subgoal` in words; at
-    reset `demonstration`, arrays as in the observation with a leading axis T.
+    `elapsed_steps` since the world began, `events` since the last call, `subgoal` in words, with
+    `grounded` also `grounded_subgoal`; at reset `demonstration`, arrays as in the observation with
+    a leading axis T, and `demonstration_subgoals`, T texts.
 
     Args:
         task: name of the task, or an episode made by hand (then `split` and `episode` are its own).
@@ -67,12 +69,16 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         distractor: neutral or competing.
         distractors: how many distractors are spoken.
         frame: whose left and right a spatial instruction uses: robot or camera.
+        actions: joint_angle, ee_pose or waypoint.
         cameras: which pictures observations hold; () plays without drawing.
+        depth: whether observations hold depth for the same cameras.
+        calibration: whether observations hold the matrices of the same cameras.
+        grounded: whether info names the pixels of the subgoal's object; costs drawing.
         max_steps: control steps that the policy has.
         render_mode: None or "rgb_array" (front and wrist side by side).
 
     Raises:
-        UnknownNameError: a task, setting, split, form or camera does not exist.
+        UnknownNameError: a task, setting, split, form, action space or camera does not exist.
         InvalidValueError: the split has no such episode, or the combination is not defined.
     """
 
@@ -94,7 +100,11 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         distractor: str = "neutral",
         distractors: int = 1,
         frame: str = "robot",
+        actions: str = JOINT_ANGLE.name,
         cameras: Sequence[str] = CAMERAS,
+        depth: bool = False,
+        calibration: bool = False,
+        grounded: bool = False,
         max_steps: int = MAX_STEPS,
         render_mode: str | None = None,
     ) -> None:
@@ -108,7 +118,10 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
             distractors=distractors,
             frame=frame,
         )
-        self.cameras = check_cameras(cameras)
+        self._space = find_action_space(actions)
+        self.actions = self._space.name
+        self._wishes = Wishes(cameras, depth, calibration).checked()
+        self.cameras = tuple(self._wishes.cameras)
         if not isinstance(max_steps, int) or max_steps < 1:
             raise InvalidValueError(
                 f"max_steps is {max_steps!r}; it has to be a whole number of at least 1."
@@ -117,14 +130,17 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
             raise UnknownNameError("render mode", render_mode, ["rgb_array"])
         self.max_steps = max_steps
         self.render_mode = render_mode
-        self.observation_space = _observation_space(self.cameras)
-        self.action_space = spaces.Box(ACTION_LOW, ACTION_HIGH, dtype=np.float64)
-        self._session: Session | None = None
-        self._feeling: Proprioception | None = None
+        self.observation_space = spaces.Dict(
+            {
+                **sensed_space(self._wishes),
+                "instruction": spaces.Text(LONGEST_INSTRUCTION, charset=PRINTABLE),
+            }
+        )
+        self.action_space = spaces.Box(self._space.low, self._space.high, dtype=np.float64)
+        self.grounded = grounded
+        self._play: _Play | None = None
         self._frame_hook: FrameHook | None = None
         self._hook_period = 1
-        self._steps = 0
-        self._reported = 0
 
     @property
     def session(self) -> Session:
@@ -133,27 +149,15 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         Raises:
             ResetNeeded: `reset` has not been called yet.
         """
-        if self._session is None:
-            raise gymnasium.error.ResetNeeded("Call reset() before anything else.")
-        return self._session
-
-    @property
-    def proprioception(self) -> Proprioception:
-        """What the robot feels.
-
-        Raises:
-            ResetNeeded: `reset` has not been called yet.
-        """
-        if self._feeling is None:
-            raise gymnasium.error.ResetNeeded("Call reset() before anything else.")
-        return self._feeling
+        return self._playing.session
 
     @property
     def status(self) -> str:
         """ongoing, success, failure or timeout."""
-        if self.session.status is Status.ONGOING and self._steps >= self.max_steps:
+        status = self.session.status
+        if status is Status.ONGOING and self._playing.steps >= self.max_steps:
             return "timeout"
-        return str(self.session.status)
+        return str(status)
 
     @property
     def events(self) -> Sequence[Event]:
@@ -170,30 +174,31 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Begin the episode anew; it is the same each time, whatever the seed."""
         super().reset(seed=seed, options=options)
-        self._session = Session(self.episode, visible=self._visible)
-        self._feeling = Proprioception(self._session.world.robot)
-        self._steps = self._reported = 0
+        play = self._play = self._begin()
         frames: list[dict[str, Any]] = []
+        subgoals: list[str] = []
 
-        def record() -> None:
-            self.proprioception.follow()
-            frames.append(self._sense())
-            self._call_hook(demonstration=True)
+        def record(stage: Stage) -> None:
+            self._follow(stage, demonstration=True)
+            frames.append(play.senses.read())
+            subgoals.append(play.label(stage))
 
-        self._session.play_demonstration(record)
-        self._feeling.follow()
-        observation = self._observe()
-        self._call_hook(demonstration=False)
-        return observation, {**self._info(), "demonstration": self._stack(frames)}
+        play.session.play_demonstration(record)
+        self._follow(self.session.judge.published)
+        video = {
+            "demonstration": stack(frames, self._wishes),
+            "demonstration_subgoals": subgoals,
+        }
+        return self._observe(), {**self._info(), **video}
 
     def step(self, action: ArrayLike) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        """Execute one action for one control step.
+        """Execute one action: one control step, or many in the waypoint space.
 
         Raises:
             InvalidActionError: wrong shape, not numeric or not finite; nothing has moved.
             ResetNeeded: the episode is over or has not begun.
         """
-        return self.step_chunk(check_action(action)[None])
+        return self.step_chunk(check_action(action, self._space)[None])
 
     def step_chunk(
         self, actions: ArrayLike
@@ -203,20 +208,17 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         Like so many calls of `step`, without the pictures that nobody would look at.
 
         Args:
-            actions: (n, 8), n >= 1.
+            actions: (n, 8), in the other spaces (n, 7), n >= 1.
 
         Raises:
             InvalidActionError: wrong shape, not numeric or not finite; nothing has moved.
             ResetNeeded: the episode is over or has not begun.
         """
-        chunk = check_chunk(actions)
+        chunk = check_chunk(actions, self._space)
         if self.status != "ongoing":
             raise gymnasium.error.ResetNeeded(f"The episode is over ({self.status}); call reset().")
         for action in chunk:
-            self.session.step(action)
-            self.proprioception.follow()
-            self._steps += 1
-            self._call_hook(demonstration=False)
+            self._execute(action)
             if self.status != "ongoing":
                 break
         status = self.status
@@ -248,64 +250,108 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
 
     def close(self) -> None:
         """Forget the episode being played."""
-        self._session = self._feeling = None
+        self._play = None
 
     @property
     def _visible(self) -> bool:
-        drawn = bool(self.cameras) or self.render_mode is not None
+        drawn = bool(self.cameras) or self.grounded or self.render_mode is not None
         return drawn or self._frame_hook is not None
+
+    @property
+    def _playing(self) -> _Play:
+        if self._play is None:
+            raise gymnasium.error.ResetNeeded("Call reset() before anything else.")
+        return self._play
+
+    def _begin(self) -> _Play:
+        session = Session(self.episode, visible=self._visible)
+        world = session.world
+        return _Play(
+            session,
+            Senses(world, self._wishes),
+            make_controller(self._space, world.robot),
+            Grounding(world.bodies, world.cameras) if self.grounded else None,
+        )
+
+    def _execute(self, action: NDArray[np.float64]) -> None:
+        """One checked action, as far as the episode lasts."""
+        try:
+            for piece in self._playing.controller.pieces(action):
+                for row in piece:
+                    self.session.step(row)
+                    self._playing.steps += 1
+                    self._follow(self.session.judge.published)
+                    if self.status != "ongoing":
+                        return
+        except MotionPlanningError as error:
+            # An outcome, not a fault: it is the policy's choice where to go.
+            self.session.judge.fail(str(error))
+
+    def _follow(self, stage: Stage | None, *, demonstration: bool = False) -> None:
+        """What has to be done after each control step.
+
+        Args:
+            stage: whose label is current.
+            demonstration: whether it belongs to the video.
+        """
+        self._playing.follow(stage)
+        self._call_hook(demonstration=demonstration)
 
     def _call_hook(self, *, demonstration: bool) -> None:
         due = self.session.world.elapsed % self._hook_period == 0
         if self._frame_hook is not None and (due or self.status != "ongoing"):
             self._frame_hook(self, demonstration)
 
-    def _sense(self) -> dict[str, Any]:
-        """The observation without the instruction."""
-        pictures = {f"{camera}_rgb": self.picture(camera) for camera in self.cameras}
-        return {**pictures, **self.proprioception.read()}
-
     def _observe(self) -> dict[str, Any]:
-        return {**self._sense(), "instruction": self.instruction.text}
-
-    def _stack(self, frames: Sequence[dict[str, Any]]) -> Demonstration:
-        keys = [key for key in self.observation_space if key != "instruction"]
-        if not frames:
-            return {key: _empty(self.observation_space[key]) for key in keys}
-        return {key: np.stack([frame[key] for frame in frames]) for key in keys}
+        return {**self._playing.senses.read(), "instruction": self.instruction.text}
 
     def _info(self) -> dict[str, Any]:
-        session = self.session
-        fresh = session.events[self._reported :]
-        self._reported = len(session.events)
-        stage = session.judge.current
-        return {
+        play, judge = self._playing, self.session.judge
+        info = {
             "status": self.status,
-            "cause": session.judge.cause,
-            "steps": self._steps,
-            "elapsed_steps": session.world.elapsed,
-            "events": [event.as_dict() for event in fresh],
-            "subgoal": plain_subgoal(stage) if stage is not None else "all stages completed",
+            "cause": judge.cause,
+            "steps": play.steps,
+            "elapsed_steps": self.session.world.elapsed,
+            "events": [event.as_dict() for event in play.fresh_events()],
+            "subgoal": COMPLETED if judge.published is None else plain_subgoal(judge.published),
         }
+        if play.grounding is not None:
+            info["grounded_subgoal"] = play.grounding.text
+        return info
 
 
-def _observation_space(cameras: Sequence[str]) -> spaces.Dict:
-    picture = spaces.Box(0, 255, (SIZE, SIZE, 3), np.uint8)
-    # Joints may pass their limits by a little while they are pushed.
-    slack = 0.1
-    joints = spaces.Box(
-        (JOINT_LOW - slack).astype(np.float32), (JOINT_HIGH + slack).astype(np.float32)
-    )
-    return spaces.Dict(
-        {
-            **{f"{camera}_rgb": picture for camera in cameras},
-            "joint_positions": joints,
-            "gripper": spaces.Box(-0.01, 0.05, (2,), np.float32),
-            "end_effector": spaces.Box(-np.inf, np.inf, (ARM_JOINTS - 1,), np.float64),
-            "instruction": spaces.Text(LONGEST_INSTRUCTION, charset=PRINTABLE),
-        }
-    )
+@dataclass
+class _Play:
+    """What lasts from one reset to the next.
 
+    Attributes:
+        session: the episode.
+        senses: what observations are read from.
+        controller: turns actions into joint actions.
+        grounding: names pixels, if that is asked for.
+        steps: control steps of the policy.
+        reported: how many events have been told.
+    """
 
-def _empty(space: spaces.Space[Any]) -> NDArray[Any]:
-    return np.zeros((0, *(space.shape or ())), dtype=space.dtype)
+    session: Session
+    senses: Senses
+    controller: Controller
+    grounding: Grounding | None
+    steps: int = 0
+    reported: int = 0
+
+    def follow(self, stage: Stage | None) -> None:
+        """To be called after each control step, with the stage whose label is current."""
+        self.senses.proprioception.follow()
+        if self.grounding is not None:
+            self.grounding.update(stage)
+
+    def label(self, stage: Stage) -> str:
+        """A stage of the video in words, grounded if that is asked for."""
+        return self.grounding.text if self.grounding else plain_subgoal(stage)
+
+    def fresh_events(self) -> Sequence[Event]:
+        """The events that have not been told yet."""
+        fresh = self.session.events[self.reported :]
+        self.reported += len(fresh)
+        return fresh

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, TypedDict
+from typing import Any, NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +37,9 @@ def check_cameras(cameras: object) -> tuple[str, ...]:
 class Observation(TypedDict):
     """What the robot sees and feels now.
 
-    Pictures are uint8 (256, 256, 3), present for the cameras that the policy asks for.
+    Pictures are uint8 (256, 256, 3), present for the cameras that the policy asks for. Depth and
+    calibration are there for the same cameras if the environment was made with ``depth=True``,
+    ``calibration=True``.
     """
 
     front_rgb: NDArray[np.uint8]
@@ -49,6 +51,15 @@ class Observation(TypedDict):
     end_effector: NDArray[np.float64]
     """(6,) x, y, z (m) and roll, pitch, yaw (rad, extrinsic x-y-z) of the tool centre, world."""
     instruction: str
+    front_depth: NotRequired[NDArray[np.int16]]
+    """(256, 256, 1) distance along the viewing direction, mm; 0 where nothing is seen."""
+    wrist_depth: NotRequired[NDArray[np.int16]]
+    front_extrinsic: NotRequired[NDArray[np.float32]]
+    """(3, 4) from the world's frame to the camera's (OpenCV: x right, y down, z forward)."""
+    wrist_extrinsic: NotRequired[NDArray[np.float32]]
+    front_intrinsic: NotRequired[NDArray[np.float32]]
+    """(3, 3) from the camera's frame to pixels."""
+    wrist_intrinsic: NotRequired[NDArray[np.float32]]
 
 
 Demonstration = dict[str, NDArray[Any]]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import roboirg
-from roboirg.actions import ACTION_HIGH, ACTION_LOW, check_chunk
+from roboirg.actions import JOINT_ANGLE, WAYPOINT, check_chunk
 from roboirg.errors import InvalidValueError, UnknownNameError
 from roboirg.policies import Policy, PrivilegedPolicy, load_policy_class, make_policy
 from roboirg.policies.listeners import ForgetfulPolicy, ListenerPolicy
@@ -12,6 +12,7 @@ from roboirg.policies.loading import (
     BUILTIN,
     is_privileged,
     policy_version,
+    wanted_actions,
     wanted_cameras,
 )
 from roboirg.tasks import all_tasks
@@ -33,7 +34,7 @@ def test_random_actions_are_valid_and_depend_on_seed_and_instruction_alone():
         return np.concatenate([policy.act(observation) for _ in range(20)])
 
     actions = walk(1)
-    assert ((actions >= ACTION_LOW) & (actions <= ACTION_HIGH)).all()
+    assert ((actions >= JOINT_ANGLE.low) & (actions <= JOINT_ANGLE.high)).all()
     assert np.array_equal(check_chunk(actions), actions)
     assert np.array_equal(walk(1), actions)
     assert not np.array_equal(walk(2), actions)
@@ -139,6 +140,32 @@ def test_cameras_may_be_a_list_or_a_property(monkeypatch):
     monkeypatch.setattr(Silent, "cameras", property(lambda _self: ("front",)))
     assert wanted_cameras(make_policy(f"{__name__}:Silent", 0)) == ("front",)
     assert wanted_cameras(Deaf) == ("front", "wrist")
+
+
+def test_a_policy_says_in_which_action_space_it_acts(monkeypatch):
+    assert wanted_actions(Silent) is JOINT_ANGLE
+    monkeypatch.setattr(Silent, "actions", "waypoint", raising=False)
+    assert wanted_actions(load_policy_class(f"{__name__}:Silent")) is WAYPOINT
+    monkeypatch.setattr(Silent, "actions", property(lambda _self: "waypoint"))
+    assert wanted_actions(make_policy(f"{__name__}:Silent", 0)) is WAYPOINT
+
+
+@pytest.mark.parametrize("name", BUILTIN)
+def test_built_in_policies_move_joints(name):
+    assert wanted_actions(load_policy_class(name)) is JOINT_ANGLE
+
+
+@pytest.mark.parametrize(
+    ("actions", "words"),
+    [
+        ("way_point", r"no action space 'way_point'.*Did you mean 'waypoint'\?"),
+        (7, "no action space 7"),
+    ],
+)
+def test_a_wrong_action_space_is_told_before_anything_starts(monkeypatch, actions, words):
+    monkeypatch.setattr(Silent, "actions", actions, raising=False)
+    with pytest.raises(InvalidValueError, match=f"{__name__}:Silent'.*{words}"):
+        load_policy_class(f"{__name__}:Silent")
 
 
 def test_whoever_looks_behind_the_scenes_is_known():

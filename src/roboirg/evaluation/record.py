@@ -159,7 +159,7 @@ class Record(Job):
     instruction: tuple[Turn, ...]
     mentions: tuple[MentionSpan, ...] = ()
     command: str
-    goal: dict[str, str | int | tuple[str, ...]]
+    goal: dict[str, str | int | tuple[str, ...] | tuple[int, ...]]
     metadata: dict[str, JsonValue]
     privileged: bool
     policy_version: str = "unknown"

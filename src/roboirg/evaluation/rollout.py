@@ -22,13 +22,13 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboirg import language, policies
-from roboirg.actions import check_chunk
+from roboirg.actions import ActionSpace, check_chunk
 from roboirg.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.errors import (
     InvalidActionError,
@@ -41,7 +41,12 @@ from roboirg.evaluation.record import EventRecord, Job, MentionSpan, Outcome, Re
 from roboirg.evaluation.video import Film, VideoOptions
 from roboirg.observations import Observation
 from roboirg.policies.base import Policy, PrivilegedPolicy
-from roboirg.policies.loading import is_privileged, policy_version, wanted_cameras
+from roboirg.policies.loading import (
+    is_privileged,
+    policy_version,
+    wanted_actions,
+    wanted_cameras,
+)
 from roboirg.splits import get_episode
 
 if TYPE_CHECKING:
@@ -142,6 +147,18 @@ class Course:
             )
 
 
+class Needs(NamedTuple):
+    """What a policy needs of its environment.
+
+    Attributes:
+        cameras: whose pictures.
+        actions: the space in which it acts.
+    """
+
+    cameras: tuple[str, ...]
+    actions: ActionSpace
+
+
 class _Fault(Exception):  # noqa: N818 - never leaves this file
     """Something other than the policy's skill ended the episode."""
 
@@ -162,10 +179,10 @@ def play_episode(job: Job, film: Film | None = None) -> Course:
     try:
         with _blame("policy"):
             policy = load_policy(job)
-            cameras = wanted_cameras(policy)
+            needs = Needs(wanted_cameras(policy), wanted_actions(policy))
         with _blame("environment"):
-            env = make_env(job, cameras)
-        _play(job, env, policy, film, course)
+            env = make_env(job, needs)
+        _play(job, env, policy, needs.actions, film, course)
     except _Fault as fault:
         course.outcome, course.cause, course.details = "error", fault.cause, fault.details
     finally:
@@ -174,8 +191,8 @@ def play_episode(job: Job, film: Film | None = None) -> Course:
     return course
 
 
-def make_env(job: Job, cameras: tuple[str, ...]) -> RoboIRGEnv:
-    """The environment of a job."""
+def make_env(job: Job, needs: Needs) -> RoboIRGEnv:
+    """The environment of a job, for a policy that needs it so."""
     import roboirg
 
     return roboirg.make(
@@ -187,7 +204,8 @@ def make_env(job: Job, cameras: tuple[str, ...]) -> RoboIRGEnv:
         stages=job.stages,
         distractor=job.distractor,
         frame=job.frame,
-        cameras=cameras,
+        cameras=needs.cameras,
+        actions=needs.actions.name,
         max_steps=job.max_steps,
     )
 
@@ -206,6 +224,7 @@ def _play(
     job: Job,
     env: RoboIRGEnv,
     policy: Policy,
+    actions: ActionSpace,
     film: Film | None,
     course: Course,
 ) -> None:
@@ -225,9 +244,9 @@ def _play(
         policy.reset(instruction, info["demonstration"])
     status, cause = "ongoing", None
     while status == "ongoing":
-        actions = _next_actions(policy, observation)
+        rows = _next_actions(policy, observation, actions)
         with _blame("environment"):
-            observation, *_, info = env.step_chunk(actions)
+            observation, *_, info = env.step_chunk(rows)
         course.steps = int(info["steps"])
         course.note(info)
         status, cause = info["status"], info.get("cause")
@@ -246,10 +265,12 @@ def _judge(job: Job, status: str, cause: str | None, course: Course) -> None:
         course.cause = f"environment: the episode ended with status {status!r}"
 
 
-def _next_actions(policy: Policy, observation: dict[str, Any]) -> NDArray[np.float64]:
+def _next_actions(
+    policy: Policy, observation: dict[str, Any], space: ActionSpace
+) -> NDArray[np.float64]:
     """The policy's next rows, all of them valid."""
     with _blame("policy"):
-        return check_chunk(policy.act(cast("Observation", observation)))
+        return check_chunk(policy.act(cast("Observation", observation)), space)
 
 
 @contextmanager

@@ -18,14 +18,19 @@ class Policy(Protocol):
     """Anything that turns observations into actions.
 
     Set the class attribute ``cameras`` to the pictures that are wanted, for example ``()``;
-    by default every observation holds both.
+    by default every observation holds both. Set ``actions`` to the action space that `act`
+    speaks, ``"joint_angle"`` by default, ``"ee_pose"`` or ``"waypoint"``.
     """
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """A new episode begins."""
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
-        """The next actions, shape (n, 8), n >= 1; all are executed before the next call."""
+        """The next actions, n >= 1; all are executed before the next call.
+
+        Returns:
+            Shape (n, 8), or (n, 7) in the action spaces ee_pose and waypoint.
+        """
 
 
 @runtime_checkable

@@ -10,6 +10,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from roboirg.actions import JOINT_ANGLE, ActionSpace, find_action_space
 from roboirg.errors import InvalidValueError, UnknownNameError
 from roboirg.observations import CAMERAS, check_cameras
 from roboirg.policies.base import Policy
@@ -101,6 +102,15 @@ def wanted_cameras(policy: object) -> tuple[str, ...]:
     return check_cameras(getattr(policy, "cameras", CAMERAS))
 
 
+def wanted_actions(policy: object) -> ActionSpace:
+    """The action space in which a policy, or a class of policies, gives its actions.
+
+    Raises:
+        UnknownNameError: its ``actions`` name none.
+    """
+    return find_action_space(getattr(policy, "actions", JOINT_ANGLE.name))
+
+
 def _check_class(spec: str, policy_class: type[Any]) -> None:
     """Complain of what would otherwise end every episode."""
     name = policy_class.__name__
@@ -124,12 +134,13 @@ def _check_class(spec: str, policy_class: type[Any]) -> None:
                 f"Policy {spec!r}: {name}() is called with seed= at most, but needs "
                 f"{parameter.name!r}; give it a default."
             )
-    # What a property says is known when there is an object.
-    if not hasattr(inspect.getattr_static(policy_class, "cameras", ()), "__get__"):
-        try:
-            wanted_cameras(policy_class)
-        except InvalidValueError as error:
-            raise InvalidValueError(f"Policy {spec!r}: {error}") from error
+    for attribute, wanted in (("cameras", wanted_cameras), ("actions", wanted_actions)):
+        # What a property says is known when there is an object.
+        if not hasattr(inspect.getattr_static(policy_class, attribute, ()), "__get__"):
+            try:
+                wanted(policy_class)
+            except InvalidValueError as error:
+                raise InvalidValueError(f"Policy {spec!r}: {error}") from error
 
 
 def _takes(policy_class: type[Any]) -> Mapping[str, inspect.Parameter]:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, cast
 
+from roboirg.errors import InvalidValueError
 from roboirg.observations import Observation
 from roboirg.policies.base import Policy, PrivilegedPolicy
+from roboirg.policies.loading import wanted_actions
 
 if TYPE_CHECKING:
     from roboirg.environment import RoboIRGEnv
@@ -19,7 +21,14 @@ def play(env: RoboIRGEnv, policy: Policy) -> dict[str, Any]:
 
     Raises:
         InvalidActionError: the policy gave an action of a wrong shape or not finite.
+        InvalidValueError: the environment has another action space than the policy.
     """
+    wanted = wanted_actions(policy).name
+    if wanted != env.actions:
+        raise InvalidValueError(
+            f"{type(policy).__name__} acts in {wanted!r}, but the environment takes "
+            f"{env.actions!r}; make it with actions={wanted!r}."
+        )
     observation, info = env.reset()
     if isinstance(policy, PrivilegedPolicy):
         policy.attach(env)
