@@ -1,26 +1,71 @@
 """Invariants of every task, over the whole registry and every split."""
 
+import contextlib
+import functools
 import itertools
-import json
-from collections import Counter
 
 import numpy as np
 import pytest
 
-from roboirg.episode import DIFFICULTIES, SPLITS
-from roboirg.errors import InvalidValueError, UnknownNameError
-from roboirg.splits import CYCLE, SIZES, base_seed, get_episode, make_episode
+from roboirg.conditions import facts_of
+from roboirg.episode import DIFFICULTIES, ROBOT_BASE, SPLITS, Goal
+from roboirg.errors import SceneRejectedError
+from roboirg.fingerprint import plain
+from roboirg.motions import Away, Glow, Shuttle, Vanish, subjects_of
+from roboirg.splits import SIZES, get_episode, make_episode
 from roboirg.tasks import all_tasks, geometry, get_task
-from roboirg.tasks.fixtures import cube_footprint
-from roboirg.tasks.placement import overlap
+from roboirg.tasks.fixtures import bin_footprint, button_footprint, cube_footprint
+from roboirg.tasks.placement import Circle, overlap
 from roboirg.tasks.unmask import container_footprint
 
 TASKS = tuple(all_tasks())
 SETTINGS = {"explicit", "direct", "reasoning", "contextual", "spatial"}
+HEIGHTS = {
+    "cube": (0.02,),
+    "hidden_cube": (0.02 / 1.2,),
+    "container": (0.052,),
+    "target": (0.005, 0.01),
+    "button": (0.0075,),
+    "bin": (0.025,),
+    "site": (0.005,),
+    "shuttle": (0.01,),
+    "marker": (-0.005,),
+}
+"""Of the origin of a thing that lies on the table, metres."""
+
+REACH = 0.85
+"""How far from its base the robot is asked to handle anything, metres in the plane. Its own is
+0.855; the farthest corner of all regions in which things are placed is 0.815 away."""
+
+# Front camera, RoboMME: world to camera, OpenCV convention, and 90 degrees over 256 pixels.
+FRONT = np.array([[0, 1, 0, 0], [0.89443, 0, -0.44721, -0.08944], [-0.44721, 0, -0.89443, 0.49194]])
+FOCAL = CENTRE = 128
+
+each_task = pytest.mark.parametrize("task", TASKS)
 
 
-def episodes(task: str):
-    return [get_episode(task, split, index) for split in SPLITS for index in range(SIZES[split])]
+@functools.cache
+def episodes(task):
+    """All episodes of the splits; where a seed gives no scene, that of the next valid one."""
+    found = []
+    for split in SPLITS:
+        for index in range(SIZES[split]):
+            try:
+                found.append(get_episode(task, split, index))
+            except SceneRejectedError:
+                found.append(valid(task, ("easy", "easy", "medium", "hard")[index % 4])[0])
+    return tuple(found)
+
+
+@functools.cache
+def valid(task, difficulty, count=1):
+    """The episodes of the first seeds that give a scene."""
+    found = []
+    seeds = itertools.count()
+    while len(found) < count:
+        with contextlib.suppress(SceneRejectedError):
+            found.append(make_episode(task, next(seeds), difficulty))
+    return tuple(found)
 
 
 def test_registry_holds_each_task_once_and_in_the_order_of_codes():
@@ -29,7 +74,7 @@ def test_registry_holds_each_task_once_and_in_the_order_of_codes():
     assert all(task.name == name for name, task in all_tasks().items())
 
 
-@pytest.mark.parametrize("task", TASKS)
+@each_task
 def test_settings_are_known_and_begin_with_explicit(task):
     settings = get_task(task).settings
     assert settings[0] == "explicit"
@@ -37,76 +82,138 @@ def test_settings_are_known_and_begin_with_explicit(task):
     assert ("spatial" in settings) == get_task(task).spatial
 
 
-@pytest.mark.parametrize("task", TASKS)
-def test_difficulties_follow_the_cycle_and_seeds_the_rule(task):
-    for episode in episodes(task):
-        assert episode.difficulty == CYCLE[episode.index % 4]
-        first = base_seed(get_task(task), episode.split) + 100 * episode.index
-        assert first <= episode.seed < first + 30
-    counts = Counter(episode.difficulty for episode in episodes(task) if episode.split == "test")
-    assert counts == {"easy": 26, "medium": 12, "hard": 12}
+@each_task
+@pytest.mark.parametrize("difficulty", DIFFICULTIES)
+def test_same_seed_same_episode_other_seed_other_scene(task, difficulty):
+    first, second = valid(task, difficulty, 2)
+    assert make_episode(task, first.seed, difficulty) == first
+    assert first.scene != second.scene
 
 
-@pytest.mark.parametrize("task", TASKS)
-def test_seeds_are_unique_over_all_splits(task):
-    seeds = [episode.seed for episode in episodes(task)]
-    assert len(set(seeds)) == len(seeds)
-
-
-@pytest.mark.parametrize("task", TASKS)
-def test_same_seed_same_episode_other_seed_other_scene(task):
-    for difficulty in DIFFICULTIES:
-        first, again = (make_episode(task, 7, difficulty) for _ in range(2))
-        assert first == again
-        assert first.scene != make_episode(task, 8, difficulty).scene
-
-
-@pytest.mark.parametrize("task", TASKS)
+@each_task
 def test_goal_is_one_of_the_scenes_goals_and_goals_differ(task):
     for episode in episodes(task):
         goals = get_task(task).goals(episode.scene)
         assert episode.goal in goals
-        assert len(set(goals)) == len(goals)
+        assert len(set(goals)) == len(goals) > 1
+        assert isinstance(episode.goal, Goal)
 
 
-@pytest.mark.parametrize("task", TASKS)
-def test_stages_speak_of_things_that_exist(task):
+@each_task
+def test_every_goal_has_stages(task):
+    for difficulty in DIFFICULTIES:
+        (episode,) = valid(task, difficulty)
+        goals = get_task(task).goals(episode.scene)
+        plans = [get_task(task).stages(episode.scene, goal) for goal in goals]
+        assert all(plans)
+        assert len(set(plans)) == len(plans)
+        assert get_task(task).stages(episode.scene, episode.goal) == episode.stages
+
+
+def names_in(stage):
+    """Every name that a stage speaks of."""
+    facts = [
+        *facts_of(stage.expects),
+        *(fact for rule in stage.forbids for fact in facts_of(rule)),
+    ]
+    spoken = {name for fact in facts for name in (fact.subject, fact.place)}
+    return (spoken | {stage.primitive.subject, stage.primitive.place, stage.points_at}) - {None}
+
+
+def names_moved(motion):
+    """Every name that a motion speaks of."""
+    spoken = set(subjects_of(motion))
+    match motion:
+        case Away(under=str(cover)):
+            spoken.add(cover)
+        case Glow(during=fact) | Vanish(when=fact) | Shuttle(stopped_by=fact):
+            spoken |= {fact.subject, fact.place} - {None}
+    return spoken
+
+
+@each_task
+def test_stages_and_motions_speak_of_things_that_exist(task):
     for episode in episodes(task):
-        names = {item.name for item in episode.scene.objects} | {"robot"}
-        assert len(names) == len(episode.scene.objects) + 1
+        objects = {item.name for item in episode.scene.objects}
+        assert len(objects) == len(episode.scene.objects)
         for stage in (*episode.demonstration, *episode.stages):
-            spoken = {stage.expects.subject, stage.primitive.subject}
-            spoken |= {fact.subject for fact in stage.forbids}
-            spoken |= {stage.expects.place, stage.primitive.place, stage.points_at} - {None}
-            assert spoken <= names
+            assert names_in(stage) <= objects | {"robot"}
             assert stage.expects not in stage.forbids
             assert ("{at}" in stage.subgoal) == (stage.points_at is not None)
-        assert {motion.subject for motion in episode.motions} <= names
+        for motion in episode.scene.motions:
+            assert names_moved(motion) <= objects
+        for fact in episode.scene.past:
+            assert {fact.subject, fact.place} - {None} <= objects
+        assert {item.inside for item in episode.scene.objects} - {None} <= objects
+        assert bool(episode.scene.past) <= bool(episode.demonstration)
 
 
-@pytest.mark.parametrize("task", TASKS)
-def test_every_goal_has_stages(task):
-    scene = make_episode(task, 3, "hard").scene
-    plans = [get_task(task).stages(scene, goal) for goal in get_task(task).goals(scene)]
-    assert all(plans)
-    assert len(set(plans)) == len(plans)
-
-
-@pytest.mark.parametrize("task", TASKS)
+@each_task
 def test_episodes_are_plain_data(task):
-    episode = get_episode(task, "test", 3)
-    assert hash(episode) == hash(make_episode(task, episode.seed, "hard", "test", 3))
-    numbers = [value for item in episode.scene.objects for value in (*item.position, item.yaw)]
-    assert json.loads(json.dumps(numbers)) == numbers
-    assert {type(value) for value in numbers} == {float}
+    for episode in episodes(task):
+        plain(episode)  # raises at anything else
+        again = make_episode(task, episode.seed, episode.difficulty, episode.split, episode.index)
+        assert again == episode
+        assert hash(again) == hash(episode)
 
 
-@pytest.mark.parametrize("task", TASKS)
+def solids(scene):
+    """The areas that nothing else may stand on."""
+    footprints = {
+        "cube": cube_footprint,
+        "container": container_footprint,
+        "bin": bin_footprint,
+        "button": button_footprint,
+    }
+    return [footprints[item.kind](item) for item in scene.objects if item.kind in footprints]
+
+
+def discs(scene):
+    """Targets and sites, but for the one over which a shuttle runs: its place is free."""
+    if scene.of_kind("shuttle"):
+        return []
+    return [
+        Circle(item.position.x, item.position.y, item.radius)
+        for item in (*scene.of_kind("target"), *scene.of_kind("site"))
+    ]
+
+
+@each_task
 def test_things_on_the_table_do_not_touch(task):
     for episode in episodes(task):
-        squares = [cube_footprint(cube) for cube in episode.scene.of_kind("cube")]
-        squares += [container_footprint(item) for item in episode.scene.of_kind("container")]
-        assert not any(overlap(*pair) for pair in itertools.combinations(squares, 2))
+        areas = [*solids(episode.scene), *discs(episode.scene)]
+        assert not any(overlap(*pair) for pair in itertools.combinations(areas, 2)), episode.key
+
+
+@each_task
+def test_hidden_cubes_are_in_the_middle_of_their_containers(task):
+    for episode in episodes(task):
+        for cube in episode.scene.of_kind("hidden_cube"):
+            assert cube.position[:2] == episode.scene[cube.inside].position[:2]
+
+
+@each_task
+def test_everything_lies_on_the_table_and_what_is_handled_within_reach(task):
+    for episode in episodes(task):
+        for item in episode.scene.objects:
+            assert any(item.position.z == pytest.approx(height) for height in HEIGHTS[item.kind]), (
+                item
+            )
+        for stage in (*episode.demonstration, *episode.stages):
+            handled = {stage.primitive.subject, stage.primitive.place} - {None, "robot"}
+            for x, y, _ in (episode.scene[name].position for name in handled):
+                assert np.hypot(x - ROBOT_BASE[0], y - ROBOT_BASE[1]) <= REACH
+
+
+@each_task
+def test_everything_is_in_the_front_picture(task):
+    for episode in episodes(task):
+        for item in episode.scene.objects:
+            right, down, ahead = FRONT @ (*item.position, 1)
+            u, v = CENTRE + FOCAL * right / ahead, CENTRE + FOCAL * down / ahead
+            assert ahead > 0
+            assert 0 <= u < 256, item
+            assert 0 <= v < 256, item
 
 
 def test_pick_x_times_scenes_are_as_in_the_facts():
@@ -125,15 +232,14 @@ def test_pick_x_times_scenes_are_as_in_the_facts():
         for cube in cubes:
             assert -0.28 <= cube.position.x <= 0.08
             assert -0.18 <= cube.position.y <= 0.18
-            assert cube.position.z == 0.02
-            # 0.04 beyond the disc is free of cubes, 0.02 around a cube of the button's square.
+            # 0.04 beyond the disc is free of cubes.
             away = np.hypot(
                 cube.position.x - target.position.x, cube.position.y - target.position.y
             )
             assert away >= 0.04 + 0.04 + geometry.CUBE_HALF
         assert len(episode.stages) == 2 * episode.goal.number("repeats") + 1
         assert not episode.demonstration
-        assert not episode.motions
+        assert not episode.scene.motions
 
 
 def test_video_unmask_scenes_are_as_in_the_facts():
@@ -151,22 +257,10 @@ def test_video_unmask_scenes_are_as_in_the_facts():
         for container in containers:
             assert abs(container.position.x) <= 0.1725
             assert abs(container.position.y) <= 0.1725
-            assert container.position.z == pytest.approx(0.052)
             assert 0 <= container.yaw <= np.pi / 2
         for first, second in itertools.combinations(containers, 2):
             gap = np.hypot(
                 first.position.x - second.position.x, first.position.y - second.position.y
             )
             assert gap >= 0.0275 + 0.04 + 0.03 + 0.04
-        assert {motion.subject for motion in episode.motions} == {c.name for c in containers}
-
-
-def test_wrong_names_and_numbers_are_named_with_what_would_be_right():
-    with pytest.raises(UnknownNameError, match=r"no task 'PickXTime'.*PickXtimes.*Did you mean"):
-        get_episode("PickXTime", "test", 0)
-    with pytest.raises(UnknownNameError, match=r"no split 'dev'.*train, val, test"):
-        get_episode("PickXtimes", "dev", 0)
-    assert get_episode("PickXtimes", "test", np.int64(3)) == get_episode("PickXtimes", "test", 3)
-    for wrong in (-1, 50, 1.0, "0", True):
-        with pytest.raises(InvalidValueError, match="has episodes 0 to 49"):
-            get_episode("PickXtimes", "test", wrong)
+        assert set(episode.scene.motions) == {Away(one.name, 0, 32) for one in containers}

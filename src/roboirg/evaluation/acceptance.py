@@ -2,58 +2,210 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import contextlib
+import functools
+import multiprocessing
+import signal
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
 
 import roboirg
-from roboirg.episode import SPLITS, Episode, Split
-from roboirg.errors import MotionPlanningError, SceneRejectedError
+from roboirg.episode import SPLITS, Difficulty, Episode, Split, episode_key
+from roboirg.errors import (
+    InvalidValueError,
+    MotionPlanningError,
+    RoboIRGError,
+    SceneRejectedError,
+)
 from roboirg.language import expressible
 from roboirg.policies import make_policy, play
-from roboirg.splits import CYCLE, MAX_REJECTED, SIZES, make_episode, slot_seed
-from roboirg.tasks import get_task
+from roboirg.splits import (
+    MAX_REJECTED,
+    SIZES,
+    TaskSplits,
+    fingerprint_of,
+    make_episode,
+    slot_difficulty,
+    slot_key,
+    slot_seed,
+)
+from roboirg.tasks import all_tasks, get_task
+
+Reason = Literal["no room", "not expressible", "oracle failed"]
+REASONS: tuple[Reason, ...] = ("no room", "not expressible", "oracle failed")
 
 
-def find_rejections(
-    tasks: Sequence[str], splits: Sequence[Split] = SPLITS
-) -> Iterator[tuple[str, int]]:
-    """For every episode its key and how many seeds had to be passed over for it.
+class Rejection(NamedTuple):
+    """Why a seed is passed over.
 
-    Raises:
-        SceneRejectedError: thirty seeds in a row were refused.
+    Attributes:
+        seed: the seed.
+        reason: what kind of thing is amiss.
+        cause: what exactly: the object without a place, the settings, the oracle's failure.
     """
-    for name in tasks:
-        for split in splits:
-            for index in range(SIZES[split]):
-                yield _first_accepted(name, split, index)
+
+    seed: int
+    reason: Reason
+    cause: str
 
 
-def _first_accepted(task: str, split: Split, index: int) -> tuple[str, int]:
-    first = slot_seed(get_task(task), split, index)
-    for rejected in range(MAX_REJECTED):
-        episode = sampled(task, first + rejected, split, index)
-        if episode is not None and is_acceptable(episode):
-            return episode.key, rejected
-    raise SceneRejectedError(f"{MAX_REJECTED} seeds from {first} gave no episode of {task}")
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """An episode whose seed is looked for."""
+
+    task: str
+    split: Split
+    index: int
+
+    @property
+    def difficulty(self) -> Difficulty:
+        """Of its scene."""
+        return slot_difficulty(self.index)
+
+    @property
+    def key(self) -> str:
+        """The short unique name of the episode."""
+        return episode_key(self.task, self.split, self.index)
 
 
-def sampled(task: str, seed: int, split: Split, index: int) -> Episode | None:
-    """The episode of a seed, or None if the seed yields no scene."""
+class Found(NamedTuple):
+    """A slot and the seeds that had to be passed over for it, in order."""
+
+    slot: Slot
+    rejections: tuple[Rejection, ...]
+
+
+Judge = Callable[[Slot, int], Rejection | None]
+"""Says why a seed cannot be taken for a slot; None if it can."""
+
+
+def slots_of(tasks: Sequence[str], splits: Sequence[Split] = SPLITS) -> tuple[Slot, ...]:
+    """Every episode of the splits of the tasks, in order."""
+    return tuple(
+        Slot(task, split, index)
+        for task in tasks
+        for split in splits
+        for index in range(SIZES[split])
+    )
+
+
+def judge_words(slot: Slot, seed: int) -> Rejection | None:
+    """Why scene or words rule a seed out; needs no simulator."""
     try:
-        return make_episode(task, seed, CYCLE[index % len(CYCLE)], split, index)
-    except SceneRejectedError:
-        return None
+        episode = _episode(slot, seed)
+    except SceneRejectedError as error:
+        return Rejection(seed, "no room", str(error))
+    sayable = expressible(episode)
+    unsaid = [name for name in get_task(slot.task).settings if name not in sayable]
+    return Rejection(seed, "not expressible", ", ".join(unsaid)) if unsaid else None
 
 
-def is_acceptable(episode: Episode) -> bool:
-    """Whether every setting of the task can be expressed and the oracle solves the episode."""
-    return expressible(episode) == get_task(episode.task).settings and is_solved(episode)
+def judge_seed(slot: Slot, seed: int) -> Rejection | None:
+    """Why scene, words or oracle rule a seed out; the oracle plays without pictures."""
+    rejection = judge_words(slot, seed)
+    if rejection is None:
+        failure = oracle_failure(_episode(slot, seed))
+        rejection = None if failure is None else Rejection(seed, "oracle failed", failure)
+    return rejection
 
 
-def is_solved(episode: Episode) -> bool:
-    """Whether the oracle succeeds, played without pictures."""
+def oracle_failure(episode: Episode) -> str | None:
+    """Why the oracle does not solve an episode, played without pictures; None if it does."""
     env = roboirg.make(episode, cameras=())
     try:
         info = play(env, make_policy("oracle", 0))
-    except MotionPlanningError:
-        return False
-    return bool(info["status"] == "success")
+    except MotionPlanningError as error:
+        return str(error)
+    return None if info["status"] == "success" else str(info["cause"] or info["status"])
+
+
+def find_seed(slot: Slot, judge: Judge = judge_seed) -> Found:
+    """The first seed of a slot that can be taken.
+
+    Raises:
+        SceneRejectedError: there is none; names the episode.
+    """
+    first = slot_seed(get_task(slot.task), slot.split, slot.index)
+    rejections: list[Rejection] = []
+    for seed in range(first, first + MAX_REJECTED + 1):
+        rejection = judge(slot, seed)
+        if rejection is None:
+            return Found(slot, tuple(rejections))
+        rejections.append(rejection)
+    raise SceneRejectedError(
+        f"No seed from {first} to {first + MAX_REJECTED} gives episode {slot.key}; "
+        f"the last one: {rejections[-1].reason} ({rejections[-1].cause})."
+    )
+
+
+def find_seeds(slots: Sequence[Slot], workers: int, judge: Judge = judge_seed) -> Iterator[Found]:
+    """`find_seed` for every slot, as they end, in so many processes; 0 for this one.
+
+    Raises:
+        InvalidValueError: a negative number of workers.
+        SceneRejectedError: an episode has no seed.
+        RoboIRGError: a process died.
+    """
+    if workers < 0:
+        raise InvalidValueError(f"workers is {workers}; it must be at least 0.")
+    if workers == 0:
+        yield from (find_seed(slot, judge) for slot in slots)
+        return
+    # Spawned, not forked: threads of the simulator do not survive a fork.
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_leave_interrupts)
+    with contextlib.ExitStack() as stack:
+        stack.callback(pool.shutdown, cancel_futures=True)
+        work = functools.partial(find_seed, judge=judge)
+        futures = [pool.submit(work, slot) for slot in slots]
+        try:
+            for future in as_completed(futures):
+                yield future.result()
+        except BrokenProcessPool as error:
+            raise RoboIRGError(f"A process that played episodes died: {error}") from error
+
+
+def check_kept(
+    tasks: Sequence[str], splits: Sequence[Split], known: Mapping[str, TaskSplits]
+) -> None:
+    """See that the splits that are not built again can be kept.
+
+    Raises:
+        InvalidValueError: they were never built, or their scenes have changed since.
+    """
+    kept = [split for split in SPLITS if split not in splits]
+    for slot in slots_of(tasks, kept):
+        entry = known.get(slot.task)
+        passed_over = entry.passed_over.get(slot_key(slot.split, slot.index), 0) if entry else 0
+        first = slot_seed(get_task(slot.task), slot.split, slot.index)
+        if entry is None or judge_words(slot, first + passed_over) is not None:
+            raise InvalidValueError(
+                f"There is no valid episode {slot.key} to keep; build all splits of {slot.task}."
+            )
+
+
+def merged(found: Sequence[Found], known: Mapping[str, TaskSplits]) -> dict[str, TaskSplits]:
+    """What is to be shipped: what was found, and what is known about everything else."""
+    splits = {task: known[task] for task in all_tasks() if task in known}
+    for task in dict.fromkeys(one.slot.task for one in found):
+        old = known[task].passed_over if task in known else {}
+        new = {one.slot: len(one.rejections) for one in found}
+        counts: dict[str, int] = {}
+        for slot in slots_of([task]):
+            key = slot_key(slot.split, slot.index)
+            counts[key] = new.get(slot, old.get(key, 0))
+        passed_over = {key: count for key, count in counts.items() if count}
+        splits[task] = TaskSplits(fingerprint_of(task, passed_over), passed_over)
+    return {task: splits[task] for task in all_tasks() if task in splits}
+
+
+def _episode(slot: Slot, seed: int) -> Episode:
+    return make_episode(slot.task, seed, slot.difficulty, slot.split, slot.index)
+
+
+def _leave_interrupts() -> None:
+    """Ctrl-C reaches the whole process group; the parent decides what it means."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

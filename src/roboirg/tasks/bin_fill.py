@@ -25,6 +25,7 @@ from roboirg.tasks.fixtures import (
     draw_bin,
     draw_button,
     draw_cube,
+    draw_number,
 )
 from roboirg.tasks.placement import Footprint, Region
 from roboirg.tasks.task import Commands, Task, Wording
@@ -69,8 +70,8 @@ def _draw_wanted(
     rng: np.random.Generator, difficulty: Difficulty, present: list[Colour]
 ) -> dict[Colour, int]:
     """How many cubes of each colour that is present are to go into the bin."""
-    candidates = _draw_number(rng, GOAL_COLOURS[difficulty])
-    total = _draw_number(rng, GOAL_CUBES[difficulty])
+    candidates = draw_number(rng, GOAL_COLOURS[difficulty])
+    total = draw_number(rng, GOAL_CUBES[difficulty])
     wanted = dict.fromkeys(present, 0)
     for index in rng.integers(candidates, size=total):
         wanted[present[index]] += 1
@@ -85,14 +86,9 @@ def _draw_spawned(
 ) -> list[Colour]:
     """A colour for each cube, shuffled: enough of what is wanted, one at least of each present."""
     spawned = [colour for colour in present for _ in range(max(wanted[colour], 1))]
-    left = _draw_number(rng, CUBES[difficulty]) - len(spawned)
+    left = draw_number(rng, CUBES[difficulty]) - len(spawned)
     spawned += [present[index] for index in rng.integers(len(present), size=left)]
     return [spawned[index] for index in rng.permutation(len(spawned))]
-
-
-def _draw_number(rng: np.random.Generator, bounds: tuple[int, int]) -> int:
-    low, high = bounds
-    return int(rng.integers(low, high + 1))
 
 
 def _draw_cubes(

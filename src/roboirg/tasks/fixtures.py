@@ -19,6 +19,12 @@ BIN_YAW = math.radians(20.0)
 """The bin is turned by at most so much to either side."""
 
 
+def draw_number(rng: np.random.Generator, bounds: tuple[int, int]) -> int:
+    """A whole number from the first bound to the second, both included; each is as likely."""
+    low, high = bounds
+    return int(rng.integers(low, high + 1))
+
+
 def draw_button(rng: np.random.Generator, region: Region, name: str = "button") -> SceneObject:
     """A button anywhere in the region; it is placed first and needs no clearance."""
     x, y = region.draw(rng)

@@ -9,13 +9,14 @@ from __future__ import annotations
 import numpy as np
 
 from roboirg.conditions import Fact
-from roboirg.episode import COLOURS, Difficulty, Goal, Primitive, Scene, SceneObject, Stage
+from roboirg.episode import Difficulty, Goal, Primitive, Scene, Stage
 from roboirg.tasks.fixtures import (
     ORDINALS,
     button_keep_out,
     cube_footprint,
     draw_button,
-    draw_cube,
+    draw_coloured_cubes,
+    draw_number,
     draw_target,
 )
 from roboirg.tasks.placement import Footprint, Region
@@ -34,16 +35,11 @@ TARGET_GAP = 0.04
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
     """Button, cubes of different colours, target disc; target cube and repeats are uniform."""
-    low, high = REPEATS[difficulty]
-    repeats = int(rng.integers(low, high + 1))
+    repeats = draw_number(rng, REPEATS[difficulty])
     button = draw_button(rng, BUTTON_REGION)
     obstacles: list[Footprint] = [button_keep_out(button)]
-    cubes: list[SceneObject] = []
-    for index in rng.permutation(len(COLOURS))[: CUBES[difficulty]]:
-        colour = COLOURS[index]
-        cube = draw_cube(rng, f"cube_{colour}", colour, WORK_REGION, CUBE_GAP, obstacles)
-        cubes.append(cube)
-        obstacles.append(cube_footprint(cube))
+    cubes = draw_coloured_cubes(rng, CUBES[difficulty], WORK_REGION, CUBE_GAP, obstacles)
+    obstacles += [cube_footprint(cube) for cube in cubes]
     target = draw_target(rng, "target", TARGET_RADIUS, WORK_REGION, TARGET_GAP, obstacles)
     chosen = cubes[int(rng.integers(len(cubes)))]
     goal = Goal.of(colour=str(chosen.colour), repeats=repeats)

@@ -17,6 +17,7 @@ from roboirg.tasks.fixtures import (
     cube_footprint,
     draw_button,
     draw_coloured_cubes,
+    draw_number,
     draw_target,
     marker_over,
 )
@@ -44,8 +45,7 @@ LINGER = 20
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
     """Button, cubes, a target on either side; target cube and repeats are uniform."""
-    low, high = REPEATS[difficulty]
-    repeats = int(rng.integers(low, high + 1))
+    repeats = draw_number(rng, REPEATS[difficulty])
     button = draw_button(rng, BUTTON_REGION)
     obstacles: list[Footprint] = [button_keep_out(button)]
     cubes = draw_coloured_cubes(rng, CUBES[difficulty], CUBE_REGION, CUBE_GAP, obstacles)
@@ -128,7 +128,7 @@ COMMANDS = Commands(
     patterns=("colour exclusion", "number deduction"),
     wordings=(
         Wording(
-            "Take {colour}, carry it over the target on your right and then over the target on "
+            "Take {colour}, carry it from above the target on your right to above the target on "
             "your left {repeats}, put it down, and press the button to stop."
         ),
         Wording(
@@ -136,7 +136,7 @@ COMMANDS = Commands(
             "on your left {repeats}, then put it down and press the button at the end."
         ),
         Wording(
-            "I want you to take {colour}, to move it over the target on your right and then over "
+            "I want you to take {colour}, to move it from over the target on your right to over "
             "the target on your left {repeats}, and to put it down and press the button when you "
             "are done."
         ),

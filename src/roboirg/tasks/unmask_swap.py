@@ -8,6 +8,7 @@ import numpy as np
 
 from roboirg.episode import COLOURS, Difficulty, Goal, Scene, SceneObject
 from roboirg.motions import Away, Motion
+from roboirg.tasks.fixtures import draw_number
 from roboirg.tasks.placement import Footprint, Region
 from roboirg.tasks.swapping import last_step, plan_swaps
 from roboirg.tasks.unmask import appearing, draw_containers_in, hide_cubes
@@ -59,8 +60,7 @@ def sample(
     away = [Away(cube.name, START, end, under=cube.inside) for cube in cubes]
     # The cubes come last: when they return, their containers have arrived.
     motions: tuple[Motion, ...] = (*appearing(containers), *swaps, *away)
-    low, high = PICKS[difficulty]
-    picks = int(rng.integers(low, high + 1))
+    picks = draw_number(rng, PICKS[difficulty])
     colours = tuple(str(cube.colour) for cube in cubes[:picks])
     return Scene((*buttons, *containers, *cubes), motions), Goal.of(colours=colours)
 
@@ -69,8 +69,7 @@ def _initiators(
     rng: np.random.Generator, difficulty: Difficulty, containers: Sequence[SceneObject]
 ) -> tuple[str, ...]:
     """Who begins an exchange: first two different ones with a cube, then any other container."""
-    low, high = SWAPS[difficulty]
-    number = int(rng.integers(low, high + 1))
+    number = draw_number(rng, SWAPS[difficulty])
     names = [container.name for container in containers]
     first, second = (names[index] for index in rng.permutation(len(COLOURS))[:2])
     others = [name for name in names if name not in (first, second)]

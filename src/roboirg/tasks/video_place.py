@@ -13,14 +13,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from roboirg.conditions import Fact
-from roboirg.episode import COLOURS, Difficulty, Primitive, Scene, SceneObject, Stage
+from roboirg.episode import Difficulty, Primitive, Scene, SceneObject, Stage
 from roboirg.motions import Point, Swap
 from roboirg.tasks import geometry, video
 from roboirg.tasks.fixtures import (
     button_keep_out,
     cube_footprint,
     draw_button,
-    draw_cube,
+    draw_coloured_cubes,
     draw_target,
 )
 from roboirg.tasks.placement import Circle, Footprint, Region
@@ -57,12 +57,9 @@ def draw_table(
     site = SceneObject("site", "site", Point(x, y, geometry.TARGET_HEIGHT), radius=site_radius)
     button = draw_button(rng, BUTTON_REGION)
     obstacles: list[Footprint] = [Circle(x, y, site_radius), button_keep_out(button)]
-    things: list[SceneObject] = [site, button]
-    for index in rng.permutation(len(COLOURS))[:cubes]:
-        colour = COLOURS[index]
-        cube = draw_cube(rng, f"cube_{colour}", colour, WORK_REGION, GAP, obstacles)
-        things.append(cube)
-        obstacles.append(cube_footprint(cube))
+    coloured = draw_coloured_cubes(rng, cubes, WORK_REGION, GAP, obstacles)
+    obstacles += [cube_footprint(cube) for cube in coloured]
+    things: list[SceneObject] = [site, button, *coloured]
     for number in range(discs):
         disc = draw_target(rng, f"target_{number}", TARGET_RADIUS, WORK_REGION, GAP, obstacles)
         things.append(disc)

@@ -12,6 +12,7 @@ import numpy as np
 from roboirg.conditions import Fact
 from roboirg.episode import Difficulty, Goal, Scene, Stage
 from roboirg.tasks import video_place
+from roboirg.tasks.fixtures import draw_number
 from roboirg.tasks.task import Commands, Task, Wording
 
 DISCS = 4
@@ -27,8 +28,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     table = Scene(objects)
     cubes, discs = table.of_kind("cube"), table.of_kind("target")
     cube = cubes[int(rng.integers(len(cubes)))]
-    low, high = PLACEMENTS
-    placements = int(rng.integers(low, high + 1))
+    placements = draw_number(rng, PLACEMENTS)
     order = rng.permutation(DISCS)[:placements]
     shown = [Fact("placed", cube.name, discs[index].name) for index in order]
     placement = int(rng.integers(1, placements + 1))

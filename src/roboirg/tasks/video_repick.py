@@ -19,6 +19,7 @@ from roboirg.tasks.fixtures import (
     cube_footprint,
     draw_button,
     draw_cube,
+    draw_number,
 )
 from roboirg.tasks.layouts import layout_points
 from roboirg.tasks.placement import Footprint, Region
@@ -51,10 +52,8 @@ PRESSED = Fact("pressed", "button")
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
     """Button and cubes; which cube is shown and how often it is wanted are uniform."""
-    low, high = REPEATS
-    repeats = int(rng.integers(low, high + 1))
-    low, high = SWAPS[difficulty]
-    swaps = int(rng.integers(low, high + 1))
+    repeats = draw_number(rng, REPEATS)
+    swaps = draw_number(rng, SWAPS[difficulty])
     button = draw_button(rng, BUTTON_REGION)
     cubes = _draw_clutter(rng, button) if difficulty == "hard" else _draw_layout(rng, button)
     # The cube that was shown begins the first exchange, the others follow in any order.
