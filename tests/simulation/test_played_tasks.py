@@ -10,6 +10,7 @@ import roboirg
 from roboirg.episode import DIFFICULTIES, Goal
 from roboirg.errors import SceneRejectedError
 from roboirg.motions import Away, Glow, subjects_of
+from roboirg.observations import CAMERAS
 from roboirg.policies import make_policy, play
 from roboirg.policies.handed import HandedPolicy
 from roboirg.simulation import settings
@@ -79,9 +80,33 @@ def test_another_goal_is_a_failure_with_a_cause(task):
     episode = get_episode(task, "test", 3)
     others = [goal for goal in get_task(task).goals(episode.scene) if goal != episode.goal]
     env = roboirg.make(episode, cameras=())
-    info = play(env, Mistaken(others[0]))
+    info = play(env, Mistaken(others[-1]))
     assert info["status"] in {"failure", "timeout"}
     assert (info["status"] == "failure") == bool(info["cause"])
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_whoever_does_nothing_runs_out_of_time(task):
+    env = roboirg.make(task, episode=0, cameras=(), max_steps=2)
+    env.reset()
+    outcomes = [env.step(settings.HOME_ACTION) for _ in range(2)]
+    assert [(outcome[2], outcome[3]) for outcome in outcomes] == [(False, False), (False, True)]
+    assert [outcome[4]["status"] for outcome in outcomes] == ["ongoing", "timeout"]
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_the_same_seed_gives_the_same_pictures_to_the_bit(task):
+    episode = get_episode(task, "test", 1)
+
+    def pictures():
+        world = World(episode.scene)
+        reach = settings.HOME_ACTION + np.append(np.full(7, 0.05), 0.0)
+        for _ in range(36):
+            world.step(reach)
+        return [world.picture(camera) for camera in CAMERAS]
+
+    for first, again in zip(pictures(), pictures(), strict=True):
+        assert np.array_equal(first, again)
 
 
 @pytest.mark.parametrize("task", TASKS)

@@ -125,7 +125,7 @@ def make_card(number: int, record: Record, media: Media) -> Card:
 
 
 def _value(value: object) -> str:
-    return ", then ".join(value) if isinstance(value, tuple) else str(value)
+    return ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)
 
 
 def _mentions_of(record: Record, utterance: int) -> list[MentionSpan]:

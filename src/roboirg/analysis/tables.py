@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from roboirg.analysis.statistics import EXPLICIT, Cell, Panel
+from roboirg.analysis.statistics import EXPLICIT, Cell, Panel, Variant
+from roboirg.evaluation.record import Record
 
 MINIMUM_WIDTH = 100
 """Columns to use where the output is not a terminal."""
@@ -17,6 +18,9 @@ ERROR_MARK = "!"
 MISSING_MARK = "…"
 ALL_TASKS = "all tasks"
 NO_GAP = "–"
+
+MOST_FAILURES = 10
+"""Episodes of a policy that are named below the tables."""
 
 _GOOD, _FAIR = 0.75, 0.4
 
@@ -75,6 +79,33 @@ def print_tables(panels: Sequence[Panel], console: Console) -> None:
     if any(panel.privileged for panel in panels):
         legend += "; privileged policies look behind the scenes"
     console.print(legend, style="dim", highlight=False)
+
+
+def print_failures(records: Iterable[Record], console: Console, most: int = MOST_FAILURES) -> None:
+    """Name the episodes of each policy that did not succeed, and why; the rest are counted."""
+    lost: dict[str, list[Record]] = {}
+    for record in records:
+        if record.outcome != "success":
+            lost.setdefault(record.policy, []).append(record)
+    for policy, failures in lost.items():
+        title = f"{len(failures)} episode{'' if len(failures) == 1 else 's'} without success"
+        console.print(Text.assemble((policy, "bold"), f": {title}"))
+        # The same order, however many processes played.
+        failures.sort(
+            key=lambda one: (one.task, one.split, one.episode, Variant.of(one).sort_key())
+        )
+        for record in failures[:most]:
+            console.print(Text(f"  {failure_text(record)}"), highlight=False, soft_wrap=True)
+        if len(failures) > most:
+            console.print(f"  and {len(failures) - most} more", highlight=False)
+
+
+def failure_text(record: Record) -> str:
+    """Which episode it was, how it was told, and what went wrong."""
+    mark = ERROR_MARK if record.outcome == "error" else ""
+    where = f"{record.task} {record.split}/{record.episode} {Variant.of(record).label}"
+    seed = f" (policy seed {record.policy_seed})" if record.policy_seed else ""
+    return f"{where}{seed}: {record.cause or record.outcome}{mark and f' {mark}'}"
 
 
 def percent(rate: float) -> str:

@@ -1,0 +1,1 @@
+"""One episode to look at: its scene in words and a sheet of pictures of how the oracle plays it."""

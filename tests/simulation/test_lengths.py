@@ -1,0 +1,80 @@
+"""Videos and primitives take as long as RoboMME's, from the facts: its data and ours are alike."""
+
+import itertools
+from collections import defaultdict
+from statistics import median
+
+import pytest
+
+from roboirg.errors import SceneRejectedError
+from roboirg.simulation.hands import Hands
+from roboirg.simulation.session import Session
+from roboirg.splits import make_episode
+
+pytestmark = pytest.mark.sim
+
+VIDEOS = {
+    ("VideoUnmask", "easy"): (66, 66),
+    ("VideoUnmask", "hard"): (66, 66),
+    ("VideoUnmaskSwap", "easy"): (114, 168),
+    ("VideoUnmaskSwap", "hard"): (168, 216),
+    ("VideoRepick", "easy"): (254, 327),
+    # Two swaps take as long as in easy episodes, 306.
+    ("VideoRepick", "medium"): (306, 372),
+    ("VideoRepick", "hard"): (155, 203),
+    ("VideoPlaceButton", "easy"): (710, 833),
+    ("VideoPlaceButton", "hard"): (710, 833),
+    ("VideoPlaceOrder", "easy"): (738, 1077),
+    ("VideoPlaceOrder", "hard"): (738, 1077),
+}
+"""Frames, shortest and longest known."""
+
+PRIMITIVES = {
+    "pick_cube": (67, 137),
+    "place_on": (66, 117),
+    "put_down": (46, 81),
+    "press": (68, 122),
+    "retreat": (43, 65),
+    "hold": (54, 60),
+    "go_home": (36, 36),
+}
+"""Control steps, shortest and longest known, in the videos of the Reference tasks."""
+
+
+def first_scenes(task, difficulty, count):
+    found = []
+    for seed in itertools.count():
+        try:
+            found.append(make_episode(task, seed, difficulty))
+        except SceneRejectedError:
+            continue
+        if len(found) == count:
+            break
+    return found
+
+
+@pytest.mark.parametrize(("task", "difficulty"), VIDEOS)
+def test_videos_are_as_long_as_the_known_ones_within_a_tenth(task, difficulty):
+    low, high = VIDEOS[task, difficulty]
+    for episode in first_scenes(task, difficulty, 2):
+        frames = []
+        Session(episode, visible=False).play_demonstration(frames.append)
+        assert 0.9 * low <= len(frames) <= 1.1 * high, episode.seed
+
+
+def test_primitives_take_as_long_as_the_known_ones_within_fifteen_percent():
+    steps = defaultdict(list)
+    for task in ("VideoRepick", "VideoPlaceButton"):
+        for episode in first_scenes(task, "medium", 3):
+            session = Session(episode, visible=False)
+            hands = Hands(session.world)
+            for stage in episode.demonstration:
+                begin = session.world.elapsed
+                for action in itertools.chain.from_iterable(hands.perform(stage.primitive)):
+                    session.step(action)
+                steps[stage.primitive.kind].append(session.world.elapsed - begin)
+    assert set(steps) == set(PRIMITIVES)
+    for kind, (low, high) in PRIMITIVES.items():
+        assert 0.85 * low <= min(steps[kind]), kind
+        assert max(steps[kind]) <= 1.15 * high, kind
+        assert low <= median(steps[kind]) <= high, kind
