@@ -5,7 +5,49 @@ import io
 from rich.console import Console
 
 from roboirg.analysis.statistics import EXPLICIT, Cell, Condition, Panel, Variant
-from roboirg.analysis.tables import NO_GAP, gap_text, points, print_tables
+from roboirg.analysis.tables import NO_GAP, gap_text, points, print_failures, print_tables
+from roboirg.evaluation.record import Job, Record
+from roboirg.evaluation.rollout import Course, describe
+
+
+def record(
+    outcome: str, cause: str | None = None, episode: int = 3, policy: str = "oracle", **told
+):
+    told = {"setting": "direct", **told}
+    job = Job(policy=policy, task="PickXtimes", split="test", episode=episode, **told)
+    return describe(job, Course(outcome, cause), started_at="now")
+
+
+def failures_text(records: list[Record], most: int = 10) -> str:
+    console = Console(file=io.StringIO(), width=40)
+    print_failures(records, console, most)
+    return console.file.getvalue()  # type: ignore[attr-defined,no-any-return]
+
+
+def test_each_failure_is_named_with_its_cause() -> None:
+    long = "picked up the green cube [1] while due: pick up the red cube for the first time"
+    assert failures_text(
+        [
+            record("success"),
+            record("error", "environment: worker died (signal 9)", episode=7),
+            record("failure", long, form="resolved", policy_seed=2),
+            record("failure", "pressed the button", policy="random"),
+        ]
+    ).splitlines() == [
+        "oracle: 2 episodes without success",
+        f"  PickXtimes test/3 direct (resolved) (policy seed 2): {long}",
+        "  PickXtimes test/7 direct: environment: worker died (signal 9) !",
+        "random: 1 episode without success",
+        "  PickXtimes test/3 direct: pressed the button",
+    ]
+
+
+def test_many_failures_are_counted_and_none_is_not_told() -> None:
+    many = [record("failure", "late", episode=number) for number in reversed(range(5))]
+    lines = failures_text(many, most=2).splitlines()
+    assert [line.split()[1] for line in lines[1:3]] == ["test/0", "test/1"]
+    assert lines[3:] == ["  and 3 more"]
+    assert failures_text([record("success")]) == ""
 
 
 def test_the_table_says_rates_gaps_and_what_is_amiss() -> None:

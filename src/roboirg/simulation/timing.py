@@ -26,6 +26,8 @@ JOINT_ACCELERATION_LIMIT = 0.9
 WAYPOINT_SPACING = 0.1
 """Radians between way points, as the norm over all joints."""
 SMALLEST_JOINT_STEP = 1e-6
+GRID_INTERVALS = 10
+"""Into which the way between two way points is divided."""
 
 toppra.setup_logging("ERROR")
 
@@ -51,7 +53,11 @@ def timed(points: NDArray[np.float64]) -> NDArray[np.float64]:
         toppra.constraint.JointVelocityConstraint(limits * JOINT_SPEED_LIMIT),
         toppra.constraint.JointAccelerationConstraint(limits * JOINT_ACCELERATION_LIMIT),
     ]
-    solver = toppra.algorithm.TOPPRA(constraints, path, parametrizer="ParametrizeConstAccel")
+    # Limits hold where the timing is computed: at every way point and nine places in between.
+    grid = np.linspace(0.0, 1.0, GRID_INTERVALS * (len(points) - 1) + 1)
+    solver = toppra.algorithm.TOPPRA(
+        constraints, path, gridpoints=grid, parametrizer="ParametrizeConstAccel"
+    )
     trajectory = solver.compute_trajectory()
     if trajectory is None:
         raise MotionPlanningError("No timing within the joint limits was found.")
