@@ -228,6 +228,83 @@ def test_instructions_are_printed(roboirg) -> None:
     assert (wrong.code, wrong.err.count("\n")) == (2, 1)
 
 
+def test_failures_are_named_below_the_table(
+    roboirg, tmp_path: Path, canned: type[CannedPlayer]
+) -> None:
+    canned.course = Course("failure", "pressed the button too early")
+    said = roboirg(*RUN, "--episodes", "3", "--workers", "0", "--out", tmp_path)
+    assert said.code == 0
+    assert "random: 15 episodes without success" in said.out
+    assert "  PickXtimes test/0 explicit: pressed the button too early\n" in said.out
+    assert "and 5 more" in said.out
+    assert "and 5 more" in roboirg("report", tmp_path).out
+
+
+def test_splits_are_built_anew_for_what_is_named(
+    roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from roboirg.evaluation import acceptance
+    from roboirg.splits import shipped, splits_text
+
+    def find(slots, workers):
+        assert workers == 0
+        # Backwards: no order of ending may matter.
+        return (acceptance.find_seed(slot, acceptance.judge_words) for slot in reversed(slots))
+
+    monkeypatch.setattr(acceptance, "find_seeds", find)
+    words = ("build-splits", "--tasks", "VideoUnmask,PickXtimes", "--split", "val", "--workers", 0)
+    said = roboirg(*words)
+    assert (said.code, said.out) == (0, splits_text(shipped()))
+    assert "VideoUnmask: 2 × not expressible: spatial (first: VideoUnmask/val/15" in said.err
+    assert "[100/100]" in said.err
+    said = roboirg(*words, "--out", tmp_path / "splits.json")
+    assert (said.code, said.out) == (0, "")
+    assert (tmp_path / "splits.json").read_text() == splits_text(shipped())
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("build-splits", "--tasks", "PickXtime"), "There is no task 'PickXtime'"),
+        (("build-splits", "--split", "dev"), "There is no split 'dev'"),
+        (("build-splits", "--workers", "-1"), "workers is -1"),
+        (("build-splits", "--out", "nowhere/splits.json"), "There is no folder for 'nowhere/"),
+        (("show", "PickXtime", "0"), "There is no task 'PickXtime'"),
+        (("show", "PickXtimes", "50"), "There is no episode 50"),
+        (("show", "PickXtimes", "0", "--split", "dev"), "There is no split 'dev'"),
+        (("show", "PickXtimes", "0", "--out", "sheet.gif"), "must end in .png"),
+    ],
+)
+def test_wrong_wishes_are_one_sentence(roboirg, words: tuple[str, ...], sentence: str) -> None:
+    said = roboirg(*words)
+    assert (said.code, said.out, said.err.count("\n")) == (2, "", 1)
+    assert sentence in said.err
+
+
+def test_an_episode_is_shown(roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(
+        "roboirg.showing.playthrough.draw_sheet", lambda _episode, path: f"success, in {path}"
+    )
+    said = roboirg("show", "VideoPlaceButton", "3", "--split", "val")
+    assert (said.code, said.err) == (0, "")
+    path = "VideoPlaceButton-val-3.png"
+    assert said.out.splitlines()[-2:] == [f"the oracle success, in {path}", path]
+    words = " ".join(said.out.split())
+    for told in ("VideoPlaceButton/val/3 hard, seed", "target_3", "change places", "that is: cube_",
+                 "relation", "contextual", "resolved"):  # fmt: skip
+        assert told in words, told
+    assert "spatial" not in words
+
+
+@pytest.mark.sim
+def test_a_shown_episode_is_a_picture(roboirg, tmp_path: Path) -> None:
+    said = roboirg("show", "PickXtimes", "0", "--out", tmp_path / "sheet.png")
+    assert (said.code, said.err) == (0, "")
+    assert "the oracle success after " in said.out
+    assert (tmp_path / "sheet.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_help_needs_nothing_heavy() -> None:
     code = (
         "import sys; sys.argv = ['roboirg', '--help']\n"

@@ -180,15 +180,67 @@ def list_tasks() -> None:
 
 
 @app.command("build-splits")
-def build_splits() -> None:
-    """Find anew which seeds the splits pass over and print them; takes a second per episode."""
-    import json
+def build_splits(
+    tasks: Tasks = "all",
+    split: Annotated[str, typer.Option(help="train, val or test; all by default.")] = "all",
+    workers: Workers = None,
+    out: Annotated[str | None, typer.Option(help="File to write instead of stdout.")] = None,
+) -> None:
+    """Find anew which seeds the splits pass over; what is not named stays as it is shipped."""
+    from rich.console import Console
 
-    from roboirg.evaluation.acceptance import find_rejections
-    from roboirg.tasks import all_tasks
+    from roboirg import splits
+    from roboirg.episode import SPLITS
+    from roboirg.evaluation.acceptance import check_kept, find_seeds, merged, slots_of
+    from roboirg.evaluation.executors import core_count
+    from roboirg.evaluation.plan import parse_names, says_all
+    from roboirg.evaluation.split_summary import followed, print_summary
+    from roboirg.evaluation.store import write_atomically
+    from roboirg.tasks import all_tasks, get_task
 
-    found = {key: rejected for key, rejected in find_rejections(list(all_tasks())) if rejected}
-    typer.echo(json.dumps(found, indent=2))
+    typed = tuple(all_tasks()) if says_all(tasks) else parse_names("task", tasks)
+    names = [get_task(name).name for name in typed]
+    wanted = SPLITS if says_all(split) else (splits.check_split(split),)
+    check_kept(names, wanted, splits.shipped())
+    if out is not None and not Path(out).parent.is_dir():
+        raise InvalidValueError(f"There is no folder for {out!r}; make it first.")
+    slots = slots_of(names, wanted)
+    console = Console(stderr=True)
+    count = core_count() if workers is None else workers
+    found = followed(find_seeds(slots, count), slots, console)
+    print_summary(found, console)
+    text = splits.splits_text(merged(found, splits.shipped()))
+    if out is None:
+        typer.echo(text, nl=False)
+    else:
+        write_atomically(Path(out), text)
+
+
+@app.command()
+def show(
+    task: Annotated[str, typer.Argument(help="Name of the task.")],
+    episode: Annotated[int, typer.Argument(help="0-based position in the split.")],
+    split: Split = "test",
+    out: Annotated[
+        str | None, typer.Option(help="The PNG file; TASK-split-episode.png by default.")
+    ] = None,
+) -> None:
+    """Print an episode's scene and words, and draw how the oracle plays it."""
+    from rich.console import Console
+
+    from roboirg.showing.playthrough import draw_sheet
+    from roboirg.showing.words import print_episode
+    from roboirg.splits import get_episode
+
+    found = get_episode(task, split, episode)
+    path = Path(f"{task}-{split}-{episode}.png" if out is None else out)
+    if path.suffix.lower() != ".png" or path.is_dir():
+        raise InvalidValueError(f"{str(path)!r} is no name for a picture; it must end in .png.")
+    console = Console()
+    print_episode(found, console)
+    verdict = draw_sheet(found, path)
+    console.print(f"[bold]the oracle[/] {verdict}", highlight=False)
+    typer.echo(path)
 
 
 @app.command()
@@ -296,13 +348,13 @@ def _print_tables(folder: Path) -> None:
     from rich.console import Console
 
     from roboirg.analysis.statistics import make_panels
-    from roboirg.analysis.tables import print_tables
+    from roboirg.analysis.tables import print_failures, print_tables
     from roboirg.evaluation.plan import read_plan
     from roboirg.evaluation.store import read_records
 
-    plan = read_plan(folder)
-    panels = make_panels(read_records(folder), plan.jobs() if plan else ())
-    print_tables(panels, Console())
+    plan, records, console = read_plan(folder), read_records(folder), Console()
+    print_tables(make_panels(records, plan.jobs() if plan else ()), console)
+    print_failures(records, console)
 
 
 def _write_page(folder: Path, *, videos: bool) -> Path:

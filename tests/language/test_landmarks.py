@@ -12,6 +12,7 @@ from roboirg.language import FORMS, expressible, instruct, resolve
 from roboirg.language.landmarks import MARGIN, landmarks, selectors
 from roboirg.language.resolver.places import find, read_places
 from roboirg.language.resolver.tokens import split_sentences
+from roboirg.motions import Away
 
 GRID = st.integers(-17, 17).map(lambda step: step / 100)
 PLACES = st.lists(st.tuples(GRID, GRID), min_size=1, max_size=8, unique=True)
@@ -178,8 +179,43 @@ def test_the_camera_frame_mixes_no_points_of_view(task):
             for form in FORMS:
                 text = instruct(episode, "spatial", form, frame="camera").text
                 places = text.replace("I want you to", "").replace("you are done", "")
-                places = places.replace("what you saw", "")
+                places = places.replace("what you saw", "").replace("all that you saw", "")
+                # What is done with the cube stays the robot's, and says so.
+                places = places.replace("on your right", "").replace("on your left", "")
                 assert not {"you", "your"} & set(places.replace(",", " ").split())
+
+
+def test_cubes_that_come_later_are_no_candidates():
+    scene = cubes([(0.0, 0.15), (0.0, -0.15), (0.1, 0.0)])
+    late = Scene(scene.objects, motions=(Away("cube_red", 0, 50),))
+    assert phrases(scene, "cube_red", "cube") == {"at the far left"}
+    assert not phrases(late, "cube_red", "cube")
+    assert "at the far left" in phrases(late, "cube_blue", "cube")
+
+
+def test_containers_appear_and_are_candidates_all_the_same():
+    scene = containers([(0.0, 0.15), (0.0, -0.15)])
+    appearing = tuple(Away(one.name, 0, 32) for one in scene.objects)
+    assert phrases(Scene(scene.objects, motions=appearing), "container_0") == {"at the far left"}
+
+
+def test_the_bin_is_a_fixture():
+    bin_ = SceneObject("bin", "bin", Point(-0.2, 0.0, 0.0))
+    scene = Scene((*cubes([(-0.1, 0.0), (0.1, 0.0)]).of_kind("cube"), bin_))
+    found = {one.landmark.phrase: one.selected() for one in selectors(scene, "cube", "robot")}
+    assert found["closest to the bin"] is scene["cube_red"]
+    assert found["farthest from the bin"] is scene["cube_green"]
+
+
+def test_a_place_of_a_counted_colour_is_that_of_one_of_its_cubes():
+    for episode in random_episodes("BinFill", 80):
+        if "spatial" not in expressible(episode):
+            continue
+        said = instruct(episode, "spatial").metadata["landmarks"]
+        for colour, phrase in zip(episode.goal.texts("colours"), said, strict=True):
+            places = selectors(episode.scene, "cube", "robot")
+            found = {one.selected() for one in places if one.landmark.phrase == phrase}
+            assert {item.colour for item in found if item is not None} == {colour}
 
 
 @pytest.mark.parametrize("gap", [0.0, MARGIN / 2, math.nextafter(MARGIN, 0.0), MARGIN])

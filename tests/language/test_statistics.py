@@ -19,9 +19,10 @@ def test_expressions_are_counted_once_per_scene():
     scenes = len({one.episode for one in said})
     assert "explicit" not in counts
     assert max(number for by in counts.values() for number in by.values()) <= scenes
-    assert set(counts["direct"]) == {"it", "former", "latter", "that"}
-    assert {"pair", "that", "other"} <= set(counts["reasoning"])
-    assert {"there", "former", "latter"} == set(counts["spatial"])
+    ranks = {"former", "latter", "first", "second", "third"}
+    assert set(counts["direct"]) == {"it", "them", "that", "then", *ranks}
+    assert {"pair", "that", "other"} == set(counts["reasoning"])
+    assert {"there", *ranks} == set(counts["spatial"])
 
 
 def test_lengths_patterns_relations_and_landmarks():
@@ -32,4 +33,5 @@ def test_lengths_patterns_relations_and_landmarks():
     patterns = statistics.pattern_counts(said)
     assert patterns["PickXtimes"] == {"colour exclusion": 100, "number deduction": 100}
     assert sum(statistics.relation_counts(said)["PickXtimes"].values()) == 100
+    assert set(statistics.relation_counts(said)["VideoPlaceOrder"]) >= {"right after", "neighbor"}
     assert set(statistics.landmark_counts(said)["VideoUnmask"]) >= {"1", "2", "3"}

@@ -12,7 +12,7 @@ UtteranceStage = Literal["introduction", "reinforcement", "distractor", "cue", "
 Role = Literal["antecedent", "anaphor"]
 Expression = Literal[
     "it", "them", "one", "former", "latter", "first", "second", "third",
-    "that", "there", "pair", "other", "before", "after",
+    "that", "then", "there", "pair", "other", "before", "after",
 ]  # fmt: skip
 
 SETTINGS: tuple[Setting, ...] = get_args(Setting)
@@ -37,8 +37,8 @@ class Mention:
         end: one past the last character.
         role: antecedent or anaphor.
         expression: class of an anaphor; None for an antecedent.
-        slot: name of the goal slot, or ``reference`` for what only leads to the goal: the two
-            excluded colours, the one of them that was chosen, the quantity to count from.
+        slot: name of the goal slot, or ``reference`` for what only leads to the goal: two colours
+            or moments, the one of them that was chosen, the quantity or position to count from.
         value: what it stands for: of a goal slot one of the goal's values, or all of them
             (``red and green``) for a plural.
     """

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Literal, NamedTuple
 
 from roboirg.episode import Scene, SceneObject
+from roboirg.motions import Away
 
 MARGIN = 0.03
 """Metres by which a landmark's object must win over any other in the quantity compared."""
@@ -105,7 +106,7 @@ def selectors(
     scene: Scene, thing: Literal["cube", "container"], frame: Frame
 ) -> Iterator[Selector]:
     """Every selector, from the best class to the last."""
-    candidates = scene.of_kind(thing)
+    candidates = seen(scene, thing)
     named = (*_extremes(candidates, frame), *_corners(candidates, frame))
     ranked = tuple(_ranks(candidates, frame))
     yield from (*named, *ranked)
@@ -115,6 +116,16 @@ def selectors(
     yield from _chains(thing, candidates, ranked, level=7)
     yield from _chains(thing, candidates, named, level=8, rank=1)
     yield from _chains(thing, candidates, named, level=9, rank=2)
+
+
+def seen(scene: Scene, thing: Literal["cube", "container"]) -> tuple[SceneObject, ...]:
+    """What a listener can check: the cubes that are there at first, or all containers."""
+    if thing == "container":
+        return scene.of_kind(thing)
+    late = {
+        motion.subject for motion in scene.motions if isinstance(motion, Away) and motion.start == 0
+    }
+    return tuple(cube for cube in scene.of_kind("cube") if cube.name not in late)
 
 
 class _Direction(NamedTuple):
@@ -178,7 +189,7 @@ def _ranks(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Select
 
 
 def _fixtures(scene: Scene, candidates: tuple[SceneObject, ...]) -> Iterator[Selector]:
-    for kind in ("button", "target"):
+    for kind in ("button", "target", "bin"):
         fixtures = [item for item in scene.objects if item.kind == kind]
         if len(fixtures) != 1:
             continue

@@ -17,13 +17,18 @@ from roboirg.tasks import Task
 Distractor = Literal["neutral", "competing"]
 DISTRACTORS: tuple[Distractor, ...] = ("neutral", "competing")
 
-PartKind = Literal["colour", "number"]
+PartKind = Literal["number", "visit", "placement", "relation", "colour", "amount"]
 PART_KINDS: Mapping[str, PartKind] = {
     "colour": "colour",
     "colours": "colour",
+    "counts": "amount",
     "repeats": "number",
+    "visit": "visit",
+    "placement": "placement",
+    "relation": "relation",
 }
-"""What kind of value each goal slot holds."""
+"""What kind of value each goal slot holds; colours that have counts are amounts with them."""
+COLOUR_SLOTS = ("colour", "colours")
 
 
 class Part(NamedTuple):
@@ -74,11 +79,16 @@ class Request:
     def parts(self) -> tuple[Part, ...]:
         """The values of the goal, in the order of its slots."""
         parts: list[Part] = []
-        for slot, value in self.episode.goal.slots:
-            kind = PART_KINDS[slot]
+        slots = self.episode.goal.slots
+        counted = "counts" in dict(slots)
+        for slot, value in slots:
+            kind = "amount" if counted and slot in COLOUR_SLOTS else PART_KINDS[slot]
             if isinstance(value, tuple):
-                several = enumerate(value)
-                parts += [Part(f"{slot}.{index}", slot, kind, one) for index, one in several]
+                several: tuple[str | int, ...] = value
+                fields = (f"{slot}.{index}" for index in range(len(several)))
+                parts += [
+                    Part(field, slot, kind, one) for field, one in zip(fields, several, strict=True)
+                ]
             else:
                 parts.append(Part(slot, slot, kind, value))
         return tuple(parts)
@@ -87,23 +97,44 @@ class Request:
         """The parts of one kind."""
         return tuple(part for part in self.parts if part.kind == kind)
 
+    @property
+    def coloured(self) -> tuple[Part, ...]:
+        """The parts that are colours, counted or not."""
+        return tuple(part for part in self.parts if part.slot in COLOUR_SLOTS)
+
+    def count_of(self, colour: Part) -> int:
+        """How many things of a colour are wanted; one unless the goal counts them."""
+        _, _, index = colour.field.partition(".")
+        counts = {part.field: part for part in self.parts if part.slot == "counts"}
+        return counts[f"counts.{index}"].number if counts else 1
+
+    def numbers_instead(self, slot: str) -> tuple[tuple[int, ...], ...]:
+        """What a slot of numbers could hold in this scene, all other slots being as they are."""
+        mine = dict(self.episode.goal.slots) | {slot: 0}
+        choices = [dict(goal.slots) for goal in self.task.goals(self.episode.scene)]
+        values = [choice[slot] for choice in choices if choice | {slot: 0} == mine]
+        return tuple(
+            tuple(int(one) for one in (value if isinstance(value, tuple) else (value,)))
+            for value in values
+        )
+
     def by_colour(self, cube: Phrase) -> Phrase:
         """The thing to handle, told by its cube."""
         return fill(self.task.commands.by_colour, {"cube": cube})
 
-    def by_place(self, place: Phrase) -> Phrase:
+    def by_place(self, place: Phrase, *, plural: bool = False) -> Phrase:
         """The thing to handle, told by its place."""
-        return fill(self.task.commands.by_place, {"place": place})
+        return fill(self.task.commands.by_place, {"place": place}, plural=plural)
 
-    def target(self, part: Part) -> SceneObject:
-        """The object that a colour part wants handled: the cube, or the container over it."""
+    def targets(self, part: Part) -> tuple[SceneObject, ...]:
+        """The objects that a colour part may want handled: cubes, or the container over one."""
         scene = self.episode.scene
-        cube = next(item for item in scene.objects if item.colour == part.value)
-        return cube if cube.inside is None else scene[cube.inside]
+        cubes = [item for item in scene.objects if item.colour == part.value]
+        return tuple(cube if cube.inside is None else scene[cube.inside] for cube in cubes)
 
     def command(self, fields: Mapping[str, Phrase]) -> Phrase:
         """The task's command with its fields filled; the same wording in all settings."""
-        handled = max(1, sum(1 for part in self.parts if part.field.rpartition(".")[2].isdigit()))
+        handled = max(1, len(self.parts_of("colour")))
         wordings = [one for one in self.task.commands.wordings if one.parts == handled]
         return fill(self.chooser.pick(f"command-{handled}", wordings).text, fields)
 

@@ -29,6 +29,43 @@ PAIR_INTRODUCTIONS = (
     "I think that {pair} go well together.",
     "The flag of my home town is {pair}.",
 )
+AMOUNT_INTRODUCTIONS = (
+    "My daughter asked for {things}.",
+    "I was just thinking about {things}.",
+    "The plan of the day calls for {things}.",
+    "I have promised my friend {things}.",
+)
+REFERENCE_AMOUNT_INTRODUCTIONS = (
+    "Yesterday I played with {things}.",
+    "My nephew owns {things}.",
+    "The box at home holds {things}.",
+)
+"""Amounts that only lead to the goal; there may be more of them than cubes on the table."""
+VISIT_INTRODUCTIONS = (
+    "I was just thinking about {which}.",
+    "Everybody here is waiting for {which}.",
+    "I have placed my bet on {which}.",
+)
+PLACEMENT_INTRODUCTIONS = (
+    "In the video I liked {which}.",
+    "{which} in the video was very neat.",
+    "I could talk for hours about {which} in the video.",
+)
+MOMENT_INTRODUCTIONS = (
+    "What happened {moment} is still on my mind.",
+    "I remember best what the video showed {moment}.",
+    "The part {moment} was the highlight of the video.",
+)
+TWO_MOMENTS_INTRODUCTIONS = (
+    "Two moments stand out in the video, {pair}, and my sister prefers {single}.",
+    "Of the two moments {pair}, my brother would choose {single}.",
+    "If my mother had to choose between the two moments {pair}, it would be {single}.",
+)
+NEIGHBOR_INTRODUCTIONS = (
+    "In the video I liked the placement {moment}.",
+    "The placement {moment} was very neat.",
+    "I could talk for hours about the placement {moment}.",
+)
 SINGLED_INTRODUCTIONS = (
     "Of the two, I would choose {single}.",
     "If I had to choose between the two, it would be {single}.",
@@ -50,6 +87,12 @@ CAMERA_PLACE_INTRODUCTIONS = (
     "I am looking at {things}, going by left and right in the front camera.",
 )
 """The same with the sides of the camera, which faces the robot."""
+MOVED_INTRODUCTIONS = (
+    "I mean how things stood before anything moved.",
+    "I am talking about the places before anything moved.",
+    "That is where things stood before anything moved.",
+)
+"""What is added to these where things change places."""
 
 COLOUR_REINFORCEMENTS = (
     "{ref} [was a present|were presents] from my aunt.",
@@ -62,6 +105,17 @@ NUMBER_REINFORCEMENTS = (
     "{ref} has always brought me luck.",
     "{ref} seems to follow me everywhere.",
 )
+VISIT_REINFORCEMENTS = (
+    "I would not want to miss {ref}.",
+    "I have been looking forward to {ref} all day.",
+    "My friends keep asking me about {ref}.",
+)
+VIDEO_REINFORCEMENTS = (
+    "I could watch {ref} again and again.",
+    "I have told everybody about {ref}.",
+    "I would recognize {ref} anywhere.",
+)
+"""Of placements and moments."""
 
 NEUTRAL_DISTRACTORS = (
     "The coffee machine is making a strange noise.",
@@ -99,6 +153,21 @@ COMPETING_NUMBER_DISTRACTORS = (
     "The bus was {other} [minute|minutes] late, but never mind that.",
     "I have {other} [meeting|meetings] today, which has nothing to do with your task.",
 )
+COMPETING_VISIT_DISTRACTORS = (
+    "My neighbor is waiting for the {other} visit, but that does not matter here.",
+    "My friend has bet on the {other} visit, but never mind that.",
+    "Yesterday I missed the {other} visit, which has nothing to do with your task.",
+)
+COMPETING_PLACEMENT_DISTRACTORS = (
+    "My neighbor liked the {other} placement, but that does not matter here.",
+    "My friend laughed about the {other} placement, but never mind that.",
+    "My sister missed the {other} placement, which has nothing to do with your task.",
+)
+COMPETING_MOMENT_DISTRACTORS = (
+    "My neighbor liked the part {other}, but that does not matter here.",
+    "My friend laughed about the part {other}, but never mind that.",
+    "My sister missed the part {other}, which has nothing to do with your task.",
+)
 
 CUES = (
     "Here is what I would like you to do.",
@@ -115,6 +184,20 @@ EXCLUSIONS = (
 PAIR_ANAPHORS = ("that pair", "those two")
 COMPLEMENTS = ("the cube in {other}", "the cube with {other}")
 """The second pick: of the two excluded colours, the one that was not chosen."""
+AMOUNT_EXCLUSIONS = (
+    "cube[|s] of a color other than {pair}",
+    "cube[|s] whose color is different from {pair}",
+)
+AMOUNT_COMPLEMENTS = ("cube[|s] in {other}", "cube[|s] with {other}")
+
+MOMENTS = {"before": "right before the button press", "after": "right after the button press"}
+MOMENT_ANAPHORS = ("at that moment", "then")
+MOMENT_COMPLEMENTS = (
+    "the other of the two moments, not {single}",
+    "whichever of the two moments is not {single}",
+)
+NEIGHBOR = "the placement that is a direct neighbor of {single}"
+"""Of two placements each is the other's neighbor; *earlier* or *later* would tell which."""
 
 
 class Relation(NamedTuple):
@@ -123,6 +206,8 @@ class Relation(NamedTuple):
     Attributes:
         name: for records.
         times: how often, told by a reference quantity.
+        cubes: how many cubes of a colour.
+        value: which number.
         offset: the result is ``factor * reference + offset``.
         factor: see `offset`.
         spells: the number that the words themselves contain; a result of this value would be
@@ -131,6 +216,8 @@ class Relation(NamedTuple):
 
     name: str
     times: str
+    cubes: str
+    value: str
     offset: int = 0
     factor: float = 1.0
     spells: int | None = None
@@ -145,10 +232,80 @@ MAX_REFERENCE = 10
 """The largest number that is introduced."""
 
 RELATIONS = (
-    Relation("one fewer", "one time fewer than {number}", offset=-1, spells=1),
-    Relation("one more", "one more time than {number}", offset=1, spells=1),
-    Relation("two fewer", "two fewer times than {number}", offset=-2, spells=2),
-    Relation("two more", "two more times than {number}", offset=2, spells=2),
-    Relation("twice", "twice as many times as {number}", factor=2.0, spells=2),
-    Relation("half", "half as many times as {number}", factor=0.5),
+    Relation(
+        "one fewer",
+        "one time fewer than {number}",
+        "one fewer {colour} cube than {number}",
+        "one less than {number}",
+        offset=-1,
+        spells=1,
+    ),
+    Relation(
+        "one more",
+        "one more time than {number}",
+        "one more {colour} cube than {number}",
+        "one more than {number}",
+        offset=1,
+        spells=1,
+    ),
+    Relation(
+        "two fewer",
+        "two fewer times than {number}",
+        "two fewer {colour} cubes than {number}",
+        "two less than {number}",
+        offset=-2,
+        spells=2,
+    ),
+    Relation(
+        "two more",
+        "two more times than {number}",
+        "two more {colour} cubes than {number}",
+        "two more than {number}",
+        offset=2,
+        spells=2,
+    ),
+    Relation(
+        "twice",
+        "twice as many times as {number}",
+        "twice as many {colour} cubes as {number}",
+        "twice {number}",
+        factor=2.0,
+        spells=2,
+    ),
+    Relation(
+        "half",
+        "half as many times as {number}",
+        "half as many {colour} cubes as {number}",
+        "half of {number}",
+        factor=0.5,
+    ),
 )
+
+
+class Step(NamedTuple):
+    """An element of a series told by another one.
+
+    Attributes:
+        name: for records.
+        words: what follows the noun.
+        offset: from the reference to the result.
+        spells: as in `Relation`.
+    """
+
+    name: str
+    words: str
+    offset: int
+    spells: int | None = None
+
+
+STEPS = (
+    Step("right after", "right after {reference}", 1),
+    Step("right before", "right before {reference}", -1),
+    Step("two after", "two after {reference}", 2, spells=2),
+    Step("two before", "two before {reference}", -2, spells=2),
+)
+NEIGHBORS = {
+    1: Step("neighbor", "that is a direct neighbor of {reference}", -1),
+    2: Step("neighbor", "that is a direct neighbor of {reference}", 1),
+}
+"""Of a series of two elements, by position."""

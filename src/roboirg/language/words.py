@@ -5,12 +5,21 @@ from __future__ import annotations
 CARDINALS = (
     "zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten",
 )  # fmt: skip
+ORDINALS = (
+    "zeroth", "first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth",
+    "tenth",
+)  # fmt: skip
 ADVERBS = {1: "once", 2: "twice"}
 
 
 def cardinal(number: int) -> str:
     """A number from 0 to 10 as a word."""
     return CARDINALS[number]
+
+
+def ordinal(number: int) -> str:
+    """A position from 1 to 10 as a word: ``first``, ``second``, ..."""
+    return ORDINALS[number]
 
 
 def times(number: int) -> str:

@@ -1,20 +1,31 @@
-"""The kinds of values that a goal can hold, one file each, and how each is spoken of.
+"""The kinds of values that a goal can hold, and how each is spoken of.
 
-The order is the order of speaking: numbers come before colours, so that ``it`` in the command
-follows the sentence about its cube.
+The order is the order of speaking: colours come last, so that ``it`` in the command follows the
+sentence about its cube.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
-from roboirg.language.kinds import colour, number
-from roboirg.language.kinds.kind import Kind
+from roboirg.language.kinds import amount, colour, moment, number, ordinal
+from roboirg.language.kinds.kind import Fields, Kind
+from roboirg.language.phrases import Phrase
 from roboirg.language.request import Part, PartKind, Request
 
-__all__ = ["KINDS", "Kind", "kinds_in"]
+__all__ = ["KINDS", "Fields", "Kind", "described", "kinds_in"]
 
-KINDS: Mapping[PartKind, Kind] = {"number": number.KIND, "colour": colour.KIND}
+KINDS: Mapping[PartKind, Kind] = {
+    kind.name: kind
+    for kind in (
+        number.KIND,
+        ordinal.VISIT,
+        ordinal.PLACEMENT,
+        moment.KIND,
+        colour.KIND,
+        amount.KIND,
+    )
+}
 
 
 def kinds_in(request: Request) -> Iterator[tuple[Kind, tuple[Part, ...]]]:
@@ -23,3 +34,12 @@ def kinds_in(request: Request) -> Iterator[tuple[Kind, tuple[Part, ...]]]:
         parts = request.parts_of(name)
         if parts:
             yield kind, parts
+
+
+def described(request: Request, things: Sequence[Phrase]) -> Fields:
+    """The fields of the command for the goal's colours, given a description for each of them."""
+    fields: Fields = {}
+    for kind, parts in kinds_in(request):
+        if kind.described is not None:
+            fields |= kind.described(parts, things)
+    return fields

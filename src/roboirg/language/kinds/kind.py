@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from roboirg.language.phrases import Phrase
+from roboirg.language.phrases import Phrase, fill, plain
 from roboirg.language.request import Part, PartKind, Request
+
+Fields = dict[str, Phrase]
+"""Words for the fields of a command."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,22 +18,39 @@ class Kind:
 
     Attributes:
         name: as in `PartKind`.
-        named: the words of the command that name a value outright.
-        reduced: for each field of the command, words that point back at the introduced values.
+        stated: the fields of the command, every value named outright.
+        reduced: the same fields with words that point back at the introduced values.
         introduce: a sentence that names the values.
         pointing: the words that a reinforcement uses for the values.
+        plural: whether these words are a plural.
         reinforcements: sentences with a field ``{ref}`` for those words.
-        competitors: sentences with a field ``{other}`` for a value that is not meant.
-        values: everything that such a sentence may name.
-        word: a value in words.
+        rivals: sentences that name values which are not meant.
+        described: of a kind that has colours: the fields, given a description of the thing or
+            things of each colour.
     """
 
     name: PartKind
-    named: Callable[[Request, Part], Phrase]
-    reduced: Callable[[Request, tuple[Part, ...]], dict[str, Phrase]]
+    stated: Callable[[Request, tuple[Part, ...]], Fields]
+    reduced: Callable[[Request, tuple[Part, ...]], Fields]
     introduce: Callable[[Request, tuple[Part, ...]], Phrase]
     pointing: Callable[[tuple[Part, ...]], Phrase]
     reinforcements: tuple[str, ...]
-    competitors: tuple[str, ...]
-    values: tuple[str | int, ...]
-    word: Callable[[str | int], str]
+    rivals: Callable[[tuple[Part, ...]], list[Phrase]]
+    plural: Callable[[tuple[Part, ...]], bool] = lambda parts: len(parts) > 1
+    described: Callable[[tuple[Part, ...], Sequence[Phrase]], Fields] | None = None
+
+
+def rival_sentences(
+    templates: Sequence[str],
+    values: Sequence[str | int],
+    word: Callable[[str | int], str],
+    parts: tuple[Part, ...],
+) -> list[Phrase]:
+    """Every template with every value that the goal does not have."""
+    taken = {part.value for part in parts}
+    return [
+        fill(template, {"other": plain(word(value))}, plural=value != 1)
+        for value in values
+        if value not in taken
+        for template in templates
+    ]

@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 from roboirg.language import templates
-from roboirg.language.kinds.kind import Kind
+from roboirg.language.kinds.kind import Fields, Kind, rival_sentences
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill
 from roboirg.language.request import Part, Request
 from roboirg.language.words import cardinal, times
 
+RIVALS = tuple(range(1, 11))
+"""Numbers that a remark may name."""
 
-def named(_request: Request, part: Part) -> Phrase:
+
+def _stated(_request: Request, parts: tuple[Part, ...]) -> Fields:
     """``three times``."""
-    return antecedent(times(part.number), part.slot, part.value)
+    return {part.field: antecedent(times(part.number), part.slot, part.value) for part in parts}
 
 
-def reduced(_request: Request, parts: tuple[Part, ...]) -> dict[str, Phrase]:
+def _reduced(_request: Request, parts: tuple[Part, ...]) -> Fields:
     """``that many times``."""
     return {part.field: anaphor("that many times", "that", part.slot, part.value) for part in parts}
 
 
-def introduce(request: Request, parts: tuple[Part, ...]) -> Phrase:
-    """A sentence that names the number."""
+def _introduce(request: Request, parts: tuple[Part, ...]) -> Phrase:
     return introduce_quantity(request, parts[0].slot, parts[0].number)
 
 
@@ -34,14 +36,18 @@ def _pointing(parts: tuple[Part, ...]) -> Phrase:
     return anaphor("that number", "that", parts[0].slot, parts[0].value)
 
 
+def rivals(parts: tuple[Part, ...]) -> list[Phrase]:
+    """Remarks that name other numbers."""
+    sentences = templates.COMPETING_NUMBER_DISTRACTORS
+    return rival_sentences(sentences, RIVALS, lambda value: cardinal(int(value)), parts)
+
+
 KIND = Kind(
     name="number",
-    named=named,
-    reduced=reduced,
-    introduce=introduce,
+    stated=_stated,
+    reduced=_reduced,
+    introduce=_introduce,
     pointing=_pointing,
     reinforcements=templates.NUMBER_REINFORCEMENTS,
-    competitors=templates.COMPETING_NUMBER_DISTRACTORS,
-    values=tuple(range(1, 11)),
-    word=lambda value: cardinal(int(value)),
+    rivals=rivals,
 )

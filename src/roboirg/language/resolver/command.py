@@ -1,57 +1,53 @@
-"""The command: which things are to be handled, and how often."""
+"""The command: which sentences it is, and the words for the things that are to be handled."""
 
 from __future__ import annotations
 
 import functools
-import re
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
-from roboirg.episode import COLOURS
-from roboirg.language.resolver.places import Place, read_places
-from roboirg.language.resolver.tokens import Sentence, number_of, ordinal_of, word_set
+from roboirg.language.resolver.descriptions import Description, describe
+from roboirg.language.resolver.quantities import Count, Quantity, quantities
+from roboirg.language.resolver.tokens import Sentence, colours_in, word_set
 
-_TAKING = word_set("take pick grab grasp lift raise carry move bring fetch get uncover remove hold")
-_PUTTING = word_set("put place set lower return drop lay")
-_PRESSING = word_set("press push hit tap")
-_BEFORE_VERB = word_set(", ; : and then please to finally now after that next afterwards")
-_PRONOUNS = word_set("it them")
-
-Kind = Literal["any", "colour", "not", "other", "place", "introduced", "introduced place"]
-
-
-class Description(NamedTuple):
-    """How the command tells one thing that is to be handled.
-
-    Attributes:
-        kind: ``any`` says nothing; ``colour`` names it; ``not`` excludes colours; ``other`` is
-            the remaining one of some colours; ``place`` names where it is; ``introduced`` and
-            ``introduced place`` point at what was named before.
-        colours: named colours; empty where the words point at those of the context.
-        minus: for ``other``, the colour that it is not; None if the words only point at it.
-        place: the named place.
-        position: which of the introduced ones, from 0; None if any of them.
-    """
-
-    kind: Kind
-    colours: tuple[str, ...] = ()
-    minus: str | None = None
-    place: Place | None = None
-    position: int | None = None
+_TAKING = word_set(
+    "take pick grab grasp lift raise carry move bring fetch get uncover remove hold swing"
+)
+_PUTTING = word_set("put place set lower return drop lay throw toss")
+_PRESSING = word_set("press push hit tap stop halt make let")
+_BEFORE_VERB = word_set(", ; : and then please to finally now after that next afterwards but first")
+_BARE_PRONOUNS = word_set("it them that")
+_SINGULAR = word_set("it cube one")
 
 
-class Count(NamedTuple):
-    """How often: ``factor * quantity + offset``; without a quantity, the one of the context."""
+class Item(NamedTuple):
+    """So many things of one sort; without a number, nothing tells how many."""
 
-    factor: float = 1.0
-    offset: int = 0
-    quantity: int | None = None
+    number: Count | None
+    thing: Description
 
 
 class Command(NamedTuple):
-    """What a command says."""
+    """What a command says.
 
-    things: tuple[Description, ...]
-    times: Count | None
+    Attributes:
+        text: all its words.
+        handled: the words for each thing that is handled, in order; each thing once.
+        added: the words for things of other colours that are only said to be put somewhere.
+    """
+
+    text: str
+    handled: tuple[Sentence, ...]
+    added: tuple[Sentence, ...] = ()
+
+    @property
+    def things(self) -> tuple[Description, ...]:
+        """What is told about the things one by one."""
+        return tuple(describe(words) for words in self.handled)
+
+    @property
+    def items(self) -> tuple[Item, ...]:
+        """What is told about the things with their numbers."""
+        return tuple(item for words in (*self.handled, *self.added) for item in _items(words))
 
 
 def is_command(words: Sentence) -> bool:
@@ -61,12 +57,26 @@ def is_command(words: Sentence) -> bool:
 
 @functools.lru_cache(maxsize=4096)
 def read_command(words: Sentence) -> Command:
-    """The things to handle, in order, and how often."""
+    """The commanding sentences, and the things to handle."""
     clauses = _clauses(words)
     taken = [clause for clause in clauses if clause[0] in _TAKING]
+    put = [clause for clause in clauses if clause[0] in _PUTTING]
     # "Put the cube on the target" handles a cube too, "put it back" the one in the hand.
-    told = taken or [clause for clause in clauses if clause[0] in _PUTTING][:1]
-    return Command(tuple(_describe(clause[1:]) for clause in told), _count(words))
+    told = taken or put
+    fresh = [clause for clause in told if clause is told[0] or not _goes_on(clause)]
+    known = {colour for clause in taken for colour in colours_in(clause)}
+    added = [clause for clause in put if taken and set(colours_in(clause)) - known]
+    return Command(
+        " ".join(words),
+        tuple(clause[1:] for clause in fresh),
+        tuple(clause[1:] for clause in added),
+    )
+
+
+def _goes_on(clause: Sentence) -> bool:
+    """Whether it only says what to do with the thing at hand: ``carry it over``."""
+    objects = [word for word in clause[1:3] if word not in ("up", "down", "back")]
+    return not objects or objects[0] in _BARE_PRONOUNS
 
 
 def _clauses(words: Sentence) -> list[Sentence]:
@@ -81,88 +91,24 @@ def _is_verb(words: Sentence, at: int) -> bool:
     return at == 0 or words[at - 1] in _BEFORE_VERB
 
 
-_THAN = re.compile(
-    r"\b(other than|different from|not (in|of|among|one of)|neither|except|apart from|outside)\b"
-)
-_OTHER_OF = re.compile(r"\bthe other (?:one |colou?r )?(?:of|in|from)\b")
-_ONE_NOT = re.compile(
-    r"\bthe (?:one|colou?r) (?:of|in|from)\b.*\b(?:not|didn't|isn't|other than|except)\b"
-)
-_NOT = re.compile(r"\b(?:not|other than|except) (?:in |for )?(red|green|blue)\b")
-_FORMER = {"former": 0, "latter": -1}
-
-
-def _describe(words: Sentence) -> Description:
+def _items(words: Sentence) -> tuple[Item, ...]:
+    """``two red cubes and one that is blue``: each quantity begins the words for one sort."""
     text = " ".join(words)
-    colours = tuple(word for word in words if word in COLOURS)
-    places = read_places(words)
-    if places:
-        return Description("place", place=places[0])
-    if _OTHER_OF.search(text) or _ONE_NOT.search(text):
-        return _complement(text, colours)
-    if _THAN.search(text):
-        return Description("not", colours)
-    if colours:
-        return Description("colour", colours[:1])
-    pointer = _pointer(words)
-    if pointer is not None:
-        return pointer
-    return Description("any")
+    found = [one for one in quantities(text) if _counts_things(one, text)]
+    if not found:
+        alone = "them" not in words and not _SINGULAR.isdisjoint(words)
+        return (Item(Count(quantity=1) if alone else None, describe(words)),)
+    ends = [*(one.start for one in found[1:]), len(text)]
+    return tuple(
+        Item(one.told, describe(_words_of(text, one, end)))
+        for one, end in zip(found, ends, strict=True)
+    )
 
 
-def _complement(text: str, colours: tuple[str, ...]) -> Description:
-    found = _NOT.search(text)
-    minus = found[1] if found else None
-    among = tuple(dict.fromkeys(colours))
-    return Description("other", () if among == (minus,) else among, minus)
+def _counts_things(one: Quantity, text: str) -> bool:
+    return not one.plain or text[one.start : one.end] not in ("once", "twice", "thrice")
 
 
-def _pointer(words: Sentence) -> Description | None:
-    if "there" in words:
-        return Description("introduced place")
-    for at, word in enumerate(words):
-        position = _FORMER.get(word)
-        rank = ordinal_of(word)
-        if position is None and rank is not None:
-            position = rank - 1
-        if position is not None:
-            is_place = bool({"place", "spot", "position"} & set(words[at + 1 : at + 2]))
-            return Description("introduced place" if is_place else "introduced", position=position)
-    if _PRONOUNS & set(words) or re.search(r"\bthat (cube|one)\b", " ".join(words)):
-        return Description("introduced")
-    return None
-
-
-_QUANTITY = r"(?P<quantity>that|it|this|\w+)(?: times?)?"
-_MORE_OR_FEWER = re.compile(
-    rf"\b(?P<step>\w+) (?:times? )?(?P<way>more|fewer|less)(?: times?)? than {_QUANTITY}"
-)
-_AS_MANY = re.compile(
-    rf"\b(?P<factor>twice|half|\w+ times) as (?:many times|often|much) as {_QUANTITY}"
-)
-_THAT_OFTEN = re.compile(r"\b(that|as) (many times|often)\b")
-_PLAIN = re.compile(r"\b(?P<number>\w+) times?\b")
-_ADVERBS = {"once": 1, "twice": 2, "thrice": 3}
-_FACTORS = {"twice": 2.0, "half": 0.5}
-
-
-def _count(words: Sentence) -> Count | None:
-    text = " ".join(words)
-    found = _MORE_OR_FEWER.search(text)
-    if found and (step := number_of(found["step"])) is not None:
-        sign = 1 if found["way"] == "more" else -1
-        return Count(offset=sign * step, quantity=number_of(found["quantity"]))
-    found = _AS_MANY.search(text)
-    if found:
-        factor = _FACTORS.get(found["factor"]) or number_of(found["factor"].split()[0])
-        return Count(factor=float(factor or 1), quantity=number_of(found["quantity"]))
-    if _THAT_OFTEN.search(text):
-        return Count()
-    for adverb, number in _ADVERBS.items():
-        if adverb in words:
-            return Count(quantity=number)
-    for plain in _PLAIN.finditer(text):
-        number_told = number_of(plain["number"])
-        if number_told is not None:
-            return Count(quantity=number_told)
-    return None
+def _words_of(text: str, one: Quantity, end: int) -> Sentence:
+    # A derived quantity has its colour inside: "one fewer red cube than that".
+    return tuple(text[one.start : end].split())

@@ -13,6 +13,7 @@ from typing import Literal
 
 from roboirg.episode import Scene, SceneObject
 from roboirg.language.resolver.tokens import Sentence, ordinal_of
+from roboirg.motions import Away
 
 Side = Literal["left", "right"]
 _SIDES: dict[str, Side] = {"left": "left", "right": "right"}
@@ -22,6 +23,7 @@ _FAR = frozenset({"far", "farthest", "furthest", "away", "back"})
 _LEAST = frozenset({"closest", "nearest"})
 _UTMOST = frozenset({"farthest", "furthest"})
 _LISTENER = frozenset({"you", "robot", "yourself"})
+_FIXTURES = frozenset({"button", "target", "bin"})
 _FILLERS = frozenset({"the", "to", "from", "a", "on", "at"})
 _CORNER_FILLERS = frozenset({"of", "the", "table", "that", "is"})
 _COLOURS = frozenset({"red", "green", "blue"})
@@ -156,8 +158,8 @@ def _read_relative(words: Sentence, at: int, rank: int, depth: int) -> tuple[Pla
     noun, following = _word(words, after), _word(words, after + 1)
     if noun in _LISTENER:
         return Towards(None, -1 if nearest else 1, rank), after + 1
-    if noun in ("button", "target"):
-        return Beside(noun, noun, nearest, rank), after + 1
+    if noun in _FIXTURES:
+        return _read_fixture(words, after, nearest=nearest, rank=rank)
     if noun in _COLOURS and following == "cube":
         return Beside(noun, "cube", nearest, rank), after + 2
     if noun in ("cube", "container") and depth < _MAX_DEPTH:
@@ -165,6 +167,16 @@ def _read_relative(words: Sentence, at: int, rank: int, depth: int) -> tuple[Pla
         if inner is not None:
             return Beside(inner[0], noun, nearest, rank), inner[1]
     return None
+
+
+def _read_fixture(
+    words: Sentence, at: int, *, nearest: bool, rank: int
+) -> tuple[Place, int] | None:
+    """``button``, ``target on your left``."""
+    noun, side = words[at], _SIDES.get(_word(words, at + 3))
+    if side is not None and words[at + 1 : at + 3] in (("on", "your"), ("on", "the")):
+        return Beside(Towards(side, 0), noun, nearest, rank), at + 4
+    return Beside(noun, noun, nearest, rank), at + 1
 
 
 def _word(words: Sentence, at: int) -> str:
@@ -184,13 +196,15 @@ def _depth(word: str) -> int:
 def find(place: Place, scene: Scene, kind: str, *, mirrored: bool) -> tuple[SceneObject, ...]:
     """What stands at a place, among the things of one kind: several if it is nearly a tie.
 
+    Cubes that appear later are nowhere yet; containers all come at once.
+
     Args:
         place: where.
         scene: everything on the table.
         kind: of the things that are compared.
         mirrored: whether left and right are those of the front camera's picture.
     """
-    candidates = [item for item in scene.objects if item.kind == kind]
+    candidates = _present(scene, kind)
     if isinstance(place, Towards):
         return _ranked(candidates, place.rank, *_measure(place, mirrored=mirrored))
     found: list[SceneObject] = []
@@ -200,6 +214,14 @@ def find(place: Place, scene: Scene, kind: str, *, mirrored: bool) -> tuple[Scen
         others = [item for item in candidates if item is not anchor]
         found += _ranked(others, place.rank, away, _TIE)
     return tuple(dict.fromkeys(found))
+
+
+def _present(scene: Scene, kind: str) -> list[SceneObject]:
+    late: set[str] = set()
+    if kind == "cube":
+        motions = [motion for motion in scene.motions if isinstance(motion, Away)]
+        late = {motion.subject for motion in motions if motion.start == 0}
+    return [item for item in scene.objects if item.kind == kind and item.name not in late]
 
 
 def _ranked(
@@ -239,7 +261,7 @@ def _tangent(item: SceneObject) -> float:
 def _anchors(place: Beside, scene: Scene, *, mirrored: bool) -> tuple[SceneObject, ...]:
     if not isinstance(place.anchor, str):
         return find(place.anchor, scene, place.kind, mirrored=mirrored)
-    like = [item for item in scene.objects if item.kind == place.kind]
+    like = _present(scene, place.kind)
     if place.anchor in _COLOURS:
         like = [item for item in like if item.colour == place.anchor]
     return tuple(like) if len(like) == 1 else ()

@@ -6,8 +6,14 @@ import re
 
 Sentence = tuple[str, ...]
 
-_WORD = re.compile(r"[a-z]+(?:'[a-z]+)?|[0-9]+|[,;:]")
+_WORD = re.compile(r"[0-9]+(?:st|nd|rd|th)\b|[a-z]+(?:'[a-z]+)?|[0-9]+|[,;:]")
 _SENTENCE_END = re.compile(r"[.!?\n]+")
+_SPELLINGS = (
+    ("’", "'"),
+    ("n't", " not"),
+    ("colour", "color"),
+    ("neighbour", "neighbor"),
+)
 
 _NUMBERS = {
     "zero": 0, "one": 1, "two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "seven": 7,
@@ -17,6 +23,13 @@ _ORDINALS = {
     "first": 1, "second": 2, "third": 3, "fourth": 4, "fifth": 5,
     "1st": 1, "2nd": 2, "3rd": 3, "4th": 4, "5th": 5,
 }  # fmt: skip
+_COLOURS = {"red": "red", "reds": "red", "green": "green", "greens": "green",
+            "blue": "blue", "blues": "blue"}  # fmt: skip
+
+NUMBER = rf"(?:{'|'.join(_NUMBERS)}|[0-9]+)"
+"""A regular expression for a cardinal number, in words or digits."""
+ORDINAL = rf"(?:{'|'.join(_ORDINALS)})"
+"""The same for an ordinal number."""
 
 
 def word_set(words: str) -> frozenset[str]:
@@ -25,8 +38,14 @@ def word_set(words: str) -> frozenset[str]:
 
 
 def split_sentences(text: str) -> tuple[Sentence, ...]:
-    """The sentences of a text as words and commas; empty ones are left out."""
-    parts = (tuple(_WORD.findall(part)) for part in _SENTENCE_END.split(text.lower()))
+    """The sentences of a text as words and commas; empty ones are left out.
+
+    American and British spelling, and short forms of *not*, come out alike.
+    """
+    text = text.lower()
+    for variant, usual in _SPELLINGS:
+        text = text.replace(variant, usual)
+    parts = (tuple(_WORD.findall(part)) for part in _SENTENCE_END.split(text))
     return tuple(part for part in parts if part)
 
 
@@ -40,3 +59,13 @@ def number_of(word: str) -> int | None:
 def ordinal_of(word: str) -> int | None:
     """1 for ``first``, 2 for ``second``, ..."""
     return _ORDINALS.get(word)
+
+
+def colour_of(word: str) -> str | None:
+    """The colour that a word names, as an adjective or a noun."""
+    return _COLOURS.get(word)
+
+
+def colours_in(words: Sentence) -> tuple[str, ...]:
+    """All colours that a sentence names, in order."""
+    return tuple(_COLOURS[word] for word in words if word in _COLOURS)

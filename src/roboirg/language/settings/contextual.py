@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from roboirg.language import templates
-from roboirg.language.kinds import Kind, kinds_in
+from roboirg.language.kinds import kinds_in
 from roboirg.language.phrases import Phrase, fill, plain, sentences
-from roboirg.language.request import Draft, Part, Request, Said, SettingRule
+from roboirg.language.request import Draft, Request, Said, SettingRule
 from roboirg.language.settings import direct
 
 REINFORCE, DISTRACT, ANNOUNCE = 2, 3, 4
@@ -36,7 +36,7 @@ def reinforcement(request: Request) -> Said:
     remarks: list[Phrase] = []
     for kind, parts in kinds_in(request):
         template = request.chooser.pick(f"{kind.name} reinforcement", kind.reinforcements)
-        remarks.append(fill(template, {"ref": kind.pointing(parts)}, plural=len(parts) > 1))
+        remarks.append(fill(template, {"ref": kind.pointing(parts)}, plural=kind.plural(parts)))
     return Said("reinforcement", sentences(remarks))
 
 
@@ -53,18 +53,8 @@ def _neutral(request: Request) -> Iterator[Phrase]:
 
 
 def _competing(request: Request) -> Iterator[Phrase]:
-    rivals = [
-        fill(template, {"other": plain(kind.word(value))}, plural=value != 1)
-        for kind, parts in kinds_in(request)
-        for value in _rival_values(kind, parts)
-        for template in kind.competitors
-    ]
+    rivals = [rival for kind, parts in kinds_in(request) for rival in kind.rivals(parts)]
     return request.chooser.endless("competing distractor", rivals)
-
-
-def _rival_values(kind: Kind, parts: tuple[Part, ...]) -> list[str | int]:
-    taken = {part.value for part in parts}
-    return [value for value in kind.values if value not in taken]
 
 
 SETTING = SettingRule("contextual", say)

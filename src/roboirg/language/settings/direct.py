@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from roboirg.language.kinds import kinds_in
-from roboirg.language.phrases import Phrase, sentences
+from roboirg.language.kinds import Fields, kinds_in
+from roboirg.language.phrases import sentences
 from roboirg.language.request import Draft, Request, Said, SettingRule
 from roboirg.language.settings.explicit import stated
 
@@ -18,7 +18,7 @@ def command(request: Request) -> Said:
     """What direct and contextual instructions end with."""
     if request.resolved:
         return Said("command", request.command(stated(request)))
-    fields: dict[str, Phrase] = {}
+    fields: Fields = {}
     for kind, parts in kinds_in(request):
         fields |= kind.reduced(request, parts)
     return Said("command", request.command(fields))

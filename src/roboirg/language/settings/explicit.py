@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from roboirg.language.kinds import KINDS
-from roboirg.language.phrases import Phrase
+from roboirg.language.kinds import Fields, kinds_in
 from roboirg.language.request import Draft, Request, Said, SettingRule
 
 
-def stated(request: Request) -> dict[str, Phrase]:
+def stated(request: Request) -> Fields:
     """The fields of the command, every value named outright."""
-    return {part.field: KINDS[part.kind].named(request, part) for part in request.parts}
+    fields: Fields = {}
+    for kind, parts in kinds_in(request):
+        fields |= kind.stated(request, parts)
+    return fields
 
 
 def say(request: Request) -> Draft:

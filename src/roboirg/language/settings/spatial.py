@@ -9,10 +9,12 @@ from collections.abc import Mapping, Sequence
 
 from roboirg.language import templates
 from roboirg.language.instruction import Expression
+from roboirg.language.kinds import described
 from roboirg.language.landmarks import Landmark, landmarks
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain
+from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain, sentences
 from roboirg.language.request import Draft, Part, Request, Said, SettingRule
 from roboirg.language.settings.explicit import stated
+from roboirg.motions import Swap
 
 POINTING: Mapping[int, tuple[tuple[str, Expression], ...]] = {
     1: (("there", "there"),),
@@ -26,23 +28,30 @@ POINTING: Mapping[int, tuple[tuple[str, Expression], ...]] = {
 
 
 def usable(request: Request, part: Part) -> tuple[Landmark, ...]:
-    """The landmarks that could tell where the thing of this part is."""
+    """The landmarks of the best class that could tell where a thing of this part is."""
     thing = request.task.commands.thing
-    return landmarks(request.episode.scene, thing, request.target(part), request.frame)
+    scene = request.episode.scene
+    found = [
+        landmark
+        for target in request.targets(part)
+        for landmark in landmarks(scene, thing, target, request.frame)
+    ]
+    best = min((landmark.level for landmark in found), default=0)
+    return tuple(landmark for landmark in found if landmark.level == best)
 
 
 def can_say(request: Request) -> bool:
-    """Whether every target has a landmark."""
-    return all(usable(request, part) for part in request.parts_of("colour"))
+    """Whether every colour has a thing with a landmark."""
+    return all(usable(request, part) for part in request.coloured)
 
 
 def say(request: Request) -> Draft:
-    """An introduction with a landmark for each target, and a command that points there."""
-    parts = request.parts_of("colour")
+    """An introduction with a landmark for each colour, and a command that points there."""
+    parts = request.coloured
     chosen = [
         request.chooser.pick(f"landmark-{part.field}", usable(request, part)) for part in parts
     ]
-    fields = stated(request)
+    things: list[Phrase] = []
     pointing = POINTING[len(parts)]
     for part, landmark, (words, expression) in zip(parts, chosen, pointing, strict=True):
         place = (
@@ -50,7 +59,8 @@ def say(request: Request) -> Draft:
             if request.resolved
             else anaphor(words, expression, part.slot, part.value)
         )
-        fields[part.field] = request.by_place(place)
+        things.append(request.by_place(place, plural=request.count_of(part) > 1))
+    fields = stated(request) | described(request, things)
     said = (introduction(request, parts, chosen), Said("command", request.command(fields)))
     notes = {
         "landmarks": [landmark.phrase for landmark in chosen],
@@ -61,7 +71,7 @@ def say(request: Request) -> Draft:
 
 
 def introduction(request: Request, parts: Sequence[Part], chosen: Sequence[Landmark]) -> Said:
-    """A sentence that names the places, and whose left and right is meant where it matters."""
+    """The places, whose left and right is meant where it matters, and when, if things move."""
     noun = plain(f"the {request.task.commands.thing} ")
     things: list[Phrase] = [
         (*noun, *antecedent(landmark.phrase, part.slot, part.value))
@@ -74,7 +84,10 @@ def introduction(request: Request, parts: Sequence[Part], chosen: Sequence[Landm
     else:
         purpose, options = "camera place introduction", templates.CAMERA_PLACE_INTRODUCTIONS
     template = request.chooser.pick(purpose, options)
-    return Said("introduction", fill(template, {"things": listed(things)}, plural=len(things) > 1))
+    said = [fill(template, {"things": listed(things)}, plural=len(things) > 1)]
+    if any(isinstance(motion, Swap) for motion in request.episode.scene.motions):
+        said.append(plain(request.chooser.pick("moved", templates.MOVED_INTRODUCTIONS)))
+    return Said("introduction", sentences(said))
 
 
 SETTING = SettingRule("spatial", say, can_say)

@@ -1,0 +1,23 @@
+"""The reasoning patterns by name; a pattern has a way for each kind of value that it can derive."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from roboirg.language.patterns import deduction, exclusion, moments, sequence
+from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
+from roboirg.language.request import Request
+
+__all__ = ["PATTERNS", "REFERENCE", "Derived", "Pattern", "way"]
+
+PATTERNS: Mapping[str, tuple[Pattern, ...]] = {
+    "colour exclusion": (exclusion.ONE_COLOUR,),
+    "number deduction": (deduction.TIMES, deduction.AMOUNTS, deduction.VISIT),
+    "sequential relation": (sequence.ORDINAL, moments.NEIGHBOR),
+    "contextual logic": (exclusion.TWO_AMOUNTS, moments.OTHER),
+}
+
+
+def way(name: str, request: Request) -> Pattern | None:
+    """How a pattern derives the episode's goal, or None if it cannot."""
+    return next((one for one in PATTERNS[name] if one.allows(request)), None)

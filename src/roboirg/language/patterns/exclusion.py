@@ -1,0 +1,73 @@
+"""Colour exclusion, and contextual logic on the two excluded colours."""
+
+from __future__ import annotations
+
+import itertools
+
+from roboirg.language import templates
+from roboirg.language.kinds import described
+from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
+from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, sentences
+from roboirg.language.request import Part, Request, other_colours
+
+
+def _exclude(request: Request) -> Derived:
+    """The colour that is not among two; a second target is the other one of the two."""
+    target, *rest = request.coloured
+    pair = request.chooser.pick("pair", list(itertools.permutations(other_colours(target.colour))))
+    both = " and ".join(pair)
+    named = antecedent(both, REFERENCE, both)
+    template = request.chooser.pick("pair introduction", templates.PAIR_INTRODUCTIONS)
+    context = [fill(template, {"pair": named})]
+    word = request.chooser.pick("pair anaphor", templates.PAIR_ANAPHORS)
+    reference = named if request.resolved else anaphor(word, "pair", REFERENCE, both)
+    counted = bool(request.parts_of("amount"))
+    options = templates.AMOUNT_EXCLUSIONS if counted else templates.EXCLUSIONS
+    exclusion = request.chooser.pick("exclusion", options)
+    things = [_thing(request, target, exclusion, {"pair": reference})]
+    patterns = ["colour exclusion"]
+    for part in rest:
+        context.append(_singled(request, part, pair))
+        options = templates.AMOUNT_COMPLEMENTS if counted else templates.COMPLEMENTS
+        complement = request.chooser.pick("complement", options)
+        other = _other(request, part, pair, word)
+        things.append(_thing(request, part, complement, {"other": other}))
+        patterns.append("contextual logic")
+    return Derived(sentences(context), described(request, things), {"patterns": patterns})
+
+
+def _thing(request: Request, part: Part, template: str, fields: dict[str, Phrase]) -> Phrase:
+    return request.by_colour(fill(template, fields, plural=request.count_of(part) > 1))
+
+
+def _singled(request: Request, part: Part, pair: tuple[str, ...]) -> Phrase:
+    """A remark that chooses one of the pair, not the one that is meant."""
+    chosen = _rejected(part, pair)
+    remark = request.chooser.pick("singled introduction", templates.SINGLED_INTRODUCTIONS)
+    return fill(remark, {"single": antecedent(chosen, REFERENCE, chosen)})
+
+
+def _other(request: Request, part: Part, pair: tuple[str, ...], word: str) -> Phrase:
+    """The command's words for the other one of the pair."""
+    if request.resolved:
+        words = f"the color of {' and '.join(pair)} that is not {_rejected(part, pair)}"
+        return antecedent(words, part.slot, part.value)
+    words = f"the color of {word} that I did not choose"
+    return anaphor(words, "other", part.slot, part.value)
+
+
+def _rejected(part: Part, pair: tuple[str, ...]) -> str:
+    return next(colour for colour in pair if colour != part.value)
+
+
+def _allows_one(request: Request) -> bool:
+    # The second of two picks is told by the pair of the first, whatever the main pattern's name.
+    return bool(request.parts_of("colour")) or len(request.coloured) == 1
+
+
+def _allows_two_amounts(request: Request) -> bool:
+    return bool(request.parts_of("amount")) and len(request.coloured) == 2  # noqa: PLR2004
+
+
+ONE_COLOUR = Pattern(_allows_one, _exclude)
+TWO_AMOUNTS = Pattern(_allows_two_amounts, _exclude)
