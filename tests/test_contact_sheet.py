@@ -9,6 +9,7 @@ from roboirg.episode import Scene
 from roboirg.errors import InvalidValueError
 from roboirg.motions import Away, Glow, Point, Shuttle, Swap, Vanish
 from roboirg.showing.contact_sheet import Moment, compose_sheet, thinned, write_png
+from roboirg.showing.happenings import Happenings
 from roboirg.showing.playthrough import FEWEST, MOST, choose, play_through
 from roboirg.showing.words import fact_words, motion_lines, video_lines
 from roboirg.splits import get_episode
@@ -84,15 +85,15 @@ def test_thinning_keeps_the_ends():
 
 
 def test_the_remarkable_is_chosen_first_and_fillers_only_fill_up():
-    assert choose([0, 3, 3, 3, 0]) == (0, 1, 2, 3, 4)
-    filled = choose([0, *[3] * 20, 1, 0])
+    assert choose([0, 4, 4, 4, 0]) == (0, 1, 2, 3, 4)
+    filled = choose([0, *[4] * 20, 1, 0])
     assert len(filled) == FEWEST
     assert {0, 21, 22} <= set(filled)
-    assert choose([0, 1, 3, 1, 3, 1, 1, 0]) == (0, 1, 3, 5, 6, 7)
-    crowded = [0, *[2] * 20, 0, *[1] * 8, 0]
+    assert choose([0, 1, 4, 1, 4, 1, 1, 0]) == (0, 1, 3, 5, 6, 7)
+    crowded = [0, *[3] * 20, 0, *[1] * 8, 0]
     chosen = choose(crowded)
     assert len(chosen) == MOST
-    assert [crowded[position] for position in chosen].count(2) == 1
+    assert [crowded[position] for position in chosen].count(3) == 1
     assert len(choose([1] * 40)) == MOST
 
 
@@ -146,3 +147,16 @@ def test_a_playthrough_shows_the_start_each_stage_and_the_end():
     assert played.moments[-1].step == played.steps
     assert all(one.pictures[0].shape == (256, 256, 3) for one in played.moments)
     assert len({one.pictures[0].tobytes() for one in played.moments}) > 2
+
+
+def test_what_moves_by_itself_is_remarkable_while_it_does():
+    episode = get_episode("ButtonUnmaskSwap", "test", 3)
+    happenings = Happenings(episode.scene.motions)
+    told = {step: happenings.at(step, 0) for step in range(300)}
+    assert str(told[33]).endswith("container 3 appear")
+    swaps = [step for step, words in told.items() if words and "change places" in words]
+    count = sum(isinstance(motion, Swap) for motion in episode.scene.motions)
+    assert swaps == [90, 140, 190][:count]
+
+    late = Happenings([Swap("a", "b", 50, 50, 0.1, stage=2)])
+    assert [step for step in range(200) if late.at(step, 2 if step >= 80 else 0)] == [156]

@@ -25,9 +25,20 @@ FAR_OFF_SHARE = 0.01
 END = -1
 MOMENTS = {
     ("PickXtimes", 2): {1: "start", 95: "middle", END: "end"},
+    ("StopCube", 3): {END: "stopped"},
+    ("SwingXtimes", 3): {END: "glowing"},
+    ("BinFill", 3): {160: "filling"},
+    ("VideoUnmaskSwap", 3): {90: "swapping"},
     ("VideoUnmask", 3): {20: "start", 160: "middle", END: "end"},
+    ("ButtonUnmaskSwap", 3): {140: "swapping"},
+    ("ButtonUnmask", 3): {END: "lifted"},
+    ("VideoRepick", 2): {236: "swapping"},
+    ("VideoPlaceButton", 3): {END: "placed"},
+    ("VideoPlaceOrder", 3): {END: "placed"},
 }
 """Elapsed steps of the oracle's run; the last is the step of success, whichever it is."""
+BOTH_CAMERAS = {"PickXtimes", "VideoUnmask"}
+"""Of the other tasks the front picture is kept: the wrist's shows no other things."""
 
 
 def film(task: str, index: int, steps: set[int]) -> dict[tuple[int, str], np.ndarray]:
@@ -49,8 +60,11 @@ def film(task: str, index: int, steps: set[int]) -> dict[tuple[int, str], np.nda
 @pytest.mark.parametrize(("task", "index"), MOMENTS)
 def test_pictures_look_as_they_did_when_they_were_looked_at(task, index):
     moments = MOMENTS[task, index]
-    taken = film(task, index, set(moments))
-    assert len(taken) == len(moments) * len(CAMERAS)
+    cameras = CAMERAS if task in BOTH_CAMERAS else ("front",)
+    taken = {
+        key: picture for key, picture in film(task, index, set(moments)).items() if key[1] in cameras
+    }
+    assert len(taken) == len(moments) * len(cameras)
     for (elapsed, camera), picture in taken.items():
         file = PICTURES / f"{task}_{moments[elapsed]}_{camera}.png"
         known = cv2.cvtColor(cv2.imread(str(file)), cv2.COLOR_BGR2RGB).astype(int)
@@ -58,7 +72,9 @@ def test_pictures_look_as_they_did_when_they_were_looked_at(task, index):
         assert off.mean() < FAR_OFF_SHARE, f"{file.name} differs"
 
 
-@pytest.mark.parametrize(("task", "index"), MOMENTS)
+@pytest.mark.parametrize(
+    ("task", "index"), [("PickXtimes", 2), ("VideoUnmaskSwap", 3), ("BinFill", 3)]
+)
 def test_leaving_out_what_a_camera_cannot_see_changes_no_pixel(task, index, monkeypatch):
     steps = set(range(40, 300, 20))
     culled = film(task, index, steps)

@@ -15,6 +15,7 @@ from roboirg.language import instruct
 from roboirg.observations import CAMERAS
 from roboirg.policies import make_policy, play
 from roboirg.showing.contact_sheet import Moment, compose_sheet, thinned, write_png
+from roboirg.showing.happenings import Happenings
 
 if TYPE_CHECKING:
     from roboirg.environment import RoboIRGEnv
@@ -24,7 +25,7 @@ MOST, FEWEST = 12, 6
 FILLER_STEPS = 16
 """Control steps between two moments that may fill a sheet up."""
 
-_ESSENTIAL, _STAGE, _SHOWN_STAGE, _FILLER = range(4)
+_ESSENTIAL, _STAGE, _HAPPENING, _SHOWN_STAGE, _FILLER = range(5)
 
 
 @dataclass(frozen=True)
@@ -43,14 +44,14 @@ class Playthrough:
 
 
 def play_through(episode: Episode) -> Playthrough:
-    """Let the oracle play, and keep pictures of the start, of each completed stage and the end.
+    """Let the oracle play, and keep pictures: start, completed stages, what moves by itself, end.
 
     Raises:
         RenderDeviceError: no Vulkan device can render.
         MissingDependencyError: the simulator is not installed.
     """
     env = roboirg.make(episode, cameras=())
-    watch = _Watch()
+    watch = _Watch(Happenings(episode.scene.motions))
     env.set_frame_hook(watch)
     try:
         info = play(env, make_policy("oracle", 0))
@@ -83,15 +84,18 @@ class _Watch:
     """Looks at the world after each control step and photographs what is remarkable.
 
     Attributes:
+        happenings: tells what moves by itself.
         seen: moments with their rank; one moment for each step, the newest.
     """
 
+    happenings: Happenings
     seen: dict[int, tuple[int, Moment]] = field(default_factory=dict)
     _completed: int = 0
     _is_demonstration: bool | None = None
 
     def __call__(self, env: RoboIRGEnv, is_demonstration: bool) -> None:
-        judge = env.session.judge
+        judge, step = env.session.judge, env.session.world.elapsed
+        happening = self.happenings.at(step, judge.index)
         begins = is_demonstration != self._is_demonstration
         completes = judge.index > self._completed
         self._is_demonstration = is_demonstration
@@ -101,7 +105,9 @@ class _Watch:
         elif completes:
             what = plain_subgoal(judge.stages[judge.index - 1])
             self.shoot(env, _SHOWN_STAGE if is_demonstration else _STAGE, f"done: {what}")
-        elif env.session.world.elapsed % FILLER_STEPS == 0:
+        elif happening is not None:
+            self.shoot(env, _HAPPENING, happening)
+        elif step % FILLER_STEPS == 0:
             due = judge.current
             self.shoot(env, _FILLER, plain_subgoal(due) if due else "")
         self._completed = judge.index
@@ -127,7 +133,7 @@ def choose(ranks: Sequence[int]) -> tuple[int, ...]:
     up on which little else is.
     """
     kept: list[int] = []
-    for rank in (_ESSENTIAL, _STAGE, _SHOWN_STAGE, _FILLER):
+    for rank in (_ESSENTIAL, _STAGE, _HAPPENING, _SHOWN_STAGE, _FILLER):
         candidates = [position for position, one in enumerate(ranks) if one == rank]
         room = max(0, (FEWEST if rank == _FILLER else MOST) - len(kept))
         kept += [candidates[number] for number in thinned(len(candidates), room)]
