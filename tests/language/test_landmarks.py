@@ -5,7 +5,7 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from language_variants import TASKS, random_episodes
+from language_variants import SPATIAL_TASKS, random_episodes
 
 from roboirg.episode import COLOURS, Point, Scene, SceneObject
 from roboirg.language import FORMS, expressible, instruct, resolve
@@ -172,7 +172,7 @@ def test_a_place_of_two_things_makes_two_goals():
     assert {goal.text("colour") for goal in goals} == {"red", "green"}
 
 
-@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("task", SPATIAL_TASKS)
 def test_the_camera_frame_mixes_no_points_of_view(task):
     for episode in random_episodes(task, 200):
         if "spatial" in expressible(episode, frame="camera"):

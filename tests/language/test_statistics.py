@@ -1,37 +1,93 @@
-"""Counting what instructions are made of."""
+"""Counting what instructions are made of, and drawing it."""
 
-from language_variants import TASKS, default_variants, split_episodes
+import functools
+import io
 
-from roboirg.language import instruct, statistics
+import pytest
+from language_variants import TASKS
+from rich.console import Console
+
+from roboirg.errors import InvalidValueError, MissingDependencyError
+from roboirg.language import SETTINGS, figure, overview, statistics
+from roboirg.language.variants import instructions, split_episodes
+from roboirg.tasks import all_tasks
 
 
-def instructions(task):
-    for episode in split_episodes(task):
-        for setting, form, options in default_variants(episode):
-            if form == "implicit":
-                yield instruct(episode, setting, form, **options)
+@functools.cache
+def said():
+    """All implicit forms of the test split."""
+    episodes = [episode for task in TASKS for episode in split_episodes(task, "test")]
+    return tuple(one for _, one in instructions(episodes, SETTINGS, ("implicit",)))
 
 
 def test_expressions_are_counted_once_per_scene():
-    said = [one for task in TASKS for one in instructions(task)]
-    counts = statistics.expression_counts(said)
-    assert statistics.expression_counts(said * 2) == counts
-    scenes = len({one.episode for one in said})
+    counts = statistics.expression_counts(said())
+    assert statistics.expression_counts(said() * 2) == counts
+    scenes = statistics.scene_counts(said() * 2)
+    assert scenes["direct"] == 50 * len(TASKS)
+    assert scenes["spatial"] == 50 * sum("spatial" in one.settings for one in all_tasks().values())
     assert "explicit" not in counts
-    assert max(number for by in counts.values() for number in by.values()) <= scenes
+    for setting, by_class in counts.items():
+        assert max(by_class.values()) <= scenes[setting]
     ranks = {"former", "latter", "first", "second", "third"}
     assert set(counts["direct"]) == {"it", "them", "that", "then", *ranks}
     assert {"pair", "that", "other"} == set(counts["reasoning"])
     assert {"there", *ranks} == set(counts["spatial"])
+    order = statistics.expression_order(counts)
+    assert set(order) == {name for by_class in counts.values() for name in by_class}
+    assert order.index("it") < order.index("former") < order.index("there")
 
 
 def test_lengths_patterns_relations_and_landmarks():
-    said = [one for task in TASKS for one in instructions(task)]
-    lengths = statistics.word_counts(said)
+    lengths = statistics.word_counts(said())
     assert lengths["explicit"].mean < lengths["direct"].mean < lengths["contextual"].mean
     assert all(one.shortest <= one.mean <= one.longest for one in lengths.values())
-    patterns = statistics.pattern_counts(said)
-    assert patterns["PickXtimes"] == {"colour exclusion": 100, "number deduction": 100}
-    assert sum(statistics.relation_counts(said)["PickXtimes"].values()) == 100
-    assert set(statistics.relation_counts(said)["VideoPlaceOrder"]) >= {"right after", "neighbor"}
-    assert set(statistics.landmark_counts(said)["VideoUnmask"]) >= {"1", "2", "3"}
+    patterns = statistics.pattern_counts(said())
+    assert patterns["PickXtimes"] == {"colour exclusion": 25, "number deduction": 25}
+    assert sum(statistics.relation_counts(said())["PickXtimes"].values()) == 25
+    assert set(statistics.relation_counts(said())["VideoPlaceOrder"]) >= {"right after", "neighbor"}
+    assert set(statistics.landmark_counts(said())["VideoUnmask"]) >= {"1", "2", "3"}
+
+
+def test_the_tables_hold_the_counts():
+    console = Console(width=160, file=io.StringIO())
+    for table in overview.overview_tables(said()):
+        console.print(table)
+    text = console.file.getvalue()
+    counts = statistics.expression_counts(said())
+    row = next(
+        line for line in text.splitlines() if line.startswith("│ spatial") and "." not in line
+    )
+    assert str(counts["spatial"]["there"]) in row
+    relations = statistics.relation_counts(said())
+    for name in {name for by_task in relations.values() for name in by_task}:
+        assert name in text
+    assert list(overview.overview_tables(said()[:1]))  # a single explicit command has no patterns
+
+
+def test_the_figure_is_drawn_the_same_every_time(tmp_path):
+    pytest.importorskip("matplotlib")
+    first = figure.write_figure(said(), tmp_path / "one", "expressions", "A title")
+    second = figure.write_figure(said(), tmp_path / "two", "expressions", "A title")
+    assert [path.name for path in first] == ["expressions.png", "expressions.svg"]
+    for one, two in zip(first, second, strict=True):
+        assert one.read_bytes() == two.read_bytes()
+    assert first[0].read_bytes().startswith(b"\x89PNG")
+
+
+def test_no_words_give_an_empty_figure(tmp_path):
+    pytest.importorskip("matplotlib")
+    assert figure.write_figure((), tmp_path, "none", "Nothing")[0].exists()
+
+
+def test_a_folder_that_cannot_be_is_one_sentence(tmp_path):
+    pytest.importorskip("matplotlib")
+    (tmp_path / "file").touch()
+    with pytest.raises(InvalidValueError, match="Cannot write"):
+        figure.write_figure(said()[:5], tmp_path / "file" / "folder", "name", "title")
+
+
+def test_without_matplotlib_one_sentence_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "matplotlib", None)
+    with pytest.raises(MissingDependencyError, match=r"roboirgbench\[report\]"):
+        figure.check_figure_support()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import itertools
 from collections.abc import Iterator, Sequence
@@ -28,21 +29,32 @@ class Chooser:
     key: str
     log: list[str] = field(default_factory=list)
 
-    def generator(self, purpose: str) -> np.random.Generator:
-        """The stream of a purpose, from its beginning."""
-        digest = hashlib.sha256(f"{self.key}|{purpose}".encode()).digest()
-        return np.random.default_rng(int.from_bytes(digest[:8], "little"))
-
     def pick(self, purpose: str, options: Sequence[Option]) -> Option:
         """One of the options, all equally likely."""
-        return self._take(purpose, options, int(self.generator(purpose).integers(len(options))))
+        return self._take(purpose, options, _drawn(self.key, purpose, len(options)))
 
     def endless(self, purpose: str, options: Sequence[Option]) -> Iterator[Option]:
         """All the options in random order, again and again; what is taken is logged."""
-        order: list[int] = self.generator(purpose).permutation(len(options)).tolist()
-        for index in itertools.cycle(order):
+        for index in itertools.cycle(_shuffled(self.key, purpose, len(options))):
             yield self._take(purpose, options, index)
 
     def _take(self, purpose: str, options: Sequence[Option], index: int) -> Option:
         self.log.append(f"{purpose}/{index}")
         return options[index]
+
+
+def _generator(key: str, purpose: str) -> np.random.Generator:
+    """The stream of a purpose, from its beginning."""
+    digest = hashlib.sha256(f"{key}|{purpose}".encode()).digest()
+    return np.random.default_rng(int.from_bytes(digest[:8], "little"))
+
+
+# Kept, because the settings and forms of an episode draw the same.
+@functools.lru_cache(maxsize=1024)
+def _drawn(key: str, purpose: str, count: int) -> int:
+    return int(_generator(key, purpose).integers(count))
+
+
+@functools.lru_cache(maxsize=1024)
+def _shuffled(key: str, purpose: str, count: int) -> tuple[int, ...]:
+    return tuple(_generator(key, purpose).permutation(count).tolist())

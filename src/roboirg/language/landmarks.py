@@ -7,6 +7,7 @@ or "the robot" in the camera frame, so that one instruction has one point of vie
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Literal, NamedTuple
@@ -82,6 +83,8 @@ class Selector(NamedTuple):
         return first if all(other is first for other in others) else None
 
 
+# Kept, because the forms of an episode ask the same.
+@functools.lru_cache(maxsize=64)
 def landmarks(
     scene: Scene, thing: Literal["cube", "container"], target: SceneObject, frame: Frame = "robot"
 ) -> tuple[Landmark, ...]:

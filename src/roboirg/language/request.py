@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
-from roboirg.episode import COLOURS, Episode, SceneObject
+from roboirg.episode import COLOURS, Episode, Goal, Scene, SceneObject
 from roboirg.errors import InvalidValueError
 from roboirg.language.choice import Chooser
 from roboirg.language.instruction import Form, Setting, UtteranceStage
 from roboirg.language.landmarks import Frame
 from roboirg.language.phrases import Phrase, fill
-from roboirg.tasks import Task
+from roboirg.tasks import Task, get_task
 
 Distractor = Literal["neutral", "competing"]
 DISTRACTORS: tuple[Distractor, ...] = ("neutral", "competing")
@@ -78,20 +79,7 @@ class Request:
     @property
     def parts(self) -> tuple[Part, ...]:
         """The values of the goal, in the order of its slots."""
-        parts: list[Part] = []
-        slots = self.episode.goal.slots
-        counted = "counts" in dict(slots)
-        for slot, value in slots:
-            kind = "amount" if counted and slot in COLOUR_SLOTS else PART_KINDS[slot]
-            if isinstance(value, tuple):
-                several: tuple[str | int, ...] = value
-                fields = (f"{slot}.{index}" for index in range(len(several)))
-                parts += [
-                    Part(field, slot, kind, one) for field, one in zip(fields, several, strict=True)
-                ]
-            else:
-                parts.append(Part(slot, slot, kind, value))
-        return tuple(parts)
+        return _parts(self.episode.goal)
 
     def parts_of(self, kind: PartKind) -> tuple[Part, ...]:
         """The parts of one kind."""
@@ -110,13 +98,7 @@ class Request:
 
     def numbers_instead(self, slot: str) -> tuple[tuple[int, ...], ...]:
         """What a slot of numbers could hold in this scene, all other slots being as they are."""
-        mine = dict(self.episode.goal.slots) | {slot: 0}
-        choices = [dict(goal.slots) for goal in self.task.goals(self.episode.scene)]
-        values = [choice[slot] for choice in choices if choice | {slot: 0} == mine]
-        return tuple(
-            tuple(int(one) for one in (value if isinstance(value, tuple) else (value,)))
-            for value in values
-        )
+        return _numbers_instead(self.task.name, self.episode.scene, self.episode.goal, slot)
 
     def by_colour(self, cube: Phrase) -> Phrase:
         """The thing to handle, told by its cube."""
@@ -176,3 +158,32 @@ def other_colours(colour: str) -> tuple[str, ...]:
             f"{colour!r} is not a colour; the colours are {', '.join(COLOURS)}."
         )
     return tuple(other for other in COLOURS if other != colour)
+
+
+# Kept, because the settings and forms of an episode ask the same.
+@functools.lru_cache(maxsize=256)
+def _parts(goal: Goal) -> tuple[Part, ...]:
+    parts: list[Part] = []
+    counted = "counts" in dict(goal.slots)
+    for slot, value in goal.slots:
+        kind = "amount" if counted and slot in COLOUR_SLOTS else PART_KINDS[slot]
+        if isinstance(value, tuple):
+            several: tuple[str | int, ...] = value
+            fields = (f"{slot}.{index}" for index in range(len(several)))
+            parts += [
+                Part(field, slot, kind, one) for field, one in zip(fields, several, strict=True)
+            ]
+        else:
+            parts.append(Part(slot, slot, kind, value))
+    return tuple(parts)
+
+
+@functools.lru_cache(maxsize=64)
+def _numbers_instead(task: str, scene: Scene, goal: Goal, slot: str) -> tuple[tuple[int, ...], ...]:
+    mine = dict(goal.slots) | {slot: 0}
+    choices = [dict(one.slots) for one in get_task(task).goals(scene)]
+    values = [choice[slot] for choice in choices if choice | {slot: 0} == mine]
+    return tuple(
+        tuple(int(one) for one in (value if isinstance(value, tuple) else (value,)))
+        for value in values
+    )

@@ -5,9 +5,9 @@ from __future__ import annotations
 import statistics
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import NamedTuple, cast
+from typing import NamedTuple, cast, get_args
 
-from roboirg.language.instruction import Instruction
+from roboirg.language.instruction import Expression, Instruction
 
 
 class Lengths(NamedTuple):
@@ -43,6 +43,18 @@ def expression_counts(instructions: Iterable[Instruction]) -> Counts:
     for setting, _, expression in sorted(scenes):
         counts.setdefault(setting, Counter())[expression] += 1
     return counts
+
+
+def expression_order(counts: Counts) -> tuple[str, ...]:
+    """The classes that occur at all, in the order of their definition."""
+    found = {name for one in counts.values() for name in one}
+    return tuple(name for name in get_args(Expression) if name in found)
+
+
+def scene_counts(instructions: Iterable[Instruction]) -> Mapping[str, int]:
+    """How many scenes there are, by setting."""
+    scenes = {(instruction.setting, instruction.episode) for instruction in instructions}
+    return Counter(setting for setting, _ in scenes)
 
 
 def word_counts(instructions: Iterable[Instruction]) -> Mapping[str, Lengths]:

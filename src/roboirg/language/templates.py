@@ -184,6 +184,8 @@ EXCLUSIONS = (
 PAIR_ANAPHORS = ("that pair", "those two")
 COMPLEMENTS = ("the cube in {other}", "the cube with {other}")
 """The second pick: of the two excluded colours, the one that was not chosen."""
+AMOUNT_PAIR_ANAPHORS = ("that pair",)
+"""Next to numbers of cubes *those two* would be two cubes."""
 AMOUNT_EXCLUSIONS = (
     "cube[|s] of a color other than {pair}",
     "cube[|s] whose color is different from {pair}",

@@ -130,9 +130,9 @@ COMMANDS = Commands(
     patterns=("number deduction", "sequential relation"),
     wordings=(
         Wording("Press the button so that the cube stops on the target during {visit}."),
-        Wording("Stop the cube on the target during {visit} by pressing the button."),
+        Wording("Use the button to stop the cube on the target during {visit}."),
         Wording(
-            "I want you to stop the cube on the target during {visit} with a press of the button."
+            "I want you to stop the cube on the target with a press of the button during {visit}."
         ),
     ),
 )

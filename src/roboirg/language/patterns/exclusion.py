@@ -19,9 +19,10 @@ def _exclude(request: Request) -> Derived:
     named = antecedent(both, REFERENCE, both)
     template = request.chooser.pick("pair introduction", templates.PAIR_INTRODUCTIONS)
     context = [fill(template, {"pair": named})]
-    word = request.chooser.pick("pair anaphor", templates.PAIR_ANAPHORS)
-    reference = named if request.resolved else anaphor(word, "pair", REFERENCE, both)
     counted = bool(request.parts_of("amount"))
+    anaphors = templates.AMOUNT_PAIR_ANAPHORS if counted else templates.PAIR_ANAPHORS
+    word = request.chooser.pick("pair anaphor", anaphors)
+    reference = named if request.resolved else anaphor(word, "pair", REFERENCE, both)
     options = templates.AMOUNT_EXCLUSIONS if counted else templates.EXCLUSIONS
     exclusion = request.chooser.pick("exclusion", options)
     things = [_thing(request, target, exclusion, {"pair": reference})]

@@ -7,6 +7,7 @@ shows, and which goals a task can have at all.
 
 from __future__ import annotations
 
+import functools
 from typing import NamedTuple
 
 from roboirg.episode import Goal, Scene
@@ -46,7 +47,7 @@ def resolve(text: str, scene: Scene, task: str) -> Resolution:
     Raises:
         UnknownNameError: there is no such task.
     """
-    candidates = get_task(task).goals(scene)
+    candidates = _possible_goals(scene, task)
     sentences = split_sentences(text)
     first, last = _command_span(sentences)
     context = listen(sentences[:first])
@@ -58,6 +59,12 @@ def resolve(text: str, scene: Scene, task: str) -> Resolution:
     goals = tuple(goal for goal in candidates if all(fits(goal) for fits in tests))
     complaints = listener.complaints if first < last else ["no command", *listener.complaints]
     return Resolution(goals, tuple(dict.fromkeys(complaints)))
+
+
+@functools.lru_cache(maxsize=64)
+def _possible_goals(scene: Scene, task: str) -> tuple[Goal, ...]:
+    # Kept, because the same scene is read about in many settings.
+    return get_task(task).goals(scene)
 
 
 def _command_span(sentences: tuple[Sentence, ...]) -> tuple[int, int]:

@@ -1,0 +1,98 @@
+"""Every variant there is, and every way in which one episode can be told."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from roboirg.episode import Episode, Split
+from roboirg.language.compose import STAGE_SETS, expressible, instruct
+from roboirg.language.instruction import FORMS, Form, Instruction, Setting
+from roboirg.language.landmarks import FRAMES
+from roboirg.language.request import DISTRACTORS
+from roboirg.language.settings import all_settings
+from roboirg.splits import SIZES, get_episode
+from roboirg.tasks import all_tasks
+
+EXPLICIT: Setting = "explicit"
+"""The setting that every other one is compared with; it is no variant."""
+
+
+class Variant(NamedTuple):
+    """A task in one of the settings that leave something implicit."""
+
+    task: str
+    setting: str
+
+
+class Telling(NamedTuple):
+    """One way to tell an episode: the arguments of `instruct`."""
+
+    setting: str
+    form: Form
+    options: Mapping[str, Any]
+
+    @property
+    def implicit(self) -> bool:
+        """Whether the command leaves something to its context."""
+        return self.form == "implicit" and self.setting != EXPLICIT
+
+    def of(self, episode: Episode) -> Instruction:
+        """What is said in an episode."""
+        return instruct(episode, self.setting, self.form, **self.options)
+
+
+def all_variants() -> tuple[Variant, ...]:
+    """Every variant of the benchmark, as the registry of tasks yields them."""
+    return tuple(
+        Variant(task.name, setting)
+        for task in all_tasks().values()
+        for setting in task.settings
+        if setting != EXPLICIT
+    )
+
+
+def tellings(episode: Episode) -> Iterator[Telling]:
+    """Every setting, form, stage set, distractor level and frame in which it can be told."""
+    frames = [frame for frame in FRAMES if "spatial" in expressible(episode, frame=frame)]
+    options: dict[str, list[dict[str, Any]]] = {name: [{}] for name in all_settings()}
+    options["contextual"] = [
+        {"stages": stages, "distractor": distractor}
+        for stages, distractor in itertools.product(STAGE_SETS, DISTRACTORS)
+    ]
+    options["spatial"] = [{"frame": frame} for frame in frames]
+    settings = [*expressible(episode)]
+    if frames and "spatial" not in settings:
+        settings.append("spatial")  # only the camera's frame tells it
+    for setting, form in itertools.product(settings, FORMS):
+        for chosen in options[setting]:
+            yield Telling(setting, form, chosen)
+
+
+def instructions(
+    episodes: Iterable[Episode],
+    settings: Sequence[str],
+    forms: Sequence[str],
+    **options: Any,  # noqa: ANN401 - those of `instruct`
+) -> Iterator[tuple[Episode, Instruction]]:
+    """Every episode in every wanted setting that can tell it, in every form.
+
+    Args:
+        episodes: what is told, in order.
+        settings: names; a task has its own among them.
+        forms: ``implicit``, ``resolved`` or both.
+        options: of `instruct`.
+    """
+    frame = options.get("frame", FRAMES[0])
+    for episode in episodes:
+        sayable = expressible(episode, frame=frame)
+        for setting, form in itertools.product(settings, forms):
+            if setting in sayable:
+                yield episode, instruct(episode, setting, form, **options)
+
+
+def split_episodes(task: str, split: Split) -> Iterator[Episode]:
+    """All episodes of a split of a task."""
+    for index in range(SIZES[split]):
+        yield get_episode(task, split, index)

@@ -1,0 +1,29 @@
+"""The language card is what the generator gives now."""
+
+from pathlib import Path
+
+from roboirg.language import card, instruct, variants
+
+PAGE = Path(__file__).parents[2] / "docs" / "language-card.md"
+
+
+def test_the_page_is_what_the_generator_gives():
+    assert PAGE.read_text() == card.language_card(), "run: make card"
+
+
+def test_every_variant_has_an_example():
+    page = card.language_card()
+    for task, setting in variants.all_variants():
+        assert page.count(f"### {task}, {setting}\n") == 1
+        episode = card.example_episode(task, setting)
+        assert f"`{episode.key}`" in page
+    assert page.count("| resolved | ") == page.count("| explicit | ") == 40
+
+
+def test_marks_are_around_the_mentions():
+    said = instruct(card.example_episode("PickXtimes", "direct"), "direct")
+    marked = card.marked(said)
+    assert marked.replace("*", "") == said.text
+    for mention in said.mentions:
+        sign = "**" if mention.role == "anaphor" else "*"
+        assert f"{sign}{said.span(mention)}{sign}" in marked

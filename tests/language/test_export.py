@@ -1,0 +1,142 @@
+"""Exported instructions: one schema, exact spans, the same bytes."""
+
+import functools
+import io
+import json
+
+import pytest
+from language_variants import TASKS
+
+from roboirg.errors import InvalidValueError, MissingDependencyError
+from roboirg.language import FORMS, SETTINGS, export
+from roboirg.language.variants import instructions, split_episodes
+from roboirg.splits import get_episode
+
+LISTS = {
+    "patterns": str,
+    "references": str,
+    "landmarks": str,
+    "templates": str,
+    "landmark_classes": int,
+    "stages": int,
+}
+
+
+@functools.cache
+def rows():
+    """Eight episodes of each task in all settings and forms."""
+    episodes = [get_episode(task, "test", index) for task in TASKS for index in range(8)]
+    return tuple(export.row(*one) for one in instructions(episodes, SETTINGS, FORMS))
+
+
+def test_every_row_has_the_same_columns_and_types():
+    columns = list(rows()[0])
+    kinds: dict[str, set[type]] = {}
+    for one in rows():
+        assert list(one) == columns
+        for name, value in one.items():
+            kinds.setdefault(name, set()).add(type(value))
+            assert name not in LISTS or all(type(item) is LISTS[name] for item in value)
+        for nested in ("turns", "mentions"):
+            assert len({tuple(item) for item in one[nested]}) <= 1
+    for name, found in kinds.items():
+        assert len(found - {type(None)}) == 1, name
+
+
+def test_ids_are_unique_and_say_what_the_row_is():
+    assert len({one["id"] for one in rows()}) == len(rows())
+    first = rows()[1]
+    assert first["id"] == "PickXtimes/test/0/explicit/resolved"
+    assert (first["task"], first["split"], first["episode"]) == ("PickXtimes", "test", 0)
+    assert first["suite"] == "counting"
+
+
+def test_spans_count_in_the_whole_prompt():
+    for one in rows():
+        for turn in one["turns"]:
+            assert one["text"][turn["start"] :].startswith(turn["text"])
+        assert " ".join(turn["text"] for turn in one["turns"]) == one["text"]
+        assert one["turns"][-1] == {
+            "stage": "command",
+            "start": len(one["text"]) - len(one["command"]),
+            "text": one["command"],
+        }
+        for mention in one["mentions"]:
+            assert one["text"][mention["start"] : mention["end"]] == mention["text"]
+            turn = one["turns"][mention["turn"]]
+            assert turn["start"] <= mention["start"] < mention["end"]
+            assert mention["end"] <= turn["start"] + len(turn["text"])
+
+
+def test_goals_are_the_episodes():
+    for one in rows():
+        goal = get_episode(one["task"], one["split"], one["episode"]).goal
+        expected = {
+            slot: list(value) if isinstance(value, tuple) else value for slot, value in goal.slots
+        }
+        assert json.loads(one["goal"]) == expected
+
+
+def test_json_lines_are_the_rows():
+    data = export.encoded(rows(), "jsonl")
+    assert data == export.encoded(rows(), "jsonl")
+    lines = data.decode().splitlines()
+    assert [json.loads(line) for line in lines] == list(rows())
+
+
+def test_arrow_reads_json_lines_and_parquet_alike():
+    pytest.importorskip("pyarrow")
+    from pyarrow import json as arrow_json
+    from pyarrow import parquet
+
+    data = export.encoded(rows(), "parquet")
+    assert data == export.encoded(rows(), "parquet")
+    table = parquet.read_table(io.BytesIO(data))
+    assert table.to_pylist() == list(rows())
+    inferred = arrow_json.read_json(io.BytesIO(export.encoded(rows(), "jsonl")))
+    assert inferred.to_pylist() == list(rows())
+    assert inferred.schema.names == table.schema.names
+    for mine, theirs in zip(table.schema, inferred.schema, strict=True):
+        assert mine.type == theirs.type, mine.name
+
+
+@pytest.mark.parametrize("settings", [SETTINGS, ("explicit",)])
+def test_parquet_has_its_types_whatever_is_in_it(settings):
+    pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    few = [one for one in rows() if one["setting"] in settings]
+    schema = parquet.read_schema(io.BytesIO(export.encoded(few, "parquet")))
+    assert str(schema.field("landmark_classes").type) == "list<element: int64>"
+    assert str(schema.field("pattern").type) == "string"
+    assert str(schema.field("episode").type) == "int64"
+
+
+def test_pandas_reads_it(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    path = tmp_path / "instructions.jsonl"
+    export.write_rows(rows(), path, "jsonl")
+    frame = pandas.read_json(path, lines=True)
+    assert list(frame.columns) == list(rows()[0])
+    assert (frame.groupby("task").size() > 0).all()
+    assert frame["text"].tolist() == [one["text"] for one in rows()]
+
+
+def test_a_file_that_cannot_be_written_is_one_sentence(tmp_path):
+    with pytest.raises(InvalidValueError, match="Cannot write"):
+        export.write_rows(rows()[:1], tmp_path / "nowhere" / "file.jsonl", "jsonl")
+
+
+def test_without_pyarrow_one_sentence_says_what_to_do(monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
+    monkeypatch.setitem(__import__("sys").modules, "pyarrow.parquet", None)
+    export.check_export_support("jsonl")
+    with pytest.raises(MissingDependencyError, match=r"roboirgbench\[export\]"):
+        export.check_export_support("parquet")
+
+
+def test_every_episode_is_there():
+    episodes = list(split_episodes("StopCube", "test"))
+    found = [export.row(*one) for one in instructions(episodes, SETTINGS, FORMS)]
+    assert len(found) == 50 * 4 * 2  # no spatial setting
+    assert [one["episode"] for one in found[::8]] == list(range(50))

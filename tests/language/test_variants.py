@@ -1,0 +1,39 @@
+"""Every variant there is, counted in the registry."""
+
+from collections import Counter
+
+from language_variants import SPATIAL_TASKS, TASKS
+
+from roboirg.language import SETTINGS, variants
+from roboirg.splits import get_episode
+from roboirg.tasks import all_tasks
+
+
+def test_the_registry_yields_forty_variants():
+    found = variants.all_variants()
+    assert len(set(found)) == len(found)
+    by_setting = Counter(variant.setting for variant in found)
+    assert by_setting == {
+        "direct": len(TASKS),
+        "reasoning": len(TASKS),
+        "contextual": len(TASKS),
+        "spatial": len(SPATIAL_TASKS),
+    }
+    # The paper's numbers.
+    assert [by_setting[setting] for setting in SETTINGS[1:]] == [11, 11, 11, 7]
+    assert len(found) == 40
+
+
+def test_every_variant_has_a_resolved_counterpart():
+    for task, setting in variants.all_variants():
+        episode = get_episode(task, "test", 2)
+        told = {(one.setting, one.form) for one in variants.tellings(episode)}
+        assert {(setting, "implicit"), (setting, "resolved")} <= told
+
+
+def test_every_option_is_told():
+    for name, task in all_tasks().items():
+        told = list(variants.tellings(get_episode(name, "test", 0)))
+        assert len(told) == 6 + 16 + (4 if "spatial" in task.settings else 0)
+        implicit = {one.setting for one in told if one.implicit}
+        assert implicit == set(task.settings) - {"explicit"}
