@@ -3,7 +3,7 @@
 PYTHON := .venv/bin/python
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test lint demo clean
+.PHONY: help setup test lint demo card clean
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
@@ -22,6 +22,9 @@ test: lint ## lint, then every test
 
 demo: setup ## the main job: three policies, every task and setting; ends with a table and a page
 	.venv/bin/roboirg demo --out runs/demo
+
+card: setup ## write docs/language-card.md anew, after a change of words or episodes
+	.venv/bin/roboirg language card --out docs/language-card.md
 
 clean: ## remove what the tools left behind; .venv and runs stay
 	rm -rf build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from roboirg import cli
+from roboirg.cli import app as cli
 from roboirg.evaluation.record import Job
 from roboirg.evaluation.rollout import Course, describe
 from roboirg.evaluation.store import RecordStore

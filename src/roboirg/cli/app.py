@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import roboirg
+from roboirg.cli import language
+from roboirg.cli.options import Distractor, Forms, Frame, Settings, Stages, Tasks, Workers
 from roboirg.errors import InvalidValueError, RoboIRGError
 
 if TYPE_CHECKING:
@@ -42,24 +44,17 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
+app.add_typer(language.language_app, name="language")
+app.add_typer(language.export_app, name="export")
+
 Policies = Annotated[
     list[str], typer.Option("--policy", help="Built-in name or package.module:Class; repeatable.")
 ]
-Tasks = Annotated[str, typer.Option(help="Names separated by commas, or all.")]
-Settings = Annotated[str, typer.Option(help="Names separated by commas, or all that a task has.")]
-Forms = Annotated[str, typer.Option(help="implicit, resolved, or both with a comma.")]
 Split = Annotated[str, typer.Option(help="train, val or test.")]
 Episodes = Annotated[str, typer.Option(help="4: the first four; or a list such as 0,3,5-9.")]
 PolicySeeds = Annotated[str, typer.Option(help="A list of numbers; each plays every episode.")]
-Stages = Annotated[str, typer.Option(help="Stages of the contextual setting, such as 1,5.")]
-Distractor = Annotated[str, typer.Option(help="Kind of distractor in the contextual setting.")]
-Frame = Annotated[str, typer.Option(help="Frame of reference in the spatial setting.")]
 MaxSteps = Annotated[int, typer.Option(help="The policy's limit in control steps (20 a second).")]
 Video = Annotated[str, typer.Option(help="Which episodes to film: off, failures or all.")]
-Workers = Annotated[
-    int | None,
-    typer.Option(help="Processes; by default one per core. 0 plays in this process."),
-]
 RetryErrors = Annotated[
     bool, typer.Option(help="Play episodes again whose newest record is an error.")
 ]
@@ -145,7 +140,7 @@ def report(
 @app.command()
 def demo(
     out: Out = "runs/demo",
-    episodes: Episodes = "4",
+    episodes: Episodes = "2-2",
     video: Video = "all",
     workers: Workers = None,
 ) -> None:

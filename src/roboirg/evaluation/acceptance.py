@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
-import multiprocessing
-import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -17,11 +12,11 @@ from roboirg.episode import SPLITS, Difficulty, Episode, Split, episode_key
 from roboirg.errors import (
     InvalidValueError,
     MotionPlanningError,
-    RoboIRGError,
     SceneRejectedError,
 )
 from roboirg.language import expressible
 from roboirg.policies import make_policy, play
+from roboirg.pool import spread
 from roboirg.splits import (
     MAX_REJECTED,
     SIZES,
@@ -149,23 +144,8 @@ def find_seeds(slots: Sequence[Slot], workers: int, judge: Judge = judge_seed) -
         SceneRejectedError: an episode has no seed.
         RoboIRGError: a process died.
     """
-    if workers < 0:
-        raise InvalidValueError(f"workers is {workers}; it must be at least 0.")
-    if workers == 0:
-        yield from (find_seed(slot, judge) for slot in slots)
-        return
-    # Spawned, not forked: threads of the simulator do not survive a fork.
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_leave_interrupts)
-    with contextlib.ExitStack() as stack:
-        stack.callback(pool.shutdown, cancel_futures=True)
-        work = functools.partial(find_seed, judge=judge)
-        futures = [pool.submit(work, slot) for slot in slots]
-        try:
-            for future in as_completed(futures):
-                yield future.result()
-        except BrokenProcessPool as error:
-            raise RoboIRGError(f"A process that played episodes died: {error}") from error
+    found = spread(functools.partial(find_seed, judge=judge), slots, workers)
+    yield from (outcome for _, outcome in found)
 
 
 def check_kept(
@@ -204,8 +184,3 @@ def merged(found: Sequence[Found], known: Mapping[str, TaskSplits]) -> dict[str,
 
 def _episode(slot: Slot, seed: int) -> Episode:
     return make_episode(slot.task, seed, slot.difficulty, slot.split, slot.index)
-
-
-def _leave_interrupts() -> None:
-    """Ctrl-C reaches the whole process group; the parent decides what it means."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,0 +1,145 @@
+"""`roboirg language ...` and `roboirg export ...`."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from roboirg.cli import app as cli
+from roboirg.errors import InvalidValueError, RoboIRGError, UnknownNameError
+from roboirg.language import card
+from roboirg.language.proof import Evidence, Failure
+
+HEAVY = ("sapien", "torch", "gymnasium", "toppra", "mani_skill", "cv2", "av")
+
+
+def call(*words: str | Path) -> str:
+    """What the command prints; its errors come as they are."""
+    result = CliRunner().invoke(cli.app, [str(word) for word in words], catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def test_all_test_episodes_are_exported_without_a_simulator(tmp_path: Path):
+    out = tmp_path / "instructions.jsonl"
+    program = (
+        "import sys\n"
+        "from roboirg.cli import main\n"
+        f"sys.argv = ['roboirg', 'export', 'instructions', '--out', {str(out)!r}]\n"
+        "try:\n    main()\nexcept SystemExit as left:\n    assert not left.code\n"
+        f"print([name for name in {HEAVY!r} if name in sys.modules])\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert done.stdout.splitlines()[-1] == "[]"
+    rows = [json.loads(line) for line in out.read_text().splitlines()]
+    assert len({(row["task"], row["episode"]) for row in rows}) == 550
+    variants = {(row["task"], row["setting"], row["form"]) for row in rows}
+    assert sum(form == "resolved" and setting != "explicit" for _, setting, form in variants) == 40
+    assert sum(form == "implicit" and setting != "explicit" for _, setting, form in variants) == 40
+    assert len(rows) == 50 * len(variants)
+
+
+def test_the_same_bytes_every_time_and_only_what_is_asked_for(tmp_path: Path):
+    files = [tmp_path / "one.jsonl", tmp_path / "two.jsonl"]
+    for file in files:
+        words = ("--tasks", "VideoUnmask,StopCube", "--settings", "spatial,direct")
+        call("export", "instructions", "--out", file, *words, "--forms", "implicit")
+    assert files[0].read_bytes() == files[1].read_bytes()
+    rows = [json.loads(line) for line in files[0].read_text().splitlines()]
+    assert len(rows) == 50 * 3
+    assert {row["setting"] for row in rows if row["task"] == "StopCube"} == {"direct"}
+    assert [path.name for path in sorted(tmp_path.iterdir())] == ["one.jsonl", "two.jsonl"]
+
+
+def test_options_of_the_words_are_passed_on(tmp_path: Path):
+    out = tmp_path / "rows.jsonl"
+    options = ("--stages", "1,2,3,5", "--distractor", "competing", "--frame", "camera")
+    call(
+        "export",
+        "instructions",
+        "--out",
+        out,
+        "--tasks",
+        "ButtonUnmask",
+        "--split",
+        "val",
+        *options,
+    )
+    rows = [json.loads(line) for line in out.read_text().splitlines()]
+    contextual = next(row for row in rows if row["setting"] == "contextual")
+    assert [turn["stage"] for turn in contextual["turns"]][1:3] == ["reinforcement", "distractor"]
+    assert contextual["distractor"] == "competing"
+    assert {row["frame"] for row in rows} == {None, "camera"}
+    assert {row["split"] for row in rows} == {"val"}
+
+
+@pytest.mark.parametrize(
+    ("words", "kind", "sentence"),
+    [
+        (("--format", "csv"), UnknownNameError, "There is no format 'csv'"),
+        (("--settings", "spatail"), UnknownNameError, "Did you mean 'spatial'?"),
+        (("--forms", "implied"), UnknownNameError, "There is no form 'implied'"),
+        (("--tasks", "StopCub"), UnknownNameError, "Did you mean 'StopCube'?"),
+        (("--split", "dev"), UnknownNameError, "There is no split 'dev'"),
+        (("--stages", "2,5"), InvalidValueError, "none of the four sets"),
+        (("--tasks", "StopCube", "--settings", "spatial"), InvalidValueError, "None of these"),
+    ],
+)
+def test_what_is_wrong_is_one_sentence(tmp_path: Path, words, kind, sentence):
+    with pytest.raises(kind, match=sentence.replace("?", r"\?")):
+        call("export", "instructions", "--out", tmp_path / "out.jsonl", *words)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_export_needs_a_place(tmp_path: Path):
+    for path in (tmp_path, tmp_path / "nowhere" / "out.jsonl"):
+        with pytest.raises(InvalidValueError, match="is no name for a file"):
+            call("export", "instructions", "--out", path)
+
+
+def test_stats_print_tables_and_draw_the_figure(tmp_path: Path):
+    pytest.importorskip("matplotlib")
+    printed = call("language", "stats", "--tasks", "PickXtimes,VideoUnmask", "--out", tmp_path)
+    for title in ("Words per instruction", "Referring expressions", "Landmark classes"):
+        assert title in printed
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"expressions-test.png", "expressions-test.svg"}
+
+
+def test_stats_of_all_splits_need_no_figure():
+    printed = call("language", "stats", "--split", "all", "--tasks", "StopCube")
+    assert "Relations" in printed
+    assert "Landmark" not in printed
+
+
+def test_prove_prints_what_was_read_and_the_exceptions():
+    words = ("--tasks", "PickXtimes", "--split", "none", "--seeds", "4", "--workers", "0")
+    printed = call("language", "prove", *words)
+    assert "Texts read back" in printed
+    assert "2 of 2 (100.00 %)" in printed  # easy, spatial
+    assert "0 of 1" in printed
+
+
+def test_a_broken_rule_is_told_and_ends_with_a_sentence(monkeypatch: pytest.MonkeyPatch):
+    failure = Failure("no leak", "PickXtimes", "direct", "PickXtimes/test/0", 7, "[red]ly")
+    found = Evidence(failures=[failure])
+    found.texts["PickXtimes", "direct"] = 1
+    monkeypatch.setattr("roboirg.language.proof.run.work_on", lambda _batch: found)
+    words = ("--tasks", "PickXtimes", "--split", "none", "--seeds", "1", "--workers", "0")
+    result = CliRunner().invoke(cli.app, ["language", "prove", *words])
+    assert isinstance(result.exception, RoboIRGError)
+    assert "1 rules were broken in 1 texts." in str(result.exception)
+    assert "no leak: PickXtimes/test/0, seed 7, direct: [red]ly" in result.output
+
+
+def test_the_card_goes_to_a_file_or_the_terminal(tmp_path: Path):
+    assert call("language", "card") == card.language_card()
+    call("language", "card", "--out", tmp_path / "card.md")
+    assert (tmp_path / "card.md").read_text() == card.language_card()
