@@ -61,9 +61,8 @@ def film(task: str, index: int, steps: set[int]) -> dict[tuple[int, str], np.nda
 def test_pictures_look_as_they_did_when_they_were_looked_at(task, index):
     moments = MOMENTS[task, index]
     cameras = CAMERAS if task in BOTH_CAMERAS else ("front",)
-    taken = {
-        key: picture for key, picture in film(task, index, set(moments)).items() if key[1] in cameras
-    }
+    shots = film(task, index, set(moments))
+    taken = {key: picture for key, picture in shots.items() if key[1] in cameras}
     assert len(taken) == len(moments) * len(cameras)
     for (elapsed, camera), picture in taken.items():
         file = PICTURES / f"{task}_{moments[elapsed]}_{camera}.png"
