@@ -44,6 +44,7 @@ LARGEST_NEWTON_STEP = 0.3
 LARGEST_JOINT_STEP = 0.35
 """Radians between way points above which the arm would swing round: no straight move."""
 
+
 class ToolPose(NamedTuple):
     """Where the tool centre point is to be, world frame."""
 
