@@ -110,7 +110,7 @@ def test_what_ends_a_search_is_named():
     slots = slots_of(["PickXtimes"], ["val"])[:3]
     with pytest.raises(SceneRejectedError, match="PickXtimes/val/0"):
         list(find_seeds(slots[:1], 1, refuse))
-    with pytest.raises(RoboIRGError, match="process that played episodes died"):
+    with pytest.raises(RoboIRGError, match="process at work died"):
         list(find_seeds(slots, 1, die))
     with pytest.raises(InvalidValueError, match="workers is -1"):
         list(find_seeds(slots, -1))

@@ -5,7 +5,6 @@ import pytest
 
 from roboirg.observations import CAMERAS
 from roboirg.simulation.cameras import Cameras
-from roboirg.simulation.senses import cameras_of
 from roboirg.simulation.settings import HOME_ACTION
 from roboirg.simulation.world import World
 from roboirg.splits import get_episode
@@ -22,7 +21,7 @@ def world() -> World:
 
 @pytest.fixture(scope="module")
 def cameras(world) -> Cameras:
-    return cameras_of(world)
+    return world.cameras
 
 
 def test_the_front_camera_stands_where_robomme_s_does(cameras):
