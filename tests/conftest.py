@@ -1,4 +1,6 @@
-"""Shared by all tests: how strictly Hypothesis looks."""
+"""Shared by all tests: how strictly Hypothesis looks, and no cache but a test's own."""
+
+import os
 
 from hypothesis import HealthCheck, settings
 
@@ -7,3 +9,6 @@ settings.register_profile(
     "roboirg", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("roboirg")
+
+# What an earlier version left in the user's cache must not decide a test.
+os.environ["ROBOIRG_CACHE"] = "off"

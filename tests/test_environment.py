@@ -20,6 +20,7 @@ from roboirg.evaluation.rollout import Needs, make_env
 from roboirg.gym import environment_id
 from roboirg.policies import make_policy, play
 from roboirg.policies.handed import HandedPolicy
+from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.settings import HOME_ACTION
 from roboirg.splits import get_episode
 from roboirg.tasks import all_tasks, get_task
@@ -248,6 +249,81 @@ def test_a_chunk_does_what_its_rows_do_and_stops_with_the_episode():
     assert chunked.events == single.events
 
 
+def test_history_holds_every_nth_observation_of_a_chunk():
+    rng = np.random.default_rng(0)
+    actions = HOME_ACTION + np.append(rng.normal(0, 0.1, (27, 7)), rng.normal(0, 1, (27, 1)), 1)
+    options = {"cameras": ("wrist",), "depth": True, "max_steps": 25}
+    single = roboirg.make("PickXtimes", **options)
+    single.reset()
+    steps = {step: single.step(action)[0] for step, action in enumerate(actions[:25], 1)}
+    env = roboirg.make("PickXtimes", **options, observe_every=4)
+    first, _ = env.reset()
+    assert first["history"] == ()
+    for rows, due in (
+        (actions[:3], []),
+        (actions[3:10], [4, 8]),
+        (actions[10:20], [12, 16, 20]),
+        (actions[20:], [24]),
+    ):
+        observation, *_ = env.step_chunk(rows)
+        assert observation in env.observation_space
+        history = observation["history"]
+        assert len(history) == len(due)
+        for seen, step in zip(history, due, strict=True):
+            assert list(seen) == list(steps[step])
+            for key, value in steps[step].items():
+                assert np.array_equal(seen[key], value), (step, key)
+    assert env.status == "timeout"
+    assert "history" not in first["history"]
+
+
+def test_history_costs_only_the_pictures_that_are_wanted(monkeypatch):
+    drawn, picture = [], Cameras.picture
+    monkeypatch.setattr(
+        Cameras, "picture", lambda self, name: drawn.append(name) or picture(self, name)
+    )
+    env = roboirg.make("PickXtimes", cameras=("front",), observe_every=8)
+    env.reset()
+    env.step_chunk(np.tile(HOME_ACTION, (20, 1)))
+    assert len(drawn) == 1 + 2 + 1
+
+
+def test_gymnasium_s_checker_is_content_with_history():
+    env = roboirg.make("VideoUnmask", cameras=(), observe_every=1)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=".*(Box action|Box observation).*")
+        check_env(env)
+
+
+class Choosy:
+    """Wants to be shown things in its own way."""
+
+    cameras = ()
+    observe_every = 5
+    demonstration_frames = "none"
+
+    def reset(self, instruction, demonstration):
+        self.seen = [len(demonstration)]
+
+    def act(self, observation):
+        self.seen.append(len(observation["history"]))
+        return np.tile(HOME_ACTION, (7, 1))
+
+
+def test_policies_are_shown_what_they_ask_for():
+    policy = Choosy()
+    wrong = roboirg.make("PickXtimes", cameras=(), demonstration_frames="none")
+    with pytest.raises(InvalidValueError, match=r"wants observe_every=5, but .* has None"):
+        play(wrong, policy)
+    job = Job(
+        policy=f"{__name__}:Choosy", task="PickXtimes", split="test", episode=2, setting="direct"
+    )
+    env = make_env(job, Needs((), ACTION_SPACES["joint_angle"], "none", 5))
+    env.max_steps = 20
+    play(env, policy)
+    assert policy.seen == [3, 0, 1, 1]
+
+
 @pytest.mark.parametrize("task", TASKS)
 def test_a_closed_environment_lets_go_of_its_world(task):
     env = roboirg.make(task, cameras=())
@@ -302,6 +378,12 @@ def test_names_and_numbers_are_checked_before_anything_is_built():
             roboirg.make("PickXtimes", cameras=(), **{option: True})
         with pytest.raises(InvalidValueError, match=f"{option} is 1; it has to be True or False"):
             roboirg.make("PickXtimes", **{option: 1})
+    for wrong in (0, 1.5, True, "every", None):
+        with pytest.raises(InvalidValueError, match=f"demonstration_frames is {wrong!r}"):
+            roboirg.make("PickXtimes", demonstration_frames=wrong)
+    for wrong in (0, 1.5, True, "all"):
+        with pytest.raises(InvalidValueError, match=f"observe_every is {wrong!r}"):
+            roboirg.make("PickXtimes", observe_every=wrong)
     for wrong in ("front", None):
         with pytest.raises(InvalidValueError, match=r"cameras is .*\('front',\)"):
             roboirg.make("PickXtimes", cameras=wrong)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import gymnasium
@@ -16,11 +16,15 @@ from roboirg.episode import Episode, Stage
 from roboirg.errors import InvalidValueError, MotionPlanningError, UnknownNameError
 from roboirg.judging import Event, Status, plain_subgoal
 from roboirg.language import instruct
-from roboirg.observations import CAMERAS
+from roboirg.observations import CAMERAS, DemonstrationFrames
 from roboirg.simulation.controllers import Controller, make_controller
+from roboirg.simulation.demonstration.library import perform
+from roboirg.simulation.demonstration.recording import Recording
+from roboirg.simulation.demonstration.video import make_video
 from roboirg.simulation.device import describe, find_render_device
 from roboirg.simulation.grounding import Grounding
-from roboirg.simulation.senses import Senses, Wishes, sensed_space, stack
+from roboirg.simulation.rendering import find_rendering
+from roboirg.simulation.senses import Senses, Wishes, sensed_space
 from roboirg.simulation.session import Session
 from roboirg.splits import get_episode
 
@@ -42,6 +46,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     position (m) and extrinsic x-y-z angles (rad) of the tool centre in the world frame;
     `instruction` text. With `depth`, `front_depth` and `wrist_depth` int16 (256, 256, 1) mm; with
     `calibration`, `front_extrinsic` float32 (3, 4), `front_intrinsic` (3, 3), and of the wrist.
+    With `observe_every`, `history`: a tuple of such observations.
 
     Action: of the space that `actions` names. `joint_angle` (8,): absolute joint targets in rad
     and the gripper, +1 open to -1 closed; one control step of 0.05 s. `ee_pose` (7,): position (m)
@@ -57,7 +62,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     Info: `status` (ongoing, success, failure, timeout), `cause`, `steps` of the policy,
     `elapsed_steps` since the world began, `events` since the last call, `subgoal` in words, with
     `grounded` also `grounded_subgoal`; at reset `demonstration`, arrays as in the observation with
-    a leading axis T, and `demonstration_subgoals`, T texts.
+    a leading axis T (pictures are drawn when they are read), and `demonstration_subgoals`, T texts.
 
     Args:
         task: name of the task, or an episode made by hand (then `split` and `episode` are its own).
@@ -74,6 +79,10 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         depth: whether observations hold depth for the same cameras.
         calibration: whether observations hold the matrices of the same cameras.
         grounded: whether info names the pixels of the subgoal's object; costs drawing.
+        demonstration_frames: which pictures the video has: "all", "none", or n for every n-th.
+        observe_every: n adds `history`, the observations after every n-th control step since the
+            last observation, to each.
+        meshes: "faithful", or "light" for quicker pictures that differ a little from RoboMME's.
         max_steps: control steps that the policy has.
         render_mode: None or "rgb_array" (front and wrist side by side).
 
@@ -105,6 +114,9 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         depth: bool = False,
         calibration: bool = False,
         grounded: bool = False,
+        demonstration_frames: DemonstrationFrames = "all",
+        observe_every: int | None = None,
+        meshes: str = "faithful",
         max_steps: int = MAX_STEPS,
         render_mode: str | None = None,
     ) -> None:
@@ -120,8 +132,16 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         )
         self._space = find_action_space(actions)
         self.actions = self._space.name
-        self._wishes = Wishes(cameras, depth, calibration).checked()
+        self._wishes = Wishes(
+            cameras,
+            depth,
+            calibration,
+            demonstration_frames,
+            observe_every,
+            find_rendering(meshes),
+        ).checked()
         self.cameras = tuple(self._wishes.cameras)
+        self.demonstration_frames, self.observe_every = demonstration_frames, observe_every
         if not isinstance(max_steps, int) or max_steps < 1:
             raise InvalidValueError(
                 f"max_steps is {max_steps!r}; it has to be a whole number of at least 1."
@@ -130,12 +150,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
             raise UnknownNameError("render mode", render_mode, ["rgb_array"])
         self.max_steps = max_steps
         self.render_mode = render_mode
-        self.observation_space = spaces.Dict(
-            {
-                **sensed_space(self._wishes),
-                "instruction": spaces.Text(LONGEST_INSTRUCTION, charset=PRINTABLE),
-            }
-        )
+        self.observation_space = self._make_observation_space()
         self.action_space = spaces.Box(self._space.low, self._space.high, dtype=np.float64)
         self.grounded = grounded
         self._play: _Play | None = None
@@ -174,22 +189,14 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Begin the episode anew; it is the same each time, whatever the seed."""
         super().reset(seed=seed, options=options)
-        play = self._play = self._begin()
-        frames: list[dict[str, Any]] = []
-        subgoals: list[str] = []
-
-        def record(stage: Stage) -> None:
-            self._follow(stage, demonstration=True)
-            frames.append(play.senses.read())
-            subgoals.append(play.label(stage))
-
-        play.session.play_demonstration(record)
+        recording = perform(self.episode, self._show, watched=self._frame_hook is not None)
         self._follow(self.session.judge.published)
-        video = {
-            "demonstration": stack(frames, self._wishes),
-            "demonstration_subgoals": subgoals,
+        play = self._playing
+        shown = {
+            "demonstration": make_video(self.episode, recording, self._wishes, play.felt),
+            "demonstration_subgoals": play.labels,
         }
-        return self._observe(), {**self._info(), **video}
+        return self._observe(), {**self._info(), **shown}
 
     def step(self, action: ArrayLike) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Execute one action: one control step, or many in the waypoint space.
@@ -263,8 +270,28 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
             raise gymnasium.error.ResetNeeded("Call reset() before anything else.")
         return self._play
 
+    def _make_observation_space(self) -> spaces.Dict:
+        fields = {
+            **sensed_space(self._wishes),
+            "instruction": spaces.Text(LONGEST_INSTRUCTION, charset=PRINTABLE),
+        }
+        if self.observe_every is not None:
+            fields["history"] = spaces.Sequence(spaces.Dict(fields))
+        return spaces.Dict(fields)
+
+    def _show(self, recording: Recording | None) -> Recording:
+        """Begin the episode and play its demonstration."""
+        play = self._play = self._begin()
+
+        def follow(stage: Stage) -> None:
+            self._follow(stage, demonstration=True)
+            play.felt.append(play.senses.feel())
+            play.labels.append(play.label(stage))
+
+        return play.session.play_demonstration(follow, recording)
+
     def _begin(self) -> _Play:
-        session = Session(self.episode, visible=self._visible)
+        session = Session(self.episode, visible=self._visible, rendering=self._wishes.rendering)
         world = session.world
         return _Play(
             session,
@@ -281,6 +308,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
                     self.session.step(row)
                     self._playing.steps += 1
                     self._follow(self.session.judge.published)
+                    self._remember()
                     if self.status != "ongoing":
                         return
         except MotionPlanningError as error:
@@ -302,7 +330,19 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         if self._frame_hook is not None and (due or self.status != "ongoing"):
             self._frame_hook(self, demonstration)
 
+    def _remember(self) -> None:
+        """Keep an observation from within a chunk, if one is wanted now."""
+        if self.observe_every is not None and self._playing.steps % self.observe_every == 0:
+            self._playing.history.append(self._look())
+
     def _observe(self) -> dict[str, Any]:
+        observation = self._look()
+        if self.observe_every is not None:
+            observation["history"] = tuple(self._playing.history)
+            self._playing.history.clear()
+        return observation
+
+    def _look(self) -> dict[str, Any]:
         return {**self._playing.senses.read(), "instruction": self.instruction.text}
 
     def _info(self) -> dict[str, Any]:
@@ -329,6 +369,9 @@ class _Play:
         senses: what observations are read from.
         controller: turns actions into joint actions.
         grounding: names pixels, if that is asked for.
+        felt: what was felt at each step of the video.
+        labels: what was being done in each step of the video.
+        history: what was seen since the last observation, as far as it is wanted.
         steps: control steps of the policy.
         reported: how many events have been told.
     """
@@ -337,6 +380,9 @@ class _Play:
     senses: Senses
     controller: Controller
     grounding: Grounding | None
+    felt: list[dict[str, Any]] = field(default_factory=list)
+    labels: list[str] = field(default_factory=list)
+    history: list[dict[str, Any]] = field(default_factory=list)
     steps: int = 0
     reported: int = 0
 

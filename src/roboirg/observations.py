@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, NotRequired, TypedDict
+from collections.abc import Mapping
+from typing import Any, Literal, NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,9 @@ from numpy.typing import NDArray
 from roboirg.errors import InvalidValueError, UnknownNameError
 
 CAMERAS = ("front", "wrist")
+
+DemonstrationFrames = Literal["all", "none"] | int
+"""Which pictures of the video there are: all, none, or every n-th, the first included."""
 
 
 def check_cameras(cameras: object) -> tuple[str, ...]:
@@ -32,6 +36,37 @@ def check_cameras(cameras: object) -> tuple[str, ...]:
         if cameras.count(camera) > 1:
             raise InvalidValueError(f"cameras names {camera!r} twice.")
     return tuple(cameras)
+
+
+def check_demonstration_frames(wish: object) -> DemonstrationFrames:
+    """Which pictures of the video somebody asks for.
+
+    Raises:
+        InvalidValueError: it is neither ``"all"`` nor ``"none"`` nor a whole number from 1 on.
+    """
+    if wish == "all":
+        return "all"
+    if wish == "none":
+        return "none"
+    if type(wish) is int and wish >= 1:
+        return wish
+    raise InvalidValueError(
+        f"demonstration_frames is {wish!r}; it has to be 'all', 'none' or a whole number of at "
+        "least 1."
+    )
+
+
+def check_observe_every(wish: object) -> int | None:
+    """After how many control steps somebody wants observations from within a chunk.
+
+    Raises:
+        InvalidValueError: it is neither None nor a whole number from 1 on.
+    """
+    if wish is None or (type(wish) is int and wish >= 1):
+        return wish
+    raise InvalidValueError(
+        f"observe_every is {wish!r}; it has to be None or a whole number of at least 1."
+    )
 
 
 class Observation(TypedDict):
@@ -60,10 +95,13 @@ class Observation(TypedDict):
     front_intrinsic: NotRequired[NDArray[np.float32]]
     """(3, 3) from the camera's frame to pixels."""
     wrist_intrinsic: NotRequired[NDArray[np.float32]]
+    history: NotRequired[tuple[Observation, ...]]
+    """With ``observe_every=n``: the observations after every n-th control step since the last."""
 
 
-Demonstration = dict[str, NDArray[Any]]
-"""As `Observation` without the instruction, one more leading axis T: what was shown before.
+Demonstration = Mapping[str, NDArray[Any]]
+"""As `Observation` without instruction and history, one more leading axis T: what was shown before.
 
-T is 0 in tasks without a video. The frame that follows it is the first observation.
+T is 0 in tasks without a video. The frame that follows it is the first observation. Pictures are
+drawn when they are read for the first time, and then kept; so nobody waits for what is not read.
 """

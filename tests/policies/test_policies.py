@@ -14,6 +14,8 @@ from roboirg.policies.loading import (
     policy_version,
     wanted_actions,
     wanted_cameras,
+    wanted_demonstration_frames,
+    wanted_history,
 )
 from roboirg.tasks import all_tasks
 
@@ -166,6 +168,32 @@ def test_a_wrong_action_space_is_told_before_anything_starts(monkeypatch, action
     monkeypatch.setattr(Silent, "actions", actions, raising=False)
     with pytest.raises(InvalidValueError, match=f"{__name__}:Silent'.*{words}"):
         load_policy_class(f"{__name__}:Silent")
+
+
+@pytest.mark.parametrize(
+    ("attribute", "wish", "words"),
+    [
+        ("demonstration_frames", "some", "demonstration_frames is 'some'; it has to be 'all', 'no"),
+        ("demonstration_frames", 0, "demonstration_frames is 0"),
+        ("observe_every", -1, "observe_every is -1; it has to be None or a whole number"),
+        ("observe_every", True, "observe_every is True"),
+    ],
+)
+def test_a_wrong_wish_for_frames_is_told_before_anything_starts(
+    monkeypatch, attribute, wish, words
+):
+    monkeypatch.setattr(Silent, attribute, wish, raising=False)
+    with pytest.raises(InvalidValueError, match=f"{__name__}:Silent'.*{words}"):
+        load_policy_class(f"{__name__}:Silent")
+
+
+def test_a_policy_says_which_frames_it_wants(monkeypatch):
+    assert (wanted_demonstration_frames(Silent), wanted_history(Silent)) == ("all", None)
+    for wish in ("none", 4):
+        monkeypatch.setattr(Silent, "demonstration_frames", wish, raising=False)
+        assert wanted_demonstration_frames(load_policy_class(f"{__name__}:Silent")) == wish
+    monkeypatch.setattr(Silent, "observe_every", property(lambda _self: 8), raising=False)
+    assert wanted_history(make_policy(f"{__name__}:Silent", 0)) == 8
 
 
 def test_whoever_looks_behind_the_scenes_is_known():

@@ -14,6 +14,7 @@ import typer
 
 import roboirg
 from roboirg.cli import language
+from roboirg.cli.bench import bench
 from roboirg.cli.options import Distractor, Forms, Frame, Settings, Stages, Tasks, Workers
 from roboirg.errors import InvalidValueError, RoboIRGError
 
@@ -46,6 +47,7 @@ app = typer.Typer(
 
 app.add_typer(language.language_app, name="language")
 app.add_typer(language.export_app, name="export")
+app.command()(bench)
 
 Policies = Annotated[
     list[str], typer.Option("--policy", help="Built-in name or package.module:Class; repeatable.")

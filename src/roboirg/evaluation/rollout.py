@@ -39,13 +39,15 @@ from roboirg.errors import (
 from roboirg.evaluation.plan import VideoMode, say
 from roboirg.evaluation.record import EventRecord, Job, MentionSpan, Outcome, Record, Turn
 from roboirg.evaluation.video import Film, VideoOptions
-from roboirg.observations import Observation
+from roboirg.observations import DemonstrationFrames, Observation
 from roboirg.policies.base import Policy, PrivilegedPolicy
 from roboirg.policies.loading import (
     is_privileged,
     policy_version,
     wanted_actions,
     wanted_cameras,
+    wanted_demonstration_frames,
+    wanted_history,
 )
 from roboirg.splits import get_episode
 
@@ -153,10 +155,14 @@ class Needs(NamedTuple):
     Attributes:
         cameras: whose pictures.
         actions: the space in which it acts.
+        demonstration_frames: which pictures of the video.
+        observe_every: after how many control steps it wants to look.
     """
 
     cameras: tuple[str, ...]
     actions: ActionSpace
+    demonstration_frames: DemonstrationFrames = "all"
+    observe_every: int | None = None
 
 
 class _Fault(Exception):  # noqa: N818 - never leaves this file
@@ -179,7 +185,12 @@ def play_episode(job: Job, film: Film | None = None) -> Course:
     try:
         with _blame("policy"):
             policy = load_policy(job)
-            needs = Needs(wanted_cameras(policy), wanted_actions(policy))
+            needs = Needs(
+                wanted_cameras(policy),
+                wanted_actions(policy),
+                wanted_demonstration_frames(policy),
+                wanted_history(policy),
+            )
         with _blame("environment"):
             env = make_env(job, needs)
         _play(job, env, policy, needs.actions, film, course)
@@ -206,6 +217,8 @@ def make_env(job: Job, needs: Needs) -> RoboIRGEnv:
         frame=job.frame,
         cameras=needs.cameras,
         actions=needs.actions.name,
+        demonstration_frames=needs.demonstration_frames,
+        observe_every=needs.observe_every,
         max_steps=job.max_steps,
     )
 

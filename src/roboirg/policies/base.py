@@ -20,6 +20,10 @@ class Policy(Protocol):
     Set the class attribute ``cameras`` to the pictures that are wanted, for example ``()``;
     by default every observation holds both. Set ``actions`` to the action space that `act`
     speaks, ``"joint_angle"`` by default, ``"ee_pose"`` or ``"waypoint"``.
+
+    Pictures of the demonstration are drawn when they are read. ``demonstration_frames = 4`` has
+    only every fourth of them, ``"none"`` none. A policy that acts in chunks and wants to see what
+    happened meanwhile sets ``observe_every = n``: then every observation holds ``history``.
     """
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:

@@ -5,14 +5,20 @@ from __future__ import annotations
 import hashlib
 import importlib
 import inspect
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from roboirg.actions import JOINT_ANGLE, ActionSpace, find_action_space
 from roboirg.errors import InvalidValueError, UnknownNameError
-from roboirg.observations import CAMERAS, check_cameras
+from roboirg.observations import (
+    CAMERAS,
+    DemonstrationFrames,
+    check_cameras,
+    check_demonstration_frames,
+    check_observe_every,
+)
 from roboirg.policies.base import Policy
 
 BUILTIN: Mapping[str, str] = {
@@ -111,6 +117,32 @@ def wanted_actions(policy: object) -> ActionSpace:
     return find_action_space(getattr(policy, "actions", JOINT_ANGLE.name))
 
 
+def wanted_demonstration_frames(policy: object) -> DemonstrationFrames:
+    """The pictures of the video that a policy, or a class of policies, asks for.
+
+    Raises:
+        InvalidValueError: its ``demonstration_frames`` are neither all, none nor every n-th.
+    """
+    return check_demonstration_frames(getattr(policy, "demonstration_frames", "all"))
+
+
+def wanted_history(policy: object) -> int | None:
+    """After how many control steps a policy, or a class of policies, wants to look.
+
+    Raises:
+        InvalidValueError: its ``observe_every`` is neither None nor a number of control steps.
+    """
+    return check_observe_every(getattr(policy, "observe_every", None))
+
+
+_WISHES: Mapping[str, Callable[[object], object]] = {
+    "cameras": wanted_cameras,
+    "actions": wanted_actions,
+    "demonstration_frames": wanted_demonstration_frames,
+    "observe_every": wanted_history,
+}
+
+
 def _check_class(spec: str, policy_class: type[Any]) -> None:
     """Complain of what would otherwise end every episode."""
     name = policy_class.__name__
@@ -134,7 +166,7 @@ def _check_class(spec: str, policy_class: type[Any]) -> None:
                 f"Policy {spec!r}: {name}() is called with seed= at most, but needs "
                 f"{parameter.name!r}; give it a default."
             )
-    for attribute, wanted in (("cameras", wanted_cameras), ("actions", wanted_actions)):
+    for attribute, wanted in _WISHES.items():
         # What a property says is known when there is an object.
         if not hasattr(inspect.getattr_static(policy_class, attribute, ()), "__get__"):
             try:

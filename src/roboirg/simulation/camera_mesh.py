@@ -9,14 +9,11 @@ mask is made by ``scripts/visible-triangles``.
 
 from __future__ import annotations
 
-import functools
 import zlib
 from importlib import resources
 from pathlib import Path
 
 import numpy as np
-import sapien
-import sapien.render
 from numpy.typing import NDArray
 
 MASK_FILE = "wrist_camera_visible.bin"
@@ -34,30 +31,19 @@ def read_stl(path: Path) -> NDArray[np.void]:
     return np.frombuffer(data, STL_TRIANGLE, count, offset=STL_HEADER + 4)
 
 
+def packed_mask() -> bytes:
+    """The bit mask as it is shipped."""
+    return resources.files("roboirg.simulation").joinpath(MASK_FILE).read_bytes()
+
+
 def visible_mask(count: int) -> NDArray[np.bool_]:
     """For each of the file's triangles whether it can be seen from outside."""
-    packed = resources.files("roboirg.simulation").joinpath(MASK_FILE).read_bytes()
-    bits = np.unpackbits(np.frombuffer(zlib.decompress(packed), np.uint8), count=count)
-    return bits.astype(bool)
+    packed = zlib.decompress(packed_mask())
+    return np.unpackbits(np.frombuffer(packed, np.uint8), count=count).astype(bool)
 
 
-def visible_shape(
-    stl: Path, material: sapien.render.RenderMaterial
-) -> sapien.render.RenderShapeTriangleMesh:
-    """The visible part of the camera, flat-shaded as in the whole."""
-    vertices, normals = _visible_triangles(stl)
-    return sapien.render.RenderShapeTriangleMesh(
-        vertices=vertices,
-        triangles=np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3),
-        normals=normals,
-        uvs=np.zeros((len(vertices), 2), np.float32),
-        material=material,
-    )
-
-
-@functools.cache
-def _visible_triangles(stl: Path) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Corners and normals (3 n, 3), three of each for a triangle."""
+def visible_triangles(stl: Path) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Corners (n, 3, 3) and normals (n, 3) of the triangles that can be seen."""
     triangles = read_stl(stl)
     seen = triangles[visible_mask(len(triangles))]
-    return seen["corners"].reshape(-1, 3), np.repeat(seen["normal"], 3, axis=0)
+    return np.ascontiguousarray(seen["corners"]), np.ascontiguousarray(seen["normal"])

@@ -85,19 +85,20 @@ def find_render_device(name: str | None = None) -> sapien.Device:
     return software
 
 
-def render_system() -> sapien.render.RenderSystem:
+def render_system(*, keep_engine: bool = True) -> sapien.render.RenderSystem:
     """Return a new render system, for one scene: scenes that share one spoil each other's pictures.
 
     SAPIEN frees its whole render engine (shaders, meshes, tables) when the last system goes, and
     making it again takes seconds; so the first call also makes one that lives as long as the
-    process and keeps the engine. SAPIEN renders on one device per process, so
-    ``ROBOIRG_RENDER_DEVICE`` is read once.
+    process and keeps the engine, unless that is not wanted. SAPIEN renders on one device per
+    process, so ``ROBOIRG_RENDER_DEVICE`` is read once.
 
     Raises:
         MissingDependencyError: SAPIEN is not installed.
         RenderDeviceError: no device can render, or its driver refuses.
     """
-    _engine_keeper()
+    if keep_engine:
+        _engine_keeper()
     return _new_system(_chosen_device())
 
 

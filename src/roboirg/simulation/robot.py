@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +20,8 @@ from roboirg.actions import ARM_JOINTS
 from roboirg.episode import ROBOT_BASE
 from roboirg.simulation import settings
 from roboirg.simulation.assets import find_model_files
-from roboirg.simulation.camera_mesh import visible_shape
+from roboirg.simulation.meshes import finish, link_shapes
+from roboirg.simulation.rendering import FAITHFUL, Rendering
 
 FINGERS = ("panda_leftfinger", "panda_rightfinger")
 TOOL_LINK = "panda_hand_tcp"
@@ -38,10 +41,13 @@ class Robot:
     Args:
         scene: where to build it; it has to be the first thing that is built.
         visible: whether to load its pictures' meshes too.
+        rendering: which meshes.
     """
 
-    def __init__(self, scene: sapien.Scene, *, visible: bool) -> None:
-        loader = _loader(visible)
+    def __init__(
+        self, scene: sapien.Scene, *, visible: bool, rendering: Rendering = FAITHFUL
+    ) -> None:
+        loader = _loader(visible, rendering.meshes == "stock")
         builder = loader.builder
         builder.set_scene(scene)
         builder.initial_pose = sapien.Pose(ROBOT_BASE)
@@ -54,19 +60,21 @@ class Robot:
             )
             joint.set_friction(0.0)
         self.links = {link.name: link for link in self.articulation.links}
-        if visible:
-            self._add_wrist_camera_mesh(loader.camera_visual)
+        self._add_meshes(loader.visuals, rendering)
         self.tool = self.links[TOOL_LINK]
         self._joints = list(self.articulation.active_joints)
         self._fingers = [self.links[name] for name in FINGERS]
         self.reset()
 
-    def _add_wrist_camera_mesh(self, visual: Any) -> None:  # noqa: ANN401
-        shape = visible_shape(find_model_files().wrist_camera, visual.material)
-        shape.local_pose = visual.pose
-        component = sapien.render.RenderBodyComponent()
-        component.attach(shape)
-        self.links[CAMERA_LINK].entity.add_component(component)
+    def _add_meshes(self, visuals: Mapping[str, Sequence[Any]], rendering: Rendering) -> None:
+        for name, records in visuals.items():
+            component = sapien.render.RenderBodyComponent()
+            for record in records:
+                for shape in link_shapes(Path(record.filename), record.material, rendering):
+                    shape.local_pose = record.pose
+                    component.attach(shape)
+            self.links[name].entity.add_component(component)
+            finish(component, rendering)
 
     def reset(self) -> None:
         """Put the robot at home, at rest."""
@@ -154,18 +162,22 @@ def _force_on(
 
 
 class _Loader(URDFLoader):  # type: ignore[misc]  # SAPIEN's wrappers have no types
-    """Reads the robot's description; leaves out what is not to be drawn.
+    """Reads the robot's description.
+
+    Args:
+        visible: whether the robot is to be seen at all.
+        stock: whether it is built with its meshes as they are installed.
 
     Attributes:
         builder: builds the robot, any number of times.
-        camera_visual: how the description wants the wrist camera's mesh shown; None if nothing
-            is drawn.
+        visuals: how the description wants the meshes shown that the builder leaves out, by link.
     """
 
-    def __init__(self, *, visible: bool) -> None:
+    def __init__(self, *, visible: bool, stock: bool) -> None:
         super().__init__()
         self._visible = visible
-        self.camera_visual: Any = None
+        self._stock = stock
+        self.visuals: dict[str, list[Any]] = {}
         self.fix_root_link = True
         # The loader wants a scene even to parse; the one to build in is set later.
         self.set_scene(sapien.Scene([sapien.physx.PhysxCpuSystem()]))
@@ -181,11 +193,12 @@ class _Loader(URDFLoader):  # type: ignore[misc]  # SAPIEN's wrappers have no ty
         if not self._visible:
             link.visuals.clear()
         super()._build_link(link, link_builder)
-        if link.name == CAMERA_LINK and self._visible:
-            self.camera_visual = link_builder.visual_records.pop()
+        if link_builder.visual_records and not self._stock:
+            self.visuals[link.name] = link_builder.visual_records[:]
+            link_builder.visual_records.clear()
 
 
 @functools.cache
-def _loader(visible: bool) -> _Loader:
+def _loader(visible: bool, stock: bool) -> _Loader:
     """The parsed robot description; parsing takes longer than building."""
-    return _Loader(visible=visible)
+    return _Loader(visible=visible, stock=stock)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import sapien
@@ -10,6 +12,9 @@ import sapien.render
 from sapien.wrapper.actor_builder import ActorBuilder
 
 from roboirg.simulation.assets import find_model_files
+from roboirg.simulation.rendering import FAITHFUL, Rendering
+
+Range = tuple[int, int]
 
 TABLE_HEIGHT = 0.9196429
 TABLE_HALF = (2.418 / 2, 1.209 / 2, TABLE_HEIGHT / 2)
@@ -18,20 +23,31 @@ TABLE_SCALE = 1.75
 QUARTER_TURN = (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
 
 FLOOR_WIDTH = 100.0
-FLOOR_CELLS = 10
-"""Squares per side. ManiSkill draws 100; with 10 single wrist pixels differ by one level."""
+FLOOR_CELLS = 100
+"""Squares per side; with fewer, single wrist pixels would differ by one level."""
+FLOOR_PIECES = (
+    ((40, 60), (40, 60)),
+    ((40, 60), (0, 40)),
+    ((40, 60), (60, 100)),
+    ((0, 40), (0, 100)),
+    ((60, 100), (0, 100)),
+)
+"""The floor's squares, from and to along x and y, in pieces that a camera draws or leaves out:
+most see only the first, which has the table in its middle."""
+WHOLE_FLOOR = (((0, 100), (0, 100)),)
 FLOOR_TEXTURE_REPEATS = 25.0
 """Repeats of the grid texture over the floor's width."""
 PLANE_UP = (0.7071068, 0.0, -0.7071068, 0.0)
 
 
-def add_scenery(scene: sapien.Scene, *, visible: bool) -> None:
+def add_scenery(scene: sapien.Scene, *, visible: bool, rendering: Rendering = FAITHFUL) -> None:
     """Add the table, whose top is at z = 0, and the floor under it."""
-    _add_table(scene, visible=visible)
-    _add_floor(scene, visible=visible)
+    _add_table(scene, visible=visible, rendering=rendering)
+    pieces = WHOLE_FLOOR if rendering.meshes == "stock" else FLOOR_PIECES
+    _add_floor(scene, pieces if visible else ())
 
 
-def _add_table(scene: sapien.Scene, *, visible: bool) -> None:
+def _add_table(scene: sapien.Scene, *, visible: bool, rendering: Rendering) -> None:
     builder = ActorBuilder()
     builder.set_scene(scene)
     builder.add_box_collision(sapien.Pose([0.0, 0.0, TABLE_HEIGHT / 2]), half_size=TABLE_HALF)
@@ -41,28 +57,46 @@ def _add_table(scene: sapien.Scene, *, visible: bool) -> None:
         )
     builder.set_physx_body_type("kinematic")
     builder.set_initial_pose(sapien.Pose(TABLE_POSITION, QUARTER_TURN))
-    builder.build(name="table")
+    table = builder.build(name="table")
+    if visible and rendering.meshes != "stock":
+        _simplify(table.find_component_by_type(sapien.render.RenderBodyComponent))
 
 
-def _add_floor(scene: sapien.Scene, *, visible: bool) -> None:
+def _simplify(table: sapien.render.RenderBodyComponent) -> None:
+    """Replace the texture that says everywhere that the table is metallic by a number."""
+    for shape in table.render_shapes:
+        for material in (part.material for part in shape.parts):
+            if material.metallic_texture is not None:
+                material.metallic_texture = None
+                material.metallic = 1.0
+
+
+def _add_floor(scene: sapien.Scene, pieces: Sequence[tuple[Range, Range]]) -> None:
     builder = ActorBuilder()
     builder.set_scene(scene)
     builder.add_plane_collision(sapien.Pose([0.0, 0.0, -TABLE_HEIGHT], PLANE_UP))
     builder.set_physx_body_type("static")
     floor = builder.build(name="floor")
-    if visible:
+    for along_x, along_y in pieces:
         component = sapien.render.RenderBodyComponent()
-        component.attach(_floor_mesh())
+        component.attach(_floor_piece(along_x, along_y).clone())
         floor.add_component(component)
 
 
-def _floor_mesh() -> sapien.render.RenderShapeTriangleMesh:
-    """A square grid of triangles with the grid texture on it."""
+@functools.cache
+def _floor_piece(along_x: Range, along_y: Range) -> sapien.render.RenderShapeTriangleMesh:
+    """Squares of the floor, from and to along x and y, as triangles with the grid texture."""
     ticks = np.linspace(-FLOOR_WIDTH / 2, FLOOR_WIDTH / 2, FLOOR_CELLS + 1)
-    x, y = (axis.ravel() for axis in np.meshgrid(ticks, ticks, indexing="ij"))
+    columns, rows = along_x[1] - along_x[0], along_y[1] - along_y[0]
+    x, y = (
+        axis.ravel()
+        for axis in np.meshgrid(
+            ticks[along_x[0] : along_x[1] + 1], ticks[along_y[0] : along_y[1] + 1], indexing="ij"
+        )
+    )
     vertices = np.stack([x, y, np.full_like(x, -TABLE_HEIGHT)], axis=1)
-    corner = np.arange(FLOOR_CELLS)[:, None] * (FLOOR_CELLS + 1) + np.arange(FLOOR_CELLS)
-    near, right = corner.ravel(), corner.ravel() + FLOOR_CELLS + 1
+    corner = np.arange(columns)[:, None] * (rows + 1) + np.arange(rows)
+    near, right = corner.ravel(), corner.ravel() + rows + 1
     triangles = np.concatenate(
         [np.stack([near, right, near + 1], axis=1), np.stack([right, right + 1, near + 1], axis=1)]
     )

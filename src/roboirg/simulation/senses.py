@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,9 +11,15 @@ from numpy.typing import NDArray
 
 from roboirg.actions import JOINT_HIGH, JOINT_LOW, POSE_SIZE
 from roboirg.errors import InvalidValueError
-from roboirg.observations import Demonstration, check_cameras
+from roboirg.observations import (
+    DemonstrationFrames,
+    check_cameras,
+    check_demonstration_frames,
+    check_observe_every,
+)
 from roboirg.simulation.cameras import SIZE
 from roboirg.simulation.proprioception import Proprioception
+from roboirg.simulation.rendering import FAITHFUL, Rendering
 from roboirg.simulation.world import World
 
 _SLACK = 0.1
@@ -21,25 +27,33 @@ _SLACK = 0.1
 
 
 class Wishes(NamedTuple):
-    """Which fields observations have besides proprioception.
+    """Which fields observations have besides proprioception, and the video.
 
     Attributes:
         cameras: whose pictures.
         depth: whether with depth.
         calibration: whether with extrinsic and intrinsic matrices.
+        demonstration_frames: which pictures the video has: all, none, or every n-th.
+        observe_every: after how many control steps there is an observation in ``history``.
+        rendering: how pictures are made.
     """
 
     cameras: Sequence[str]
     depth: bool = False
     calibration: bool = False
+    demonstration_frames: DemonstrationFrames = "all"
+    observe_every: int | None = None
+    rendering: Rendering = FAITHFUL
 
     def checked(self) -> Wishes:
         """These wishes, if they can be fulfilled.
 
         Raises:
             UnknownNameError: there is no such camera.
-            InvalidValueError: depth or calibration is wanted of no camera.
+            InvalidValueError: depth or calibration is wanted of no camera, or a number is none.
         """
+        check_demonstration_frames(self.demonstration_frames)
+        check_observe_every(self.observe_every)
         cameras = check_cameras(self.cameras)
         for name, wanted in (("depth", self.depth), ("calibration", self.calibration)):
             if not isinstance(wanted, bool):
@@ -70,19 +84,32 @@ class Senses:
 
     def read(self) -> dict[str, Any]:
         """The observation without the instruction."""
-        fields: dict[str, Any] = {
-            f"{camera}_rgb": self._world.picture(camera) for camera in self._wishes.cameras
-        }
-        for camera in self._wishes.cameras if self._wishes.depth else ():
-            fields[f"{camera}_depth"] = self._world.cameras.depth(camera)
+        drawn = {field: draw(self._world, field) for field in drawn_space(self._wishes)}
+        return {**drawn, **self.feel()}
+
+    def feel(self) -> dict[str, Any]:
+        """The part of the observation for which nothing is drawn."""
+        fields: dict[str, Any] = {}
         for camera in self._wishes.cameras if self._wishes.calibration else ():
             fields[f"{camera}_extrinsic"] = self._world.cameras.extrinsic(camera)
             fields[f"{camera}_intrinsic"] = self._world.cameras.intrinsic(camera)
         return {**fields, **self.proprioception.read()}
 
 
-def sensed_space(wishes: Wishes) -> dict[str, spaces.Space[Any]]:
-    """The space of each field that `Senses.read` gives."""
+def draw(world: World, field: str) -> NDArray[Any]:
+    """A field such as ``"front_rgb"`` of the world as it is now."""
+    camera, _, kind = field.rpartition("_")
+    return _DRAWN[kind](world, camera)
+
+
+_DRAWN: Mapping[str, Callable[[World, str], NDArray[Any]]] = {
+    "rgb": lambda world, camera: world.picture(camera),
+    "depth": lambda world, camera: world.cameras.depth(camera),
+}
+
+
+def drawn_space(wishes: Wishes) -> dict[str, spaces.Space[Any]]:
+    """The space of each field that has to be drawn."""
     fields: dict[str, spaces.Space[Any]] = {
         f"{camera}_rgb": spaces.Box(0, 255, (SIZE, SIZE, 3), np.uint8) for camera in wishes.cameras
     }
@@ -91,6 +118,12 @@ def sensed_space(wishes: Wishes) -> dict[str, spaces.Space[Any]]:
         fields[f"{camera}_depth"] = spaces.Box(
             int(millimetres.min), int(millimetres.max), (SIZE, SIZE, 1), np.int16
         )
+    return fields
+
+
+def felt_space(wishes: Wishes) -> dict[str, spaces.Space[Any]]:
+    """The space of each field that `Senses.feel` gives."""
+    fields: dict[str, spaces.Space[Any]] = {}
     for camera in wishes.cameras if wishes.calibration else ():
         fields[f"{camera}_extrinsic"] = spaces.Box(-np.inf, np.inf, (3, 4), np.float32)
         fields[f"{camera}_intrinsic"] = spaces.Box(-np.inf, np.inf, (3, 3), np.float32)
@@ -103,11 +136,16 @@ def sensed_space(wishes: Wishes) -> dict[str, spaces.Space[Any]]:
     }
 
 
-def stack(frames: Sequence[dict[str, Any]], wishes: Wishes) -> Demonstration:
-    """Moments of a video as arrays with a leading axis T, which may be 0."""
+def sensed_space(wishes: Wishes) -> dict[str, spaces.Space[Any]]:
+    """The space of each field that `Senses.read` gives."""
+    return {**drawn_space(wishes), **felt_space(wishes)}
+
+
+def stack_felt(moments: Sequence[dict[str, Any]], wishes: Wishes) -> dict[str, NDArray[Any]]:
+    """What `Senses.feel` gave, as arrays with a leading axis T, which may be 0."""
     return {
-        key: np.stack([frame[key] for frame in frames]) if frames else _empty(space)
-        for key, space in sensed_space(wishes).items()
+        key: np.stack([moment[key] for moment in moments]) if moments else _empty(space)
+        for key, space in felt_space(wishes).items()
     }
 
 

@@ -63,7 +63,7 @@ def apply_physics_settings() -> None:
 
 @functools.cache
 def apply_render_settings() -> None:
-    """Choose the shader of all cameras and the formats of their pictures."""
+    """Choose the usual shader of cameras and the formats of their pictures."""
     sapien.render.set_camera_shader_dir("minimal")
     sapien.render.set_picture_format("Color", "r8g8b8a8unorm")
     sapien.render.set_picture_format("ColorRaw", "r8g8b8a8unorm")

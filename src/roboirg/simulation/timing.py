@@ -9,10 +9,10 @@ lengths that policies trained on RoboMME's data have seen.
 
 from __future__ import annotations
 
+import functools
+from types import ModuleType
+
 import numpy as np
-import toppra
-import toppra.algorithm
-import toppra.constraint
 from numpy.typing import NDArray
 
 from roboirg.actions import ARM_JOINTS
@@ -28,8 +28,6 @@ WAYPOINT_SPACING = 0.1
 SMALLEST_JOINT_STEP = 1e-6
 GRID_INTERVALS = 10
 """Into which the way between two way points is divided."""
-
-toppra.setup_logging("ERROR")
 
 
 def timed(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -47,6 +45,7 @@ def timed(points: NDArray[np.float64]) -> NDArray[np.float64]:
     points = _spaced(points)
     if len(points) == 1:
         return points
+    toppra = _toppra()
     limits = np.ones(ARM_JOINTS)
     path = toppra.SplineInterpolator(np.linspace(0.0, 1.0, len(points)), points)
     constraints = [
@@ -63,6 +62,18 @@ def timed(points: NDArray[np.float64]) -> NDArray[np.float64]:
         raise MotionPlanningError("No timing within the joint limits was found.")
     count = max(int(trajectory.duration / CONTROL_PERIOD), 2)
     return np.asarray(trajectory(np.linspace(0.0, trajectory.duration, count)))
+
+
+@functools.cache
+def _toppra() -> ModuleType:
+    """The library, which takes half a second to import: it brings a plotting library."""
+    import toppra
+    import toppra.algorithm
+    import toppra.constraint
+
+    toppra.setup_logging("ERROR")
+    module: ModuleType = toppra
+    return module
 
 
 def _spaced(points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -18,6 +18,7 @@ from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.detection import Detector
 from roboirg.simulation.device import render_system
 from roboirg.simulation.motions import Moment, MotionPlayer
+from roboirg.simulation.rendering import FAITHFUL, Rendering
 from roboirg.simulation.robot import CAMERA_LINK, Robot
 from roboirg.simulation.scenery import add_scenery
 
@@ -29,23 +30,26 @@ class World:
         scene: the objects and their scripted movements.
         visible: False leaves out all that is only drawn; pictures are then not to be had, and
             no Vulkan device is needed.
+        rendering: how pictures are made.
 
     Attributes:
         elapsed: control steps since the beginning.
         facts: all that held at the last evaluation.
     """
 
-    def __init__(self, scene: Scene, *, visible: bool = True) -> None:
+    def __init__(
+        self, scene: Scene, *, visible: bool = True, rendering: Rendering = FAITHFUL
+    ) -> None:
         settings.apply_physics_settings()
         systems: list[Any] = [sapien.physx.PhysxCpuSystem()]
         if visible:
-            systems.append(render_system())
+            systems.append(render_system(keep_engine=rendering.quick_start))
             settings.apply_render_settings()
         self._scene = sapien.Scene(systems)
         self._physics = systems[0]
         self._physics.timestep = 1.0 / settings.PHYSICS_RATE
-        self.robot = Robot(self._scene, visible=visible)
-        add_scenery(self._scene, visible=visible)
+        self.robot = Robot(self._scene, visible=visible, rendering=rendering)
+        add_scenery(self._scene, visible=visible, rendering=rendering)
         self.bodies = {
             item.name: bodies.build(self._scene, item, visible=visible) for item in scene.objects
         }
@@ -55,7 +59,8 @@ class World:
         self._cameras: Cameras | None = None
         if visible:
             settings.add_lights(self._scene)
-            self._cameras = Cameras(self._scene, self.robot.links[CAMERA_LINK].entity)
+            mount = self.robot.links[CAMERA_LINK].entity
+            self._cameras = Cameras(self._scene, mount, rendering)
         self.elapsed = 0
         self.facts: frozenset[Fact] = self._detector.detect([], self._motions.absent())
 
@@ -69,15 +74,19 @@ class World:
             The facts that hold afterwards.
         """
         self._motions.before_step(Moment(self.elapsed, self.facts, self._stages))
-        self.robot.set_targets(action)
-        for _ in range(settings.PHYSICS_STEPS):
-            self._physics.step()
+        self.advance(action)
         self.elapsed += 1
         self.facts = self._detector.detect(
             self._physics.get_contacts(), self._motions.absent(), self._motions.stopped()
         )
         self._motions.after_step(self.facts)
         return self.facts
+
+    def advance(self, action: NDArray[np.floating[Any]]) -> None:
+        """The physics of one control step and nothing else: no motions, no facts, no time."""
+        self.robot.set_targets(action)
+        for _ in range(settings.PHYSICS_STEPS):
+            self._physics.step()
 
     def note_stage(self, index: int) -> None:
         """Take note that a stage is due, for the motions that wait for it."""

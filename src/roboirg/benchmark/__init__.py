@@ -1,0 +1,1 @@
+"""How fast this machine plays episodes, against the floor and against the stock path."""

@@ -1,0 +1,223 @@
+"""The robot's meshes in a form that is quick to draw, derived from the installed files.
+
+The installed meshes are shaded flat, with three corners of its own for each triangle, and computing
+corners is most of what drawing them costs on a processor. Where a triangle's normal is that of its
+first corner (`roboirg.simulation.shaders`), the other two can be any corners at their places.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import sapien
+import sapien.render
+from numpy.typing import NDArray
+
+from roboirg.simulation import camera_mesh, shaders
+from roboirg.simulation.derived import Arrays, code_of, kept_arrays
+from roboirg.simulation.light_meshes import CAMERA_SHARE, LINK_SHARE, SMALL, lighten
+from roboirg.simulation.rendering import Rendering
+
+FINGER = "finger.glb"
+"""Seen from so near by the wrist camera that it is never lightened."""
+
+
+class Triangles(NamedTuple):
+    """Triangles that are shaded flat.
+
+    Attributes:
+        corners: (n, 3, 3), metres.
+        normals: (n, 3).
+    """
+
+    corners: NDArray[np.float32]
+    normals: NDArray[np.float32]
+
+
+class Shared(NamedTuple):
+    """Triangles that share corners; the normal of each is that of its first corner.
+
+    Attributes:
+        vertices: (m, 3), metres.
+        normals: (m, 3).
+        triangles: (n, 3), indices of vertices.
+    """
+
+    vertices: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    triangles: NDArray[np.uint32]
+
+
+@dataclass(frozen=True)
+class _Look:
+    """What there is to say of a material without textures."""
+
+    emission: tuple[float, ...]
+    base_color: tuple[float, ...]
+    specular: float
+    roughness: float
+    metallic: float
+    transmission: float
+    ior: float
+    transmission_roughness: float
+
+    @classmethod
+    def of(cls, material: sapien.render.RenderMaterial) -> _Look:
+        return cls(
+            tuple(material.emission),
+            tuple(material.base_color),
+            material.specular,
+            material.roughness,
+            material.metallic,
+            material.transmission,
+            material.ior,
+            material.transmission_roughness,
+        )
+
+    def packed(self) -> NDArray[np.float32]:
+        return np.array(np.hstack([*astuple(self)]), np.float32)
+
+    @classmethod
+    def unpacked(cls, numbers: NDArray[np.float32]) -> _Look:
+        values = [float(number) for number in numbers]
+        return cls(tuple(values[:4]), tuple(values[4:8]), *values[8:])
+
+    def material(self) -> sapien.render.RenderMaterial:
+        emission, base_color, *rest = astuple(self)
+        return sapien.render.RenderMaterial(list(emission), list(base_color), *rest)
+
+
+def link_shapes(
+    path: Path, material: sapien.render.RenderMaterial | None, rendering: Rendering
+) -> list[sapien.render.RenderShapeTriangleMesh]:
+    """A link's shapes, to be attached to a body and placed.
+
+    Args:
+        path: the installed mesh.
+        material: for files that have none.
+        rendering: faithful or light.
+    """
+    look = None if material is None else _Look.of(material)
+    return [shape.clone() for shape in _shapes(path, look, rendering)]
+
+
+def finish(body: sapien.render.RenderBodyComponent, rendering: Rendering) -> None:
+    """Have a body of `link_shapes` that is in a scene shaded as they want it."""
+    if _flat(rendering):
+        shaders.mark(body)
+
+
+def share_corners(flat: Triangles) -> Shared:
+    """Few vertices for all triangles, in the triangles' order."""
+    places = _numbers_of(flat.corners.reshape(-1, 3)).reshape(-1, 3).tolist()
+    ways = _numbers_of(flat.normals).tolist()
+    at: dict[int, list[int]] = {}
+    vertex_of: dict[tuple[int, int], int] = {}
+    sources: list[tuple[int, int]] = []
+    firsts = []
+    for number, (three, way) in enumerate(zip(places, ways, strict=True)):
+        # A vertex with this normal, or one more where there are the fewest.
+        first = min(
+            range(3),
+            key=lambda k: -1 if (three[k], way) in vertex_of else len(at.get(three[k], ())),
+        )
+        if (three[first], way) not in vertex_of:
+            vertex_of[three[first], way] = len(sources)
+            at.setdefault(three[first], []).append(len(sources))
+            sources.append((number, first))
+        firsts.append(first)
+    for number, three in enumerate(places):
+        for corner, place in enumerate(three):
+            if place not in at:
+                at[place] = [len(sources)]
+                sources.append((number, corner))
+    triangles = []
+    for three, way, first in zip(places, ways, firsts, strict=True):
+        here = vertex_of[three[first], way]
+        # What has been computed lately need not be computed again.
+        others = [
+            min(at[three[(first + k) % 3]], key=lambda vertex: abs(vertex - here)) for k in (1, 2)
+        ]
+        triangles.append([here, *others])
+    owners, corners = np.array(sources).T
+    return Shared(
+        flat.corners[owners, corners],
+        flat.normals[owners],
+        np.array(triangles, dtype=np.uint32),
+    )
+
+
+def _numbers_of(rows: NDArray[np.float32]) -> NDArray[np.intp]:
+    """A number for each row, equal for equal rows."""
+    return np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1)
+
+
+def _flat(rendering: Rendering) -> bool:
+    return rendering.slim_shader and shaders.slim_shader() is not None
+
+
+@functools.cache
+def _shapes(
+    path: Path, look: _Look | None, rendering: Rendering
+) -> Sequence[sapien.render.RenderShapeTriangleMesh]:
+    arrays = _derived(path, light=rendering.meshes == "light" and path.name != FINGER)
+    shapes = []
+    for part in range(len(arrays) // 4):
+        vertices, normals, triangles, numbers = (
+            arrays[f"{field}{part}"] for field in (*Shared._fields, "look")
+        )
+        if not _flat(rendering):  # three vertices of its own for each triangle
+            vertices = vertices[triangles].reshape(-1, 3)
+            normals = np.repeat(normals[triangles[:, 0]], 3, axis=0)
+            triangles = np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3)
+        own = _Look.unpacked(np.asarray(numbers, np.float32)) if len(numbers) else look
+        shapes.append(
+            sapien.render.RenderShapeTriangleMesh(
+                vertices=vertices,
+                triangles=triangles,
+                normals=normals,
+                uvs=np.zeros((len(vertices), 2), np.float32),
+                material=None if own is None else own.material(),
+            )
+        )
+    return shapes
+
+
+def _derived(path: Path, *, light: bool) -> Arrays:
+    """For each part of a mesh the fields of `Shared` and the look, each with the part's number."""
+    # The contents of the installed files are known: they have been checked.
+    sources = code_of("meshes", "camera_mesh", "light_meshes") + camera_mesh.packed_mask()
+
+    def derive() -> Arrays:
+        arrays: Arrays = {}
+        for part, (flat, look) in enumerate(_installed(path)):
+            share = CAMERA_SHARE if path.suffix == ".stl" else LINK_SHARE
+            lighter = light and len(flat.corners) > SMALL
+            drawn = Triangles(*lighten(flat.corners, share=share)) if lighter else flat
+            shared = share_corners(drawn)
+            for field, array in zip(Shared._fields, shared, strict=True):
+                arrays[f"{field}{part}"] = array
+            arrays[f"look{part}"] = np.zeros(0) if look is None else look.packed()
+        return arrays
+
+    return kept_arrays(f"{path.stem}-{'light' if light else 'faithful'}", sources, derive)
+
+
+def _installed(path: Path) -> list[tuple[Triangles, _Look | None]]:
+    """The parts of an installed mesh that can be seen, with their own looks."""
+    if path.suffix == ".stl":
+        return [(Triangles(*camera_mesh.visible_triangles(path)), None)]
+    return [
+        (
+            Triangles(
+                part.vertices[part.triangles], part.get_vertex_normal()[part.triangles[:, 0]]
+            ),
+            _Look.of(part.material),
+        )
+        for part in sapien.render.RenderShapeTriangleMesh(str(path)).parts
+    ]

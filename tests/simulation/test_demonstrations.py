@@ -1,0 +1,359 @@
+"""Demonstrations: a replay is the demonstration to the last bit, and a cache changes nothing."""
+
+import os
+import pickle
+import subprocess
+import sys
+import weakref
+
+import numpy as np
+import pytest
+
+import roboirg
+from roboirg.evaluation.record import Job
+from roboirg.evaluation.rollout import Player
+from roboirg.simulation.cameras import Cameras
+from roboirg.simulation.demonstration import frames as frames_module
+from roboirg.simulation.demonstration import library
+from roboirg.simulation.demonstration.recording import Move, Recording
+from roboirg.simulation.hands import Hands
+from roboirg.simulation.rendering import FAITHFUL
+from roboirg.simulation.session import Session
+from roboirg.simulation.settings import HOME_ACTION
+from roboirg.splits import get_episode
+from roboirg.tasks import all_tasks
+
+pytestmark = pytest.mark.sim
+
+VIDEO_TASKS = tuple(task for task in all_tasks() if get_episode(task, "test", 0).demonstration)
+SHORT = "VideoUnmask"
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("ROBOIRG_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def unplanned(monkeypatch):
+    """Makes planning a mistake."""
+
+    def forbid():
+        monkeypatch.setattr(Hands, "perform", None)
+
+    return forbid
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """Which pictures have been drawn."""
+    names, picture = [], Cameras.picture
+
+    def counted(self, camera):
+        names.append(camera)
+        return picture(self, camera)
+
+    monkeypatch.setattr(Cameras, "picture", counted)
+    return names
+
+
+def reset(task=SHORT, **options):
+    env = roboirg.make(task, **{"episode": 1, "cameras": (), **options})
+    observation, info = env.reset()
+    return env, observation, info
+
+
+def same(first, second):
+    assert list(first) == list(second)
+    for key, value in first.items():
+        assert value.dtype == second[key].dtype
+        assert np.array_equal(value, second[key]), key
+
+
+def test_five_tasks_have_a_video():
+    assert len(VIDEO_TASKS) == 5
+
+
+@pytest.mark.parametrize("visible", [False, True])
+@pytest.mark.parametrize("task", VIDEO_TASKS)
+def test_a_replay_is_the_demonstration_to_the_last_bit(task, visible):
+    planned, replayed = (
+        Session(get_episode(task, "test", 3), visible=shown) for shown in (False, visible)
+    )
+    first, second = [], []
+    made = planned.play_demonstration(lambda _: first.append(planned.state_hash()))
+    kept = Recording.decoded(made.encoded())
+    again = replayed.play_demonstration(lambda _: second.append(replayed.state_hash()), kept)
+    assert first == second
+    assert len(first) == kept.length_of_video(planned.episode) > 0
+    assert again.end == made.end == kept.end
+    assert planned.events == replayed.events
+    # What cannot be read, such as the solver's memory of contacts, shows in what comes next.
+    rng = np.random.default_rng(5)
+    for _ in range(100):
+        action = HOME_ACTION + rng.normal(0.0, 0.2, 8)
+        planned.step(action)
+        replayed.step(action)
+    assert planned.state_hash() == replayed.state_hash()
+
+
+@pytest.mark.parametrize("task", VIDEO_TASKS)
+def test_pictures_read_late_are_those_of_the_demonstration(task):
+    seen = {"front_rgb": [], "wrist_rgb": []}
+    every = 1 if task == SHORT else 60
+    steps = []
+
+    def look(env, is_demonstration):
+        if is_demonstration:
+            steps.append(None)
+            if len(steps) % every == 1 % every:
+                for field, frames in seen.items():
+                    frames.append(env.picture(field.removesuffix("_rgb")))
+
+    env = roboirg.make(task, episode=1, demonstration_frames=every)
+    env.set_frame_hook(look)
+    _, info = env.reset()
+    env.step_chunk(np.tile(HOME_ACTION + 0.1, (20, 1)))
+    env.close()
+    video = info["demonstration"]
+    assert video.length == len(steps) == len(video["gripper"])
+    for field, frames in seen.items():
+        assert np.array_equal(video[field], np.stack(frames)), field
+        assert video[field] is video[field]
+
+
+def test_depth_and_calibration_of_the_video_are_those_of_its_moments():
+    options = {"cameras": ("wrist",), "depth": True, "calibration": True}
+    seen = []
+    env = roboirg.make(SHORT, episode=1, **options)
+    env.set_frame_hook(lambda env, shown: seen.append(env._playing.senses.read()) if shown else 0)
+    video = env.reset()[1]["demonstration"]
+    assert list(video) == list(seen[0])
+    same({key: np.stack([moment[key] for moment in seen]) for key in video}, dict(video))
+
+
+def test_nothing_is_drawn_before_it_is_read(drawn):
+    env, _, info = reset(cameras=("front", "wrist"))
+    world = weakref.ref(env.session.world)
+    assert drawn == ["front", "wrist"]  # the first observation
+    video = info["demonstration"]
+    assert (video.length, len(video["joint_positions"]), "front_rgb" in video) == (66, 66, True)
+    assert "front_rgb (not drawn)" in repr(video)
+    assert drawn == ["front", "wrist"]
+    env.close()
+    assert world() is None
+    assert video["wrist_rgb"].shape == (66, 256, 256, 3)
+    assert drawn == ["front", "wrist"] + ["wrist"] * 66
+    plain = pickle.loads(pickle.dumps(video))  # noqa: S301 - our own
+    assert type(plain) is dict
+    same(plain, dict(video))
+
+
+def test_every_nth_picture_or_none_if_that_is_wanted(drawn):
+    _, _, info = reset(cameras=("front",))
+    _, _, few = reset(cameras=("front",), demonstration_frames=7)
+    _, _, none = reset(cameras=("front",), demonstration_frames="none")
+    drawn.clear()
+    assert np.array_equal(few["demonstration"]["front_rgb"].shape, (10, 256, 256, 3))
+    assert len(drawn) == 10
+    assert np.array_equal(
+        few["demonstration"]["front_rgb"], info["demonstration"]["front_rgb"][::7]
+    )
+    assert set(none["demonstration"]) == {"joint_positions", "gripper", "end_effector"}
+    for info_ in (few, none):
+        assert len(info_["demonstration"]["gripper"]) == 66
+        assert len(info_["demonstration_subgoals"]) == 66
+
+
+def story(task=SHORT):
+    """All that an environment and a run tell."""
+    _, observation, info = reset(task, cameras=("front", "wrist"), depth=True, grounded=True)
+    job = Job(policy=f"{__name__}:Viewer", task=task, split="test", episode=1, setting="direct")
+    record = Player(None)(job).model_dump(exclude={"started_at", "duration_s", "details"})
+    video = dict(info.pop("demonstration"))
+    return {**observation, **video, "first": observation["front_rgb"]}, info, record
+
+
+class Viewer:
+    """Acts by what it has seen of the video."""
+
+    def reset(self, instruction, demonstration):
+        self.seen = demonstration["wrist_rgb"].mean(axis=(1, 2, 3))
+
+    def act(self, observation):
+        actions = np.tile(HOME_ACTION, (40, 1))
+        actions[:, 0] += 1e-3 * self.seen[:40]
+        return actions
+
+
+def test_cold_warm_or_off_the_cache_changes_nothing(cache, monkeypatch, drawn, unplanned):
+    monkeypatch.setitem(sys.modules, __name__, sys.modules[__name__])
+    cold = story()
+    at_first = len(drawn)
+    assert len(list(cache.glob("actions/*"))) == 1
+    assert len(list(cache.glob("frames/*"))) == 4
+    with monkeypatch.context() as patch:
+        patch.setenv("ROBOIRG_CACHE", "off")
+        off = story()
+    drawn.clear()
+    unplanned()
+    warm = story()
+    assert len(drawn) == at_first - 2 * 66
+    for arrays, info, record in (warm, off):
+        assert record == cold[2]
+        assert record["demonstration_steps"] == 66
+        assert info == cold[1]
+        assert arrays["instruction"] == cold[0]["instruction"]
+        for key in set(arrays) - {"instruction"}:
+            assert np.array_equal(arrays[key], cold[0][key]), key
+
+
+@pytest.mark.parametrize("task", VIDEO_TASKS)
+def test_a_warm_reset_is_a_cold_one(task, cache, unplanned):
+    _, observation, info = reset(task)
+    (entry,) = cache.glob("actions/*")
+    assert entry.stat().st_size < 200_000
+    unplanned()
+    env, again, warm = reset(task)
+    same(dict(info.pop("demonstration")), dict(warm.pop("demonstration")))
+    assert (info, observation.pop("instruction")) == (warm, again.pop("instruction"))
+    same(observation, again)
+    assert env.session.judge.index == len(env.episode.demonstration)
+
+
+def tampered(recording, **changes):
+    fields = {"actions": recording.actions, "stages": recording.stages, "end": recording.end}
+    return Recording(**{**fields, **changes}).encoded()
+
+
+@pytest.mark.parametrize("fault", ["end", "actions", "stages"])
+def test_a_replay_that_ends_differently_is_replaced_and_told(cache, caplog, fault):
+    _, observation, info = reset()
+    (entry,) = cache.glob("actions/*")
+    store = library.open_cache("actions")
+    good = store.read(entry.name)
+    right = Recording.decoded(good)
+    changes = {
+        "end": "0" * 64,
+        "actions": right.actions[::-1] + 0.3,
+        "stages": right.stages[:0],
+    }
+    wrong = {fault: changes[fault]}
+    if fault == "stages":
+        wrong["actions"] = right.actions[:0]
+    store.write(entry.name, tampered(right, **wrong))
+    _, after, rebuilt = reset()
+    assert [record.levelname for record in caplog.records] == ["WARNING"]
+    assert entry.name in caplog.text
+    assert f"{SHORT}/test/1" in caplog.text
+    assert np.array_equal(after["end_effector"], observation["end_effector"])
+    same(dict(info["demonstration"]), dict(rebuilt["demonstration"]))
+    assert Recording.decoded(store.read(entry.name)).end == right.end
+    reset()
+    assert len(caplog.records) == 1
+
+
+def test_who_looks_on_sees_the_right_demonstration_once(cache):
+    _, _, _ = reset()
+    (entry,) = cache.glob("actions/*")
+    store = library.open_cache("actions")
+    right = Recording.decoded(store.read(entry.name))
+    store.write(entry.name, tampered(right, actions=right.actions + 0.2))
+    seen = []
+    env = roboirg.make(SHORT, episode=1, cameras=())
+    env.set_frame_hook(lambda env, shown: seen.append(env.session.world.elapsed))
+    env.reset()
+    assert seen == list(range(1, 68))
+
+
+@pytest.mark.parametrize("kind", ["actions", "frames"])
+def test_a_damaged_entry_is_made_anew(cache, caplog, kind):
+    _, _, info = reset(cameras=("front",))
+    before = info["demonstration"]["front_rgb"]
+    (entry,) = cache.glob(f"{kind}/*")
+    size = entry.stat().st_size
+    with entry.open("r+b") as file:
+        file.truncate(size // 2)
+    _, _, again = reset(cameras=("front",))
+    assert np.array_equal(again["demonstration"]["front_rgb"], before)
+    assert [record.getMessage() for record in caplog.records] == [
+        f"The cache entry {entry} is damaged; it is made anew."
+    ]
+    assert entry.stat().st_size == size
+
+
+FILLER = """
+import sys, zlib, roboirg
+print("ready", flush=True)
+sys.stdin.readline()
+for _ in range(3):
+    video = roboirg.make("VideoUnmask", episode=1, cameras=("front",)).reset()[1]["demonstration"]
+    print(*[zlib.crc32(video[key].tobytes()) for key in video], flush=True)
+"""
+
+
+def test_two_processes_may_fill_the_cache_at_once(cache):
+    processes = [
+        subprocess.Popen(
+            [sys.executable, "-c", FILLER],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "ROBOIRG_CACHE": str(cache)},
+        )
+        for _ in range(2)
+    ]
+    for process in processes:
+        assert process.stdout.readline() == "ready\n"
+    for process in processes:
+        process.stdin.write("\n")
+        process.stdin.flush()
+    told = [process.communicate(timeout=120) for process in processes]
+    assert [complaints for _, complaints in told] == ["", ""]
+    assert len({line for lines, _ in told for line in lines.splitlines()}) == 1
+    for kind in ("actions", "frames"):
+        assert len(list(cache.glob(f"{kind}/*"))) == 1
+
+
+def test_keys_change_with_what_determines_a_demonstration(monkeypatch):
+    episode = get_episode(SHORT, "test", 1)
+    key = library.recording_key(episode)
+    assert library.recording_key(get_episode(SHORT, "test", 1)) == key
+    assert library.recording_key(get_episode(SHORT, "test", 2)) != key
+    for name, other in (("_SOURCE_HASH", "another"), ("_processor", lambda: "another")):
+        with monkeypatch.context() as patch:
+            patch.setattr(library, name, other)
+            library._ground.cache_clear()
+            assert library.recording_key(episode) != key
+        library._ground.cache_clear()
+    assert library.recording_key(episode) == key
+    ground = library._ground()
+    for part in ("sapien 3", "numpy ", "scipy ", "toppra ", "python 3"):
+        assert part in ground
+
+
+def test_pictures_drawn_otherwise_are_other_entries(cache):
+    def read(meshes):
+        return reset(cameras=("front",), meshes=meshes)[2]["demonstration"]["front_rgb"]
+
+    faithful = read("faithful")
+    assert len(list(cache.glob("frames/*"))) == 1
+    key = frames_module.rendering_key(FAITHFUL)
+    assert "llvmpipe" in key or "NVIDIA" in key
+    assert ".so" in key
+    light = read("light")
+    assert len(list(cache.glob("frames/*"))) == 2
+    assert not np.array_equal(light, faithful)
+    assert np.array_equal(read("faithful"), faithful)
+
+
+def test_a_recording_survives_as_it_is():
+    moves = [Move(1, np.nextafter(np.arange(8.0), 9.0)), Move(2, np.full(8, -0.0))]
+    recording = Recording.of(moves, "ab12")
+    again = Recording.decoded(recording.encoded())
+    assert again.actions.tobytes() == recording.actions.tobytes()
+    assert [move.stage for move in again.moves()] == [1, 2]
+    assert again.end == "ab12"
+    assert Recording.of([], "").actions.shape == (0, 8)

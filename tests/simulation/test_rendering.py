@@ -1,0 +1,188 @@
+"""The quick ways of drawing against the stock path, frame by frame, in two scenes side by side."""
+
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sapien
+import sapien.physx
+
+import roboirg
+from roboirg.observations import CAMERAS
+from roboirg.policies import make_policy, play
+from roboirg.simulation import bodies, culling, meshes, settings, shaders
+from roboirg.simulation.cameras import Cameras
+from roboirg.simulation.device import render_system
+from roboirg.simulation.rendering import FAITHFUL, LIGHT, STOCK, Rendering
+from roboirg.simulation.robot import CAMERA_LINK, Robot
+from roboirg.simulation.scenery import add_scenery
+from roboirg.splits import get_episode
+from roboirg.tasks import all_tasks
+
+pytestmark = pytest.mark.sim
+
+CULLING_ALONE = Rendering(slim_shader=False, meshes="stock")
+
+MANY_FRAMES = bool(os.environ.get("ROBOIRG_TEST_MANY_FRAMES"))
+"""Whether to compare at least 500 frames of oracle's runs over all tasks, not a sample."""
+RUNS = [(name, 2) for name in all_tasks()] if MANY_FRAMES else [("VideoPlaceButton", 2)]
+FRAMES = 50 if MANY_FRAMES else 12
+"""Of each run."""
+
+FAITHFUL_SHARE = 1e-5
+NOTICEABLE_LEVELS, NOTICEABLE_SHARE, MEAN_LEVELS = 8, 0.01, 0.5
+
+
+class Stage:
+    """A scene that is only looked at."""
+
+    def __init__(self, scene, rendering):
+        settings.apply_physics_settings()
+        settings.apply_render_settings()
+        self.scene = sapien.Scene([sapien.physx.PhysxCpuSystem(), render_system()])
+        self.robot = Robot(self.scene, visible=True, rendering=rendering)
+        add_scenery(self.scene, visible=True, rendering=rendering)
+        self.bodies = [bodies.build(self.scene, item, visible=True) for item in scene.objects]
+        settings.add_lights(self.scene)
+        mount = self.robot.links[CAMERA_LINK].entity
+        self.cameras = Cameras(self.scene, mount, rendering)
+
+    def show(self, moment):
+        """Pictures and segmentations, (2, 256, 256, 3) and (2, 256, 256), of a moment."""
+        joints, poses, presses = moment
+        self.robot.articulation.set_qpos(joints)
+        for body, pose, press in zip(self.bodies, poses, presses, strict=True):
+            if body.button is None:
+                body.entity.set_pose(pose)
+            else:
+                body.button.set_qpos(press)
+        pictures = self.cameras.pictures(CAMERAS)
+        segments = [self.cameras.segmentation(camera) for camera in CAMERAS]
+        return np.stack([pictures[camera] for camera in CAMERAS]).astype(int), np.stack(segments)
+
+
+def moments(task, index):
+    """So many moments of an oracle's run."""
+    taken = []
+
+    def note(env, _demonstration):
+        world = env.session.world
+        things = world.bodies.values()
+        taken.append(
+            (
+                world.robot.articulation.get_qpos().copy(),
+                [thing.entity.pose for thing in things],
+                [None if it.button is None else it.button.get_qpos().copy() for it in things],
+            )
+        )
+
+    env = roboirg.make(task, episode=index, cameras=())
+    env.set_frame_hook(note)
+    assert play(env, make_policy("oracle", 0))["status"] == "success"
+    return [taken[number] for number in np.linspace(0, len(taken) - 1, FRAMES).astype(int)]
+
+
+class Differences:
+    """Sums over all pictures."""
+
+    def __init__(self):
+        self.pixels = self.changed = self.noticeable = self.segments = 0
+        self.levels = 0.0
+
+    def add(self, ours, stock):
+        apart = np.abs(ours[0] - stock[0])
+        self.pixels += apart[..., 0].size
+        self.changed += int((apart.max(axis=-1) > 0).sum())
+        self.noticeable += int((apart.max(axis=-1) > NOTICEABLE_LEVELS).sum())
+        self.levels += float(apart.mean(axis=-1).sum())
+        self.segments += int((ours[1] != stock[1]).sum())
+
+    def __str__(self):
+        return (
+            f"{self.changed} of {self.pixels} pixels differ, {self.noticeable} noticeably, "
+            f"{self.levels / self.pixels:.4f} levels on average; segmentation: {self.segments}"
+        )
+
+
+def test_pictures_are_those_of_the_stock_path():
+    found = {rendering: Differences() for rendering in (CULLING_ALONE, FAITHFUL, LIGHT)}
+    for task, index in RUNS:
+        scene = get_episode(task, "test", index).scene
+        stock = Stage(scene, STOCK)
+        stages = {rendering: Stage(scene, rendering) for rendering in found}
+        for moment in moments(task, index):
+            wanted = stock.show(moment)
+            for rendering, stage in stages.items():
+                found[rendering].add(stage.show(moment), wanted)
+    for rendering, differences in found.items():
+        print(rendering, differences)  # noqa: T201 - shown by pytest -s
+    assert found[CULLING_ALONE].changed == found[CULLING_ALONE].segments == 0
+    faithful, light = found[FAITHFUL], found[LIGHT]
+    assert faithful.changed <= FAITHFUL_SHARE * faithful.pixels
+    assert faithful.segments <= FAITHFUL_SHARE * faithful.pixels
+    assert light.changed > 0
+    assert light.noticeable <= NOTICEABLE_SHARE * light.pixels
+    assert light.levels <= MEAN_LEVELS * light.pixels
+
+
+def test_each_camera_keeps_its_record_of_what_it_draws(monkeypatch):
+    scene = get_episode("PickXtimes", "test", 2).scene
+    settings.apply_render_settings()
+    assert culling.keeps_records(), "SAPIEN records differently now: `Bodies.take` became slow"
+    quick, slow = Stage(scene, FAITHFUL), Stage(scene, FAITHFUL)
+    for moment in moments("PickXtimes", 2):
+        wanted = quick.show(moment)
+        with monkeypatch.context() as patch:
+            patch.setattr(culling, "keeps_records", lambda: False)
+            for ours, theirs in zip(slow.show(moment), wanted, strict=True):
+                assert np.array_equal(ours, theirs)
+
+
+def test_an_unknown_shader_is_used_as_it_is(monkeypatch, caplog):
+    scene = get_episode("PickXtimes", "test", 2).scene
+    usual = Stage(scene, Rendering(slim_shader=False))
+    with monkeypatch.context() as patch:
+        patch.setattr(shaders, "_STOCK_SHA256", "of another version")
+        for function in (shaders.slim_shader, meshes._shapes):
+            function.cache_clear()
+        unknown = Stage(scene, FAITHFUL)
+        assert "it is used as it is" in caplog.text
+        for moment in moments("PickXtimes", 2)[::4]:
+            for ours, theirs in zip(unknown.show(moment), usual.show(moment), strict=True):
+                assert np.array_equal(ours, theirs)
+    for function in (shaders.slim_shader, meshes._shapes):
+        function.cache_clear()
+
+
+def test_a_damaged_shader_in_the_cache_is_written_anew(monkeypatch, tmp_path):
+    monkeypatch.setenv("ROBOIRG_CACHE", str(tmp_path))
+    folder = Path(shaders.slim_shader.__wrapped__())
+    assert folder.is_relative_to(tmp_path)
+    text = (folder / "gbuffer.vert").read_text()
+    (folder / "gbuffer.vert").write_text(text[:100])
+    (folder / "gbuffer.frag").unlink()
+    assert shaders.slim_shader.__wrapped__() == str(folder)
+    assert (folder / "gbuffer.vert").read_text() == text
+    assert (folder / "gbuffer.frag").is_file()
+    monkeypatch.setenv("ROBOIRG_CACHE", "off")
+    passing = Path(shaders.slim_shader.__wrapped__())
+    assert (passing / "gbuffer.vert").read_text() == text
+    shutil.rmtree(passing.parent)
+
+
+def test_triangles_keep_their_places_and_normals_when_they_share_corners():
+    ticks = np.arange(6.0)
+    x, y = np.meshgrid(ticks, ticks, indexing="ij")
+    heights = np.random.default_rng(0).random(x.shape).round(1)
+    points = np.stack([x, y, heights], axis=-1).astype(np.float32)
+    halves = [(points[:-1, :-1], points[1:, :-1], points[:-1, 1:])]
+    halves += [(points[1:, :-1], points[1:, 1:], points[:-1, 1:])]
+    corners = np.concatenate([np.stack(half, axis=2).reshape(-1, 3, 3) for half in halves])
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    shared = meshes.share_corners(meshes.Triangles(corners, normals))
+    assert np.array_equal(shared.normals[shared.triangles[:, 0]], normals)
+    for given, kept in zip(corners, shared.vertices[shared.triangles], strict=True):
+        assert any(np.array_equal(np.roll(given, turn, axis=0), kept) for turn in range(3))
+    assert len(shared.vertices) < 0.5 * 3 * len(corners)
