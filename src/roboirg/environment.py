@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import gymnasium
@@ -17,12 +16,13 @@ from roboirg.errors import InvalidValueError, MotionPlanningError, UnknownNameEr
 from roboirg.judging import Event, Status, plain_subgoal
 from roboirg.language import instruct
 from roboirg.observations import CAMERAS, DemonstrationFrames
-from roboirg.simulation.controllers import Controller, make_controller
+from roboirg.simulation.controllers import make_controller
 from roboirg.simulation.demonstration.library import perform
 from roboirg.simulation.demonstration.recording import Recording
 from roboirg.simulation.demonstration.video import make_video
 from roboirg.simulation.device import describe, find_render_device
 from roboirg.simulation.grounding import Grounding
+from roboirg.simulation.play import Play
 from roboirg.simulation.rendering import find_rendering
 from roboirg.simulation.senses import Senses, Wishes, sensed_space
 from roboirg.simulation.session import Session
@@ -153,7 +153,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         self.observation_space = self._make_observation_space()
         self.action_space = spaces.Box(self._space.low, self._space.high, dtype=np.float64)
         self.grounded = grounded
-        self._play: _Play | None = None
+        self._play: Play | None = None
         self._frame_hook: FrameHook | None = None
         self._hook_period = 1
 
@@ -265,7 +265,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         return drawn or self._frame_hook is not None
 
     @property
-    def _playing(self) -> _Play:
+    def _playing(self) -> Play:
         if self._play is None:
             raise gymnasium.error.ResetNeeded("Call reset() before anything else.")
         return self._play
@@ -290,10 +290,10 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
 
         return play.session.play_demonstration(follow, recording)
 
-    def _begin(self) -> _Play:
+    def _begin(self) -> Play:
         session = Session(self.episode, visible=self._visible, rendering=self._wishes.rendering)
         world = session.world
-        return _Play(
+        return Play(
             session,
             Senses(world, self._wishes),
             make_controller(self._space, world.robot),
@@ -358,46 +358,3 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         if play.grounding is not None:
             info["grounded_subgoal"] = play.grounding.text
         return info
-
-
-@dataclass
-class _Play:
-    """What lasts from one reset to the next.
-
-    Attributes:
-        session: the episode.
-        senses: what observations are read from.
-        controller: turns actions into joint actions.
-        grounding: names pixels, if that is asked for.
-        felt: what was felt at each step of the video.
-        labels: what was being done in each step of the video.
-        history: what was seen since the last observation, as far as it is wanted.
-        steps: control steps of the policy.
-        reported: how many events have been told.
-    """
-
-    session: Session
-    senses: Senses
-    controller: Controller
-    grounding: Grounding | None
-    felt: list[dict[str, Any]] = field(default_factory=list)
-    labels: list[str] = field(default_factory=list)
-    history: list[dict[str, Any]] = field(default_factory=list)
-    steps: int = 0
-    reported: int = 0
-
-    def follow(self, stage: Stage | None) -> None:
-        """To be called after each control step, with the stage whose label is current."""
-        self.senses.proprioception.follow()
-        if self.grounding is not None:
-            self.grounding.update(stage)
-
-    def label(self, stage: Stage) -> str:
-        """A stage of the video in words, grounded if that is asked for."""
-        return self.grounding.text if self.grounding else plain_subgoal(stage)
-
-    def fresh_events(self) -> Sequence[Event]:
-        """The events that have not been told yet."""
-        fresh = self.session.events[self.reported :]
-        self.reported += len(fresh)
-        return fresh

@@ -42,8 +42,8 @@ class Workload:
 
 
 def over_the_table() -> Workload:
-    """The arm comes down on a cube and lifts it; seen from the front it is in the background."""
-    return _stretch("PickXtimes", 2, first=50)
+    """The arm moves from home to above a cube; seen from the front it is in the background."""
+    return _stretch("PickXtimes", 2, first=4)
 
 
 def as_in_demonstrations() -> Workload:
