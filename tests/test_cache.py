@@ -119,7 +119,12 @@ def test_a_kill_while_writing_leaves_no_bad_entry(tmp_path, caplog, monkeypatch)
     caught_writing = 0
     for number in range(12):
         process = writer(tmp_path, 10**9, 3_000_000)
-        time.sleep(0.03 + 0.011 * number)
+        before = set(entries(tmp_path))
+        # As soon as it writes, or a little later: in the middle of it, or between two entries.
+        while not any(name.endswith(".part") for name in set(entries(tmp_path)) - before):
+            assert process.poll() is None
+            time.sleep(0.0002)
+        time.sleep(0.0005 * number)
         os.kill(process.pid, signal.SIGKILL)
         process.communicate(timeout=10)
         assert process.returncode == -signal.SIGKILL
