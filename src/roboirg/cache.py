@@ -125,11 +125,18 @@ def open_cache(kind: Kind) -> Cache:
     Raises:
         InvalidValueError: ``ROBOIRG_CACHE_GIB`` is no positive number.
     """
+    folder = cache_folder()
+    if folder is None:
+        return Cache(None, 0)
+    return Cache(folder / kind, int(_size() * _SHARES[kind]))
+
+
+def cache_folder() -> Path | None:
+    """The folder of all caches, as the environment variable wants it; None for none."""
     named = os.environ.get(FOLDER_VARIABLE, "")
     if named == OFF:
-        return Cache(None, 0)
-    folder = Path(named).expanduser() if named else platformdirs.user_cache_path("roboirgbench")
-    return Cache(folder / kind, int(_size() * _SHARES[kind]))
+        return None
+    return Path(named).expanduser() if named else platformdirs.user_cache_path("roboirgbench")
 
 
 def _size() -> float:

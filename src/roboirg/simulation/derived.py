@@ -5,30 +5,20 @@ from __future__ import annotations
 import functools
 import hashlib
 import io
-import os
 import secrets
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import platformdirs
 from numpy.typing import NDArray
 
-from roboirg.cache import FOLDER_VARIABLE, OFF, Cache
+from roboirg.cache import Cache, cache_folder
 
 Arrays = dict[str, NDArray[np.generic]]
 
 _MOST_BYTES = 2**28
 """That derived meshes may take; they take a tenth of it."""
-
-
-def derived_folder() -> Path | None:
-    """The folder of the caches; None if there are to be none."""
-    named = os.environ.get(FOLDER_VARIABLE, "")
-    if named == OFF:
-        return None
-    return Path(named).expanduser() if named else platformdirs.user_cache_path("roboirgbench")
 
 
 def kept_arrays(name: str, sources: bytes, make: Callable[[], Arrays]) -> Arrays:
@@ -39,7 +29,7 @@ def kept_arrays(name: str, sources: bytes, make: Callable[[], Arrays]) -> Arrays
         sources: all that determines them.
         make: derives them.
     """
-    folder = derived_folder()
+    folder = cache_folder()
     cache = Cache(None if folder is None else folder / "meshes", _MOST_BYTES)
     key = f"{name}-{hashlib.sha256(sources).hexdigest()[:24]}.npz"
     raw = cache.read(key)

@@ -80,11 +80,15 @@ class Senses:
     def __init__(self, world: World, wishes: Wishes) -> None:
         self._world = world
         self._wishes = wishes
+        self._drawn = tuple(drawn_space(wishes))
         self.proprioception = Proprioception(world.robot)
 
     def read(self) -> dict[str, Any]:
         """The observation without the instruction."""
-        drawn = {field: draw(self._world, field) for field in drawn_space(self._wishes)}
+        if self._drawn:
+            # All cameras begin before the first picture is waited for.
+            self._world.cameras.draw(self._wishes.cameras)
+        drawn = {field: draw(self._world, field) for field in self._drawn}
         return {**drawn, **self.feel()}
 
     def feel(self) -> dict[str, Any]:

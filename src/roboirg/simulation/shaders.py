@@ -22,7 +22,8 @@ import numpy as np
 import sapien
 import sapien.render
 
-from roboirg.simulation.derived import derived_folder, write_whole
+from roboirg.cache import cache_folder
+from roboirg.simulation.derived import write_whole
 
 STOCK_SHADER = "minimal"
 _COMMON = "common"
@@ -144,7 +145,7 @@ def _edit(text: str, start: str, end: str, instead: str) -> str:
 
 def _write(texts: dict[str, str]) -> Path:
     """Put the texts into a folder; what is there already is checked."""
-    folder = derived_folder()
+    folder = cache_folder()
     if folder is not None:
         try:
             return _fill(folder / "shaders" / _digest(texts)[:16], texts)
