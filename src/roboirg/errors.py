@@ -8,6 +8,9 @@
 | `MissingDependencyError` | an extra or a model file is not installed | exit code 2 |
 | `RenderDeviceError` | no Vulkan device can render | exit code 2 |
 | `SceneRejectedError` | a seed yields no valid scene (callers try the next seed) | never seen |
+| `PolicyConnectionError` | a policy's server or model cannot be reached | recorded as an error |
+| `PolicyTimeoutError` | a policy does not answer in time | recorded as an error |
+| `PolicyReplyError` | a policy's server or model answers something else | recorded as an error |
 | `MotionPlanningError` | the oracle's hands find no path | recorded as an error |
 """
 
@@ -62,3 +65,15 @@ class SceneRejectedError(RoboIRGError):
 
 class MotionPlanningError(RoboIRGError, RuntimeError):
     """No collision-free straight motion within the joint limits was found."""
+
+
+class PolicyConnectionError(RoboIRGError, ConnectionError):
+    """The server or model behind a policy cannot be reached, or went away."""
+
+
+class PolicyTimeoutError(RoboIRGError, TimeoutError):
+    """The server or model behind a policy did not answer within the time it has."""
+
+
+class PolicyReplyError(RoboIRGError, RuntimeError):
+    """The server or model behind a policy answered with an error or with something else."""

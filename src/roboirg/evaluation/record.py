@@ -1,28 +1,56 @@
-"""What was to be played (`Job`) and what came of it (`Record`), one JSON object each.
+"""What was to be played (`Job`), what came of it (`Result`), and all that is kept (`Record`).
 
-A record says everything that the report and the statistics need, so that they never open the
-simulator. It depends on its job alone: not on the worker, the order, or what ran before.
+A record is one JSON object. It says everything that the report and the statistics need, so that
+they never open the simulator. It depends on its job alone: not on the worker, the order, or what
+ran before; `INCIDENTALS` names the fields that are exempt.
 """
 
 from __future__ import annotations
 
 import hashlib
 import re
-from typing import Literal
+from typing import Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, JsonValue
 
-SCHEMA_VERSION: Literal[1] = 1
+from roboirg.observations import DemonstrationFrames
+
+SCHEMA_VERSION: Literal[2] = 2
 
 Outcome = Literal["success", "failure", "error"]
 
+ErrorKind = Literal[
+    "policy", "invalid_action", "timeout", "connection", "environment", "infrastructure"
+]
+"""Whose fault an error is: the policy raised; its action cannot be executed; it took longer than it
+may; its server is not to be reached; the world raised; a process, machine or disk gave way."""
+
+ERROR_KINDS: tuple[ErrorKind, ...] = get_args(ErrorKind)
+
+FailureKind = Literal["grounding", "execution"]
+
 ALL_STAGES = (1, 2, 3, 4, 5)
 DEFAULT_DISTRACTOR = "neutral"
+DEFAULT_DISTRACTORS = 1
 DEFAULT_FRAME = "robot"
 DEFAULT_MAX_STEPS = 1300
+DEFAULT_MESHES = "faithful"
 
-INCIDENTALS = frozenset({"started_at", "duration_s", "video", "film_lost", "details"})
-"""Times, paths and lost films: all that may differ between two runs of the same command."""
+INCIDENTALS = frozenset(
+    {
+        "attempt",
+        "details",
+        "duration_s",
+        "film_lost",
+        "plan",
+        "started_at",
+        "timings",
+        "usage",
+        "video",
+    }
+)
+"""Times, costs, paths, lost films and tries: all that may differ between two runs of the same
+command."""
 
 
 class _Data(BaseModel):
@@ -42,9 +70,14 @@ class Job(_Data):
             played as ``implicit``.
         stages: which stages of the discourse are spoken (contextual setting; else all).
         distractor: kind of distractor (contextual setting; else the default).
+        distractors: how many of them are spoken (contextual setting; else the default).
         frame: frame of reference (spatial setting; else the default).
         policy_seed: chosen for the run; the policy gets a seed made of it and the episode's.
         max_steps: the policy's limit, control steps.
+        actions: the action space that is prescribed, or None for the policy's own.
+        demonstration_frames: which pictures of the video are prescribed; None as the policy says.
+        observe_every: after how many control steps there is a picture; None as the policy says.
+        meshes: faithful or light.
     """
 
     policy: str
@@ -55,9 +88,14 @@ class Job(_Data):
     form: str = "implicit"
     stages: tuple[int, ...] = ALL_STAGES
     distractor: str = DEFAULT_DISTRACTOR
+    distractors: int = DEFAULT_DISTRACTORS
     frame: str = DEFAULT_FRAME
     policy_seed: int = 0
     max_steps: int = DEFAULT_MAX_STEPS
+    actions: str | None = None
+    demonstration_frames: DemonstrationFrames | None = None
+    observe_every: int | None = None
+    meshes: str = DEFAULT_MESHES
 
     @property
     def slug(self) -> str:
@@ -116,68 +154,112 @@ class EventRecord(_Data):
     holds: bool = True
 
 
-class Record(Job):
-    """What came of a job.
+class Attribution(_Data):
+    """Why an episode failed, concluded from its events.
 
     Attributes:
-        schema_version: of this table of fields.
+        kind: ``grounding`` (the wrong thing was done) or ``execution`` (the right thing was not
+            brought off).
+        failure: which of the kind, as in `roboirg.judging.attribution`.
+        subject: name of the object that it is about, if there is one.
+        step: control step of the policy's turn at which it showed, if there is one.
+        sentence: the same in words.
+    """
+
+    kind: FailureKind
+    failure: str
+    subject: str | None = None
+    step: int | None = None
+    sentence: str
+
+
+class Result(Job):
+    """What came of a job, without what was said and done: all that rates are made of.
+
+    Attributes:
         seed: of the episode's scene.
         difficulty: easy, medium or hard.
         outcome: success, failure (the policy's doing) or error (nobody knows what the policy
             would have done; never counted as a failure).
-        cause: why it failed, or ``policy: …``, ``invalid action: …``, ``environment: …``.
+        error: whose fault an error is; None if it is none.
+        cause: why it failed or ended in an error, in words.
+        attribution: of a failure; None if nobody can tell.
         steps: control steps that the policy played.
         demonstration_steps: frames, one per control step, of the video that was shown before;
             0 without one.
+        privileged: whether the policy looks behind the scenes (it has ``attach``).
+        policy_version: tells a policy from an earlier one of the same name.
+        language_version: version of the instruction generator.
+        environment_version: version of scenes, rules and physics.
+        package_version: version of roboirg.
+        code: fingerprint of the package's files.
+        plan: fingerprint of the plan in whose course it was played.
+        attempt: 1 for the first try.
+    """
+
+    seed: int
+    difficulty: str
+    outcome: Outcome
+    error: ErrorKind | None = None
+    cause: str | None = None
+    attribution: Attribution | None = None
+    steps: int = 0
+    demonstration_steps: int = 0
+    privileged: bool
+    policy_version: str = "unknown"
+    language_version: str
+    environment_version: int
+    package_version: str
+    code: str = "unknown"
+    plan: str | None = None
+    attempt: int = 1
+
+    @property
+    def identity(self) -> Job:
+        """The job this is the result of."""
+        return Job(**{name: getattr(self, name) for name in Job.model_fields})
+
+
+class Record(Result):
+    """All that is kept of an episode.
+
+    Attributes:
+        schema_version: of this table of fields.
         instruction: the utterances that the policy was given.
         mentions: the referring expressions in them.
         command: the same task in plain words (the explicit setting).
         goal: what the instruction conveys, a value for each slot.
         metadata: of the instruction: reasoning pattern, relation, stages, landmarks, template
             ids and the like.
-        privileged: whether the policy looks behind the scenes (it has ``attach``).
-        policy_version: tells a policy from an earlier one of the same name.
+        policy_metadata: what the policy says of itself: checkpoint, server, model, …
         events: what happened, in order.
+        usage: what the episode cost: ``calls``, ``input_tokens``, ``output_tokens``, ``cost_usd``
+            of models that the policy asked.
+        timings: wall-clock seconds: ``load``, ``reset``, ``act``, ``step``.
         video: path relative to the records file, or None.
         film_lost: why the film that was asked for could not be written, or None.
         details: the traceback of an error, or None.
         render_device: the driver's name of the device that drew the pictures, or None.
-        language_version: version of the instruction generator.
-        environment_version: version of scenes, rules and physics.
-        package_version: version of roboirg.
         started_at: ISO 8601, UTC.
         duration_s: wall-clock seconds.
     """
 
-    schema_version: Literal[1] = SCHEMA_VERSION
-    seed: int
-    difficulty: str
-    outcome: Outcome
-    cause: str | None = None
-    steps: int = 0
-    demonstration_steps: int = 0
+    schema_version: Literal[2] = SCHEMA_VERSION
     instruction: tuple[Turn, ...]
     mentions: tuple[MentionSpan, ...] = ()
     command: str
     goal: dict[str, str | int | tuple[str, ...] | tuple[int, ...]]
     metadata: dict[str, JsonValue]
-    privileged: bool
-    policy_version: str = "unknown"
+    policy_metadata: dict[str, JsonValue] = {}
     events: tuple[EventRecord, ...] = ()
+    usage: dict[str, float] = {}
+    timings: dict[str, float] = {}
     video: str | None = None
     film_lost: str | None = None
     details: str | None = None
     render_device: str | None = None
-    language_version: str
-    environment_version: int
-    package_version: str
     started_at: str
     duration_s: float
-
-    @property
-    def identity(self) -> Job:
-        """The job this is the record of."""
-        return Job(**{name: getattr(self, name) for name in Job.model_fields})
 
     def comparable(self) -> dict[str, object]:
         """All fields that depend on the job alone: everything but `INCIDENTALS`."""
