@@ -175,6 +175,14 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         return str(status)
 
     @property
+    def subgoal(self) -> str:
+        """What is to be done now, in words; with `grounded`, with the pixels of what is meant."""
+        play, stage = self._playing, self.session.judge.published
+        if play.grounding is not None:
+            return play.grounding.text
+        return COMPLETED if stage is None else plain_subgoal(stage)
+
+    @property
     def events(self) -> Sequence[Event]:
         """Everything that happened since reset, the demonstration included."""
         return tuple(self.session.events)

@@ -24,6 +24,12 @@ class Policy(Protocol):
     Pictures of the demonstration are drawn when they are read. ``demonstration_frames = 4`` has
     only every fourth of them, ``"none"`` none. A policy that acts in chunks and wants to see what
     happened meanwhile sets ``observe_every = n``: then every observation holds ``history``.
+
+    All of these are optional, and so are the following. ``version`` (text) and ``metadata``
+    (JSON values by name; read after `reset`) go into the records. ``usage()`` is called when the
+    episode has ended and gives what it cost: ``calls``, ``input_tokens``, ``output_tokens``,
+    ``cost_usd``. ``close()`` is called after that. ``grounded = True`` has the environment name
+    the pixels of subgoals, for privileged policies that pass them on.
     """
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
@@ -34,6 +40,17 @@ class Policy(Protocol):
 
         Returns:
             Shape (n, 8), or (n, 7) in the action spaces ee_pose and waypoint.
+        """
+
+
+@runtime_checkable
+class SubgoalFollower(Policy, Protocol):
+    """A policy that a planner can tell what to do next."""
+
+    def follow(self, subgoal: str) -> None:
+        """What to do next, in words, perhaps with ``at <y, x>`` (pixels of the front picture).
+
+        Called before `act`, whenever a planner stands in front; it holds until the next call.
         """
 
 
