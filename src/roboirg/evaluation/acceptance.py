@@ -27,7 +27,7 @@ from roboirg.splits import (
     slot_key,
     slot_seed,
 )
-from roboirg.tasks import all_tasks, get_task
+from roboirg.tasks import every_task, get_task
 
 Reason = Literal["no room", "not expressible", "oracle failed"]
 REASONS: tuple[Reason, ...] = ("no room", "not expressible", "oracle failed")
@@ -169,7 +169,7 @@ def check_kept(
 
 def merged(found: Sequence[Found], known: Mapping[str, TaskSplits]) -> dict[str, TaskSplits]:
     """What is to be shipped: what was found, and what is known about everything else."""
-    splits = {task: known[task] for task in all_tasks() if task in known}
+    splits = {task: known[task] for task in every_task() if task in known}
     for task in dict.fromkeys(one.slot.task for one in found):
         old = known[task].passed_over if task in known else {}
         new = {one.slot: len(one.rejections) for one in found}
@@ -179,7 +179,7 @@ def merged(found: Sequence[Found], known: Mapping[str, TaskSplits]) -> dict[str,
             counts[key] = new.get(slot, old.get(key, 0))
         passed_over = {key: count for key, count in counts.items() if count}
         splits[task] = TaskSplits(fingerprint_of(task, passed_over), passed_over)
-    return {task: splits[task] for task in all_tasks() if task in splits}
+    return {task: splits[task] for task in every_task() if task in splits}
 
 
 def _episode(slot: Slot, seed: int) -> Episode:

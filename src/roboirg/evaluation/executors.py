@@ -1,43 +1,25 @@
 """Where jobs are played: in this process, or in processes beside it.
 
 An executor gets jobs and a way to play them and yields one record for each, in the order in
-which they end. It stores nothing: the caller does, the moment a record arrives. Whoever writes
-another (Ray, a cluster) implements `Executor` and nothing else.
+which they end. It stores nothing and tries nothing again: the caller does. Whoever writes another
+one implements `Executor` and nothing else; `roboirg.evaluation.cluster` is one for many machines.
 """
 
 from __future__ import annotations
 
-import contextlib
-import ctypes
-import multiprocessing
 import os
-import signal
-import sys
-import threading
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
-from typing import NamedTuple, Protocol
+from multiprocessing.connection import wait
+from typing import Protocol
 
-from roboirg.errors import (
-    InvalidValueError,
-    MissingDependencyError,
-    RenderDeviceError,
-    RoboIRGError,
-)
+from roboirg.errors import InvalidValueError
 from roboirg.evaluation.record import Job, Record
-from roboirg.evaluation.rollout import Course, Play, describe, utc_now
+from roboirg.evaluation.rollout import Play
+from roboirg.evaluation.workers import POLL_S, Worker
 
-ATTEMPTS = 2
-"""A job whose worker dies gets one more chance: the first death may have been the machine's."""
-
-GRACE_S = 2.0
-"""How long a worker may take to go when it is told to."""
-
-_PR_SET_PDEATHSIG = 1
-_FATAL = {error.__name__: error for error in (RenderDeviceError, MissingDependencyError)}
+NO_LIMIT_S = float("inf")
 
 
 class Executor(Protocol):
@@ -53,7 +35,10 @@ class Executor(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class InProcess:
-    """Plays one job after the other right here: for debuggers. A crash takes all with it."""
+    """Plays one job after the other right here: for debuggers.
+
+    Nobody supervises it: a crash takes all with it, and what hangs, hangs.
+    """
 
     def run(self, jobs: Sequence[Job], play: Play) -> Iterator[Record]:
         """Yield one record for each job, in their order."""
@@ -64,18 +49,19 @@ class InProcess:
 class LocalProcesses:
     """Plays jobs in processes of this machine that live as long as there is work.
 
-    A process that dies (segmentation fault, out of memory) costs its job one attempt; after
-    the second the job's record is an error and the others go on. The processes die with the
-    one that made them, however it dies.
+    A process that dies (segmentation fault, out of memory) or hangs costs its job an error, is
+    replaced, and the others go on. The processes die with the one that made them, however it dies.
 
     Args:
         workers: how many at most, at least 1.
+        episode_timeout_s: how long an episode may take.
 
     Raises:
         InvalidValueError: fewer than one worker.
     """
 
     workers: int
+    episode_timeout_s: float = NO_LIMIT_S
 
     def __post_init__(self) -> None:
         if self.workers < 1:
@@ -83,40 +69,42 @@ class LocalProcesses:
 
     def run(self, jobs: Sequence[Job], play: Play) -> Iterator[Record]:
         """Yield one record for each job, as they end."""
-        waiting = deque(_Task(job) for job in jobs)
+        waiting = deque(jobs)
         # With a process on every core, Mesa's own threads would only take turns.
         crowded = self.workers >= core_count()
-        crew: dict[Connection, _Worker] = {}
-        retired: list[_Worker] = []
+        crew: list[Worker] = []
+        retired: list[Worker] = []
         try:
             while waiting or crew:
                 while waiting and len(crew) < self.workers:
-                    worker = _Worker.hire(play, crowded, waiting.popleft())
-                    crew[worker.connection] = worker
-                for connection in wait(list(crew)):
-                    worker = crew[_as_connection(connection)]
-                    reply = worker.receive()
-                    if isinstance(reply, _Death):
-                        del crew[worker.connection]
-                        retry, record = _after_death(worker.task, reply)
-                        waiting.extendleft(retry)
+                    crew.append(Worker.hire(play, waiting.popleft(), crowded=crowded))
+                for worker, record in self._ended(crew):
+                    if worker.is_gone:
+                        crew.remove(worker)
+                    elif waiting:
+                        worker.assign(waiting.popleft())
                     else:
-                        record = reply
-                        if waiting:
-                            worker.assign(waiting.popleft())
-                        else:
-                            retired.append(crew.pop(worker.connection))
-                            worker.dismiss()
-                    if record is not None:
-                        yield record
+                        crew.remove(worker)
+                        retired.append(worker)
+                        worker.dismiss()
+                    yield record
         finally:
-            for worker in crew.values():
+            for worker in crew:
                 worker.stop()
-            for worker in (*crew.values(), *retired):
+            for worker in (*crew, *retired):
                 worker.bury()
 
+    def _ended(self, crew: list[Worker]) -> Iterator[tuple[Worker, Record]]:
+        """Wait a moment; every worker whose job has ended, one way or another."""
+        ready = wait([worker.connection for worker in crew], POLL_S)
+        for worker in tuple(crew):
+            if worker.connection in ready:
+                yield worker, worker.receive()
+            elif (record := worker.overdue(self.episode_timeout_s)) is not None:
+                yield worker, record
 
-def choose_executor(workers: int | None) -> Executor:
+
+def choose_executor(workers: int | None, episode_timeout_s: float = NO_LIMIT_S) -> Executor:
     """The executor for a number of workers: None for one per core, 0 for this process.
 
     Raises:
@@ -124,7 +112,7 @@ def choose_executor(workers: int | None) -> Executor:
     """
     if workers == 0:
         return InProcess()
-    return LocalProcesses(core_count() if workers is None else workers)
+    return LocalProcesses(core_count() if workers is None else workers, episode_timeout_s)
 
 
 def core_count() -> int:
@@ -132,137 +120,3 @@ def core_count() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
-
-
-class _Task(NamedTuple):
-    job: Job
-    attempt: int = 1
-
-
-class _Death(NamedTuple):
-    reason: str
-
-
-class _Fatal(NamedTuple):
-    kind: str
-    sentence: str
-
-
-@dataclass
-class _Worker:
-    """A process, our end of the pipe to it, and what it is playing."""
-
-    process: BaseProcess
-    connection: Connection
-    task: _Task
-
-    @classmethod
-    def hire(cls, play: Play, crowded: bool, task: _Task) -> _Worker:
-        # Spawned, not forked: a forked Vulkan driver or thread pool is undefined behaviour.
-        context = multiprocessing.get_context("spawn")
-        ours, theirs = context.Pipe()
-        # Not a daemon in multiprocessing's sense: policies may have processes of their own.
-        process = context.Process(target=_work, args=(theirs, play, crowded, os.getpid()))
-        process.start()
-        # Ours must be the only other end, so that its death reads as the end of the file.
-        theirs.close()
-        worker = cls(process, ours, task)
-        worker.assign(task)
-        return worker
-
-    def assign(self, task: _Task) -> None:
-        self.task = task
-        # A process that is already dead is noticed at the next receive.
-        with contextlib.suppress(BrokenPipeError):
-            self.connection.send(task.job)
-
-    def receive(self) -> Record | _Death:
-        try:
-            reply = self.connection.recv()
-        except (EOFError, ConnectionResetError):
-            self.process.join()
-            self.connection.close()
-            return _Death(_reason(self.process.exitcode))
-        if isinstance(reply, _Fatal):
-            raise _FATAL.get(reply.kind, RoboIRGError)(reply.sentence)
-        if not isinstance(reply, Record):
-            raise TypeError(f"a worker sent {type(reply).__name__}, not a Record")
-        return reply
-
-    def dismiss(self) -> None:
-        """Let it go: it has nothing to do, so closing the pipe ends it."""
-        self.connection.close()
-
-    def stop(self) -> None:
-        """End it in the middle of what it does."""
-        self.process.terminate()
-        self.connection.close()
-
-    def bury(self) -> None:
-        """See it gone."""
-        self.process.join(GRACE_S)
-        if self.process.exitcode is None:
-            self.process.kill()
-            self.process.join()
-
-
-def _after_death(task: _Task, death: _Death) -> tuple[list[_Task], Record | None]:
-    if task.attempt < ATTEMPTS:
-        return [_Task(task.job, task.attempt + 1)], None
-    course = Course(cause=f"environment: worker died ({death.reason})")
-    return [], describe(task.job, course, started_at=utc_now())
-
-
-def _reason(exit_code: int | None) -> str:
-    if exit_code is not None and exit_code < 0:
-        return f"signal {-exit_code}"
-    return f"exit code {exit_code}"
-
-
-def _as_connection(ready: object) -> Connection:
-    if not isinstance(ready, Connection):
-        raise TypeError(f"{ready!r} is not one of our pipes")
-    return ready
-
-
-def _work(connection: Connection, play: Play, crowded: bool, parent: int) -> None:
-    """The life of a worker process."""
-    # Ctrl-C reaches the whole process group; the parent decides what it means.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    _die_with(parent)
-    if crowded:
-        # Read by lavapipe when it is loaded, which is later than this.
-        os.environ.setdefault("LP_NUM_THREADS", "1")
-    while True:
-        try:
-            job = connection.recv()
-        except EOFError:
-            return
-        try:
-            reply: Record | _Fatal = play(job)
-        except RoboIRGError as error:
-            reply = _Fatal(type(error).__name__, str(error))
-        try:
-            connection.send(reply)
-        except BrokenPipeError:
-            return
-
-
-def _die_with(parent: int) -> None:
-    """See to it that this process does not outlive the one that made it."""
-    if sys.platform == "linux":
-        # Even when this process hangs in native code. Tied to the thread that made it, which
-        # waits in `LocalProcesses.run` for as long as there are workers.
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:
-        os._exit(1)  # it died before the line above
-    maker = multiprocessing.parent_process()
-    if maker is not None:
-        watch = threading.Thread(target=_exit_when_ready, args=(maker.sentinel,), daemon=True)
-        watch.start()
-
-
-def _exit_when_ready(sentinel: int) -> None:
-    wait([sentinel])
-    os._exit(1)

@@ -2,53 +2,82 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Sequence
+import hashlib
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from roboirg import language, policies, splits, tasks
+from roboirg.actions import find_action_space
 from roboirg.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.record import (
     ALL_STAGES,
     DEFAULT_DISTRACTOR,
+    DEFAULT_DISTRACTORS,
     DEFAULT_FRAME,
     DEFAULT_MAX_STEPS,
+    DEFAULT_MESHES,
+    ERROR_KINDS,
+    ErrorKind,
     Job,
 )
 from roboirg.evaluation.store import write_atomically
+from roboirg.evaluation.words import (
+    WHOLE,
+    parse_episodes,
+    parse_names,
+    parse_numbers,
+    parse_stage_sets,
+    says_all,
+)
 from roboirg.language.instruction import FORMS, SETTINGS, Instruction
-
-_MOST_NUMBERS = 10_000
-_MOST_DIGITS = 18
-_LONGEST_WORD = 40
-_NUMBERS_HINT = "write numbers and ranges such as 0,3,5-9"
-_WHOLE: Literal["all"] = "all"
+from roboirg.observations import (
+    DemonstrationFrames,
+    check_demonstration_frames,
+    check_observe_every,
+)
 
 PLAN_FILE = "plan.json"
 
 VideoMode = Literal["off", "failures", "all"]
 VIDEO_MODES: tuple[VideoMode, ...] = get_args(VideoMode)
 
+MESHES = ("faithful", "light")
+
+PASSING: tuple[ErrorKind, ...] = ("connection", "environment", "infrastructure")
+"""Errors that may be gone when the episode is tried again."""
+
+FINGERPRINT_LENGTH = 12
+"""Hexadecimal digits."""
+
 
 class Plan(BaseModel):
     """Which policies play which episodes, told how.
 
     Attributes:
-        policies: built-in names or ``package.module:Class``.
+        policies: built-in names, ``package.module:Class``, or addresses.
         tasks: names.
         settings: names, or ``"all"`` for those in which each episode can be told.
         forms: implicit, resolved or both.
         split: train, val or test.
         episodes: 0-based positions in the split.
         policy_seeds: each plays every episode.
-        stages: of the discourse, for the contextual setting.
+        stages: of the discourse, for the contextual setting; every set of them is played.
         distractor: for the contextual setting.
+        distractors: how many of them are spoken in the contextual setting.
         frame: for the spatial setting.
         max_steps: the policy's limit, control steps.
-        video: which episodes are filmed. Not part of a record's identity.
+        actions: the action space to be played in; None for each policy's own.
+        demonstration_frames: which pictures of the video there are; None as each policy says.
+        observe_every: after how many control steps there is a picture; None as each policy says.
+        meshes: faithful or light.
+        video: which episodes are filmed. Not part of a record's identity, like all that follows.
+        policy_timeout_s: seconds that one call of a policy may take.
+        episode_timeout_s: seconds that an episode may take.
+        tries: how often an episode is tried that ends in one of the errors `retry_on`.
+        retry_on: kinds of errors.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -60,11 +89,25 @@ class Plan(BaseModel):
     split: str = "test"
     episodes: tuple[int, ...]
     policy_seeds: tuple[int, ...] = (0,)
-    stages: tuple[int, ...] = ALL_STAGES
+    stages: tuple[tuple[int, ...], ...] = (ALL_STAGES,)
     distractor: str = DEFAULT_DISTRACTOR
+    distractors: int = DEFAULT_DISTRACTORS
     frame: str = DEFAULT_FRAME
     max_steps: int = DEFAULT_MAX_STEPS
+    actions: str | None = None
+    demonstration_frames: DemonstrationFrames | None = None
+    observe_every: int | None = None
+    meshes: str = DEFAULT_MESHES
     video: VideoMode = "off"
+    policy_timeout_s: float = 600.0
+    episode_timeout_s: float = 7200.0
+    tries: int = 2
+    retry_on: tuple[ErrorKind, ...] = PASSING
+
+    @property
+    def fingerprint(self) -> str:
+        """Tells this plan from every other."""
+        return hashlib.sha256(self.model_dump_json().encode()).hexdigest()[:FINGERPRINT_LENGTH]
 
     def checked(self) -> Plan:
         """This plan, if all of it can be played.
@@ -75,30 +118,24 @@ class Plan(BaseModel):
         """
         for name in self.policies:
             policies.load_policy_class(name)
-        _check_names("form", self.forms, FORMS)
-        if self.max_steps < 1:
-            raise InvalidValueError(f"max_steps is {self.max_steps}; it must be at least 1.")
+        self._check_options()
         for task in self.tasks:
             for index in (min(self.episodes), max(self.episodes)):
                 splits.get_episode(task, self.split, index)
             self._check_settings(task)
-        for said in dict.fromkeys(map(_words, self.jobs())):
-            # Whether it can be said so is the language's to judge, for every episode.
+        for said in self._distinct_words():
+            # Whether it can be said so is the language's to judge.
             say(said)
         return self
 
     def jobs(self) -> tuple[Job, ...]:
         """Every episode to play, once: by policy, task, episode, setting, form, seed."""
         return tuple(
-            dict.fromkeys(
-                self._job(policy, task, episode, setting=setting, form=form, seed=seed)
-                for policy in self.policies
-                for task in self.tasks
-                for episode in self.episodes
-                for setting in self.settings_of(task, episode)
-                for form in self.forms
-                for seed in self.policy_seeds
-            )
+            job
+            for policy in self.policies
+            for task in self.tasks
+            for episode in self.episodes
+            for job in self._jobs_of(policy, task, episode, seeds=self.policy_seeds)
         )
 
     def settings_of(self, task: str, episode: int) -> tuple[str, ...]:
@@ -107,25 +144,61 @@ class Plan(BaseModel):
             return language.expressible(splits.get_episode(task, self.split, episode))
         return self.settings
 
-    def _job(
-        self, policy: str, task: str, episode: int, *, setting: str, form: str, seed: int
-    ) -> Job:
+    def _jobs_of(
+        self, policy: str, task: str, episode: int, *, seeds: tuple[int, ...]
+    ) -> Iterator[Job]:
         # Options that say nothing in a setting keep their defaults there: the same words are
-        # the same job.
-        contextual, spatial = setting == "contextual", setting == "spatial"
-        return Job(
-            policy=policy,
-            task=task,
-            split=self.split,
-            episode=episode,
-            setting=setting,
-            form="implicit" if setting == "explicit" else form,
-            stages=self.stages if contextual else ALL_STAGES,
-            distractor=self.distractor if contextual else DEFAULT_DISTRACTOR,
-            frame=self.frame if spatial else DEFAULT_FRAME,
-            policy_seed=seed,
-            max_steps=self.max_steps,
-        )
+        # the same job, and are played once.
+        for setting in self.settings_of(task, episode):
+            contextual, spatial = setting == "contextual", setting == "spatial"
+            for form in self.forms if setting != "explicit" else ("implicit",):
+                for stages in self.stages if contextual else (ALL_STAGES,):
+                    for seed in seeds:
+                        yield Job(
+                            policy=policy,
+                            task=task,
+                            split=self.split,
+                            episode=episode,
+                            setting=setting,
+                            form=form,
+                            stages=stages,
+                            distractor=self.distractor if contextual else DEFAULT_DISTRACTOR,
+                            distractors=self.distractors if contextual else DEFAULT_DISTRACTORS,
+                            frame=self.frame if spatial else DEFAULT_FRAME,
+                            policy_seed=seed,
+                            max_steps=self.max_steps,
+                            actions=self.actions,
+                            demonstration_frames=self.demonstration_frames,
+                            observe_every=self.observe_every,
+                            meshes=self.meshes,
+                        )
+
+    def _distinct_words(self) -> Iterator[Job]:
+        """One job for each way of telling that could turn out not to be possible."""
+        # In all settings and in the usual way an episode is told only as it can be.
+        usual = self.settings == "all" and self.frame == DEFAULT_FRAME
+        for task in self.tasks:
+            for episode in self.episodes[:1] if usual else self.episodes:
+                yield from self._jobs_of("", task, episode, seeds=(0,))
+
+    def _check_options(self) -> None:
+        _check_names("form", self.forms, FORMS)
+        _check_names("kind of meshes", (self.meshes,), MESHES)
+        for name, least in (("max_steps", 1), ("tries", 1)):
+            if getattr(self, name) < least:
+                raise InvalidValueError(
+                    f"{name} is {getattr(self, name)}; it must be at least {least}."
+                )
+        for name in ("policy_timeout_s", "episode_timeout_s"):
+            if not getattr(self, name) > 0:
+                raise InvalidValueError(
+                    f"{name} is {getattr(self, name)}; it must be more than 0 seconds."
+                )
+        if self.actions is not None:
+            find_action_space(self.actions)
+        if self.demonstration_frames is not None:
+            check_demonstration_frames(self.demonstration_frames)
+        check_observe_every(self.observe_every)
 
     def _check_settings(self, task: str) -> None:
         has = tasks.get_task(task).settings
@@ -140,12 +213,13 @@ class Plan(BaseModel):
 def make_plan(
     policies: Iterable[str],
     *,
-    tasks: str = "all",
-    settings: str = "all",
+    tasks: str = WHOLE,
+    settings: str = WHOLE,
     forms: str = "implicit",
     episodes: str = "4",
     policy_seeds: str = "0",
     stages: str = "1-5",
+    retry_on: str = ",".join(PASSING),
     **options: object,
 ) -> Plan:
     """A checked plan from words as they are typed.
@@ -157,7 +231,8 @@ def make_plan(
         forms: names separated by commas.
         episodes: ``4`` for the first four, or a list such as ``0,3,5-9``.
         policy_seeds: a list of numbers.
-        stages: a list of numbers.
+        stages: a list of numbers, or several with semicolons.
+        retry_on: kinds of errors separated by commas, or ``none``.
         **options: other fields of `Plan`.
 
     Raises:
@@ -171,11 +246,12 @@ def make_plan(
         plan = Plan(
             policies=parse_names("policy", ",".join(policies)),
             tasks=_task_names(tasks),
-            settings=_WHOLE if says_all(settings) else parse_names("setting", settings),
+            settings="all" if says_all(settings) else parse_names("setting", settings),
             forms=parse_names("form", forms),
             episodes=parse_episodes(episodes, split),
             policy_seeds=parse_numbers("policy seed", policy_seeds),
-            stages=parse_stages(stages),
+            stages=parse_stage_sets(stages),
+            retry_on=_error_kinds(retry_on),
             **options,  # type: ignore[arg-type]
         )
     except ValidationError as error:
@@ -198,110 +274,6 @@ def read_plan(folder: Path) -> Plan | None:
         return None
 
 
-def parse_names(kind: str, text: str) -> tuple[str, ...]:
-    """Names separated by commas, each once.
-
-    Raises:
-        InvalidValueError: there is none.
-    """
-    names = tuple(dict.fromkeys(word.strip() for word in text.split(",") if word.strip()))
-    if not names:
-        raise InvalidValueError(f"No {kind} was given.")
-    return names
-
-
-def says_all(text: str) -> bool:
-    """Whether a list of names is, or contains, the word for all of them."""
-    return _WHOLE in (word.strip().lower() for word in text.split(","))
-
-
-def parse_episodes(text: str, split: str = "test") -> tuple[int, ...]:
-    """``4`` is the first four episodes; with a comma or a dash it is a list of positions.
-
-    Raises:
-        UnknownNameError: there is no such split.
-        InvalidValueError: it is neither, no episode at all, or the split has fewer.
-    """
-    size = splits.SIZES[splits.check_split(split)]
-    found = re.fullmatch(r"\s*(-?)(\d+)\s*", text)
-    if found is None:
-        ranges = _parse_ranges("episode", text, _NUMBERS_HINT)
-    else:
-        count = _number("number of episodes", found[2])
-        if found[1] or count == 0:
-            alone = "" if count else "; for episode 0 alone write '0,'"
-            raise InvalidValueError(
-                f"The number of episodes is {text.strip()}; it must be at least 1{alone}."
-            )
-        ranges = [range(count)]
-    for numbers in ranges:
-        if numbers[-1] >= size:
-            raise InvalidValueError(
-                f"There is no episode {numbers[-1]}: split {split!r} has episodes 0 to {size - 1}."
-            )
-    return _union(ranges)
-
-
-def parse_stages(text: str) -> tuple[int, ...]:
-    """Stages of the contextual setting, such as ``1,5``.
-
-    Raises:
-        InvalidValueError: it is no list of numbers.
-    """
-    sets = "; ".join(",".join(map(str, stages)) for stages in language.STAGE_SETS)
-    return _union(_parse_ranges("list of stages", text, f"the four are {sets}"))
-
-
-def parse_numbers(kind: str, text: str) -> tuple[int, ...]:
-    """Numbers and ranges separated by commas, such as ``0,3,5-9``, each once, in order.
-
-    Raises:
-        InvalidValueError: it is something else, or a very long list.
-    """
-    return _union(_parse_ranges(kind, text, _NUMBERS_HINT))
-
-
-def _parse_ranges(kind: str, text: str, hint: str) -> list[range]:
-    ranges = []
-    for part in parse_names(kind, text):
-        found = re.fullmatch(r"(\d+)(?:\s*-\s*(\d+))?", part)
-        first, last = (-1, -2) if found is None else _ends(kind, found[1], found[2])
-        if last < first:
-            raise InvalidValueError(f"{_short(part)!r} is no {kind}; {hint}.")
-        ranges.append(range(first, last + 1))
-    return ranges
-
-
-def _ends(kind: str, first: str, last: str | None) -> tuple[int, int]:
-    return _number(kind, first), _number(kind, last or first)
-
-
-def _number(kind: str, digits: str) -> int:
-    if len(digits) > _MOST_DIGITS:
-        raise InvalidValueError(
-            f"The {kind} {_short(digits)} has {len(digits)} digits; "
-            f"it must have at most {_MOST_DIGITS}."
-        )
-    return int(digits)
-
-
-def _union(ranges: Sequence[range]) -> tuple[int, ...]:
-    count = sum(map(len, ranges))
-    if count > _MOST_NUMBERS:
-        raise InvalidValueError(
-            f"A list of {count} numbers is too long; at most {_MOST_NUMBERS} are allowed."
-        )
-    return tuple(dict.fromkeys(number for numbers in ranges for number in numbers))
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= _LONGEST_WORD else f"{text[:_LONGEST_WORD]}…"
-
-
-def _task_names(text: str) -> tuple[str, ...]:
-    return tuple(tasks.all_tasks()) if says_all(text) else parse_names("task", text)
-
-
 def say(job: Job) -> Instruction:
     """The instruction of a job.
 
@@ -314,16 +286,24 @@ def say(job: Job) -> Instruction:
         job.form,
         stages=job.stages,
         distractor=job.distractor,
+        distractors=job.distractors,
         frame=job.frame,
     )
 
 
-def _words(job: Job) -> Job:
-    """The job as far as words go: whoever hears them, however often."""
-    return job.model_copy(update={"policy": "", "policy_seed": 0})
+def _task_names(text: str) -> tuple[str, ...]:
+    return tasks.find_tasks(parse_names("task", text))
 
 
-def _check_names(kind: str, names: Iterable[str], known: Iterable[str]) -> None:
+def _error_kinds(text: str) -> tuple[ErrorKind, ...]:
+    if text.strip().lower() == "none":
+        return ()
+    names = parse_names("kind of error", text)
+    _check_names("kind of error", names, ERROR_KINDS)
+    return tuple(kind for kind in ERROR_KINDS if kind in names)
+
+
+def _check_names(kind: str, names: Sequence[str], known: Iterable[str]) -> None:
     for name in names:
         if name not in known:
             raise UnknownNameError(kind, name, known)

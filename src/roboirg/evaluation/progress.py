@@ -24,8 +24,8 @@ class Reporter(Protocol):
     def begin(self, total: int, done: int) -> None:
         """So many episodes are in the plan, so many of them were there before."""
 
-    def advance(self, record: Record) -> None:
-        """This record is stored."""
+    def advance(self, record: Record, *, is_new: bool = True) -> None:
+        """This record is stored; it is not new if the episode was only tried again."""
 
     def notice(self, text: str) -> None:
         """A sentence that a person should read now."""
@@ -37,7 +37,7 @@ class Silent:
     def begin(self, total: int, done: int) -> None:
         """Nothing."""
 
-    def advance(self, record: Record) -> None:
+    def advance(self, record: Record, *, is_new: bool = True) -> None:
         """Nothing."""
 
     def notice(self, text: str) -> None:
@@ -109,9 +109,9 @@ class ConsoleReporter:
         if done:
             self._console.print(f"{done} of {total} episodes are already there.")
 
-    def advance(self, record: Record) -> None:
+    def advance(self, record: Record, *, is_new: bool = True) -> None:
         """Move on by one."""
-        self._done += 1
+        self._done += is_new
         self._score.add(record)
         left = self._score.time_left(self._total - self._done)
         if self._console.is_terminal:

@@ -235,7 +235,8 @@ class Record(Result):
         events: what happened, in order.
         usage: what the episode cost: ``calls``, ``input_tokens``, ``output_tokens``, ``cost_usd``
             of models that the policy asked.
-        timings: wall-clock seconds: ``load``, ``reset``, ``act``, ``step``.
+        timings: wall-clock seconds by phase: ``policy_load``, ``policy_reset``, ``policy_act``,
+            ``env_reset``, ``env_step``, ….
         video: path relative to the records file, or None.
         film_lost: why the film that was asked for could not be written, or None.
         details: the traceback of an error, or None.

@@ -1,49 +1,43 @@
 """One job, played to its record.
 
-| what goes wrong | outcome | cause |
+| what goes wrong | outcome | kind of error |
 | --- | --- | --- |
-| the task's rules are broken, or time is up | failure | the judge's words |
-| the policy raises, or wants to exit | error | ``policy: …`` |
-| the policy's action cannot be executed | error | ``invalid action: …`` |
-| the world or the demonstration raises | error | ``environment: …`` |
+| the task's rules are broken, or time is up | failure | |
+| the policy raises, or wants to exit | error | policy |
+| the policy's action cannot be executed | error | invalid_action |
+| the policy's server does not answer in time, or at all | error | timeout, connection |
+| the world or the demonstration raises | error | environment |
 | no Vulkan device, a missing dependency | none: the run stops | |
-| a film cannot be written | as without it | |
+| a film cannot be written, a policy cannot say what it cost | as without it | |
 """
 
 from __future__ import annotations
 
-import datetime as dt
-import importlib.metadata
+import contextlib
 import json
-import re
+import math
 import time
-import traceback
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import JsonValue
 
-from roboirg import language, policies
+from roboirg import policies
 from roboirg.actions import ActionSpace, check_chunk
-from roboirg.episode import ENVIRONMENT_VERSION, Episode
-from roboirg.errors import (
-    InvalidActionError,
-    MissingDependencyError,
-    RenderDeviceError,
-    RoboIRGError,
-)
-from roboirg.evaluation.plan import VideoMode, say
-from roboirg.evaluation.record import EventRecord, Job, MentionSpan, Outcome, Record, Turn
+from roboirg.errors import InvalidActionError, InvalidValueError
+from roboirg.evaluation.course import Course, describe, utc_now
+from roboirg.evaluation.faults import Fault, blame, one_line
+from roboirg.evaluation.plan import VideoMode
+from roboirg.evaluation.record import Job, Record
 from roboirg.evaluation.video import Film, VideoOptions
+from roboirg.evaluation.watching import Phase, watched
 from roboirg.observations import DemonstrationFrames, Observation
 from roboirg.policies.base import Policy, PrivilegedPolicy
 from roboirg.policies.loading import (
-    is_privileged,
-    policy_version,
     wanted_actions,
     wanted_cameras,
     wanted_demonstration_frames,
@@ -60,7 +54,10 @@ Play = Callable[[Job], Record]
 VIDEO_FOLDER = "videos"
 NOTHING_DRAWN = "none"
 
-_LONGEST_CAUSE = 400
+MOST_ROWS = 10_000
+"""Actions that a policy may give at once; an episode has 1300 steps."""
+MOST_METADATA = 65_536
+"""Characters of JSON that a policy may say of itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,11 +68,19 @@ class Player:
         folder: of the run; films go to ``videos/`` in it.
         video: which episodes are filmed.
         options: how they are filmed.
+        policy_timeout_s: seconds that a call of the policy may take, where there is a supervisor.
+        plan: fingerprint of the plan, for the records.
     """
 
     folder: Path
     video: VideoMode = "off"
     options: VideoOptions = field(default_factory=VideoOptions)
+    policy_timeout_s: float | None = None
+    plan: str | None = None
+
+    def in_folder(self, folder: Path) -> Player:
+        """The same, for another folder."""
+        return replace(self, folder=folder)
 
     def __call__(self, job: Job) -> Record:
         """Play one job.
@@ -88,7 +93,7 @@ class Player:
         film = None
         if self.video != "off":
             film = Film(self.folder / VIDEO_FOLDER / f"{job.slug}.mp4", self.options)
-        course = play_episode(job, film)
+        course = play_episode(job, film, self.policy_timeout_s)
         video = self._keep(film, course)
         lost = None if film is None or film.trouble is None else one_line(film.trouble)
         return describe(
@@ -98,6 +103,7 @@ class Player:
             film_lost=lost,
             started_at=started_at,
             duration_s=round(time.monotonic() - start, 3),
+            plan=self.plan,
         )
 
     def _keep(self, film: Film | None, course: Course) -> str | None:
@@ -110,45 +116,6 @@ class Player:
         return None
 
 
-@dataclass
-class Course:
-    """How an episode went; filled while it goes, so that an error leaves what was before it.
-
-    Attributes:
-        outcome: success, failure or error.
-        cause: why not success.
-        steps: control steps of the policy.
-        demonstration_steps: frames of the video shown before.
-        turn: control steps of the world before the policy's turn.
-        events: what happened.
-        render_device: driver's name, None if the episode did not get that far.
-        details: traceback of an error.
-    """
-
-    outcome: Outcome = "error"
-    cause: str | None = "environment: the episode did not begin"
-    steps: int = 0
-    demonstration_steps: int = 0
-    turn: int = 0
-    events: list[EventRecord] = field(default_factory=list)
-    render_device: str | None = None
-    details: str | None = None
-
-    def note(self, info: Mapping[str, Any]) -> None:
-        """Keep the events that the environment reports."""
-        for event in info.get("events", ()):
-            place = event.get("place")
-            self.events.append(
-                EventRecord(
-                    step=int(event["step"]) - self.turn,
-                    kind=str(event["kind"]),
-                    subject=str(event["subject"]),
-                    place=None if place is None else str(place),
-                    holds=bool(event.get("holds", True)),
-                )
-            )
-
-
 class Needs(NamedTuple):
     """What a policy needs of its environment.
 
@@ -157,23 +124,46 @@ class Needs(NamedTuple):
         actions: the space in which it acts.
         demonstration_frames: which pictures of the video.
         observe_every: after how many control steps it wants to look.
+        grounded: whether it passes on subgoals with pixels.
     """
 
     cameras: tuple[str, ...]
     actions: ActionSpace
     demonstration_frames: DemonstrationFrames = "all"
     observe_every: int | None = None
+    grounded: bool = False
 
 
-class _Fault(Exception):  # noqa: N818 - never leaves this file
-    """Something other than the policy's skill ended the episode."""
+class _Phases:
+    """Calls of policy and world: blamed, watched and timed."""
 
-    def __init__(self, cause: str, details: str) -> None:
-        super().__init__(cause)
-        self.cause, self.details = cause, details
+    def __init__(self, course: Course, policy_timeout_s: float | None) -> None:
+        self._timings = course.timings
+        self._limit_s = policy_timeout_s
+
+    @contextlib.contextmanager
+    def policy(self, phase: Phase, name: str) -> Iterator[None]:
+        with blame("policy"), watched(phase, self._limit_s), self._timed(name):
+            yield
+
+    @contextlib.contextmanager
+    def world(self, name: str) -> Iterator[None]:
+        with blame("environment"), watched("world"), self._timed(name):
+            yield
+
+    @contextlib.contextmanager
+    def _timed(self, name: str) -> Iterator[None]:
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            spent = self._timings.get(name, 0.0) + time.perf_counter() - start
+            self._timings[name] = round(spent, 6)
 
 
-def play_episode(job: Job, film: Film | None = None) -> Course:
+def play_episode(
+    job: Job, film: Film | None = None, policy_timeout_s: float | None = None
+) -> Course:
     """Play one job and say how it went; every fault of policy or world ends up in the cause.
 
     Raises:
@@ -181,25 +171,44 @@ def play_episode(job: Job, film: Film | None = None) -> Course:
         MissingDependencyError: something has to be installed first.
     """
     course = Course()
-    env = None
+    phases = _Phases(course, policy_timeout_s)
+    policy, env = None, None
     try:
-        with _blame("policy"):
+        with phases.policy("policy loading", "policy_load"):
             policy = load_policy(job)
-            needs = Needs(
-                wanted_cameras(policy),
-                wanted_actions(policy),
-                wanted_demonstration_frames(policy),
-                wanted_history(policy),
-            )
-        with _blame("environment"):
+            needs = needs_of(policy, job)
+        with phases.world("env_reset"):
             env = make_env(job, needs)
-        _play(job, env, policy, needs.actions, film, course)
-    except _Fault as fault:
-        course.outcome, course.cause, course.details = "error", fault.cause, fault.details
+        _play(job, env, policy, needs.actions, film, course, phases)
+    except Fault as fault:
+        course.fail(fault.kind, fault.cause, fault.details)
     finally:
+        if policy is not None:
+            _say_goodbye(policy, course, phases)
         if env is not None:
             env.close()
     return course
+
+
+def needs_of(policy: Policy, job: Job) -> Needs:
+    """What a policy needs, where the job prescribes nothing else.
+
+    Raises:
+        InvalidValueError: it acts in another action space than is prescribed.
+    """
+    actions = wanted_actions(policy)
+    if job.actions not in (None, actions.name):
+        raise InvalidValueError(
+            f"the policy acts in {actions.name!r}, but {job.actions!r} is prescribed."
+        )
+    frames, every = job.demonstration_frames, job.observe_every
+    return Needs(
+        wanted_cameras(policy),
+        actions,
+        wanted_demonstration_frames(policy) if frames is None else frames,
+        wanted_history(policy) if every is None else every,
+        bool(getattr(policy, "grounded", False)),
+    )
 
 
 def make_env(job: Job, needs: Needs) -> RoboIRGEnv:
@@ -214,11 +223,14 @@ def make_env(job: Job, needs: Needs) -> RoboIRGEnv:
         episode=job.episode,
         stages=job.stages,
         distractor=job.distractor,
+        distractors=job.distractors,
         frame=job.frame,
         cameras=needs.cameras,
         actions=needs.actions.name,
+        grounded=needs.grounded,
         demonstration_frames=needs.demonstration_frames,
         observe_every=needs.observe_every,
+        meshes=job.meshes,
         max_steps=job.max_steps,
     )
 
@@ -229,7 +241,8 @@ def load_policy(job: Job) -> Policy:
     Its seed is made of the run's and the episode's: the same in every setting, another in every
     episode.
     """
-    seeds = np.random.SeedSequence((job.policy_seed, _episode(job).seed))
+    episode = get_episode(job.task, job.split, job.episode)
+    seeds = np.random.SeedSequence((job.policy_seed, episode.seed))
     return policies.make_policy(job.policy, seed=int(seeds.generate_state(1)[0]))
 
 
@@ -240,25 +253,31 @@ def _play(
     actions: ActionSpace,
     film: Film | None,
     course: Course,
+    phases: _Phases,
 ) -> None:
-    with _blame("environment"):
+    with phases.world("env_reset"):
         if film is not None:
+            film.caption = env.instruction.text
             env.set_frame_hook(film.shoot, every=film.options.every)
         observation, info = env.reset()
+        if film is not None:
+            film.shoot(env)  # what the policy sees first
         device = str(env.render_device)
         course.render_device = None if device == NOTHING_DRAWN else device
         course.demonstration_steps = len(info["demonstration"]["joint_positions"])
         course.turn = int(info["elapsed_steps"])
         course.note(info)
         instruction = env.instruction.text
-    with _blame("policy"):
+    with phases.policy("policy reset()", "policy_reset"):
         if isinstance(policy, PrivilegedPolicy):
             policy.attach(env)
         policy.reset(instruction, info["demonstration"])
+        course.policy_metadata = _metadata_of(policy)
     status, cause = "ongoing", None
     while status == "ongoing":
-        rows = _next_actions(policy, observation, actions)
-        with _blame("environment"):
+        with phases.policy("policy act()", "policy_act"):
+            rows = _next_actions(policy, observation, actions)
+        with phases.world("env_step"):
             observation, *_, info = env.step_chunk(rows)
         course.steps = int(info["steps"])
         course.note(info)
@@ -270,7 +289,7 @@ def _judge(job: Job, status: str, cause: str | None, course: Course) -> None:
     if status == "success":
         course.outcome, course.cause = "success", None
     elif status == "timeout":
-        course.outcome = "failure"
+        course.outcome, course.timed_out = "failure", True
         course.cause = cause or f"not done after {job.max_steps} steps"
     elif status == "failure":
         course.outcome, course.cause = "failure", cause or "the judge gave no cause"
@@ -281,88 +300,36 @@ def _judge(job: Job, status: str, cause: str | None, course: Course) -> None:
 def _next_actions(
     policy: Policy, observation: dict[str, Any], space: ActionSpace
 ) -> NDArray[np.float64]:
-    """The policy's next rows, all of them valid."""
-    with _blame("policy"):
-        return check_chunk(policy.act(cast("Observation", observation)), space)
+    """The policy's next rows, all of them valid.
+
+    Raises:
+        InvalidActionError: they are not, or too many.
+    """
+    rows = policy.act(cast("Observation", observation))
+    count = len(rows) if hasattr(rows, "__len__") else 0
+    if count > MOST_ROWS:
+        raise InvalidActionError(f"{count} actions at once are too many; at most {MOST_ROWS}.")
+    return check_chunk(rows, space)
 
 
-@contextmanager
-def _blame(whom: str) -> Iterator[None]:
-    """Turn what is raised inside into a fault of policy or environment."""
+def _metadata_of(policy: Policy) -> dict[str, JsonValue]:
+    """What a policy says of itself, as a reader of the record will find it."""
+    text = json.dumps(dict(getattr(policy, "metadata", {})), allow_nan=False)
+    if len(text) > MOST_METADATA:
+        raise InvalidValueError(
+            f"the policy's metadata are {len(text)} characters of JSON; at most {MOST_METADATA}."
+        )
+    return cast("dict[str, JsonValue]", json.loads(text))
+
+
+def _say_goodbye(policy: Policy, course: Course, phases: _Phases) -> None:
+    """Ask what it cost and close it; trouble with that leaves the verdict as it is."""
     try:
-        yield
-    except (RenderDeviceError, MissingDependencyError, _Fault):
-        # The first two would end every other episode just the same: the run stops.
-        raise
-    except InvalidActionError as error:
-        raise _Fault(f"invalid action: {error}", traceback.format_exc()) from error
-    except (Exception, SystemExit) as error:  # the boundary: anything is possible in there
-        raise _Fault(f"{whom}: {one_line(error)}", traceback.format_exc()) from error
-
-
-def one_line(error: BaseException) -> str:
-    """An exception as one line that is the same in every process."""
-    words = str(error) if isinstance(error, RoboIRGError) else f"{type(error).__name__}: {error}"
-    words = re.sub(r"0x[0-9a-fA-F]{6,}", "0x…", " ".join(words.split())).rstrip(": ")
-    return words.encode("utf-8", "replace").decode()[:_LONGEST_CAUSE]
-
-
-def describe(
-    job: Job,
-    course: Course,
-    *,
-    started_at: str,
-    duration_s: float = 0.0,
-    video: str | None = None,
-    film_lost: str | None = None,
-) -> Record:
-    """The record of a job that went so. Needs no simulator."""
-    episode = _episode(job)
-    instruction, plain = say(job), language.instruct(episode, "explicit")
-    return Record(
-        **dict(job),
-        seed=episode.seed,
-        difficulty=episode.difficulty,
-        outcome=course.outcome,
-        cause=course.cause,
-        steps=course.steps,
-        demonstration_steps=course.demonstration_steps,
-        instruction=tuple(Turn(stage=u.stage, text=u.text) for u in instruction.utterances),
-        mentions=tuple(
-            MentionSpan(
-                utterance=mention.utterance,
-                start=mention.start,
-                end=mention.end,
-                role=mention.role,
-                expression=mention.expression,
-                slot=mention.slot,
-                value=mention.value,
-            )
-            for mention in instruction.mentions
-        ),
-        command=plain.text,
-        goal=dict(episode.goal.as_mapping()),
-        # Exactly what a reader of the file will find.
-        metadata=json.loads(json.dumps(dict(instruction.metadata))),
-        privileged=is_privileged(job.policy),
-        policy_version=policy_version(job.policy),
-        events=tuple(course.events),
-        video=video,
-        film_lost=film_lost,
-        details=course.details,
-        render_device=course.render_device,
-        language_version=str(language.LANGUAGE_VERSION),
-        environment_version=ENVIRONMENT_VERSION,
-        package_version=importlib.metadata.version("roboirgbench"),
-        started_at=started_at,
-        duration_s=duration_s,
-    )
-
-
-def utc_now() -> str:
-    """The time, ISO 8601, to the second."""
-    return dt.datetime.now(dt.UTC).isoformat(timespec="seconds")
-
-
-def _episode(job: Job) -> Episode:
-    return get_episode(job.task, job.split, job.episode)
+        with phases.policy("policy close()", "policy_close"):
+            if hasattr(policy, "usage"):
+                usage = {str(name): float(value) for name, value in policy.usage().items()}
+                course.usage = {name: cost for name, cost in usage.items() if math.isfinite(cost)}
+            if hasattr(policy, "close"):
+                policy.close()
+    except Fault as fault:
+        course.details = course.details or fault.details

@@ -5,7 +5,8 @@ from __future__ import annotations
 import contextlib
 import signal
 import threading
-from collections.abc import Generator, Iterator, Sequence
+from collections import Counter
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from pathlib import Path
 from types import FrameType
 from typing import NamedTuple
@@ -13,14 +14,18 @@ from typing import NamedTuple
 from roboirg.episode import ENVIRONMENT_VERSION
 from roboirg.errors import InvalidValueError
 from roboirg.evaluation.executors import Executor
+from roboirg.evaluation.lines import Stored, key_of
 from roboirg.evaluation.plan import Plan, write_plan
 from roboirg.evaluation.progress import Reporter, Silent
 from roboirg.evaluation.record import Job, Record
 from roboirg.evaluation.rollout import Play
-from roboirg.evaluation.store import TORN_FILE, RecordStore, StoreError, latest
+from roboirg.evaluation.store import TORN_FILE, RecordStore, StoreError
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.policies.loading import policy_version
 from roboirg.splits import get_episode
+
+UNREACHABLE_AFTER = 20
+"""So many episodes of a policy in a row without a connection, and its others are left for later."""
 
 
 class Terminated(KeyboardInterrupt):
@@ -31,21 +36,22 @@ class Summary(NamedTuple):
     """What a run found and did.
 
     Attributes:
-        records: the newest of every job of the plan, in the plan's order.
-        played: how many of them are new.
+        total: jobs in the plan.
+        played: how many episodes were played now, further tries not counted.
+        errors: of the plan's records, those that are neither success nor failure.
+        missing: jobs of the plan that have no record.
         torn_bytes: of a line that a kill had cut short, moved to ``records.torn``.
-        unfilmed: the new records whose films could not be written.
+        unfilmed: why films of new records could not be written.
+        unreachable: policies that could not be reached again and again.
     """
 
-    records: tuple[Record, ...]
+    total: int
     played: int
+    errors: tuple[Stored, ...]
+    missing: int
     torn_bytes: int
-    unfilmed: tuple[Record, ...]
-
-    @property
-    def errors(self) -> tuple[Record, ...]:
-        """The records that are neither success nor failure."""
-        return tuple(record for record in self.records if record.outcome == "error")
+    unfilmed: tuple[str, ...]
+    unreachable: tuple[str, ...]
 
 
 def run_plan(
@@ -58,6 +64,9 @@ def run_plan(
     reporter: Reporter | None = None,
 ) -> Summary:
     """Play what the plan has and the folder lacks; store each record the moment it arrives.
+
+    An episode that ends in an error of one of the kinds `Plan.retry_on` is tried again after all
+    others, up to `Plan.tries` times; the newest record counts.
 
     Args:
         plan: what should be there in the end.
@@ -76,47 +85,123 @@ def run_plan(
     listener = reporter or Silent()
     jobs = plan.jobs()
     with _sigterm_interrupts(), RecordStore(folder) as store:
-        if store.torn:
-            listener.notice(
-                f"An earlier run was stopped in the middle of a line; its {len(store.torn)} bytes "
-                f"were moved to {folder / TORN_FILE}."
-            )
-        _check_versions(store.records, folder)
-        _check_policies(plan, store.records, folder)
+        _tell_damage(store, listener)
+        _check_versions(store.stored.values(), folder)
+        _check_policies(plan, store.stored.values(), folder)
         write_plan(plan, folder)
-        stored = latest(store.records)
-        todo = [
-            job
-            for job in jobs
-            if job not in stored or (retry_errors and stored[job].outcome == "error")
-        ]
+        todo = [job for job in jobs if _is_due(store, job, retry_errors=retry_errors)]
         listener.begin(len(jobs), len(jobs) - len(todo))
-        unfilmed = []
-        with contextlib.closing(_iterate(executor, todo, play)) as records:
-            for record in records:
-                store.append(record)
-                listener.advance(record)
-                if record.film_lost:
-                    unfilmed.append(record)
-        newest = latest(store.records)
+        course = _Run(plan, store, listener)
+        course.play(todo, play, executor)
+        found = [store.stored.get(key_of(job)) for job in jobs]
         return Summary(
-            tuple(newest[job] for job in jobs), len(todo), len(store.torn), tuple(unfilmed)
+            total=len(jobs),
+            played=len(course.tries),
+            errors=tuple(one for one in found if one is not None and one.outcome == "error"),
+            missing=found.count(None),
+            torn_bytes=len(store.torn),
+            unfilmed=tuple(course.unfilmed),
+            unreachable=tuple(course.unreachable),
         )
 
 
-def _check_versions(records: Sequence[Record], folder: Path) -> None:
+class _Run:
+    """What a run has done so far.
+
+    Attributes:
+        tries: of each job, in this run.
+        unfilmed: why films were lost.
+        unreachable: policies that could not be reached again and again.
+    """
+
+    def __init__(self, plan: Plan, store: RecordStore, listener: Reporter) -> None:
+        self._plan, self._store, self._listener = plan, store, listener
+        self._unconnected: Counter[str] = Counter()
+        self.tries: Counter[Job] = Counter()
+        self.unfilmed: list[str] = []
+        self.unreachable: list[str] = []
+
+    def play(self, todo: Sequence[Job], play: Play, executor: Executor) -> None:
+        """Play jobs, and once more what ended in an error that may pass."""
+        while todo:
+            todo = self._play_once(todo, play, executor)
+
+    def _play_once(self, todo: Sequence[Job], play: Play, executor: Executor) -> list[Job]:
+        """Play jobs; those that are to be played afterwards."""
+        open_jobs, again = dict.fromkeys(todo), []
+        with contextlib.closing(_iterate(executor, todo, play)) as records:
+            for record in records:
+                job = record.identity
+                open_jobs.pop(job, None)
+                self._keep(job, record)
+                if self._is_to_be_tried_again(job, record):
+                    again.append(job)
+                if self._has_lost_touch(record):
+                    # The rest of the world goes on without it.
+                    self._tell_unreachable(record)
+                    again += open_jobs
+                    break
+        return [job for job in again if job.policy not in self.unreachable]
+
+    def _keep(self, job: Job, record: Record) -> None:
+        before = self._store.stored.get(key_of(job))
+        if before is not None:
+            record = record.model_copy(update={"attempt": before.attempt + 1})
+        self._store.append(record)
+        self.tries[job] += 1
+        self._listener.advance(record, is_new=self.tries[job] == 1)
+        if record.film_lost:
+            self.unfilmed.append(record.film_lost)
+
+    def _is_to_be_tried_again(self, job: Job, record: Record) -> bool:
+        return record.error in self._plan.retry_on and self.tries[job] < self._plan.tries
+
+    def _has_lost_touch(self, record: Record) -> bool:
+        if record.error == "connection":
+            self._unconnected[record.policy] += 1
+        else:
+            self._unconnected[record.policy] = 0
+        return self._unconnected[record.policy] >= UNREACHABLE_AFTER
+
+    def _tell_unreachable(self, record: Record) -> None:
+        self.unreachable.append(record.policy)
+        self._listener.notice(
+            f"{record.policy} could not be reached in {UNREACHABLE_AFTER} episodes in a row "
+            f"({record.cause}); its other episodes are left for another run."
+        )
+
+
+def _is_due(store: RecordStore, job: Job, *, retry_errors: bool) -> bool:
+    stored = store.stored.get(key_of(job))
+    return stored is None or (retry_errors and stored.outcome == "error")
+
+
+def _tell_damage(store: RecordStore, listener: Reporter) -> None:
+    if store.torn:
+        listener.notice(
+            f"An earlier run was stopped in the middle of a line; its {len(store.torn)} bytes "
+            f"were moved to {store.folder / TORN_FILE}."
+        )
+    if store.damaged:
+        listener.notice(
+            f"{store.path} has {len(store.damaged)} damaged lines, the first is line "
+            f"{store.damaged[0]}; their episodes are played again."
+        )
+
+
+def _check_versions(records: Iterable[Stored], folder: Path) -> None:
     """Refuse to mix words or worlds of two versions: rates of different things are no rate."""
-    for record in records:
-        if record.language_version != LANGUAGE_VERSION:
-            raise StoreError(
-                f"{folder} holds episodes told in language version {record.language_version}, but "
-                f"this roboirg speaks {LANGUAGE_VERSION}; choose another --out."
-            )
-        if record.environment_version != ENVIRONMENT_VERSION:
-            raise StoreError(
-                f"{folder} holds episodes of environment version {record.environment_version}, "
-                f"but this roboirg has version {ENVIRONMENT_VERSION}; choose another --out."
-            )
+    records = tuple(records)
+    for language in {record.language_version for record in records} - {LANGUAGE_VERSION}:
+        raise StoreError(
+            f"{folder} holds episodes told in language version {language}, but this roboirg "
+            f"speaks {LANGUAGE_VERSION}; choose another --out."
+        )
+    for world in {record.environment_version for record in records} - {ENVIRONMENT_VERSION}:
+        raise StoreError(
+            f"{folder} holds episodes of environment version {world}, but this roboirg has "
+            f"version {ENVIRONMENT_VERSION}; choose another --out."
+        )
     for task, split, episode, seed in {
         (record.task, record.split, record.episode, record.seed) for record in records
     }:
@@ -128,15 +213,15 @@ def _check_versions(records: Sequence[Record], folder: Path) -> None:
             )
 
 
-def _check_policies(plan: Plan, records: Sequence[Record], folder: Path) -> None:
+def _check_policies(plan: Plan, records: Iterable[Stored], folder: Path) -> None:
     """Refuse to mix what two policies of the same name did."""
     versions = {name: policy_version(name) for name in plan.policies}
-    for record in records:
-        now = versions.get(record.policy, record.policy_version)
-        if record.policy_version != now:
+    for policy, version in {(record.policy, record.policy_version) for record in records}:
+        now = versions.get(policy, version)
+        if version != now:
             raise StoreError(
-                f"{folder} holds episodes of {record.policy} in version {record.policy_version}, "
-                f"but it has changed since (now {now}); choose another --out."
+                f"{folder} holds episodes of {policy} in version {version}, but it has changed "
+                f"since (now {now}); choose another --out."
             )
 
 

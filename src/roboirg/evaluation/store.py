@@ -6,6 +6,7 @@ Guaranteed, on a local POSIX file system:
 - Killing the process at any moment loses at most the record whose `append` had not returned. A
   torn last line is never read as a record; the next writer moves it to ``records.torn`` (copied
   and synced there before it is cut off here) and says so.
+- A line in the middle that is no JSON costs that line alone: it is passed over and told of.
 - One writer at a time: the lock is the kernel's (`flock`), so it ends with its owner, however
   that dies, and never goes stale.
 
@@ -19,22 +20,30 @@ import contextlib
 import fcntl
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import NamedTuple, Self, TypeVar
 
-from pydantic import ValidationError
+from roboirg.evaluation.lines import (
+    DamagedLineError,
+    Key,
+    Stored,
+    StoreError,
+    key_of,
+    read_line,
+    read_stored,
+)
+from roboirg.evaluation.record import Job, Record, Result
 
-from roboirg.errors import RoboIRGError
-from roboirg.evaluation.record import SCHEMA_VERSION, Job, Record
+__all__ = ["Contents", "RecordStore", "StoreError", "read_contents", "read_records", "read_results"]
 
 RECORDS_FILE = "records.jsonl"
 TORN_FILE = "records.torn"
 LOCK_FILE = ".lock"
 
-
-class StoreError(RoboIRGError):
-    """The records cannot be read or written; the sentence says which and why."""
+Kind = TypeVar("Kind", bound=Result)
+Parsed = TypeVar("Parsed")
 
 
 class Contents(NamedTuple):
@@ -43,19 +52,26 @@ class Contents(NamedTuple):
     Attributes:
         records: all of them, in the order of the file.
         torn: bytes of an unfinished last line, usually empty.
+        damaged: numbers of the lines that are no JSON, usually none.
     """
 
     records: tuple[Record, ...]
     torn: bytes
+    damaged: tuple[int, ...] = ()
 
 
 class RecordStore:
     """The records of one output folder, open for appending by this process alone.
 
-    Use as a context manager. `torn` holds the bytes that were moved aside when it was opened.
+    Use as a context manager. Whole records are not kept in memory, only what `Stored` has.
 
     Args:
         folder: made if it does not exist.
+
+    Attributes:
+        stored: what is in the file, the newest of each identity.
+        torn: the bytes that were moved aside when it was opened.
+        damaged: numbers of the lines that are no JSON; their episodes count as not played.
 
     Raises:
         StoreError: another process writes there, or the file is not one of ours.
@@ -70,9 +86,11 @@ class RecordStore:
                 self._lock = os.open(folder / LOCK_FILE, os.O_RDWR | os.O_CREAT, 0o644)
                 undo.callback(os.close, self._lock)
                 self._take_lock()
-                contents = read_contents(self.path)
-                self.torn = contents.torn
-                self._records = list(contents.records)
+                lines = _Lines(self.path)
+                self.stored: dict[Key, Stored] = {
+                    key_of(one): one for one in lines.parsed(read_stored)
+                }
+                self.torn, self.damaged = lines.torn, tuple(lines.damaged)
                 self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
                 undo.callback(os.close, self._file)
                 self._mend()
@@ -80,11 +98,6 @@ class RecordStore:
             except OSError as error:
                 raise StoreError(f"Cannot write to {folder}: {error.strerror}.") from error
             undo.pop_all()
-
-    @property
-    def records(self) -> tuple[Record, ...]:
-        """All records, in the order of the file."""
-        return tuple(self._records)
 
     def append(self, record: Record) -> None:
         """Write one record; when this returns, it is on the disk.
@@ -94,12 +107,13 @@ class RecordStore:
         """
         size = os.fstat(self._file).st_size
         try:
-            _write_all(self._file, record.model_dump_json().encode() + b"\n")
+            line = record.model_dump_json().encode()
+            _write_all(self._file, line + b"\n")
             os.fsync(self._file)
         except OSError as error:
             os.ftruncate(self._file, size)
             raise StoreError(f"Cannot write to {self.path}: {error.strerror}.") from error
-        self._records.append(record)
+        self.stored[key_of(record)] = read_stored(line, self.path, 0)
 
     def close(self) -> None:
         """Let the next writer in."""
@@ -145,43 +159,43 @@ def read_contents(path: Path) -> Contents:
     """Everything in a file of records; takes no lock, so a run may be under way.
 
     Raises:
-        StoreError: a line is not a record of this version.
+        StoreError: a line is a record of a version that cannot be read, or no record.
     """
-    try:
-        *lines, last = path.read_bytes().split(b"\n")
-    except FileNotFoundError:
-        return Contents((), b"")
-    except OSError as error:
-        raise StoreError(f"Cannot read {path}: {error.strerror}.") from error
-    records = [_parse(line, path, number) for number, line in enumerate(lines, start=1)]
-    if not last:
-        return Contents(tuple(records), b"")
-    try:
-        json.loads(last)
-    except ValueError:
-        return Contents(tuple(records), last)
-    # A JSON object has no proper prefix that is one: this line lacks nothing but its newline.
-    return Contents((*records, _parse(last, path, len(lines) + 1)), b"")
+    lines = _Lines(path)
+    records = tuple(lines.parsed(partial(read_line, kind=Record)))
+    return Contents(records, lines.torn, tuple(lines.damaged))
 
 
 def read_records(folder: Path) -> tuple[Record, ...]:
     """The records of a run's folder, the newest of each identity, in the order of the file.
 
     Raises:
-        StoreError: there are none, or a line is not a record of this version.
+        StoreError: there are none, or a line is no record of a version that can be read.
     """
-    path = folder / RECORDS_FILE
-    records = latest(read_contents(path).records)
-    if not records:
-        raise StoreError(
-            f"There are no records in {folder}; give the --out folder of a `roboirg run`."
-        )
-    return tuple(records.values())
+    return _newest(folder, Record)
 
 
-def latest(records: Iterable[Record]) -> Mapping[Job, Record]:
+def read_results(folder: Path) -> tuple[Result, ...]:
+    """As `read_records`, without what was said and done: for very many of them.
+
+    Raises:
+        StoreError: there are none, or a line is no record of a version that can be read.
+    """
+    return _newest(folder, Result)
+
+
+def read_index(folder: Path) -> dict[Key, Stored]:
+    """What is stored in a run's folder, the newest of each identity; empty if there is no run.
+
+    Raises:
+        StoreError: the file cannot be read, or a line is no record of a version that can be read.
+    """
+    return {key_of(one): one for one in _Lines(folder / RECORDS_FILE).parsed(read_stored)}
+
+
+def latest(records: Iterable[Kind]) -> Mapping[Job, Kind]:
     """The newest record of each job."""
-    newest: dict[Job, Record] = {}
+    newest: dict[Job, Kind] = {}
     for record in records:
         newest[record.identity] = record
     return newest
@@ -205,24 +219,62 @@ def write_atomically(path: Path, text: str) -> None:
         raise StoreError(f"Cannot write {path}: {error.strerror}.") from error
 
 
-def _parse(line: bytes, path: Path, number: int) -> Record:
-    where = f"{path} line {number}"
+class _Lines:
+    """A file of records, line by line.
+
+    Attributes:
+        torn: bytes of an unfinished last line, known after `parsed`.
+        damaged: numbers of lines that are no JSON, known after `parsed`.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.torn = b""
+        self.damaged: list[int] = []
+
+    def parsed(self, parse: Callable[[bytes, Path, int], Parsed]) -> Iterator[Parsed]:
+        """What `parse` makes of each line, path and number; nothing if there is no file.
+
+        Raises:
+            StoreError: the file cannot be read, or whatever `parse` raises.
+        """
+        try:
+            file = self._path.open("rb")
+        except FileNotFoundError:
+            return
+        except OSError as error:
+            raise StoreError(f"Cannot read {self._path}: {error.strerror}.") from error
+        with file:
+            for number, line in enumerate(file, start=1):
+                # A JSON object has no proper prefix that is one: if the last line lacks nothing
+                # but its newline, the record is whole.
+                if not line.endswith(b"\n") and not _is_json(line):
+                    self.torn = line
+                    return
+                try:
+                    yield parse(line.removesuffix(b"\n"), self._path, number)
+                except DamagedLineError:
+                    self.damaged.append(number)
+
+
+def _is_json(line: bytes) -> bool:
     try:
-        data = json.loads(line)
-    except ValueError as error:
-        raise StoreError(f"{where} is damaged: it is not JSON ({error}).") from error
-    version = data.get("schema_version") if isinstance(data, dict) else None
-    if version != SCHEMA_VERSION:
+        json.loads(line)
+    except ValueError:
+        return False
+    return True
+
+
+def _newest(folder: Path, kind: type[Kind]) -> tuple[Kind, ...]:
+    lines = _Lines(folder / RECORDS_FILE)
+    newest: dict[Key, Kind] = {}
+    for one in lines.parsed(partial(read_line, kind=kind)):
+        newest[key_of(one)] = one
+    if not newest:
         raise StoreError(
-            f"{where} has schema version {version!r}, but this roboirg reads version "
-            f"{SCHEMA_VERSION}; use the roboirg that wrote it, or another folder."
+            f"There are no records in {folder}; give the --out folder of a `roboirg run`."
         )
-    try:
-        return Record.model_validate_json(line)
-    except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise StoreError(f"{where} is not a record: {place}: {first['msg']}.") from error
+    return tuple(newest.values())
 
 
 def _write_all(descriptor: int, data: bytes) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.errors import MissingDependencyError, RenderDeviceError
+from roboirg.lettering import wrapped, write_text
 
 if TYPE_CHECKING:
     from av.container import OutputContainer
@@ -30,6 +32,10 @@ LAST_FRAME_REPEATS = 8
 """The end is what one wants to see: it stays for most of a second."""
 
 POSTER_SUFFIX = ".jpg"
+
+_TEXT_SCALE, _TEXT_LINE, _TEXT_MARGIN = 0.4, 16, 6
+_MOST_LINES = 12
+_INK, _PAPER = (31, 35, 40), 255
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +77,16 @@ def check_video_support() -> None:
         ) from error
 
 
-def compose(pictures: Sequence[Frame], *, is_demonstration: bool) -> Frame:
-    """Pictures side by side, a line between them; what was shown before has a coloured border."""
+def compose(
+    pictures: Sequence[Frame], caption: str = "", *, is_demonstration: bool = False
+) -> Frame:
+    """Pictures side by side, a line between them; what was shown before has a coloured border.
+
+    Args:
+        pictures: uint8 (height, width, 3), all of one height.
+        caption: goes below, broken into lines.
+        is_demonstration: whether it was shown before the policy's turn.
+    """
     line = np.zeros((pictures[0].shape[0], GAP, 3), np.uint8)
     parts = [part for picture in pictures for part in (line, picture)][1:]
     frame: Frame = np.concatenate(parts, axis=1)
@@ -80,7 +94,18 @@ def compose(pictures: Sequence[Frame], *, is_demonstration: bool) -> Frame:
         colour = np.array(DEMONSTRATION_COLOUR, np.uint8)
         frame[:BORDER] = frame[-BORDER:] = colour
         frame[:, :BORDER] = frame[:, -BORDER:] = colour
-    return frame
+    return np.concatenate([frame, _bar(caption, frame.shape[1])]) if caption else frame
+
+
+@functools.lru_cache(maxsize=8)
+def _bar(caption: str, width: int) -> Frame:
+    """A caption on paper; its height is even, as H.264 wants it."""
+    lines = wrapped(caption, width - 2 * _TEXT_MARGIN, _TEXT_SCALE)[:_MOST_LINES]
+    height = len(lines) * _TEXT_LINE + 2 * _TEXT_MARGIN
+    bar: Frame = np.full((height, width, 3), _PAPER, np.uint8)
+    for number, text in enumerate(lines, start=1):
+        write_text(bar, text, _TEXT_MARGIN, number * _TEXT_LINE, _TEXT_SCALE, _INK)
+    return bar
 
 
 @dataclass
@@ -95,11 +120,13 @@ class Film:
         options: how to film.
 
     Attributes:
+        caption: below the pictures; set before the first of them.
         trouble: why it was given up, or None.
     """
 
     path: Path
     options: VideoOptions = field(default_factory=VideoOptions)
+    caption: str = field(default="", init=False)
     trouble: Exception | None = field(default=None, init=False)
     _container: OutputContainer | None = field(default=None, init=False, repr=False)
     _stream: VideoStream | None = field(default=None, init=False, repr=False)
@@ -121,7 +148,7 @@ class Film:
             return
         try:
             pictures = [world.picture(camera) for camera in self.options.cameras]
-            self._add(compose(pictures, is_demonstration=is_demonstration))
+            self._add(compose(pictures, self.caption, is_demonstration=is_demonstration))
         except (RenderDeviceError, MissingDependencyError):
             raise
         except Exception as error:  # noqa: BLE001 - see the class

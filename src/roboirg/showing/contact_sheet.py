@@ -8,12 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from roboirg.errors import InvalidValueError
-
-Frame = NDArray[np.uint8]
-Colour = tuple[int, int, int]
+from roboirg.lettering import Colour, Frame, wrapped, write_text
 
 PER_BAND = 6
 """Moments side by side; further ones go below."""
@@ -24,8 +21,6 @@ _BAR = 6
 """Height of the coloured bar over a moment, pixels."""
 _CAPTION_LINES = 5
 
-_FONT = 0
-"""OpenCV's FONT_HERSHEY_SIMPLEX."""
 _TITLE_SCALE, _TITLE_LINE = 0.8, 34
 _TEXT_SCALE, _TEXT_LINE = 0.45, 18
 
@@ -68,12 +63,12 @@ def compose_sheet(title: str, subtitle: str, moments: Sequence[Moment]) -> Frame
     columns = math.ceil(len(moments) / math.ceil(len(moments) / PER_BAND))
     # A single narrow column would break the title.
     width = 2 * _MARGIN + max(columns, 3) * (_PICTURE + _GAP) - _GAP
-    lines = _wrapped(subtitle, width - 2 * _MARGIN, _TEXT_SCALE)
+    lines = wrapped(subtitle, width - 2 * _MARGIN, _TEXT_SCALE)
     head = _strip(width, _MARGIN + _TITLE_LINE + (len(lines) + 1) * _TEXT_LINE)
     y = _MARGIN + _TITLE_LINE // 2
-    _write(head, title, _MARGIN, y, _TITLE_SCALE, _INK, thickness=2)
+    write_text(head, title, _MARGIN, y, _TITLE_SCALE, _INK, thickness=2)
     for number, line in enumerate(lines):
-        _write(head, line, _MARGIN, y + _TITLE_LINE + number * _TEXT_LINE, _TEXT_SCALE, _PALE)
+        write_text(head, line, _MARGIN, y + _TITLE_LINE + number * _TEXT_LINE, _TEXT_SCALE, _PALE)
     bands = [
         _band(moments[start : start + columns], width) for start in range(0, len(moments), columns)
     ]
@@ -108,7 +103,7 @@ def thinned(count: int, most: int) -> tuple[int, ...]:
 
 def _band(moments: Sequence[Moment], width: int) -> Frame:
     """Moments side by side: a bar, the caption, the pictures."""
-    captions = [_wrapped(moment.caption, _PICTURE, _TEXT_SCALE) for moment in moments]
+    captions = [wrapped(moment.caption, _PICTURE, _TEXT_SCALE) for moment in moments]
     longest = min(_CAPTION_LINES, max(map(len, captions)))
     caption_height = _BAR + _PAD + (1 + longest) * _TEXT_LINE + _PAD
     heights = max(len(moment.pictures) for moment in moments)
@@ -119,9 +114,9 @@ def _band(moments: Sequence[Moment], width: int) -> Frame:
         band[:_BAR, x : x + _PICTURE] = np.array(colour, np.uint8)
         y = _BAR + _PAD + _TEXT_LINE - 4
         when = f"step {moment.step}" + (" (video)" if moment.is_demonstration else "")
-        _write(band, when, x, y, _TEXT_SCALE, _PALE)
+        write_text(band, when, x, y, _TEXT_SCALE, _PALE)
         for number, line in enumerate(captions[column][:longest], start=1):
-            _write(band, line, x, y + number * _TEXT_LINE, _TEXT_SCALE, _INK)
+            write_text(band, line, x, y + number * _TEXT_LINE, _TEXT_SCALE, _INK)
         for row, picture in enumerate(moment.pictures):
             top = caption_height + row * (_PICTURE + _GAP)
             band[top : top + _PICTURE, x : x + _PICTURE] = picture
@@ -130,27 +125,3 @@ def _band(moments: Sequence[Moment], width: int) -> Frame:
 
 def _strip(width: int, height: int) -> Frame:
     return np.full((height, width, 3), _PAPER, np.uint8)
-
-
-def _write(
-    image: Frame, text: str, x: int, y: int, scale: float, colour: Colour, thickness: int = 1
-) -> None:
-    """Put a line of text with its base line at y; the fonts that are always there are ASCII."""
-    import cv2
-
-    ascii_text = text.encode("ascii", "replace").decode()
-    cv2.putText(image, ascii_text, (x, y), _FONT, scale, colour, thickness, cv2.LINE_AA)
-
-
-def _wrapped(text: str, width: int, scale: float) -> list[str]:
-    """The text in lines of at most so many pixels; a word that is longer has its own line."""
-    import cv2
-
-    lines: list[str] = []
-    for word in text.split():
-        longer = f"{lines[-1]} {word}" if lines else word
-        if lines and cv2.getTextSize(longer, _FONT, scale, 1)[0][0] <= width:
-            lines[-1] = longer
-        else:
-            lines.append(word)
-    return lines

@@ -1,0 +1,23 @@
+"""Which code played: a fingerprint of the installed package."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+from pathlib import Path
+
+import roboirg
+
+FINGERPRINT_LENGTH = 12
+"""Hexadecimal digits."""
+
+
+@functools.cache
+def code_fingerprint() -> str:
+    """SHA-256 over the names and bytes of the package's Python files, shortened."""
+    digest = hashlib.sha256()
+    root = Path(roboirg.__file__).parent
+    for path in sorted(root.rglob("*.py")):
+        digest.update(f"{path.relative_to(root).as_posix()}\0".encode())
+        digest.update(path.read_bytes() + b"\0")
+    return digest.hexdigest()[:FINGERPRINT_LENGTH]

@@ -1,0 +1,101 @@
+"""Plans as YAML files, and those that come with the package."""
+
+from __future__ import annotations
+
+import importlib.resources
+from collections.abc import Mapping
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from roboirg.errors import InvalidValueError, UnknownNameError
+from roboirg.evaluation.plan import Plan
+
+_PACKAGE = "roboirg.evaluation"
+_FOLDER = "plans"
+_SUFFIXES = (".yaml", ".yml")
+_LISTS = frozenset(
+    {
+        "policies",
+        "tasks",
+        "settings",
+        "forms",
+        "episodes",
+        "policy_seeds",
+        "stages",
+        "retry_on",
+    }
+)
+"""Keys whose values are typed as lists on the command line."""
+
+
+def named_plans() -> tuple[str, ...]:
+    """The names of the plans that come with the package."""
+    names = (Path(file.name) for file in _folder().iterdir())
+    return tuple(sorted(name.stem for name in names if name.suffix in _SUFFIXES))
+
+
+def read_plan_file(name: str) -> dict[str, Any]:
+    """A plan file as options of `make_plan`.
+
+    Lists become words as they are typed on the command line: ``[1, 5]`` is ``"1,5"`` and
+    ``[[1, 5], [1, 2, 5]]`` is ``"1,5;1,2,5"``.
+
+    Args:
+        name: of a plan that comes with the package, or path of a YAML file.
+
+    Raises:
+        UnknownNameError: there is no plan of this name, or it has a key that no plan has.
+        InvalidValueError: the file cannot be read, or is no mapping.
+    """
+    data = _load(name)
+    if not isinstance(data, Mapping):
+        raise InvalidValueError(
+            f"The plan {name!r} is of type {type(data).__name__}; it has to be a mapping such as "
+            "'tasks: all'."
+        )
+    for key in data:
+        if key not in Plan.model_fields:
+            raise UnknownNameError(f"key of a plan (in {name!r})", key, Plan.model_fields)
+    return {key: _as_typed(key, value) for key, value in data.items() if value is not None}
+
+
+def _load(name: str) -> object:
+    try:
+        return yaml.safe_load(_find(name).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidValueError(f"The plan {name!r} cannot be read: {error}.") from error
+    except yaml.YAMLError as error:
+        words = " ".join(str(error).split())
+        raise InvalidValueError(f"The plan {name!r} is no YAML: {words}.") from error
+
+
+def _find(name: str) -> Path | Traversable:
+    path = Path(name)
+    if path.suffix in _SUFFIXES:
+        return path
+    if name not in named_plans():
+        raise UnknownNameError("plan", name, [*named_plans(), "FILE.yaml"])
+    return _folder() / f"{name}.yaml"
+
+
+def _folder() -> Traversable:
+    return importlib.resources.files(_PACKAGE) / _FOLDER
+
+
+def _as_typed(key: str, value: object) -> object:
+    if value is False:
+        return "off"  # as YAML 1.1 reads the word
+    if key not in _LISTS:
+        return value
+    if not isinstance(value, list):
+        return [str(value)] if key == "policies" else str(value)
+    if key == "policies":
+        return [str(one) for one in value]
+    if key == "stages" and any(isinstance(one, list) for one in value):
+        return ";".join(str(_as_typed(key, one)) for one in value)
+    typed = ",".join(map(str, value))
+    # Alone, a number of episodes would be that of the first ones.
+    return f"{typed}," if key == "episodes" and len(value) == 1 else typed
