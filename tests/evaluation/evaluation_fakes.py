@@ -14,7 +14,7 @@ from roboirg.errors import RenderDeviceError
 from roboirg.evaluation.executors import LocalProcesses
 from roboirg.evaluation.plan import Plan
 from roboirg.evaluation.record import EventRecord, Job, Record
-from roboirg.evaluation.rollout import Course, describe
+from roboirg.evaluation.course import Course, describe
 from roboirg.evaluation.runner import run_plan
 
 
@@ -56,8 +56,8 @@ def fake_course(job: Job) -> Course:
     luck = hashlib.sha256(job.slug.encode()).digest()[0]
     events = [EventRecord(step=luck, kind="picked", subject="cube_red")]
     if luck % 2 or job.setting == "explicit":
-        return Course("success", None, steps=luck, events=events)
-    return Course("failure", "picked the wrong cube", steps=luck, events=events)
+        return Course("success", cause=None, steps=luck, events=events)
+    return Course("failure", cause="picked the wrong cube", steps=luck, events=events)
 
 
 def starts(folder: Path, job: Job | None = None) -> list[str]:

@@ -5,16 +5,9 @@ from pathlib import Path
 import pytest
 
 from roboirg.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.plan import (
-    Plan,
-    make_plan,
-    parse_episodes,
-    parse_numbers,
-    parse_stages,
-    read_plan,
-    write_plan,
-)
+from roboirg.evaluation.plan import Plan, make_plan, read_plan, write_plan
 from roboirg.evaluation.record import Job
+from roboirg.evaluation.words import parse_episodes, parse_numbers, parse_stages
 from roboirg.language import expressible
 from roboirg.splits import get_episode
 from roboirg.tasks import all_tasks
@@ -55,7 +48,19 @@ def test_sentences_about_numbers_say_what_would_be_right() -> None:
 @pytest.mark.parametrize("text", ["all", "ALL", "all,explicit", "direct, All"])
 def test_all_means_all_wherever_it_stands(text: str) -> None:
     assert make_plan(["random"], settings=text, episodes="1").settings == "all"
-    assert make_plan(["random"], tasks=text, episodes="1").tasks == tuple(all_tasks())
+    words = text.replace("explicit", "BinFill").replace("direct", "StopCube")
+    assert make_plan(["random"], tasks=words, episodes="1").tasks == tuple(all_tasks())
+
+
+def test_tasks_beside_the_benchmark_are_asked_for_by_name_or_suite() -> None:
+    real = ("PutInBox", "PickByCount")
+    assert make_plan(["random"], tasks="real", episodes="1").tasks == real
+    assert make_plan(["random"], tasks="PickByCount,Real", episodes="1").tasks == real[::-1]
+    every = make_plan(["random"], tasks="real, all", episodes="1").tasks
+    assert every == (*all_tasks(), *real)
+    assert not set(real) & set(all_tasks())
+    with pytest.raises(UnknownNameError, match=r"no task 'reall'.*Did you mean 'real'"):
+        make_plan(["random"], tasks="all,reall")
 
 
 def test_all_settings_are_those_that_each_episode_can_be_told_in() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,7 +19,9 @@ from roboirg.errors import (
 )
 from roboirg.evaluation import rollout
 from roboirg.evaluation.record import Job
-from roboirg.evaluation.rollout import Player, load_policy, one_line, play_episode
+from roboirg.evaluation.course import Course
+from roboirg.evaluation.faults import one_line
+from roboirg.evaluation.rollout import Player, load_policy, play_episode
 from roboirg.evaluation.video import Film, VideoOptions
 
 JOB = Job(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
@@ -102,7 +105,7 @@ class PaperInsider(PaperPolicy):
 
 @pytest.fixture
 def stage(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
-    def play(world: PaperWorld, policy: Any) -> rollout.Course:
+    def play(world: PaperWorld, policy: Any) -> Course:
         monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: world)
         monkeypatch.setattr(rollout, "load_policy", lambda _job: policy)
         return play_episode(JOB)
@@ -110,7 +113,7 @@ def stage(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
     return play
 
 
-def test_all_rows_are_played_until_the_end(stage: Callable[..., rollout.Course]) -> None:
+def test_all_rows_are_played_until_the_end(stage: Callable[..., Course]) -> None:
     policy, world = PaperPolicy(), PaperWorld(length=5)
     course = stage(world, policy)
     assert (course.outcome, course.cause, course.steps) == ("success", None, 5)
@@ -121,11 +124,11 @@ def test_all_rows_are_played_until_the_end(stage: Callable[..., rollout.Course])
     assert world.closed
 
 
-def test_one_row_is_a_chunk_of_one(stage: Callable[..., rollout.Course]) -> None:
+def test_one_row_is_a_chunk_of_one(stage: Callable[..., Course]) -> None:
     assert stage(PaperWorld(2), PaperPolicy(np.zeros(8))).steps == 2
 
 
-def test_an_insider_is_attached_before_reset(stage: Callable[..., rollout.Course]) -> None:
+def test_an_insider_is_attached_before_reset(stage: Callable[..., Course]) -> None:
     policy = PaperInsider()
     stage(PaperWorld(), policy)
     assert policy.heard == ["PaperWorld", "do it", 3]
@@ -139,7 +142,7 @@ def test_an_insider_is_attached_before_reset(stage: Callable[..., rollout.Course
     ],
 )
 def test_the_judge_decides(
-    stage: Callable[..., rollout.Course],
+    stage: Callable[..., Course],
     status: str,
     given: str | None,
     outcome: str,
@@ -162,12 +165,12 @@ def test_the_judge_decides(
     ],
 )
 def test_a_fault_of_the_policy_is_an_error_not_a_failure(
-    stage: Callable[..., rollout.Course], answer: Any, cause: str
+    stage: Callable[..., Course], answer: Any, cause: str
 ) -> None:
     world = PaperWorld()
     course = stage(world, PaperPolicy(answer))
     assert course.outcome == "error"
-    assert rollout.re.fullmatch(f"{cause}.*", str(course.cause))
+    assert re.fullmatch(f"{cause}.*", str(course.cause))
     assert "Traceback" in str(course.details)
     assert world.closed
 
@@ -180,7 +183,7 @@ def test_a_fault_of_the_policy_is_an_error_not_a_failure(
     ],
 )
 def test_a_fault_of_the_world_is_an_error(
-    stage: Callable[..., rollout.Course], trouble: Exception, cause: str
+    stage: Callable[..., Course], trouble: Exception, cause: str
 ) -> None:
     world = PaperWorld()
     world.trouble = trouble
@@ -191,13 +194,13 @@ def test_a_fault_of_the_world_is_an_error(
 
 @pytest.mark.parametrize("error", [RenderDeviceError("no"), MissingDependencyError("no")])
 def test_what_ends_every_episode_ends_the_run(
-    stage: Callable[..., rollout.Course], error: Exception
+    stage: Callable[..., Course], error: Exception
 ) -> None:
     with pytest.raises(type(error)):
         stage(PaperWorld(), PaperPolicy(error))
 
 
-def test_ctrl_c_is_nobodys_fault(stage: Callable[..., rollout.Course]) -> None:
+def test_ctrl_c_is_nobodys_fault(stage: Callable[..., Course]) -> None:
     policy = PaperPolicy()
     policy.act = lambda _observation: (_ for _ in ()).throw(KeyboardInterrupt)  # type: ignore[method-assign]
     with pytest.raises(KeyboardInterrupt):
@@ -282,7 +285,7 @@ def test_a_folder_of_films_that_is_a_file_does_not_touch_the_verdict(
 
 
 def test_wrong_cameras_of_an_object_are_the_policys_fault(
-    stage: Callable[..., rollout.Course],
+    stage: Callable[..., Course],
 ) -> None:
     policy = PaperPolicy()
     policy.cameras = "front"  # type: ignore[assignment]
@@ -292,9 +295,9 @@ def test_wrong_cameras_of_an_object_are_the_policys_fault(
 
 def test_a_record_says_what_is_in_the_words_and_who_cheats() -> None:
     job = JOB.model_copy(update={"setting": "reasoning", "policy": "oracle"})
-    record = rollout.describe(job, rollout.Course("success", None), started_at="now")
+    record = rollout.describe(job, Course("success", None), started_at="now")
     assert record.metadata["pattern"]
     assert record.metadata["templates"]
     assert record.privileged
-    assert not rollout.describe(JOB, rollout.Course(), started_at="now").privileged
+    assert not rollout.describe(JOB, Course(), started_at="now").privileged
     assert type(record).model_validate_json(record.model_dump_json()) == record

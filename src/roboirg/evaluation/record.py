@@ -39,6 +39,7 @@ DEFAULT_MESHES = "faithful"
 INCIDENTALS = frozenset(
     {
         "attempt",
+        "code",
         "details",
         "duration_s",
         "film_lost",
@@ -49,8 +50,8 @@ INCIDENTALS = frozenset(
         "video",
     }
 )
-"""Times, costs, paths, lost films and tries: all that may differ between two runs of the same
-command."""
+"""Times, costs, paths, lost films, tries, and which code and plan it was: all that may differ between
+two runs of the same command."""
 
 
 class _Data(BaseModel):
