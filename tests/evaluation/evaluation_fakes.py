@@ -77,15 +77,21 @@ def is_alive(pid: int) -> bool:
     return state not in "ZX"
 
 
-def small_plan(episodes: int = 4, policies: tuple[str, ...] = ("random",)) -> Plan:
+def small_plan(
+    episodes: int = 4, policies: tuple[str, ...] = ("random",), seeds: int = 1
+) -> Plan:
     return Plan(
         policies=policies,
         tasks=("PickXtimes",),
         settings=("explicit", "direct"),
         episodes=tuple(range(episodes)),
+        policy_seeds=tuple(range(seeds)),
     )
 
 
 if __name__ == "__main__":
     folder = Path(sys.argv[1])
-    run_plan(small_plan(8), folder, FakePlay(folder, seconds=0.15), LocalProcesses(2))
+    episodes = int(sys.argv[2]) if len(sys.argv) > 2 else 8
+    seeds = int(sys.argv[3]) if len(sys.argv) > 3 else 1
+    seconds = float(sys.argv[4]) if len(sys.argv) > 4 else 0.15
+    run_plan(small_plan(episodes, seeds=seeds), folder, FakePlay(folder, seconds), LocalProcesses(2))

@@ -174,7 +174,7 @@ def play_episode(
     phases = _Phases(course, policy_timeout_s)
     policy, env = None, None
     try:
-        with phases.policy("policy loading", "policy_load"):
+        with phases.policy("policy's constructor", "policy_load"):
             policy = load_policy(job)
             needs = needs_of(policy, job)
         with phases.world("env_reset"):
@@ -268,14 +268,14 @@ def _play(
         course.turn = int(info["elapsed_steps"])
         course.note(info)
         instruction = env.instruction.text
-    with phases.policy("policy reset()", "policy_reset"):
+    with phases.policy("policy's reset()", "policy_reset"):
         if isinstance(policy, PrivilegedPolicy):
             policy.attach(env)
         policy.reset(instruction, info["demonstration"])
         course.policy_metadata = _metadata_of(policy)
     status, cause = "ongoing", None
     while status == "ongoing":
-        with phases.policy("policy act()", "policy_act"):
+        with phases.policy("policy's act()", "policy_act"):
             rows = _next_actions(policy, observation, actions)
         with phases.world("env_step"):
             observation, *_, info = env.step_chunk(rows)
@@ -325,7 +325,7 @@ def _metadata_of(policy: Policy) -> dict[str, JsonValue]:
 def _say_goodbye(policy: Policy, course: Course, phases: _Phases) -> None:
     """Ask what it cost and close it; trouble with that leaves the verdict as it is."""
     try:
-        with phases.policy("policy close()", "policy_close"):
+        with phases.policy("policy's close()", "policy_close"):
             if hasattr(policy, "usage"):
                 usage = {str(name): float(value) for name, value in policy.usage().items()}
                 course.usage = {name: cost for name, cost in usage.items() if math.isfinite(cost)}

@@ -14,12 +14,12 @@ from multiprocessing.context import SpawnContext
 from typing import Literal, get_args
 
 Phase = Literal[
-    "starting",
+    "start",
     "world",
-    "policy loading",
-    "policy reset()",
-    "policy act()",
-    "policy close()",
+    "policy's constructor",
+    "policy's reset()",
+    "policy's act()",
+    "policy's close()",
 ]
 PHASES: tuple[Phase, ...] = get_args(Phase)
 
