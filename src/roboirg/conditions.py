@@ -16,6 +16,8 @@ FactKind = Literal[
     "binned",
     "lifted",
     "put_down",
+    "reached",
+    "held",
     "pressed",
     "hovering",
     "near",
@@ -25,19 +27,35 @@ FactKind = Literal[
 ]
 
 
+GroundingFailure = Literal[
+    "wrong_object", "wrong_count", "wrong_order", "wrong_time", "wrong_place"
+]
+"""Something else was done than what was meant."""
+
+ExecutionFailure = Literal[
+    "nothing_reached", "missed_grasp", "dropped", "misplaced", "out_of_time", "unreachable"
+]
+"""What was meant was not brought off."""
+
+LASTING_KINDS: frozenset[FactKind] = frozenset({"binned"})
+"""Facts of these kinds never cease to hold."""
+
+
 class Fact(NamedTuple):
     """Something that is true in the world at one evaluation, one after each control step.
 
     | kind | subject, place | true while |
     | --- | --- | --- |
-    | ``picked`` | cube | it is above z 0.05 and grasped |
-    | ``lying`` | cube | it lies released, z <= 0.035 |
-    | ``placed`` | cube, target or site | it lies released within 0.05 (xy) of the place |
+    | ``picked`` | cube or tape | it is above z 0.05 and grasped |
+    | ``lying`` | cube or tape | it lies released, z <= 0.035 |
+    | ``placed`` | cube or tape, target or site | it lies released within 0.05 (xy) of the place |
     | ``over`` | cube, target | it came within 0.03 (xy) below z 0.12, until beyond 0.04 or z 0.3 |
-    | ``binned`` | cube, bin | from the moment on at which it has fallen in: released within 0.05 \
-(xy), z <= 0.035, fingers more than 0.02 open, the hand more than 0.02 away |
+    | ``binned`` | cube or tape, bin or box | from the moment on at which it has fallen in: \
+released within 0.05 (xy), z <= 0.035, fingers more than 0.02 open, the hand more than 0.02 away |
     | ``lifted`` | container | its origin is above z 0.15 |
     | ``put_down`` | container | its origin is at z <= 0.07, released, the hand above z 0.05 |
+    | ``reached`` | cube, tape or container | the tool centre is within 0.03 of its origin |
+    | ``held`` | cube, tape or container | both fingers grasp it, at whatever height |
     | ``pressed`` | button | its cap is more than 0.005 down |
     | ``hovering`` | robot, button | the hand is within 0.03 (xy) of the button and below z 0.2 |
     | ``near`` | shuttle, target | its centre is within 0.06 (xy) of the target's |
@@ -45,7 +63,8 @@ class Fact(NamedTuple):
     | ``still`` | ``"robot"`` | no arm joint moves faster than 0.2 rad/s |
     | ``home`` | ``"robot"`` | all nine joints are within 0.01 of the home position |
 
-    Thresholds, metres: RoboMME, evaluation mode.
+    Thresholds, metres: RoboMME, evaluation mode. ``reached`` and ``held`` are our own: no stage
+    asks for them, they tell how something failed.
     """
 
     kind: FactKind
@@ -105,10 +124,13 @@ class Rule(NamedTuple):
     Attributes:
         condition: must not hold.
         cause: what happened, in words, for records: ``"pressed the button too early"``.
+        failure: what it means that this rule is broken; None if the facts in it tell, as they do
+            where a stage forbids a fact. It judges nothing.
     """
 
     condition: Condition
     cause: str
+    failure: GroundingFailure | ExecutionFailure | None = None
 
 
 def absent(fact: Fact) -> Count:

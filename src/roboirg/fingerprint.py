@@ -14,6 +14,10 @@ Plain = str | int | float | bool | None | list["Plain"] | dict[str, "Plain"]
 
 DECIMALS = 9
 
+NOT_COUNTED = frozenset({("Rule", "failure")})
+"""Type and name of fields that say how a failure is called and change no score: two episodes that
+differ in nothing else are the same."""
+
 
 def fingerprint(episodes: Iterable[Episode]) -> str:
     """SHA-256, in hexadecimal, over the canonical JSON of whole episodes, in their order.
@@ -45,5 +49,6 @@ def plain(value: object) -> Plain:
             return [plain(item) for item in value]
     else:
         raise TypeError(f"{value!r} of {type(value).__name__} is no plain data")
-    fields = {name: plain(getattr(value, name)) for name in names}
-    return {"type": type(value).__name__, **fields}
+    kind = type(value).__name__
+    counted = (name for name in names if (kind, name) not in NOT_COUNTED)
+    return {"type": kind, **{name: plain(getattr(value, name)) for name in counted}}

@@ -1,6 +1,18 @@
-"""Stages and events give a verdict, without a simulator."""
+"""Stages and events give a verdict, without a simulator, and say why an episode failed."""
 
+from roboirg.judging.attribution import attribute
 from roboirg.judging.events import Event, changes
+from roboirg.judging.finding import EXECUTION, GROUNDING, Finding
 from roboirg.judging.judge import Judge, Status, plain_subgoal
 
-__all__ = ["Event", "Judge", "Status", "changes", "plain_subgoal"]
+__all__ = [
+    "EXECUTION",
+    "GROUNDING",
+    "Event",
+    "Finding",
+    "Judge",
+    "Status",
+    "attribute",
+    "changes",
+    "plain_subgoal",
+]

@@ -37,6 +37,7 @@ class Judge:
         published: the stage that was due when the last evaluation began, or None when all are
             completed: labels change one step after the stage (RoboMME).
         cause: why the episode failed; None before that.
+        broken: what was forbidden and came to hold; None before that, or if `fail` ended it.
     """
 
     def __init__(self, stages: Sequence[Stage], scene: Scene | None = None) -> None:
@@ -46,6 +47,7 @@ class Judge:
         self.index = 0
         self.published = self.current
         self.cause: str | None = None
+        self.broken: Fact | Rule | None = None
         self._history = History()
         self._held_since: int | None = None
 
@@ -73,6 +75,7 @@ class Judge:
             self._history.start_timer(stage.timer)
         broken = next((rule for rule in stage.forbids if self._is_broken(rule)), None)
         if broken is not None:
+            self.broken = broken
             self.fail(describe_violation(broken, stage, self._scene))
         elif self._completed(step, stage):
             self.index += 1
@@ -119,7 +122,8 @@ def describe_object(name: str, scene: Scene) -> str:
     if item is None:
         return name
     if item.kind != "container":
-        return f"the {item.colour} cube" if item.colour else f"the {item.kind}"
+        noun = item.kind.removeprefix("hidden_")
+        return f"the {item.colour} {noun}" if item.colour else f"the {item.kind}"
     hidden = scene.hidden_in(name)
     return f"the container over the {hidden.colour} cube" if hidden else "an empty container"
 

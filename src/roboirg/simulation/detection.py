@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from collections.abc import Set as AbstractSet
 
 import numpy as np
@@ -29,6 +29,7 @@ PRESSED_DEPTH = 0.005
 HOVER_DISTANCE, HOVER_HEIGHT = 0.03, 0.2
 NEAR_DISTANCE = 0.06
 HOME_TOLERANCE = 0.01
+REACHED_DISTANCE = 0.03
 REACH = 0.12
 """What is farther from the tool centre point than this cannot be between the fingers, m."""
 
@@ -50,7 +51,7 @@ class Detector:
         self._bodies = tuple(bodies.values())
         self._targets = self._of_kind("target")
         self._places = (*self._targets, *self._of_kind("site"))
-        self._bins = self._of_kind("bin")
+        self._bins = (*self._of_kind("bin"), *self._of_kind("box"))
         self._before: frozenset[Fact] = frozenset()
         self._contacts: Contacts = []
         self._tool = self._tool_now()
@@ -74,7 +75,7 @@ class Detector:
         for body in self._bodies:
             if body.item.name in absent:
                 continue
-            if body.item.kind == "cube":
+            if body.item.kind in ("cube", "tape"):
                 facts.update(self._cube_facts(body))
             elif body.item.kind == "container":
                 facts.update(self._container_facts(body))
@@ -88,6 +89,7 @@ class Detector:
 
     def _cube_facts(self, cube: Body) -> Iterator[Fact]:
         name, position = cube.item.name, cube.position
+        held = yield from self._hand_facts(cube, position)
         for target in self._targets:
             fact = Fact("over", name, target.item.name)
             distance, height = BEYOND_DISTANCE, BEYOND_HEIGHT
@@ -96,13 +98,12 @@ class Detector:
             if position.z < height and _apart(position, target.position) <= distance:
                 yield fact
         if position.z > PICKED_HEIGHT:
-            if self._grasps(cube):
+            if held:
                 yield Fact("picked", name)
-        elif position.z <= RELEASED_HEIGHT and not self._grasps(cube):
-            yield from self._released_facts(cube)
+        elif position.z <= RELEASED_HEIGHT and not held:
+            yield from self._released_facts(name, position)
 
-    def _released_facts(self, cube: Body) -> Iterator[Fact]:
-        name, position = cube.item.name, cube.position
+    def _released_facts(self, name: str, position: Point) -> Iterator[Fact]:
         yield Fact("lying", name)
         for place in self._places:
             if _apart(position, place.position) <= ON_TARGET_DISTANCE:
@@ -116,14 +117,11 @@ class Detector:
                 yield Fact("binned", name, bin_.item.name)
 
     def _container_facts(self, container: Body) -> Iterator[Fact]:
-        height = container.position.z
+        position = container.position
+        height, held = position.z, (yield from self._hand_facts(container, position))
         if height > LIFTED_HEIGHT:
             yield Fact("lifted", container.item.name)
-        elif (
-            height <= PUT_DOWN_HEIGHT
-            and self._tool.z > PUT_DOWN_TOOL_HEIGHT
-            and not self._grasps(container)
-        ):
+        elif height <= PUT_DOWN_HEIGHT and self._tool.z > PUT_DOWN_TOOL_HEIGHT and not held:
             yield Fact("put_down", container.item.name)
 
     def _button_facts(self, button: Body) -> Iterator[Fact]:
@@ -147,9 +145,17 @@ class Detector:
         if away < HOME_TOLERANCE:
             yield Fact("home", "robot")
 
-    def _grasps(self, body: Body) -> bool:
-        near = math.dist(body.position, self._tool) <= REACH
-        return near and self._robot.grasps(body.physics, self._contacts)
+    def _hand_facts(self, body: Body, position: Point) -> Generator[Fact, None, bool]:
+        """Where the hand is at something movable; gives back whether it is held."""
+        distance = math.dist(position, self._tool)
+        if distance > REACH:
+            return False
+        if distance <= REACHED_DISTANCE:
+            yield Fact("reached", body.item.name)
+        held = self._robot.grasps(body.physics, self._contacts)
+        if held:
+            yield Fact("held", body.item.name)
+        return held
 
     def _of_kind(self, kind: str) -> tuple[Body, ...]:
         return tuple(body for body in self._bodies if body.item.kind == kind)

@@ -193,10 +193,11 @@ def _wrong_counts(scene: Scene, goal: Goal) -> Iterator[Rule]:
             continue
         things = f"{count} {colour} cube{'' if count == 1 else 's'} in the bin"
         if count == 0:
-            yield Rule(Count(binned), f"a {colour} cube in the bin")
+            yield Rule(Count(binned), f"a {colour} cube in the bin", "wrong_object")
         else:
-            yield Rule(Count(binned, least=count + 1), f"more than {things}")
-            yield Rule(Count(binned, least=0, most=count - 1), f"fewer than {things}")
+            yield Rule(Count(binned, least=count + 1), f"more than {things}", "wrong_count")
+            fewer = Count(binned, least=0, most=count - 1)
+            yield Rule(fewer, f"fewer than {things}", "wrong_count")
 
 
 def _of_colour(scene: Scene, colour: str) -> list[str]:

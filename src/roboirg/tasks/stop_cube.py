@@ -8,6 +8,7 @@ angle is drawn independently.
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import numpy as np
 
@@ -92,10 +93,11 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     too_early = Rule(
         Began((stopped,), least=1, until=interval * (visit - 1) - 1),
         "stopped the cube on an earlier visit",
+        "wrong_time",
     )
     press = Stage(
         expects=stopped,
-        forbids=(*wrong, too_early),
+        forbids=(*_wrong(interval, visit, off_target="misplaced"), too_early),
         primitive=Primitive("press_below", "button", steps=interval * visit - interval // 2),
         subgoal="press the button to stop the cube on the target {at}",
         points_at="target",
@@ -114,14 +116,17 @@ def checkpoints(interval: int, visit: int) -> tuple[int, ...]:
     return (*range(CHECKPOINT, press, CHECKPOINT), press)
 
 
-def _wrong(interval: int, visit: int) -> tuple[Rule, ...]:
-    """What fails the episode in every stage."""
-    off_target = All((Fact("pressed", "button"), absent(Fact("near", "shuttle", "target"))))
+def _wrong(
+    interval: int, visit: int, off_target: Literal["wrong_time", "misplaced"] = "wrong_time"
+) -> tuple[Rule, ...]:
+    """What fails the episode in every stage; off the target while it is time, it is bad aim."""
+    off = All((Fact("pressed", "button"), absent(Fact("near", "shuttle", "target"))))
     return (
-        Rule(off_target, "pressed the button while the cube was off the target"),
+        Rule(off, "pressed the button while the cube was off the target", off_target),
         Rule(
             Elapsed(least=interval * visit + 1),
             f"let the cube's {ORDINALS[visit - 1]} visit pass",
+            "wrong_time",
         ),
     )
 

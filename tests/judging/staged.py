@@ -1,0 +1,183 @@
+"""A stage for episodes without a simulator: hands that bring about facts as the world would.
+
+Every method takes at least one control step. The judge looks on from the first moment and nothing
+more happens after its verdict.
+"""
+
+from __future__ import annotations
+
+from roboirg.conditions import Fact
+from roboirg.episode import Episode, Stage
+from roboirg.judging import Event, Finding, Judge, Status, attribute, changes
+from roboirg.motions import Shuttle
+
+NEAR_SHARE = 0.07
+"""Of a pass, before and after its middle, in which the shuttle is near its target."""
+
+
+class Staged:
+    """One episode, its demonstration already shown; the policy's turn begins."""
+
+    def __init__(self, episode: Episode) -> None:
+        self.episode = episode
+        self.judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
+        self.events: list[Event] = []
+        self.step = -1
+        self.now: set[Fact] = set()
+        self.before: frozenset[Fact] = frozenset()
+        self.binned: set[str] = set()
+        kinds = {"cube": "lying", "tape": "lying", "container": "put_down"}
+        for item in episode.scene.objects:
+            if item.kind in kinds:
+                self.now.add(Fact(kinds[item.kind], item.name))
+        self.tick()
+        self._show()
+        self.tick()
+        self.turn = self.step
+
+    def _show(self) -> None:
+        """Whatever the video is about; only its end matters here."""
+        for stage in self.episode.demonstration:
+            shown = set(self.now) | {stage.expects}
+            rest, self.now = self.now, shown
+            for _ in range(stage.lasting + 1):
+                self.tick()
+            self.now = rest
+        assert self.judge.index == len(self.episode.demonstration)
+
+    def tick(self, steps: int = 1) -> Staged:
+        """Let time pass."""
+        for _ in range(steps):
+            if self.judge.status is not Status.ONGOING:
+                break
+            self.step += 1
+            self._run_shuttle()
+            facts = frozenset(self.now)
+            self.events += changes(self.step, self.before, facts)
+            self.before = facts
+            self.judge.update(self.step, facts)
+        return self
+
+    def until(self, step: int) -> Staged:
+        """Let time pass until so many steps since reset."""
+        return self.tick(step - self.step)
+
+    def _run_shuttle(self) -> None:
+        for run in self.episode.scene.motions:
+            if not isinstance(run, Shuttle):
+                continue
+            near, stopped = (Fact(kind, run.subject, "target") for kind in ("near", "stopped"))
+            if self._halted:
+                continue
+            phase = (self.step / run.interval) % 1.0
+            self.now.discard(near)
+            if abs(phase - 0.5) <= NEAR_SHARE and self.step < run.passes * run.interval:
+                self.now.add(near)
+                if run.stopped_by in self.now:
+                    self.now.add(stopped)
+
+    @property
+    def _halted(self) -> bool:
+        return any(event.fact == Fact("pressed", "button") for event in self.events)
+
+    def set(self, *facts: Fact, off: tuple[Fact, ...] = ()) -> Staged:
+        """Facts begin and cease to hold, and it is a step later."""
+        self.now = (self.now - set(off)) | set(facts)
+        return self.tick()
+
+    def reach(self, name: str) -> Staged:
+        return self.set(Fact("reached", name))
+
+    def miss(self, name: str) -> Staged:
+        """The fingers close on nothing and the hand goes away."""
+        return self.reach(name).tick(5).set(off=(Fact("reached", name),))
+
+    def grasp(self, name: str) -> Staged:
+        gone = tuple(f for f in self.now if f.subject == name and f.kind in RESTING)
+        return self.reach(name).set(Fact("held", name), off=gone)
+
+    def lift(self, name: str) -> Staged:
+        return self.grasp(name).tick(3).set(self._up(name))
+
+    def _up(self, name: str) -> Fact:
+        kind = self.episode.scene[name].kind
+        return Fact("lifted" if kind == "container" else "picked", name)
+
+    def put(self, name: str, place: str | None = None) -> Staged:
+        """Lower it, let go, and take the hand away."""
+        rest = "put_down" if self.episode.scene[name].kind == "container" else "lying"
+        self.set(off=(self._up(name),)).tick(3)
+        there = () if place is None else (Fact("placed", name, place),)
+        self.set(Fact(rest, name), *there, off=(Fact("held", name),))
+        return self.set(off=(Fact("reached", name),))
+
+    def drop(self, name: str, place: str | None = None) -> Staged:
+        """Let go of it in the air."""
+        self.set(off=(self._up(name), Fact("held", name), Fact("reached", name))).tick(2)
+        there = () if place is None else (Fact("placed", name, place),)
+        rest = "put_down" if self.episode.scene[name].kind == "container" else "lying"
+        return self.set(Fact(rest, name), *there)
+
+    def fill(self, name: str, place: str) -> Staged:
+        """Let it fall in; in a bin it is gone at once."""
+        self.set(off=(self._up(name), Fact("held", name), Fact("reached", name))).tick(2)
+        return self.set(Fact("binned", name, place))
+
+    def carry(self, name: str, place: str) -> Staged:
+        over = Fact("over", name, place)
+        return self.set(over).tick(3).set(off=(over,))
+
+    def press(self, name: str = "button") -> Staged:
+        hover, down = Fact("hovering", "robot", name), Fact("pressed", name)
+        return self.set(hover).set(down).tick(2).set(off=(down,)).set(off=(hover,))
+
+    def hover(self, name: str = "button") -> Staged:
+        return self.set(Fact("hovering", "robot", name))
+
+    def do(self, stage: Stage, instead: dict[str, str] | None = None) -> Staged:
+        """A stage of a plan as the oracle does it, with some names taken for others."""
+        kind, subject, place, steps, _ = stage.primitive
+        swap = instead or {}
+        subject, place = swap.get(subject, subject), swap.get(str(place), str(place))
+        match kind:
+            case "pick_cube" | "pick_container":
+                self.lift(subject)
+            case "place_on":
+                self.put(subject, place)
+            case "drop_into" | "put_into":
+                self.fill(subject, place)
+            case "move_over":
+                self.carry(subject, place)
+            case "put_down":
+                self.put(subject)
+            case "press":
+                self.press(subject)
+            case "press_below":
+                self.until(steps - 1).press(subject)
+            case "hover":
+                self.hover(subject)
+            case "hold_until":
+                self.until(steps)
+            case _:
+                self.tick(steps + 2)
+        return self.tick()
+
+    def play(self, stages: tuple[Stage, ...]) -> Staged:
+        for stage in stages:
+            self.do(stage)
+        return self
+
+    def finding(self, *, timed_out: bool = True, cause: str | None = None) -> Finding | None:
+        """What is said of it if time is up now, unless there is a verdict."""
+        ongoing = self.judge.status is Status.ONGOING
+        return attribute(
+            self.episode,
+            self.events,
+            timed_out=ongoing and timed_out,
+            turn=self.turn,
+            elapsed=self.step,
+            cause=self.judge.cause or cause,
+        )
+
+
+RESTING = ("lying", "put_down", "placed")

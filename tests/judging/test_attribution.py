@@ -1,0 +1,271 @@
+"""Every task, every way to fail: events played without a simulator, judged by the real judge."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import get_args
+
+import pytest
+from attribution_cases import CASES, Case
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from staged import Staged
+
+from roboirg.conditions import ExecutionFailure, Fact, GroundingFailure, Rule, facts_of
+from roboirg.episode import Episode
+from roboirg.fingerprint import NOT_COUNTED, fingerprint, plain
+from roboirg.judging import EXECUTION, GROUNDING, Finding, Status, attribute
+from roboirg.splits import get_episode
+from roboirg.tasks import every_task
+
+DOCUMENT = (Path(__file__).parents[2] / "docs" / "attribution.md").read_text()
+TASKS = tuple(sorted({task for one in CASES for task in one.tasks}))
+SAMPLE = [("test", index) for index in range(12)] + [("train", index) for index in range(4)]
+"""Six easy, four medium and four hard episodes, at least."""
+
+each_case = pytest.mark.parametrize(
+    ("task", "one"),
+    [
+        pytest.param(task, one, id=f"{task}-{one.failure}-{one.play.__name__}")
+        for one in CASES
+        for task in one.tasks
+    ],
+)
+
+
+def played(task: str, one: Case) -> list[Staged]:
+    """The case in every episode of the sample that offers what it needs."""
+    stages = [Staged(get_episode(task, *where)) for where in SAMPLE]
+    return [staged for staged in stages if one.play(staged) is not False]
+
+
+@each_case
+def test_each_way_to_fail_is_told(task: str, one: Case) -> None:
+    courses = played(task, one)
+    assert courses, "no episode of the sample offers it"
+    for staged in courses:
+        found = staged.finding()
+        assert found is not None
+        assert found.failure == one.failure, (staged.episode.key, found, staged.judge.cause)
+        assert (staged.judge.status is Status.FAILURE) == one.early
+        check(staged, found)
+
+
+def check(staged: Staged, found: Finding) -> None:
+    """What holds of every finding."""
+    assert found.kind == ("grounding" if found.failure in GROUNDING else "execution")
+    assert found.failure in (*GROUNDING, *EXECUTION)
+    assert 0 <= found.step <= staged.step - staged.turn
+    assert re.fullmatch(r"[A-Z].*[^.]\.", found.sentence)
+    if found.subject is not None:
+        assert found.subject in {item.name for item in staged.episode.scene.objects}
+
+
+def test_every_task_has_the_failures_that_the_document_says_and_no_others() -> None:
+    rows = re.findall(r"^\| ((?:\w+(?:, )?)+) \| ((?:`\w+`(?:, )?)+) \|$", DOCUMENT, re.MULTILINE)
+    documented = {
+        task: set(re.findall(r"\w+", failures))
+        for names, failures in rows
+        for task in names.split(", ")
+    }
+    tried = {task: {one.failure for one in CASES if task in one.tasks} for task in TASKS}
+    assert tried == documented
+    assert set(documented) == set(every_task())
+
+
+def test_every_failure_is_defined_once_in_the_document() -> None:
+    defined = re.findall(r"^\| (?:grounding|execution)? ?\| `(\w+)` \|", DOCUMENT, re.MULTILINE)
+    assert tuple(defined) == (*GROUNDING, *EXECUTION)
+    assert get_args(GroundingFailure) == GROUNDING
+    assert get_args(ExecutionFailure) == EXECUTION
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_a_pose_that_cannot_be_reached_and_what_came_before(task: str) -> None:
+    staged = Staged(get_episode(task, "test", 3)).tick(5)
+    found = staged.finding(timed_out=False, cause="no way to (9, 9, 9)")
+    assert found == Finding(
+        "execution", "unreachable", None, 5, "A pose could not be reached: no way to (9, 9, 9)."
+    )
+    assert staged.finding(timed_out=False) is None
+
+
+# Who does what is meant, and who does something else perfectly
+
+
+@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("where", SAMPLE, ids=lambda where: f"{where[0]}-{where[1]}")
+def test_a_success_has_no_attribution(task: str, where: tuple[str, int]) -> None:
+    episode = get_episode(task, *where)
+    staged = Staged(episode).play(episode.stages)
+    assert staged.judge.status is Status.SUCCESS
+    assert staged.finding() is None
+    assert staged.finding(timed_out=False) is None
+
+
+episodes = st.builds(get_episode, st.sampled_from(TASKS), st.just("test"), st.integers(0, 49))
+
+
+@given(episodes, st.floats(0, 1, exclude_max=True))
+@settings(max_examples=150)
+def test_whoever_does_only_what_is_meant_fails_by_execution(episode: Episode, share: float) -> None:
+    staged = Staged(episode).play(episode.stages)
+    end = staged.turn + int(share * (staged.step - staged.turn))
+    events = [event for event in staged.events if event.step <= end]
+    found = attribute(episode, events, timed_out=True, turn=staged.turn, elapsed=end)
+    assert found is not None
+    assert found.kind == "execution"
+    assert found.step <= end - staged.turn
+
+
+@given(episodes, st.data())
+@settings(max_examples=200)
+def test_taking_one_thing_for_another_is_a_grounding_failure_or_none(
+    episode: Episode, data: st.DataObject
+) -> None:
+    starts = [
+        index
+        for index, stage in enumerate(episode.stages)
+        if stage.primitive.kind not in {"put_down", "press_below"}
+        and stage.primitive.subject != "robot"
+    ]
+    begin = data.draw(st.sampled_from(starts))
+    primitive = episode.stages[begin].primitive
+    carried = primitive.kind in {"place_on", "drop_into", "put_into", "move_over"}
+    right = str(primitive.place) if carried else primitive.subject
+    kind = episode.scene[right].kind
+    wrong = data.draw(st.sampled_from([item.name for item in episode.scene.of_kind(kind)]))
+    staged = Staged(episode).play(episode.stages[:begin])
+    for stage in episode.stages[begin:]:
+        staged.do(stage, {right: wrong, wrong: right})
+    found = staged.set(Fact("still", "robot")).tick(150).finding()
+    assert (found is None) == (staged.judge.status is Status.SUCCESS)
+    assert found is None or found.kind == "grounding"
+    assert right != wrong or found is None
+
+
+# Anything at all
+
+
+def anything(episode: Episode) -> st.SearchStrategy[list[frozenset[Fact]]]:
+    """Courses of facts of which most make no sense, though they are about what is there."""
+    asked = {fact for stage in episode.stages for fact in facts_of(stage.expects)}
+    asked |= {f for stage in episode.stages for one in stage.forbids for f in facts_of(one)}
+    names = sorted({fact.subject for fact in asked} & {o.name for o in episode.scene.objects})
+    touches = [Fact(kind, name) for name in names for kind in ("reached", "held", "lying")]
+    some = st.sampled_from([*sorted(asked, key=str), *touches, Fact("still", "robot")])
+    return st.lists(st.frozensets(some, max_size=4), max_size=25)
+
+
+@given(episodes, st.data(), st.booleans())
+@settings(max_examples=300)
+def test_whatever_happens_there_is_one_attribution_of_a_failure_and_none_else(
+    episode: Episode, data: st.DataObject, timed_out: bool
+) -> None:
+    done = data.draw(st.integers(0, len(episode.stages) - 1))
+    staged = Staged(episode).play(episode.stages[:done])
+    for facts in data.draw(anything(episode)):
+        lasting = {fact for fact in staged.now if fact.kind == "binned"}
+        staged.now = lasting | facts
+        staged.tick(data.draw(st.integers(1, 40)))
+    found = staged.finding(timed_out=timed_out)
+    failed = staged.judge.status is Status.FAILURE
+    assert (found is not None) == (failed or (timed_out and staged.judge.status is Status.ONGOING))
+    if found is not None:
+        check(staged, found)
+        assert found == staged.finding(timed_out=timed_out)
+
+
+# Details
+
+
+def test_steps_are_of_the_policy_s_turn() -> None:
+    staged = Staged(get_episode("VideoUnmask", "test", 0))
+    assert staged.turn > 60
+    right = staged.episode.stages[0].primitive.subject
+    wrong = next(c.name for c in staged.episode.scene.of_kind("container") if c.name != right)
+    found = staged.tick(10).lift(wrong).finding()
+    assert found is not None
+    assert found.subject == wrong
+    assert found.step == staged.step - staged.turn
+    assert found.sentence == f"{str(staged.judge.cause)[:1].upper()}{str(staged.judge.cause)[1:]}."
+
+
+def test_what_shows_late_is_dated_when_it_was_done() -> None:
+    episode = next(
+        found
+        for found in (get_episode("BinFill", "test", index) for index in range(50))
+        if len(found.goal.texts("colours")) < len({c.colour for c in found.scene.of_kind("cube")})
+        and len(found.stages) >= 7
+    )
+    named = episode.goal.texts("colours")
+    wrong = next(c.name for c in episode.scene.of_kind("cube") if c.colour not in named)
+    staged = Staged(episode).lift(wrong).fill(wrong, "bin")
+    done = staged.step
+    found = staged.play(episode.stages[2:]).finding()
+    assert staged.judge.status is Status.FAILURE
+    assert found is not None
+    assert (found.failure, found.subject) == ("wrong_object", wrong)
+    assert staged.turn + found.step == done < staged.step
+
+
+def test_what_the_video_shows_is_nobody_s_act() -> None:
+    """In the video the cube is picked and put on discs; the policy has done nothing."""
+    staged = Staged(get_episode("VideoPlaceOrder", "test", 0)).tick(50)
+    shown = {event.fact.kind for event in staged.events if event.step < staged.turn}
+    assert {"picked", "placed"} <= shown
+    found = staged.finding()
+    assert found is not None
+    assert (found.failure, found.step) == ("nothing_reached", 50)
+
+
+def test_a_slip_is_dated_and_what_came_right_before_is_not_blamed() -> None:
+    episodes = (get_episode("BinFill", "test", index) for index in range(50))
+    episode = next(found for found in episodes if len(found.stages) == 5)
+    second = episode.stages[2].primitive.subject
+    staged = Staged(episode).play(episode.stages[:2]).lift(second).drop(second)
+    done = staged.step
+    found = staged.press().finding()
+    assert staged.judge.status is Status.FAILURE
+    assert found is not None
+    assert (found.failure, found.subject) == ("dropped", second)
+    assert staged.turn + found.step == done
+    episode = next(
+        found
+        for found in (get_episode("PickXtimes", "test", index) for index in range(50))
+        if len(found.stages) == 5
+    )
+    cube = episode.stages[0].primitive.subject
+    staged = Staged(episode).play(episode.stages[:2]).lift(cube).put(cube)
+    done = staged.step
+    found = staged.press().finding()
+    assert found is not None
+    assert found.failure == "misplaced"
+    assert staged.turn + found.step == done - 1
+
+
+def test_rules_name_their_failure_where_their_facts_cannot_tell() -> None:
+    """A rule without a name has to be about acts that `mistake` can place."""
+    for task in every_task():
+        for index in range(4):
+            stages = get_episode(task, "test", index).stages
+            rules = {one for s in stages for one in s.forbids if isinstance(one, Rule)}
+            for rule in rules:
+                if rule.failure is None:
+                    assert {fact.kind for fact in facts_of(rule)} <= {
+                        "pressed",
+                        "over",
+                        "picked",
+                        "binned",
+                    }, rule
+                else:
+                    assert rule.failure in (*GROUNDING, *EXECUTION)
+
+
+def test_the_name_of_a_failure_is_no_part_of_an_episode_s_identity() -> None:
+    named, other = Rule(Fact("pressed", "b"), "x", "wrong_time"), Rule(Fact("pressed", "b"), "x")
+    assert plain(named) == plain(other)
+    assert plain(named) != plain(named._replace(cause="y"))
+    assert {("Rule", "failure")} == NOT_COUNTED
+    assert fingerprint([get_episode("StopCube", "test", 0)])

@@ -1,0 +1,153 @@
+"""Attribution of episodes that the simulator has played."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import roboirg
+from roboirg.conditions import Fact
+from roboirg.environment import RoboIRGEnv
+from roboirg.episode import Goal, Primitive
+from roboirg.judging import Finding, attribute
+from roboirg.policies import make_policy, play
+from roboirg.policies.handed import HandedPolicy
+from roboirg.simulation.hands import Hands
+from roboirg.splits import get_episode
+from roboirg.tasks import all_tasks, get_task
+
+pytestmark = pytest.mark.sim
+
+OPEN = 1.0
+
+
+def finding(env: RoboIRGEnv, info: dict[str, Any]) -> Finding | None:
+    return attribute(
+        env.episode,
+        env.events,
+        timed_out=env.status == "timeout",
+        turn=info["elapsed_steps"] - info["steps"],
+        elapsed=info["elapsed_steps"],
+        cause=info["cause"],
+    )
+
+
+class Mistaken(HandedPolicy):
+    """The oracle's hands with another goal in mind."""
+
+    def __init__(self, goal: Goal) -> None:
+        super().__init__()
+        self.goal = goal
+
+    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
+        return self.goal
+
+
+@pytest.mark.parametrize("task", all_tasks())
+def test_hands_that_do_another_task_well_fail_by_grounding(task: str) -> None:
+    episode = get_episode(task, "test", 3)
+    others = [goal for goal in get_task(task).goals(episode.scene) if goal != episode.goal]
+    for goal in (others[0], others[-1]):
+        env = roboirg.make(episode, cameras=(), max_steps=1000)
+        info = play(env, Mistaken(goal))
+        found = finding(env, info)
+        assert (found is None) == (info["status"] == "success")
+        assert found is None or found.kind == "grounding", (goal, found)
+
+
+@pytest.mark.parametrize(
+    ("task", "episode", "failure", "subject"),
+    [
+        ("VideoUnmask", 0, "wrong_object", "container"),
+        ("PickXtimes", 1, "wrong_count", "button"),
+        ("VideoPlaceOrder", 0, "wrong_place", "cube"),
+    ],
+)
+def test_the_forgetful_listener(task: str, episode: int, failure: str, subject: str) -> None:
+    env = roboirg.make(task, setting="contextual", episode=episode, cameras=())
+    info = play(env, make_policy("forgetful", 0))
+    found = finding(env, info)
+    assert found is not None
+    assert (found.kind, found.failure) == ("grounding", failure)
+    assert str(found.subject).startswith(subject)
+    assert found.step == info["steps"]
+
+
+Pieces = Iterator[NDArray[np.float64]]
+
+
+def picked_up(hands: Hands, cube: str) -> Pieces:
+    yield from hands.perform(Primitive("pick_cube", cube))
+
+
+def dropping(hands: Hands, cube: str) -> Pieces:
+    for piece in picked_up(hands, cube):
+        last = piece
+        yield piece
+    yield opened(np.repeat(last[-1:], 10, axis=0))
+
+
+def setting_down(hands: Hands, cube: str) -> Pieces:
+    yield from picked_up(hands, cube)
+    yield from hands.perform(Primitive("put_down", cube, height=0.02))
+
+
+def missing(hands: Hands, cube: str) -> Pieces:
+    for piece in picked_up(hands, cube):
+        yield opened(piece)
+
+
+def opened(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    rows = rows.copy()
+    rows[:, -1] = OPEN
+    return rows
+
+
+@pytest.mark.parametrize(
+    ("work", "failure"),
+    [
+        (picked_up, "out_of_time"),
+        (dropping, "dropped"),
+        (setting_down, "misplaced"),
+        (missing, "missed_grasp"),
+    ],
+)
+@pytest.mark.parametrize("task", ["PickXtimes", "VideoPlaceButton"])
+def test_what_the_hand_does(task: str, work: Callable[[Hands, str], Pieces], failure: str) -> None:
+    env = roboirg.make(task, episode=3, cameras=(), max_steps=400)
+    _, info = env.reset()
+    cube = env.episode.stages[0].primitive.subject
+    for piece in work(Hands(env.session.world), cube):
+        *_, info = env.step_chunk(piece)
+    resting = np.append(env.session.world.robot.arm_positions, piece[-1, -1])
+    *_, info = env.step_chunk(np.repeat(resting[None], 400, axis=0))
+    assert info["status"] == "timeout"
+    found = finding(env, info)
+    assert found is not None
+    assert (found.failure, found.subject) == (failure, cube)
+
+
+def test_a_pose_out_of_reach() -> None:
+    env = roboirg.make("PickXtimes", episode=0, cameras=(), actions="ee_pose")
+    env.reset()
+    *_, info = env.step(np.array([5.0, 0.0, 0.2, 3.14, 0.0, 0.0, 1.0]))
+    found = finding(env, info)
+    assert info["status"] == "failure"
+    assert found is not None
+    assert found.failure == "unreachable"
+    assert str(info["cause"]).rstrip(".") in found.sentence
+
+
+def test_what_is_picked_is_held_and_was_reached() -> None:
+    env = roboirg.make("VideoRepick", episode=1, cameras=())
+    play(env, make_policy("oracle", 0))
+    cube = env.episode.stages[0].primitive.subject
+    begun = [event.fact for event in env.events if event.holds and event.fact.subject == cube]
+    kinds = [fact.kind for fact in begun if fact.kind in ("reached", "held", "picked")]
+    assert kinds[:3] == ["reached", "held", "picked"]
+    ceased = [event for event in env.events if not event.holds]
+    assert {Fact("held", cube), Fact("reached", cube)} <= {event.fact for event in ceased}
