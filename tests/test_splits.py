@@ -21,9 +21,9 @@ from roboirg.splits import (
     shipped,
     splits_text,
 )
-from roboirg.tasks import all_tasks, get_task
+from roboirg.tasks import every_task, get_task
 
-TASKS = tuple(all_tasks())
+TASKS = tuple(every_task())
 each_task = pytest.mark.parametrize("task", TASKS)
 
 

@@ -13,20 +13,35 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 from roboirg.conditions import Condition, Fact, Rule
 from roboirg.motions import Motion, Point
 
-Colour = Literal["red", "green", "blue"]
+Colour = Literal["red", "green", "blue", "yellow", "gray", "purple"]
 Difficulty = Literal["easy", "medium", "hard"]
 Split = Literal["train", "val", "test"]
-Suite = Literal["counting", "permanence", "reference"]
+Suite = Literal["counting", "permanence", "reference", "real"]
 ObjectKind = Literal[
-    "cube", "hidden_cube", "container", "target", "button", "bin", "site", "shuttle", "marker"
+    "cube",
+    "hidden_cube",
+    "container",
+    "target",
+    "button",
+    "bin",
+    "site",
+    "shuttle",
+    "marker",
+    "box",
+    "tape",
 ]
 
 COLOURS: tuple[Colour, ...] = ("red", "green", "blue")
+"""Those of cubes."""
+ALL_COLOURS: tuple[Colour, ...] = get_args(Colour)
+SUITES: tuple[Suite, ...] = get_args(Suite)
+BENCHMARK_SUITES: tuple[Suite, ...] = ("counting", "permanence", "reference")
+"""The suites of the benchmark; the tasks of the real robot are beside it."""
 DIFFICULTIES: tuple[Difficulty, ...] = ("easy", "medium", "hard")
 SPLITS: tuple[Split, ...] = ("train", "val", "test")
 
@@ -47,10 +62,11 @@ class SceneObject:
         name: unique in the scene, for example ``"cube_red"`` or ``"container_2"``.
         kind: what it is; shape and mass follow from the kind, `radius` and `thickness`. A ``site``
             is a round place that nobody sees, a ``shuttle`` a cube that runs by itself and touches
-            nothing, a ``marker`` a disc that lights up over a target.
+            nothing, a ``marker`` a disc that lights up over a target, a ``box`` an open box that
+            stands fast, a ``tape`` a roll of adhesive tape that lies flat.
         position: of the object's origin, world frame, metres.
         yaw: rotation about the vertical, radians.
-        colour: of a cube; None for things whose colour tells nothing.
+        colour: of a cube, box or tape; None for things whose colour tells nothing.
         inside: name of the container that stands over this (hidden) cube, else None.
         radius: of a target, site or marker, metres; None for the other kinds.
         thickness: of a target, metres; None for the usual 0.005.
@@ -106,7 +122,8 @@ class Goal:
     ``counts`` (a number for each); PickXtimes and SwingXtimes ``colour`` and ``repeats``; StopCube
     ``visit`` (2 for the second); the four Unmask tasks ``colours`` (one or two names, in the order
     of picking); VideoRepick ``repeats``; VideoPlaceButton ``colour`` and ``relation`` (before or
-    after); VideoPlaceOrder ``colour`` and ``placement`` (1 for the first).
+    after); VideoPlaceOrder ``colour`` and ``placement`` (1 for the first); PutInBox ``colour`` (of
+    the box); PickByCount ``colour`` (of the tape) and ``repeats``.
     """
 
     slots: tuple[tuple[str, SlotValue], ...]
@@ -158,9 +175,10 @@ class Primitive(NamedTuple):
 
     | kind | subject, place | movement |
     | --- | --- | --- |
-    | ``pick_cube`` | cube | grasp it and lift it |
-    | ``place_on`` | cube, target or site | put what is held there |
+    | ``pick_cube`` | cube or tape | grasp it and lift it |
+    | ``place_on`` | cube or tape, target or site | put what is held there |
     | ``drop_into`` | cube, bin | let what is held fall in, and retreat |
+    | ``put_into`` | tape, box | let go of what is held right above the rim, and up |
     | ``move_over`` | cube, target | carry what is held over the place |
     | ``put_down`` | cube or container | straight down, let go at the tool height `height`, up |
     | ``pick_container`` | container | grasp its knob and lift it |
@@ -184,6 +202,7 @@ class Primitive(NamedTuple):
         "pick_cube",
         "place_on",
         "drop_into",
+        "put_into",
         "move_over",
         "put_down",
         "pick_container",

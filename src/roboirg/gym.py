@@ -8,7 +8,7 @@ from __future__ import annotations
 import gymnasium
 
 from roboirg.episode import ENVIRONMENT_VERSION
-from roboirg.tasks import all_tasks
+from roboirg.tasks import every_task
 
 NAMESPACE = "RoboIRG"
 
@@ -18,7 +18,7 @@ def environment_id(task: str) -> str:
     return f"{NAMESPACE}/{task}-v{ENVIRONMENT_VERSION}"
 
 
-for _task in all_tasks():
+for _task in every_task():
     gymnasium.register(
         id=environment_id(_task),
         entry_point="roboirg.environment:RoboIRGEnv",

@@ -7,11 +7,11 @@ from roboirg.episode import SPLITS, Episode
 from roboirg.errors import SceneRejectedError
 from roboirg.language import variants
 from roboirg.splits import CYCLE, get_episode, make_episode
-from roboirg.tasks import all_tasks
+from roboirg.tasks import every_task
 
-TASKS = tuple(all_tasks())
-PAIRS = [(name, setting) for name, task in all_tasks().items() for setting in task.settings]
-SPATIAL_TASKS = tuple(name for name, task in all_tasks().items() if "spatial" in task.settings)
+TASKS = tuple(every_task())
+PAIRS = [(name, setting) for name, task in every_task().items() for setting in task.settings]
+SPATIAL_TASKS = tuple(name for name, task in every_task().items() if "spatial" in task.settings)
 
 
 def split_episodes(task: str) -> Iterator[Episode]:

@@ -61,6 +61,16 @@ GOLDEN: dict[tuple[str, str], str] = {
     ("VideoPlaceOrder", "direct"): "9dc2c12d648bad14",
     ("VideoPlaceOrder", "reasoning"): "94ffdef0ae12c6fa",
     ("VideoPlaceOrder", "contextual"): "4cb73e0566d69249",
+    ("PutInBox", "explicit"): "04d5e1525b55b35c",
+    ("PutInBox", "direct"): "f4da66c718c2d848",
+    ("PutInBox", "reasoning"): "dd6e73da07147435",
+    ("PutInBox", "contextual"): "170c32f64a4d1dd1",
+    ("PutInBox", "spatial"): "661444c9a9f6d563",
+    ("PickByCount", "explicit"): "1560ac35cb100ea1",
+    ("PickByCount", "direct"): "985ad5e9154dfb46",
+    ("PickByCount", "reasoning"): "987bbf8549466ee4",
+    ("PickByCount", "contextual"): "d2acdfc76968060d",
+    ("PickByCount", "spatial"): "2d0720a1065b84d4",
 }
 
 

@@ -15,7 +15,7 @@ from roboirg.language.proof.examine import leaking, not_needed, not_read_back, n
 from roboirg.language.proof.run import RANDOM_BASE, random_episode
 from roboirg.language.proof.tables import proof_tables
 from roboirg.splits import get_episode, slot_seed
-from roboirg.tasks import all_tasks, get_task
+from roboirg.tasks import every_task, get_task
 
 EPISODE = get_episode("PickXtimes", "test", 3)
 
@@ -130,9 +130,9 @@ def test_scenes_without_landmark_are_counted_and_fail_only_in_splits():
 
 
 def test_random_scenes_are_not_those_of_the_splits():
-    last = max(slot_seed(task, "val", 50) for task in all_tasks().values())
+    last = max(slot_seed(task, "val", 50) for task in every_task().values())
     assert last < RANDOM_BASE
-    for task in all_tasks():
+    for task in every_task():
         assert random_episode(task, 7) == random_episode(task, 7)
         assert random_episode(task, 7).difficulty == "hard"
 

@@ -10,7 +10,7 @@ from rich.console import Console
 from roboirg.errors import InvalidValueError, MissingDependencyError
 from roboirg.language import SETTINGS, figure, overview, statistics
 from roboirg.language.variants import instructions, split_episodes
-from roboirg.tasks import all_tasks
+from roboirg.tasks import every_task
 
 
 @functools.cache
@@ -25,7 +25,7 @@ def test_expressions_are_counted_once_per_scene():
     assert statistics.expression_counts(said() * 2) == counts
     scenes = statistics.scene_counts(said() * 2)
     assert scenes["direct"] == 50 * len(TASKS)
-    assert scenes["spatial"] == 50 * sum("spatial" in one.settings for one in all_tasks().values())
+    assert scenes["spatial"] == 50 * sum("spatial" in one.settings for one in every_task().values())
     assert "explicit" not in counts
     for setting, by_class in counts.items():
         assert max(by_class.values()) <= scenes[setting]

@@ -34,9 +34,11 @@ MOMENTS = {
     ("VideoRepick", 2): {236: "swapping"},
     ("VideoPlaceButton", 3): {END: "placed"},
     ("VideoPlaceOrder", 3): {END: "placed"},
+    ("PutInBox", 0): {1: "start", END: "inside"},
+    ("PickByCount", 1): {1: "start", END: "done"},
 }
 """Elapsed steps of the oracle's run; the last is the step of success, whichever it is."""
-BOTH_CAMERAS = {"PickXtimes", "VideoUnmask"}
+BOTH_CAMERAS = {"PickXtimes", "VideoUnmask", "PutInBox", "PickByCount"}
 """Of the other tasks the front picture is kept: the wrist's shows no other things."""
 
 

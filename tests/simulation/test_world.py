@@ -10,11 +10,11 @@ from roboirg.motions import Away
 from roboirg.simulation import settings
 from roboirg.simulation.world import World
 from roboirg.splits import get_episode
-from roboirg.tasks import all_tasks
+from roboirg.tasks import every_task
 
 pytestmark = pytest.mark.sim
 
-TASKS = tuple(all_tasks())
+TASKS = tuple(every_task())
 
 
 def world_of(task: str, index: int = 3, *, visible: bool = False) -> World:

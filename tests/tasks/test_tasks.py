@@ -13,12 +13,13 @@ from roboirg.errors import SceneRejectedError
 from roboirg.fingerprint import plain
 from roboirg.motions import Away, Glow, Shuttle, Vanish, subjects_of
 from roboirg.splits import SIZES, get_episode, make_episode
-from roboirg.tasks import all_tasks, geometry, get_task
+from roboirg.tasks import every_task, geometry, get_task
 from roboirg.tasks.fixtures import bin_footprint, button_footprint, cube_footprint
 from roboirg.tasks.placement import Circle, overlap
+from roboirg.tasks.real_table import box_footprint, tape_footprint
 from roboirg.tasks.unmask import container_footprint
 
-TASKS = tuple(all_tasks())
+TASKS = tuple(every_task())
 SETTINGS = {"explicit", "direct", "reasoning", "contextual", "spatial"}
 HEIGHTS = {
     "cube": (0.02,),
@@ -30,6 +31,8 @@ HEIGHTS = {
     "site": (0.005,),
     "shuttle": (0.01,),
     "marker": (-0.005,),
+    "box": (0.02,),
+    "tape": (0.0175,),
 }
 """Of the origin of a thing that lies on the table, metres."""
 
@@ -69,9 +72,9 @@ def valid(task, difficulty, count=1):
 
 
 def test_registry_holds_each_task_once_and_in_the_order_of_codes():
-    codes = [task.code for task in all_tasks().values()]
+    codes = [task.code for task in every_task().values()]
     assert codes == sorted(set(codes))
-    assert all(task.name == name for name, task in all_tasks().items())
+    assert all(task.name == name for name, task in every_task().items())
 
 
 @each_task
@@ -164,6 +167,8 @@ def solids(scene):
         "container": container_footprint,
         "bin": bin_footprint,
         "button": button_footprint,
+        "box": box_footprint,
+        "tape": tape_footprint,
     }
     return [footprints[item.kind](item) for item in scene.objects if item.kind in footprints]
 

@@ -60,7 +60,7 @@ def export_instructions(
     frame: Frame = "robot",
 ) -> None:
     """Write a row for each episode, setting and form; docs/language.md explains the columns."""
-    from roboirg.evaluation.plan import parse_names, parse_stages
+    from roboirg.evaluation.words import parse_names, parse_stages
     from roboirg.language import FORMS
     from roboirg.language.export import EXPORT_FORMATS, check_export_support, row, write_rows
     from roboirg.language.variants import instructions, split_episodes
@@ -189,15 +189,14 @@ def _console() -> Console:
 
 
 def _tasks(text: str) -> tuple[str, ...]:
-    from roboirg.evaluation.plan import parse_names, says_all
-    from roboirg.tasks import all_tasks, get_task
+    from roboirg.evaluation.words import parse_names
+    from roboirg.tasks import find_tasks
 
-    typed = tuple(all_tasks()) if says_all(text) else parse_names("task", text)
-    return tuple(get_task(name).name for name in typed)
+    return find_tasks(parse_names("task", text))
 
 
 def _settings(text: str) -> tuple[str, ...]:
-    from roboirg.evaluation.plan import parse_names, says_all
+    from roboirg.evaluation.words import parse_names, says_all
     from roboirg.language import SETTINGS
 
     if says_all(text):
@@ -207,7 +206,7 @@ def _settings(text: str) -> tuple[str, ...]:
 
 def _splits(text: str) -> tuple[Split, ...]:
     from roboirg.episode import SPLITS
-    from roboirg.evaluation.plan import says_all
+    from roboirg.evaluation.words import says_all
     from roboirg.splits import check_split
 
     return SPLITS if says_all(text) else (check_split(text),)

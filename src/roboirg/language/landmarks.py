@@ -14,6 +14,7 @@ from typing import Literal, NamedTuple
 
 from roboirg.episode import Scene, SceneObject
 from roboirg.motions import Away
+from roboirg.tasks.task import Thing
 
 MARGIN = 0.03
 """Metres by which a landmark's object must win over any other in the quantity compared."""
@@ -29,6 +30,8 @@ Frame = Literal["robot", "camera"]
 FRAMES: tuple[Frame, ...] = ("robot", "camera")
 
 ORDINALS = {1: "second", 2: "third"}
+PAIRED: tuple[Thing, ...] = ("box", "tape")
+"""Things of which there are always two."""
 
 
 class Landmark(NamedTuple):
@@ -36,9 +39,10 @@ class Landmark(NamedTuple):
 
     Attributes:
         phrase: what follows the noun: "the cube *at the far left*".
-        level: class, in the order of preference: 1 extremes, 2 corners, 3 ranks, 4 fixtures,
-            5 cubes of another colour, 6 nearest to an object of class 1 or 2, 7 to one of
-            class 3, 8 second nearest to one of class 1 or 2, 9 third nearest to one of those.
+        level: class, in the order of preference: 1 extremes and the sides of a pair, 2 corners,
+            3 ranks, 4 fixtures, 5 cubes of another colour, 6 nearest to an object of class 1 or 2,
+            7 to one of class 3, 8 second nearest to one of class 1 or 2, 9 third nearest to one of
+            those.
         sided: whether the words name left or right, so that it matters whose.
     """
 
@@ -86,7 +90,7 @@ class Selector(NamedTuple):
 # Kept, because the forms of an episode ask the same.
 @functools.lru_cache(maxsize=64)
 def landmarks(
-    scene: Scene, thing: Literal["cube", "container"], target: SceneObject, frame: Frame = "robot"
+    scene: Scene, thing: Thing, target: SceneObject, frame: Frame = "robot"
 ) -> tuple[Landmark, ...]:
     """The landmarks of the best available class that tell the target; empty if none does.
 
@@ -105,11 +109,15 @@ def landmarks(
     return tuple(found)
 
 
-def selectors(
-    scene: Scene, thing: Literal["cube", "container"], frame: Frame
-) -> Iterator[Selector]:
-    """Every selector, from the best class to the last."""
+def selectors(scene: Scene, thing: Thing, frame: Frame) -> Iterator[Selector]:
+    """Every selector, from the best class to the last.
+
+    Boxes and tapes stand in pairs, one on either side of the robot, and are told by their side.
+    """
     candidates = seen(scene, thing)
+    if thing in PAIRED:
+        yield from _sides(candidates, frame)
+        return
     named = (*_extremes(candidates, frame), *_corners(candidates, frame))
     ranked = tuple(_ranks(candidates, frame))
     yield from (*named, *ranked)
@@ -121,9 +129,9 @@ def selectors(
     yield from _chains(thing, candidates, named, level=9, rank=2)
 
 
-def seen(scene: Scene, thing: Literal["cube", "container"]) -> tuple[SceneObject, ...]:
-    """What a listener can check: the cubes that are there at first, or all containers."""
-    if thing == "container":
+def seen(scene: Scene, thing: Thing) -> tuple[SceneObject, ...]:
+    """What a listener can check: the cubes that are there at first, or all things of a kind."""
+    if thing != "cube":
         return scene.of_kind(thing)
     late = {
         motion.subject for motion in scene.motions if isinstance(motion, Away) and motion.start == 0
@@ -165,6 +173,12 @@ def _column(item: SceneObject) -> float:
 def _extremes(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
     for way in _directions(frame):
         yield Selector(Landmark(way.extreme, 1, way.sided), (way.reading,), candidates)
+
+
+def _sides(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
+    left, right = (way.reading for way in _directions(frame) if way.sided)
+    for side, reading in (("left", left), ("right", right)):
+        yield Selector(Landmark(f"on the {side}", 1, sided=True), (reading,), candidates)
 
 
 def _corners(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:

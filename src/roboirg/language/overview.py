@@ -10,7 +10,7 @@ from roboirg.language import statistics
 from roboirg.language.instruction import SETTINGS, Instruction
 from roboirg.language.statistics import Counts
 from roboirg.language.templates import RELATIONS, STEPS
-from roboirg.tasks import all_tasks
+from roboirg.tasks import every_task
 
 
 def overview_tables(said: Sequence[Instruction]) -> Iterator[Table]:
@@ -24,7 +24,7 @@ def overview_tables(said: Sequence[Instruction]) -> Iterator[Table]:
     )
     for title, counts, order in by_task:
         if counts:
-            yield _tallied(title, "task", counts, [*all_tasks()], order or _found(counts))
+            yield _tallied(title, "task", counts, [*every_task()], order or _found(counts))
 
 
 _RELATIONS = [*(one.name for one in (*RELATIONS, *STEPS)), "neighbor"]

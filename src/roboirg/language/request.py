@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
-from roboirg.episode import COLOURS, Episode, Goal, Scene, SceneObject
+from roboirg.episode import Colour, Episode, Goal, Scene, SceneObject
 from roboirg.errors import InvalidValueError
 from roboirg.language.choice import Chooser
 from roboirg.language.instruction import Form, Setting, UtteranceStage
@@ -100,6 +100,16 @@ class Request:
         """What a slot of numbers could hold in this scene, all other slots being as they are."""
         return _numbers_instead(self.task.name, self.episode.scene, self.episode.goal, slot)
 
+    def other_colours(self, colour: str) -> tuple[Colour, ...]:
+        """The colours that the task speaks of, without this one."""
+        colours = self.task.commands.colours
+        if colour not in colours:
+            raise InvalidValueError(
+                f"{colour!r} is no colour of {self.task.name}; its colours are "
+                f"{', '.join(colours)}."
+            )
+        return tuple(other for other in colours if other != colour)
+
     def by_colour(self, cube: Phrase) -> Phrase:
         """The thing to handle, told by its cube."""
         return fill(self.task.commands.by_colour, {"cube": cube})
@@ -149,15 +159,6 @@ class SettingRule:
     name: Setting
     say: Callable[[Request], Draft]
     can_say: Callable[[Request], bool] = lambda _request: True
-
-
-def other_colours(colour: str) -> tuple[str, ...]:
-    """The two colours of the benchmark that are not this one."""
-    if colour not in COLOURS:
-        raise InvalidValueError(
-            f"{colour!r} is not a colour; the colours are {', '.join(COLOURS)}."
-        )
-    return tuple(other for other in COLOURS if other != colour)
 
 
 # Kept, because the settings and forms of an episode ask the same.

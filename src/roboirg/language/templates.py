@@ -178,19 +178,19 @@ CUES = (
 )
 
 EXCLUSIONS = (
-    "the cube of a color other than {pair}",
-    "the cube whose color is different from {pair}",
+    "the {thing} of a color other than {pair}",
+    "the {thing} whose color is different from {pair}",
 )
 PAIR_ANAPHORS = ("that pair", "those two")
-COMPLEMENTS = ("the cube in {other}", "the cube with {other}")
+COMPLEMENTS = ("the {thing} in {other}", "the {thing} with {other}")
 """The second pick: of the two excluded colours, the one that was not chosen."""
 AMOUNT_PAIR_ANAPHORS = ("that pair",)
 """Next to numbers of cubes *those two* would be two cubes."""
 AMOUNT_EXCLUSIONS = (
-    "cube[|s] of a color other than {pair}",
-    "cube[|s] whose color is different from {pair}",
+    "{thing}[|s] of a color other than {pair}",
+    "{thing}[|s] whose color is different from {pair}",
 )
-AMOUNT_COMPLEMENTS = ("cube[|s] in {other}", "cube[|s] with {other}")
+AMOUNT_COMPLEMENTS = ("{thing}[|s] in {other}", "{thing}[|s] with {other}")
 
 MOMENTS = {"before": "right before the button press", "after": "right after the button press"}
 MOMENT_ANAPHORS = ("at that moment", "then")

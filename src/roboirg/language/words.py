@@ -1,4 +1,4 @@
-"""Numbers in words."""
+"""Numbers in words, and nouns in the plural."""
 
 from __future__ import annotations
 
@@ -10,6 +10,11 @@ ORDINALS = (
     "tenth",
 )  # fmt: skip
 ADVERBS = {1: "once", 2: "twice"}
+
+
+def plural(noun: str) -> str:
+    """The plural of the name of a thing: ``cubes``, ``boxes``."""
+    return f"{noun}es" if noun.endswith("x") else f"{noun}s"
 
 
 def cardinal(number: int) -> str:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 MAX_RETRIES = 3
 """How often in an episode the hands try again what did not work."""
-UNDOES_PICK = frozenset({"place_on", "put_down", "drop_into", "move_over"})
+UNDOES_PICK = frozenset({"place_on", "put_down", "drop_into", "put_into", "move_over"})
 """Primitives that need the object in the hand: to repeat one, it has to be picked up again."""
 
 

@@ -1,9 +1,12 @@
-"""Objects of a scene as SAPIEN bodies: shapes, masses and colours as RoboMME builds them."""
+"""Objects of a scene as SAPIEN bodies: shapes, masses and colours as RoboMME builds them.
+
+Boxes and rolls of tape are our own.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,18 +18,24 @@ from sapien.wrapper.articulation_builder import ArticulationBuilder
 
 from roboirg.episode import SceneObject
 from roboirg.motions import Point
+from roboirg.simulation.ring import Rgba, ring
 from roboirg.tasks import geometry
 
-Rgba = tuple[float, float, float, float]
+Triple = tuple[float, float, float]
+Cuboid = tuple[Triple, Triple]
+"""Centre and half sides in the object's frame, m."""
 
 COLOUR_RGBA: dict[str, Rgba] = {
     "red": (1.0, 0.0, 0.0, 1.0),
     "green": (0.0, 1.0, 0.0, 1.0),
     "blue": (0.0, 0.0, 1.0, 1.0),
+    "yellow": (1.0, 0.8, 0.0, 1.0),
+    "gray": (0.5, 0.5, 0.5, 1.0),
+    "purple": (160 / 255, 32 / 255, 240 / 255, 1.0),
 }
 WHITE: Rgba = (1.0, 1.0, 1.0, 1.0)
-GRAY: Rgba = (0.5, 0.5, 0.5, 1.0)
-PURPLE: Rgba = (160 / 255, 32 / 255, 240 / 255, 1.0)
+GRAY: Rgba = COLOUR_RGBA["gray"]
+PURPLE: Rgba = COLOUR_RGBA["purple"]
 RED: Rgba = COLOUR_RGBA["red"]
 WOOD: Rgba = (0.8, 0.6, 0.4, 1.0)
 BLACK: Rgba = (0.0, 0.0, 0.0, 1.0)
@@ -36,6 +45,8 @@ UPRIGHT = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
 UPSIDE_DOWN = (0.0, 1.0, 0.0, 0.0)
 RING_SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
 CAP_DENSITY = 1500.0
+FLOOR_SHADE = 0.5
+"""Brightness of a box's floor in that of its walls: no shadow shows its depth."""
 BUTTON_STIFFNESS = 800.0
 BUTTON_DAMPING = 40.0
 
@@ -184,18 +195,10 @@ def _build_shuttle(scene: sapien.Scene, item: SceneObject, visible: bool) -> Bod
 
 def _build_bin(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
     """Four walls; the black floor is only seen, things fall to the table."""
-    wall, height = geometry.BIN_WALL / 2, geometry.BIN_HEIGHT / 2
-    side = geometry.BIN_HALF - wall
+    height = geometry.BIN_HEIGHT / 2
     builder = ActorBuilder()
-    for sign in (-1.0, 1.0):
-        for centre, half in (
-            ((0.0, sign * side, 0.0), (geometry.BIN_HALF, wall, height)),
-            ((sign * side, 0.0, 0.0), (wall, geometry.BIN_HOLE_HALF, height)),
-        ):
-            builder.add_box_collision(sapien.Pose(centre), half_size=half)
-            if visible:
-                material = _material(WOOD)
-                builder.add_box_visual(sapien.Pose(centre), half_size=half, material=material)
+    walls = _walls(geometry.BIN_HALF, geometry.BIN_WALL / 2, height)
+    _add_boxes(builder, walls, WOOD if visible else None)
     if visible:
         floor = geometry.BIN_FLOOR_HEIGHT / 2
         builder.add_box_visual(
@@ -204,6 +207,61 @@ def _build_bin(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
             material=_material(BLACK),
         )
     return _finish(builder, scene, item, "kinematic")
+
+
+def _build_box(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
+    """Four walls and a floor, which stand fast."""
+    rgba = COLOUR_RGBA[str(item.colour)]
+    red, green, blue, _ = rgba
+    dark = (FLOOR_SHADE * red, FLOOR_SHADE * green, FLOOR_SHADE * blue, 1.0)
+    wall, height, floor = geometry.BOX_WALL / 2, geometry.BOX_HEIGHT / 2, geometry.BOX_FLOOR / 2
+    inner = geometry.BOX_HALF - geometry.BOX_WALL
+    bottom = ((0.0, 0.0, floor - height), (inner, inner, floor))
+    builder = ActorBuilder()
+    _add_boxes(builder, _walls(geometry.BOX_HALF, wall, height), rgba if visible else None)
+    _add_boxes(builder, [bottom], dark if visible else None)
+    return _finish(builder, scene, item, "kinematic")
+
+
+def _walls(half: float, wall: float, height: float) -> list[Cuboid]:
+    """Four walls around a square; half of the outer side, and half thickness and height."""
+    side, hole = half - wall, half - 2 * wall
+    return [
+        cuboid
+        for sign in (-1.0, 1.0)
+        for cuboid in (
+            ((0.0, sign * side, 0.0), (half, wall, height)),
+            ((sign * side, 0.0, 0.0), (wall, hole, height)),
+        )
+    ]
+
+
+def _add_boxes(builder: ActorBuilder, cuboids: Sequence[Cuboid], rgba: Rgba | None) -> None:
+    """Boxes to be touched and, if they have a colour, seen."""
+    for centre, half in cuboids:
+        builder.add_box_collision(sapien.Pose(centre), half_size=half)
+        if rgba is not None:
+            material = _material(rgba)
+            builder.add_box_visual(sapien.Pose(centre), half_size=half, material=material)
+
+
+def _build_tape(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
+    """A ring of boxes, which fingers can take from outside or by its wall; round to the eye."""
+    outer, inner = geometry.TAPE_RADIUS, geometry.TAPE_HOLE_RADIUS
+    wall = (outer - inner) / 2
+    half = (wall, outer * math.tan(math.pi / geometry.TAPE_SIDES), geometry.TAPE_HALF)
+    builder = ActorBuilder()
+    for number in range(geometry.TAPE_SIDES):
+        angle = 2 * math.pi * number / geometry.TAPE_SIDES
+        centre = (math.cos(angle) * (inner + wall), math.sin(angle) * (inner + wall), 0.0)
+        turned = [math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2)]
+        builder.add_box_collision(sapien.Pose(centre, turned), half_size=half)
+    body = _finish(builder, scene, item, "dynamic")
+    if visible:
+        component = sapien.render.RenderBodyComponent()
+        component.attach(ring(outer, inner, geometry.TAPE_HALF, COLOUR_RGBA[str(item.colour)]))
+        body.entity.add_component(component)
+    return body
 
 
 def _build_button(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
@@ -254,4 +312,6 @@ _BUILDERS: dict[str, Callable[[sapien.Scene, SceneObject, bool], Body]] = {
     "site": _build_site,
     "shuttle": _build_shuttle,
     "marker": _build_marker,
+    "box": _build_box,
+    "tape": _build_tape,
 }

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from roboirg.simulation.bodies import Body
 from roboirg.tasks import geometry
-from roboirg.tasks.placement import Footprint, Rectangle, overlap
+from roboirg.tasks.placement import Circle, Footprint, Rectangle, overlap
 
 FINGER_OFFSET = 0.048
 """From the tool's axis to the middle of an open finger, m."""
@@ -71,6 +71,10 @@ def _footprints(body: Body) -> Iterator[Footprint]:
     match body.item.kind:
         case "cube":
             yield Rectangle(x, y, geometry.CUBE_HALF, geometry.CUBE_HALF, yaw)
+        case "tape":
+            yield Circle(x, y, geometry.TAPE_RADIUS)
+        case "box":
+            yield Rectangle(x, y, geometry.BOX_HALF, geometry.BOX_HALF, yaw)
         case "container":
             half = geometry.CONTAINER_FOOTPRINT_HALF
             yield Rectangle(x, y, half, half, yaw)

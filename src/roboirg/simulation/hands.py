@@ -30,6 +30,8 @@ CONTAINER_GRASP = 0.01
 TARGET_RELEASE = 0.005
 SITE_RELEASE = 0.01
 BIN_RELEASE = 0.2
+BOX_RELEASE = 0.065
+"""Tool height at which the open fingers stay above the walls of a box."""
 BIN_RETREAT = 0.1
 """How far the hand goes back towards the robot after letting go over the bin."""
 OVER_TARGET = 0.1
@@ -92,6 +94,13 @@ class Hands:
         yield self._grip(OPEN)
         back = place._replace(x=place.x - BIN_RETREAT)
         yield self._move(_above(back, BIN_RELEASE), rotation)
+
+    def _put_into(self, primitive: Primitive) -> Iterator[Piece]:
+        place, rotation = self._place(primitive), self._rotation()
+        yield self._move(_above(place, CUBE_HOVER), rotation)
+        yield self._move(_above(place, BOX_RELEASE), rotation)
+        yield self._grip(OPEN)
+        yield self._move(_above(place, CUBE_HOVER), rotation)
 
     def _move_over(self, primitive: Primitive) -> Iterator[Piece]:
         yield self._move(_above(self._place(primitive), OVER_TARGET), self._rotation())
@@ -196,6 +205,7 @@ _ROUTINES: dict[str, Callable[[Hands, Primitive], Iterator[Piece]]] = {
     "pick_cube": Hands._pick_cube,
     "place_on": Hands._place_on,
     "drop_into": Hands._drop_into,
+    "put_into": Hands._put_into,
     "move_over": Hands._move_over,
     "put_down": Hands._put_down,
     "pick_container": Hands._pick_container,

@@ -13,6 +13,7 @@ from sapien.wrapper.actor_builder import ActorBuilder
 
 from roboirg.simulation.assets import find_model_files
 from roboirg.simulation.rendering import FAITHFUL, Rendering
+from roboirg.simulation.table_mesh import table_shape
 
 Range = tuple[int, int]
 
@@ -51,24 +52,19 @@ def _add_table(scene: sapien.Scene, *, visible: bool, rendering: Rendering) -> N
     builder = ActorBuilder()
     builder.set_scene(scene)
     builder.add_box_collision(sapien.Pose([0.0, 0.0, TABLE_HEIGHT / 2]), half_size=TABLE_HALF)
-    if visible:
-        builder.add_visual_from_file(
-            str(find_model_files().table), sapien.Pose(q=QUARTER_TURN), [TABLE_SCALE] * 3
-        )
+    turned = sapien.Pose(q=QUARTER_TURN)
+    stock = rendering.meshes == "stock"
+    if visible and stock:
+        builder.add_visual_from_file(str(find_model_files().table), turned, [TABLE_SCALE] * 3)
     builder.set_physx_body_type("kinematic")
     builder.set_initial_pose(sapien.Pose(TABLE_POSITION, QUARTER_TURN))
     table = builder.build(name="table")
-    if visible and rendering.meshes != "stock":
-        _simplify(table.find_component_by_type(sapien.render.RenderBodyComponent))
-
-
-def _simplify(table: sapien.render.RenderBodyComponent) -> None:
-    """Replace the texture that says everywhere that the table is metallic by a number."""
-    for shape in table.render_shapes:
-        for material in (part.material for part in shape.parts):
-            if material.metallic_texture is not None:
-                material.metallic_texture = None
-                material.metallic = 1.0
+    if visible and not stock:
+        shape = table_shape().clone()
+        shape.scale, shape.local_pose = [TABLE_SCALE] * 3, turned
+        component = sapien.render.RenderBodyComponent()
+        component.attach(shape)
+        table.add_component(component)
 
 
 def _add_floor(scene: sapien.Scene, pieces: Sequence[tuple[Range, Range]]) -> None:

@@ -1,4 +1,4 @@
-"""Sizes of the objects, as RoboMME builds them. Metres."""
+"""Sizes of the objects, as RoboMME builds them; of boxes and tapes, our own. Metres."""
 
 from __future__ import annotations
 
@@ -47,3 +47,19 @@ CONTAINER_HALF = CONTAINER_INNER / 2 + CONTAINER_WALL / 2
 CONTAINER_FOOTPRINT_HALF = CONTAINER_INNER / 2 + CONTAINER_WALL
 CONTAINER_HEIGHT = CONTAINER_WALL_HEIGHT + CONTAINER_ROOF / 2
 """Height of the origin of a container that stands on the table."""
+
+BOX_HALF = 0.065
+"""Half the outer side of an open box."""
+BOX_WALL = 0.005
+BOX_HEIGHT = 0.04
+"""Low enough that the hand, 0.2 wide, may pick a tape right beside it."""
+BOX_FLOOR = 0.002
+
+TAPE_RADIUS = 0.0275
+"""Outer radius of a roll of tape: open fingers are 0.08 apart."""
+TAPE_HOLE_RADIUS = 0.015
+TAPE_HALF = 0.0175
+"""Half the width of the tape, and the height of the middle of a roll that lies. However the roll
+leans on the walls of a box, its middle stays below 0.035."""
+TAPE_SIDES = 12
+"""A roll is a ring of so many sides: opposite ones are parallel, as the fingers are."""

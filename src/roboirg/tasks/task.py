@@ -8,7 +8,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from roboirg.episode import Difficulty, Goal, Scene, Stage, Suite
+from roboirg.episode import COLOURS, Colour, Difficulty, Goal, Scene, Stage, Suite
+
+Thing = Literal["cube", "container", "box", "tape"]
+"""What can be told by a place: its kind and its name in words."""
 
 
 def _no_stages(_scene: Scene) -> tuple[Stage, ...]:
@@ -36,25 +39,29 @@ class Commands:
     Attributes:
         patterns: reasoning patterns, in the order in which the episodes cycle through them.
         wordings: at least two for each number of parts.
-        thing: what the robot handles, a ``"cube"`` or a ``"container"``; places are told among
-            all things of that kind.
-        by_colour: the thing told by a colour; ``{cube}`` is the cube of that colour.
+        thing: what the goal chooses among, for example ``"cube"``; places are told among all
+            things of that kind.
+        coloured: what has the colour that tells the thing: itself, or the cube in a container.
+        colours: those that are spoken of; colour exclusion takes exactly three.
+        by_colour: the thing told by a colour; ``{cube}`` is what has that colour.
         by_place: the thing told by a place, after its count if it has one: ``cube[|s] ...``.
     """
 
     patterns: tuple[str, ...]
     wordings: tuple[Wording, ...]
-    thing: Literal["cube", "container"] = "cube"
+    thing: Thing = "cube"
+    coloured: Thing = "cube"
+    colours: tuple[Colour, ...] = COLOURS
     by_colour: str = "{cube}"
     by_place: str = "the cube {place}"
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One task of the benchmark.
+    """One task, of the benchmark or of the real robot.
 
     Attributes:
-        name: as in RoboMME, for example ``"PickXtimes"``.
+        name: as in RoboMME and the paper, for example ``"PickXtimes"``.
         suite: the suite it belongs to.
         code: number of the task in the rule that gives an episode its seed.
         spatial: whether the spatial setting is defined for it.

@@ -84,12 +84,12 @@ def introduce_references(
     return fill(request.chooser.pick(purpose, options), {"things": listed(things)})
 
 
-def _pointing(parts: tuple[Part, ...]) -> Phrase:
-    return colour.those_cubes(tuple(shade for shade, _ in pairs(parts)))
+def _pointing(request: Request, parts: tuple[Part, ...]) -> Phrase:
+    return colour.those(request, tuple(shade for shade, _ in pairs(parts)))
 
 
-def _rivals(parts: tuple[Part, ...]) -> list[Phrase]:
-    return [*colour.rivals(parts), *number.rivals(parts)]
+def _rivals(request: Request, parts: tuple[Part, ...]) -> list[Phrase]:
+    return [*colour.rivals(request, parts), *number.rivals(request, parts)]
 
 
 def _described(parts: tuple[Part, ...], things: Sequence[Phrase]) -> Fields:

@@ -1,15 +1,15 @@
-"""Colours: which cube, or the container over which cube."""
+"""Colours: which cube, box or tape, or the container over which cube."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from roboirg.episode import COLOURS
 from roboirg.language import templates
 from roboirg.language.instruction import Expression
 from roboirg.language.kinds.kind import Fields, Kind, rival_sentences
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed
 from roboirg.language.request import Part, Request
+from roboirg.language.words import plural
 
 REDUCED: Mapping[int, tuple[tuple[str, Expression], ...]] = {
     1: (("it", "it"),),
@@ -19,14 +19,15 @@ REDUCED: Mapping[int, tuple[tuple[str, Expression], ...]] = {
 """What points back at one, two or three introduced cubes."""
 
 
-def cube(part: Part) -> Phrase:
+def named(request: Request, part: Part) -> Phrase:
     """``the red cube``."""
-    return antecedent(f"the {part.colour} cube", part.slot, part.value)
+    noun = request.task.commands.coloured
+    return antecedent(f"the {part.colour} {noun}", part.slot, part.value)
 
 
 def _stated(request: Request, parts: tuple[Part, ...]) -> Fields:
     """``the red cube``, or the container that hides it."""
-    return {part.field: request.by_colour(cube(part)) for part in parts}
+    return {part.field: request.by_colour(named(request, part)) for part in parts}
 
 
 def _reduced(request: Request, parts: tuple[Part, ...]) -> Fields:
@@ -39,25 +40,28 @@ def _reduced(request: Request, parts: tuple[Part, ...]) -> Fields:
 
 def _introduce(request: Request, parts: tuple[Part, ...]) -> Phrase:
     template = request.chooser.pick("colour introduction", templates.COLOUR_INTRODUCTIONS)
-    things = listed([cube(part) for part in parts])
+    things = listed([named(request, part) for part in parts])
     return fill(template, {"things": things}, plural=len(parts) > 1)
 
 
-def _pointing(parts: tuple[Part, ...]) -> Phrase:
+def _pointing(request: Request, parts: tuple[Part, ...]) -> Phrase:
     if len(parts) == 1:
-        return anaphor("that cube", "that", parts[0].slot, parts[0].value)
-    return those_cubes(parts)
+        words = f"that {request.task.commands.coloured}"
+        return anaphor(words, "that", parts[0].slot, parts[0].value)
+    return those(request, parts)
 
 
-def those_cubes(parts: tuple[Part, ...]) -> Phrase:
-    """A plural for the cubes of all colours."""
+def those(request: Request, parts: tuple[Part, ...]) -> Phrase:
+    """A plural for the cubes, boxes or tapes of all colours."""
     values = " and ".join(part.colour for part in parts)
-    return anaphor("those cubes", "them", parts[0].slot, values)
+    words = f"those {plural(request.task.commands.coloured)}"
+    return anaphor(words, "them", parts[0].slot, values)
 
 
-def rivals(parts: tuple[Part, ...]) -> list[Phrase]:
+def rivals(request: Request, parts: tuple[Part, ...]) -> list[Phrase]:
     """Remarks that name other colours."""
-    return rival_sentences(templates.COMPETING_COLOUR_DISTRACTORS, COLOURS, str, parts)
+    colours = request.task.commands.colours
+    return rival_sentences(templates.COMPETING_COLOUR_DISTRACTORS, colours, str, parts)
 
 
 def _described(parts: tuple[Part, ...], things: Sequence[Phrase]) -> Fields:

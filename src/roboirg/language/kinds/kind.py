@@ -33,9 +33,9 @@ class Kind:
     stated: Callable[[Request, tuple[Part, ...]], Fields]
     reduced: Callable[[Request, tuple[Part, ...]], Fields]
     introduce: Callable[[Request, tuple[Part, ...]], Phrase]
-    pointing: Callable[[tuple[Part, ...]], Phrase]
+    pointing: Callable[[Request, tuple[Part, ...]], Phrase]
     reinforcements: tuple[str, ...]
-    rivals: Callable[[tuple[Part, ...]], list[Phrase]]
+    rivals: Callable[[Request, tuple[Part, ...]], list[Phrase]]
     plural: Callable[[tuple[Part, ...]], bool] = lambda parts: len(parts) > 1
     described: Callable[[tuple[Part, ...], Sequence[Phrase]], Fields] | None = None
 

@@ -40,11 +40,11 @@ def _introduce(request: Request, parts: tuple[Part, ...]) -> Phrase:
     return fill(template, {"moment": named(parts[0])})
 
 
-def _pointing(parts: tuple[Part, ...]) -> Phrase:
+def _pointing(_request: Request, parts: tuple[Part, ...]) -> Phrase:
     return anaphor("that moment", "that", parts[0].slot, parts[0].value)
 
 
-def _rivals(parts: tuple[Part, ...]) -> list[Phrase]:
+def _rivals(_request: Request, parts: tuple[Part, ...]) -> list[Phrase]:
     values = tuple(templates.MOMENTS)
     sentences = templates.COMPETING_MOMENT_DISTRACTORS
     return rival_sentences(sentences, values, lambda value: templates.MOMENTS[str(value)], parts)

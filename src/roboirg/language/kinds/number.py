@@ -32,11 +32,11 @@ def introduce_quantity(request: Request, slot: str, quantity: int) -> Phrase:
     return fill(template, {"number": antecedent(cardinal(quantity), slot, quantity)})
 
 
-def _pointing(parts: tuple[Part, ...]) -> Phrase:
+def _pointing(_request: Request, parts: tuple[Part, ...]) -> Phrase:
     return anaphor("that number", "that", parts[0].slot, parts[0].value)
 
 
-def rivals(parts: tuple[Part, ...]) -> list[Phrase]:
+def rivals(_request: Request, parts: tuple[Part, ...]) -> list[Phrase]:
     """Remarks that name other numbers."""
     sentences = templates.COMPETING_NUMBER_DISTRACTORS
     return rival_sentences(sentences, RIVALS, lambda value: cardinal(int(value)), parts)

@@ -43,9 +43,9 @@ def _stated(_request: Request, parts: tuple[Part, ...]) -> Fields:
     return wrapped(part, antecedent(words, part.slot, part.value))
 
 
-def _reduced(_request: Request, parts: tuple[Part, ...]) -> Fields:
+def _reduced(request: Request, parts: tuple[Part, ...]) -> Fields:
     """``that visit``."""
-    return wrapped(parts[0], _pointing(parts))
+    return wrapped(parts[0], _pointing(request, parts))
 
 
 def _introduce(request: Request, parts: tuple[Part, ...]) -> Phrase:
@@ -64,16 +64,16 @@ def by_number(part: Part, value: Phrase) -> Fields:
     return wrapped(part, (*plain(f"the {part.kind} whose number is "), *value))
 
 
-def _pointing(parts: tuple[Part, ...]) -> Phrase:
+def _pointing(_request: Request, parts: tuple[Part, ...]) -> Phrase:
     (part,) = parts
     return anaphor(f"that {part.kind}", "that", part.slot, part.value)
 
 
-def _visit_rivals(parts: tuple[Part, ...]) -> list[Phrase]:
+def _visit_rivals(_request: Request, parts: tuple[Part, ...]) -> list[Phrase]:
     return rival_sentences(templates.COMPETING_VISIT_DISTRACTORS, VISITS, _word, parts)
 
 
-def _placement_rivals(parts: tuple[Part, ...]) -> list[Phrase]:
+def _placement_rivals(_request: Request, parts: tuple[Part, ...]) -> list[Phrase]:
     return rival_sentences(templates.COMPETING_PLACEMENT_DISTRACTORS, PLACEMENTS, _word, parts)
 
 

@@ -7,14 +7,15 @@ import itertools
 from roboirg.language import templates
 from roboirg.language.kinds import described
 from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, sentences
-from roboirg.language.request import Part, Request, other_colours
+from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, sentences
+from roboirg.language.request import Part, Request
 
 
 def _exclude(request: Request) -> Derived:
     """The colour that is not among two; a second target is the other one of the two."""
     target, *rest = request.coloured
-    pair = request.chooser.pick("pair", list(itertools.permutations(other_colours(target.colour))))
+    others = request.other_colours(target.colour)
+    pair = request.chooser.pick("pair", list(itertools.permutations(others)))
     both = " and ".join(pair)
     named = antecedent(both, REFERENCE, both)
     template = request.chooser.pick("pair introduction", templates.PAIR_INTRODUCTIONS)
@@ -38,7 +39,8 @@ def _exclude(request: Request) -> Derived:
 
 
 def _thing(request: Request, part: Part, template: str, fields: dict[str, Phrase]) -> Phrase:
-    return request.by_colour(fill(template, fields, plural=request.count_of(part) > 1))
+    words = {"thing": plain(request.task.commands.coloured), **fields}
+    return request.by_colour(fill(template, words, plural=request.count_of(part) > 1))
 
 
 def _singled(request: Request, part: Part, pair: tuple[str, ...]) -> Phrase:

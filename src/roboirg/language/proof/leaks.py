@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import cast
 
-from roboirg.episode import COLOURS, Goal, SlotValue
+from roboirg.episode import ALL_COLOURS, Goal, SlotValue
 from roboirg.language.instruction import Instruction
 
 _COLOUR_SLOTS = frozenset(("colour", "colours"))
@@ -23,7 +23,9 @@ _NUMBERS = {
     4: frozenset(("4", "four", "fours", "fourth", "4th")),
     5: frozenset(("5", "five", "fives", "fifth", "5th")),
 }
-_COLOUR_WORDS = frozenset((*COLOURS, "reds", "greens", "blues"))
+_COLOUR_WORDS = frozenset(
+    spelling for name in (*ALL_COLOURS, "grey") for spelling in (name, f"{name}s")
+)
 _TIME_WORDS = frozenset(
     ("before", "after", "earlier", "later", "previous", "previously", "next", "following")
 )
@@ -56,7 +58,7 @@ def _spellings(value: SlotValue) -> frozenset[str]:
     if isinstance(value, int):
         return _NUMBERS[value]
     # Any colour: naming another one tells something too.
-    return _COLOUR_WORDS if value in COLOURS else _TIME_WORDS
+    return _COLOUR_WORDS if value in ALL_COLOURS else _TIME_WORDS
 
 
 def _without_ranks(instruction: Instruction) -> str:

@@ -12,7 +12,7 @@ from roboirg.episode import DIFFICULTIES
 from roboirg.language.instruction import SETTINGS
 from roboirg.language.landmarks import FRAMES
 from roboirg.language.proof.evidence import Evidence, Placed, Told
-from roboirg.tasks import all_tasks
+from roboirg.tasks import every_task
 
 Group = TypeVar("Group", Told, Placed)
 
@@ -101,7 +101,7 @@ def _share(some: Mapping[Group, int], all_: Mapping[Group, int], group: Group) -
 def _tasks(names: Iterable[str]) -> list[str]:
     # Evidence comes in any order; tables have that of the registry.
     present = set(names)
-    return [task for task in all_tasks() if task in present]
+    return [task for task in every_task() if task in present]
 
 
 def _table(title: str, names: Iterable[str], numbers: Iterable[str]) -> Table:

@@ -15,6 +15,7 @@ _TAKING = word_set(
 _PUTTING = word_set("put place set lower return drop lay throw toss")
 _PRESSING = word_set("press push hit tap stop halt make let")
 _BEFORE_VERB = word_set(", ; : and then please to finally now after that next afterwards but first")
+_INTO = word_set("into inside in")
 _BARE_PRONOUNS = word_set("it them that")
 _SINGULAR = word_set("it cube one")
 
@@ -33,16 +34,23 @@ class Command(NamedTuple):
         text: all its words.
         handled: the words for each thing that is handled, in order; each thing once.
         added: the words for things of other colours that are only said to be put somewhere.
+        entered: the words for each thing that something is put into.
     """
 
     text: str
     handled: tuple[Sentence, ...]
     added: tuple[Sentence, ...] = ()
+    entered: tuple[Sentence, ...] = ()
 
     @property
     def things(self) -> tuple[Description, ...]:
         """What is told about the things one by one."""
         return tuple(describe(words) for words in self.handled)
+
+    @property
+    def boxes(self) -> tuple[Description, ...]:
+        """What is told about the things that something is put into."""
+        return tuple(describe(words) for words in self.entered)
 
     @property
     def items(self) -> tuple[Item, ...]:
@@ -70,7 +78,16 @@ def read_command(words: Sentence) -> Command:
         " ".join(words),
         tuple(clause[1:] for clause in fresh),
         tuple(clause[1:] for clause in added),
+        tuple(found for clause in clauses if (found := _entered(clause))),
     )
+
+
+def _entered(clause: Sentence) -> Sentence:
+    """``it`` of ``put the tape into it``; empty if nothing is put into anything."""
+    if clause[0] not in _TAKING | _PUTTING:
+        return ()
+    at = next((at for at, word in enumerate(clause) if word in _INTO), len(clause))
+    return clause[at + 1 :]
 
 
 def _goes_on(clause: Sentence) -> bool:

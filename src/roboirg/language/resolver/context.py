@@ -11,7 +11,7 @@ from roboirg.language.resolver.moments import Moment, Time, named_moments, time_
 from roboirg.language.resolver.ordinals import named_positions
 from roboirg.language.resolver.places import Place, read_places
 from roboirg.language.resolver.quantities import plain_numbers, quantities
-from roboirg.language.resolver.tokens import Sentence, colours_in
+from roboirg.language.resolver.tokens import COLOUR, Sentence, colours_in
 
 _DISMISSAL = re.compile(
     r"\b(never mind|nothing to do with|not matter|no matter|ignore|forget (about )?"
@@ -84,7 +84,7 @@ def _amounts(text: str) -> tuple[tuple[str, int], ...]:
     """``two of the red cubes and a blue one``."""
     found: list[tuple[str, int]] = []
     for one in quantities(text):
-        after = re.match(r"\s*(?:cubes? )?(?:of )?(?:the )?(red|green|blue)s?\b", text[one.end :])
+        after = re.match(rf"\s*(?:cubes? )?(?:of )?(?:the )?({COLOUR})s?\b", text[one.end :])
         if one.plain and after and one.told.quantity is not None:
             found.append((after[1], one.told.quantity))
     return tuple(found)

@@ -7,9 +7,17 @@ from typing import Literal, NamedTuple
 
 from roboirg.language.resolver.moments import Time, time_told
 from roboirg.language.resolver.places import Place, read_places
-from roboirg.language.resolver.tokens import Sentence, colour_of, colours_in, ordinal_of, word_set
+from roboirg.language.resolver.tokens import (
+    COLOUR,
+    Sentence,
+    colour_of,
+    colours_in,
+    ordinal_of,
+    word_set,
+)
 
 _PRONOUNS = word_set("it them")
+_POINTED = word_set("cube box tape one color")
 _PLACE_NOUNS = word_set("place spot position location")
 _SERIES_NOUNS = word_set("visit placement time pass placing stay occasion")
 _FORMER = {"former": 0, "latter": -1}
@@ -45,7 +53,7 @@ _THAN = re.compile(
 )
 _OTHER_OF = re.compile(r"\bthe other (?:one |color )?(?:of|in|from)\b")
 _ONE_NOT = re.compile(r"\bthe (?:one|color) (?:of|in|from)\b.*\b(?:not|other than|except)\b")
-_NOT = re.compile(r"\b(?:not|other than|except) (?:in |for |the )?(red|green|blue)\b")
+_NOT = re.compile(rf"\b(?:not|other than|except) (?:in |for |the )?({COLOUR})\b")
 
 
 def describe(words: Sentence) -> Description:
@@ -80,7 +88,7 @@ def _pointer(words: Sentence) -> Description | None:
         if position is not None and after not in _SERIES_NOUNS:
             kind: Kind = "introduced place" if after in _PLACE_NOUNS else "introduced"
             return Description(kind, times=times, position=position)
-        if word in _PRONOUNS or (before == "that" and word in ("cube", "one", "color")):
+        if word in _PRONOUNS or (before == "that" and word in _POINTED):
             return Description("introduced")
     return None
 

@@ -29,7 +29,8 @@ def tests_for(slots: Collection[str], command: Command, listener: Listener) -> l
     elif "colours" in slots:
         tests.append(_things_in_order(command, listener))
     if "colour" in slots:
-        colours = common(listener.objects(thing) for thing in command.things)
+        things = command.boxes if listener.chooses_box else command.things
+        colours = common(listener.objects(thing) for thing in things)
         tests.append(lambda goal: colours is None or goal.text("colour") in colours)
     if "repeats" in slots:
         tests.append(_number("repeats", listener.times(read_times(command.text))))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import TypeVar
 
-from roboirg.episode import Scene, SceneObject
+from roboirg.episode import ObjectKind, Scene, SceneObject
 from roboirg.language.resolver.command import Item
 from roboirg.language.resolver.context import Context
 from roboirg.language.resolver.descriptions import Description
@@ -17,6 +17,9 @@ from roboirg.language.resolver.standing import standing_at
 from roboirg.motions import Shuttle
 
 Told = TypeVar("Told")
+_CHOSEN: tuple[ObjectKind, ...] = ("container", "box", "tape")
+"""Kinds of things among which commands choose, rather than among cubes, the first that there is."""
+
 Amounts = dict[str, set[int] | None]
 """For each colour that is possible, how many; None if any number is."""
 
@@ -33,7 +36,13 @@ class Listener:
         self._scene = scene
         self._context = context
         self._times = times
-        self._kind = "container" if scene.of_kind("container") else "cube"
+        kinds = {item.kind for item in scene.objects}
+        self._kind = next((kind for kind in _CHOSEN if kind in kinds), "cube")
+
+    @property
+    def chooses_box(self) -> bool:
+        """Whether commands choose among boxes to put something into."""
+        return self._kind == "box"
 
     def objects(self, thing: Description) -> set[str] | None:
         """The colours that a description leaves open; None if it says nothing."""

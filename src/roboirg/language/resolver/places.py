@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from roboirg.episode import Scene, SceneObject
-from roboirg.language.resolver.tokens import Sentence, ordinal_of
+from roboirg.language.resolver.tokens import Sentence, colour_of, ordinal_of
 from roboirg.motions import Away
 
 Side = Literal["left", "right"]
@@ -26,7 +26,11 @@ _LISTENER = frozenset({"you", "robot", "yourself"})
 _FIXTURES = frozenset({"button", "target", "bin"})
 _FILLERS = frozenset({"the", "to", "from", "a", "on", "at"})
 _CORNER_FILLERS = frozenset({"of", "the", "table", "that", "is"})
-_COLOURS = frozenset({"red", "green", "blue"})
+_THINGS = frozenset({"cube", "container", "box", "tape"})
+_COLOURED = _THINGS - {"container"}
+_PAIRED = _COLOURED - {"cube"}
+_TO_A_SIDE = frozenset({"on", "to", "at"})
+_SIDE_FILLERS = frozenset({"the", "your", "far"})
 
 _MAX_DEPTH = 4
 """Places told by places told by ...: further down nobody follows."""
@@ -102,8 +106,27 @@ def _read(words: Sentence, at: int, depth: int = 0) -> tuple[Place, int] | None:
     if word in _MOST:
         return Towards(_MOST[word], 0), at + 1
     return (
-        _read_corner(words, at) or _read_extreme(words, at) or _read_relative(words, at, 1, depth)
+        _read_side(words, at)
+        or _read_corner(words, at)
+        or _read_extreme(words, at)
+        or _read_relative(words, at, 1, depth)
     )
+
+
+def _read_side(words: Sentence, at: int) -> tuple[Place, int] | None:
+    """``left box``, ``tape on your right``: of things that stand on either side."""
+    word, following = _word(words, at), _word(words, at + 1)
+    if word in _SIDES and following in _PAIRED:
+        return Towards(_SIDES[word], 0), at + 2
+    if word not in _PAIRED or following not in _TO_A_SIDE:
+        return None
+    after = at + 2
+    while _word(words, after) in _SIDE_FILLERS:
+        after += 1
+    side = _SIDES.get(_word(words, after))
+    if side is None or _word(words, after + 1) in ("corner", *_PAIRED):
+        return None
+    return Towards(side, 0), after + 1
 
 
 def _read_extreme(words: Sentence, at: int) -> tuple[Place, int] | None:
@@ -160,9 +183,9 @@ def _read_relative(words: Sentence, at: int, rank: int, depth: int) -> tuple[Pla
         return Towards(None, -1 if nearest else 1, rank), after + 1
     if noun in _FIXTURES:
         return _read_fixture(words, after, nearest=nearest, rank=rank)
-    if noun in _COLOURS and following == "cube":
-        return Beside(noun, "cube", nearest, rank), after + 2
-    if noun in ("cube", "container") and depth < _MAX_DEPTH:
+    if colour_of(noun) and following in _COLOURED:
+        return Beside(noun, following, nearest, rank), after + 2
+    if noun in _THINGS and depth < _MAX_DEPTH:
         inner = _read(words, _skip(words, after + 1), depth + 1)
         if inner is not None:
             return Beside(inner[0], noun, nearest, rank), inner[1]
@@ -262,6 +285,6 @@ def _anchors(place: Beside, scene: Scene, *, mirrored: bool) -> tuple[SceneObjec
     if not isinstance(place.anchor, str):
         return find(place.anchor, scene, place.kind, mirrored=mirrored)
     like = _present(scene, place.kind)
-    if place.anchor in _COLOURS:
+    if colour_of(place.anchor):
         like = [item for item in like if item.colour == place.anchor]
     return tuple(like) if len(like) == 1 else ()

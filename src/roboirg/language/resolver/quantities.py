@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
-from roboirg.language.resolver.tokens import NUMBER, Sentence, number_of
+from roboirg.language.resolver.tokens import COLOUR, NUMBER, THING, THINGS, Sentence, number_of
 
 _CONCEIVABLE = range(1, 11)
 """What a quantity that was not heard may have been."""
@@ -42,7 +42,7 @@ class Quantity(NamedTuple):
     plain: bool = False
 
 
-_NOUNS = r"(?: (?:times?|cubes?|ones?|visits?|red|green|blue|such|of|the|them))"
+_NOUNS = rf"(?: (?:times?|{THING}|{THINGS}|ones?|visits?|{COLOUR}|such|of|the|them))"
 _TO = rf"(?P<quantity>that|it|this|the|{NUMBER})\b"
 _MORE = "more|larger|greater|higher|bigger|above|over"
 _LESS = "fewer|less|smaller|lower|below|under"
@@ -61,14 +61,15 @@ _SOME = re.compile(r"\ba (?:couple|pair) of\b")
 _ADVERB = re.compile(r"\b(?:once(?! (?:you|it|that|the|all|this))|twice|thrice)\b")
 _NOT_AFTER = (
     "the", "that", "this", "those", "these", "which", "other", "another", "every", "each", "any",
-    "some", "no", "than", "as", "from", "red", "green", "blue", "number", "visit", "placement",
+    "some", "no", "than", "as", "from", "red", "green", "blue", "yellow", "gray", "purple",
+    "number", "visit", "placement",
 )  # fmt: skip
 _POINTED = "".join(rf"(?<!\b{word} )" for word in _NOT_AFTER)
 """After these words a number word only points, as in ``those two``, ``the red one``."""
 _PLAIN = re.compile(rf"{_POINTED}\b(?P<number>{NUMBER})\b(?! times as)")
 _SINGLE = re.compile(
     r"(?<!\bas )(?<!\bthan )(?<!\bto )(?<!\bfrom )(?<!\bof )(?<!\bhides )(?<!\bover )"
-    r"\b(?:an?|the)(?: single)? (?=(?:red|green|blue) (?:cube|one)\b)"
+    rf"\b(?:an?|the)(?: single)? (?={COLOUR} (?:{THING}|one)\b)"
 )
 _FACTORS = {"twice": 2.0, "double": 2.0, "thrice": 3.0, "triple": 3.0, "half": 0.5}
 _ADVERBS = {"once": 1, "twice": 2, "thrice": 3}

@@ -13,6 +13,7 @@ _SPELLINGS = (
     ("n't", " not"),
     ("colour", "color"),
     ("neighbour", "neighbor"),
+    ("grey", "gray"),
 )
 
 _NUMBERS = {
@@ -23,13 +24,18 @@ _ORDINALS = {
     "first": 1, "second": 2, "third": 3, "fourth": 4, "fifth": 5,
     "1st": 1, "2nd": 2, "3rd": 3, "4th": 4, "5th": 5,
 }  # fmt: skip
-_COLOURS = {"red": "red", "reds": "red", "green": "green", "greens": "green",
-            "blue": "blue", "blues": "blue"}  # fmt: skip
+_COLOUR_NAMES = ("red", "green", "blue", "yellow", "gray", "purple")
+_COLOURS = {word: name for name in _COLOUR_NAMES for word in (name, f"{name}s")}
 
 NUMBER = rf"(?:{'|'.join(_NUMBERS)}|[0-9]+)"
 """A regular expression for a cardinal number, in words or digits."""
 ORDINAL = rf"(?:{'|'.join(_ORDINALS)})"
 """The same for an ordinal number."""
+COLOUR = rf"(?:{'|'.join(_COLOUR_NAMES)})"
+"""The same for a colour."""
+THING = r"(?:cube|box|tape)"
+"""The same for one of the things that have colours; the plural is `THINGS`."""
+THINGS = r"(?:cubes|boxes|tapes)"
 
 
 def word_set(words: str) -> frozenset[str]:

@@ -36,7 +36,8 @@ def reinforcement(request: Request) -> Said:
     remarks: list[Phrase] = []
     for kind, parts in kinds_in(request):
         template = request.chooser.pick(f"{kind.name} reinforcement", kind.reinforcements)
-        remarks.append(fill(template, {"ref": kind.pointing(parts)}, plural=kind.plural(parts)))
+        pointing = kind.pointing(request, parts)
+        remarks.append(fill(template, {"ref": pointing}, plural=kind.plural(parts)))
     return Said("reinforcement", sentences(remarks))
 
 
@@ -53,7 +54,7 @@ def _neutral(request: Request) -> Iterator[Phrase]:
 
 
 def _competing(request: Request) -> Iterator[Phrase]:
-    rivals = [rival for kind, parts in kinds_in(request) for rival in kind.rivals(parts)]
+    rivals = [rival for kind, parts in kinds_in(request) for rival in kind.rivals(request, parts)]
     return request.chooser.endless("competing distractor", rivals)
 
 

@@ -1,0 +1,122 @@
+"""PickByCount: pick the yellow or the gray tape and place it on the target, once or twice.
+
+Suite of the real robot, this is its twin. Nothing marks the end: an operator waits whether the
+robot goes on, and so does the judge. Facts: the paper's study with a real robot. Difficulties do
+not differ.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from roboirg.conditions import Elapsed, Fact, Rule
+from roboirg.episode import Colour, Difficulty, Goal, Primitive, Scene, Stage
+from roboirg.tasks.fixtures import ORDINALS, draw_number, draw_target
+from roboirg.tasks.placement import Circle, Footprint, Region
+from roboirg.tasks.real_table import Side, draw_sides, draw_tape, on_side
+from roboirg.tasks.task import Commands, Task, Wording
+
+TAPES: tuple[Colour, ...] = ("yellow", "gray")
+REPEATS = (1, 2)
+
+TARGET_REGION = Region(0.06, 0.0, 0.1, 0.1)
+TARGET_RADIUS = 0.05
+LEFT_TAPE_REGION = Region(-0.09, 0.14, 0.11, 0.09)
+TAPE_GAP = 0.03
+WAIT_STEPS = 140
+"""How long all tapes have to be left alone in the end, control steps: whoever goes on has picked
+one up by then. The longest pick of RoboMME's data takes 137."""
+
+
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+    """The target, a tape on either side; sides, target tape and number are uniform."""
+    del difficulty
+    target = draw_target(rng, "target", TARGET_RADIUS, TARGET_REGION, 0.0, ())
+    obstacles: list[Footprint] = [Circle(target.position.x, target.position.y, TARGET_RADIUS)]
+    left, right = draw_sides(rng, TAPES)
+    sides: dict[Colour, Side] = {left: "left", right: "right"}
+    tapes = tuple(
+        draw_tape(
+            rng,
+            f"tape_{colour}",
+            colour,
+            on_side(LEFT_TAPE_REGION, sides[colour]),
+            TAPE_GAP,
+            obstacles,
+        )
+        for colour in TAPES
+    )
+    chosen = TAPES[int(rng.integers(len(TAPES)))]
+    goal = Goal.of(colour=str(chosen), repeats=draw_number(rng, REPEATS))
+    return Scene((*tapes, target)), goal
+
+
+def goals(scene: Scene) -> tuple[Goal, ...]:
+    """Every tape of the scene, once or twice."""
+    return tuple(
+        Goal.of(colour=str(tape.colour), repeats=repeats)
+        for tape in scene.of_kind("tape")
+        for repeats in range(REPEATS[0], REPEATS[1] + 1)
+    )
+
+
+def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
+    """Pick and place, as often as wanted, then leave all tapes alone for a while."""
+    colour = goal.text("colour")
+    tape = f"tape_{colour}"
+    wrong = tuple(
+        Rule(Fact("picked", item.name), f"picked up the {item.colour} tape", failure="wrong_object")
+        for item in scene.of_kind("tape")
+        if item.name != tape
+    )
+    again = Rule(Fact("picked", tape), f"picked up the {colour} tape again", failure="wrong_count")
+    plan: list[Stage] = []
+    for ordinal in ORDINALS[: goal.number("repeats")]:
+        pick = Stage(
+            expects=Fact("picked", tape),
+            forbids=wrong,
+            primitive=Primitive("pick_cube", tape),
+            subgoal=f"pick up the {colour} tape {{at}} for the {ordinal} time",
+            points_at=tape,
+        )
+        put = Stage(
+            expects=Fact("placed", tape, "target"),
+            forbids=wrong,
+            primitive=Primitive("place_on", tape, "target"),
+            subgoal=f"place the {colour} tape onto the target {{at}}",
+            points_at="target",
+        )
+        plan += [pick, put]
+    leave = Stage(
+        expects=Elapsed(WAIT_STEPS, timer="left alone"),
+        forbids=(again, *wrong),
+        primitive=Primitive("retreat", "robot", steps=WAIT_STEPS),
+        subgoal="leave the tapes where they are",
+        timer="left alone",
+    )
+    return (*plan, leave)
+
+
+COMMANDS = Commands(
+    thing="tape",
+    coloured="tape",
+    colours=TAPES,
+    by_place="the tape {place}",
+    patterns=("number deduction",),
+    wordings=(
+        Wording("Take {colour} and place it on the target {repeats}."),
+        Wording("Grab {colour} and set it on the target {repeats}."),
+        Wording("I want you to take {colour} and put it down on the target {repeats}."),
+    ),
+)
+
+TASK = Task(
+    name="PickByCount",
+    suite="real",
+    code=13,
+    spatial=True,
+    sample=sample,
+    goals=goals,
+    stages=stages,
+    commands=COMMANDS,
+)

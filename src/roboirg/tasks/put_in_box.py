@@ -1,0 +1,105 @@
+"""PutInBox: put the yellow tape into the green or the purple box.
+
+Suite of the real robot, this is its twin. What has to be understood is which box; the tape is the
+only one. Facts: the paper's study with a real robot; a tape that is put into the wrong box, an
+operator counts as a failure, and so does the judge. Difficulties do not differ.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from roboirg.conditions import Fact, Rule
+from roboirg.episode import Colour, Difficulty, Goal, Primitive, Scene, Stage
+from roboirg.tasks.placement import Footprint, Region
+from roboirg.tasks.real_table import (
+    Side,
+    box_footprint,
+    draw_box,
+    draw_sides,
+    draw_tape,
+    on_side,
+)
+from roboirg.tasks.task import Commands, Task, Wording
+
+BOXES: tuple[Colour, ...] = ("green", "purple")
+TAPE: Colour = "yellow"
+
+LEFT_BOX_REGION = Region(0.03, 0.15, 0.05, 0.05)
+TAPE_REGION = Region(-0.13, 0.0, 0.08, 0.18)
+TAPE_GAP = 0.03
+
+
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+    """A box on either side, the tape before them; sides and target box are uniform."""
+    del difficulty
+    left, right = draw_sides(rng, BOXES)
+    sides: dict[Colour, Side] = {left: "left", right: "right"}
+    boxes = tuple(
+        draw_box(rng, f"box_{colour}", colour, on_side(LEFT_BOX_REGION, sides[colour]))
+        for colour in BOXES
+    )
+    obstacles: list[Footprint] = [box_footprint(box) for box in boxes]
+    tape = draw_tape(rng, "tape", TAPE, TAPE_REGION, TAPE_GAP, obstacles)
+    goal = Goal.of(colour=str(BOXES[int(rng.integers(len(BOXES)))]))
+    return Scene((*boxes, tape)), goal
+
+
+def goals(scene: Scene) -> tuple[Goal, ...]:
+    """Every box of the scene."""
+    return tuple(Goal.of(colour=str(box.colour)) for box in scene.of_kind("box"))
+
+
+def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
+    """Pick the tape and put it into the box, and into no other."""
+    target = f"box_{goal.text('colour')}"
+    wrong = tuple(
+        Rule(
+            Fact("binned", "tape", box.name),
+            f"put the tape into the {box.colour} box",
+            failure="wrong_place",
+        )
+        for box in scene.of_kind("box")
+        if box.name != target
+    )
+    pick = Stage(
+        expects=Fact("picked", "tape"),
+        forbids=wrong,
+        primitive=Primitive("pick_cube", "tape"),
+        subgoal="pick up the tape {at}",
+        points_at="tape",
+    )
+    put_in = Stage(
+        expects=Fact("binned", "tape", target),
+        forbids=wrong,
+        primitive=Primitive("put_into", "tape", target),
+        subgoal=f"put the tape into the {goal.text('colour')} box {{at}}",
+        points_at=target,
+    )
+    return pick, put_in
+
+
+COMMANDS = Commands(
+    thing="box",
+    coloured="box",
+    # Excluding the tape's colour and that of a box leaves the other box.
+    colours=(*BOXES, TAPE),
+    by_place="the box {place}",
+    patterns=("colour exclusion",),
+    wordings=(
+        Wording("Put the tape into {colour}."),
+        Wording("Please place the tape into {colour}."),
+        Wording("I want you to put the tape into {colour}."),
+    ),
+)
+
+TASK = Task(
+    name="PutInBox",
+    suite="real",
+    code=12,
+    spatial=True,
+    sample=sample,
+    goals=goals,
+    stages=stages,
+    commands=COMMANDS,
+)

@@ -1,0 +1,182 @@
+"""Boxes and rolls of tape in the simulator: sizes, masses, holes, and what comes of using them."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+import roboirg
+from roboirg.conditions import Fact
+from roboirg.episode import Goal, Primitive, Scene, SceneObject
+from roboirg.motions import Point
+from roboirg.policies import play
+from roboirg.policies.handed import HandedPolicy
+from roboirg.simulation import settings
+from roboirg.simulation.hands import Hands
+from roboirg.simulation.world import World
+from roboirg.splits import get_episode
+from roboirg.tasks import geometry
+
+pytestmark = pytest.mark.sim
+
+TAPE = SceneObject("tape", "tape", Point(0.0, 0.0, geometry.TAPE_HALF), 0.0, "yellow")
+BOX = SceneObject("box_green", "box", Point(0.0, 0.0, geometry.BOX_HEIGHT / 2), 0.2, "green")
+HALF_OPEN = -0.1
+"""A gripper action at which each finger is 0.0125 from the middle: one fits into the hole."""
+
+
+class Mistaken(HandedPolicy):
+    """The oracle's hands with another goal in mind."""
+
+    def __init__(self, goal):
+        super().__init__()
+        self.goal = goal
+
+    def decide(self, env, instruction):
+        return self.goal
+
+
+def rest(world, steps):
+    for _ in range(steps):
+        world.step(settings.HOME_ACTION)
+    return world
+
+
+def execute(world, pieces, gripper=None):
+    for action in itertools.chain.from_iterable(pieces):
+        if gripper is not None:
+            action[-1] = gripper
+        world.step(action)
+
+
+def dropped(x, y, height, box=BOX):
+    """The world after a tape has fallen from a height and come to rest."""
+    tape = SceneObject("tape", "tape", Point(x, y, height), 0.7, "yellow")
+    return rest(World(Scene((box, tape)), visible=False), 40)
+
+
+def test_a_roll_weighs_about_as_much_as_a_cube_and_lies_still():
+    world = rest(World(Scene((TAPE,)), visible=False), 40)
+    body = world.bodies["tape"]
+    assert 0.05 <= body.physics.mass <= 0.1
+    assert body.position == pytest.approx(TAPE.position, abs=1e-4)
+    assert Fact("lying", "tape") in world.facts
+
+
+def test_a_roll_is_picked_from_outside():
+    world = World(Scene((TAPE,)), visible=False)
+    execute(world, Hands(world).perform(Primitive("pick_cube", "tape")))
+    assert Fact("picked", "tape") in world.facts
+    assert Fact("held", "tape") in world.facts
+
+
+def test_a_roll_is_picked_by_its_wall():
+    """A finger fits into the hole; the wall is what is held then."""
+    world = World(Scene((TAPE,)), visible=False)
+    hands = Hands(world)
+    rotation = hands._rotation()  # closes along y
+    middle = (geometry.TAPE_RADIUS + geometry.TAPE_HOLE_RADIUS) / 2
+    above, at = (Point(0.0, middle, z) for z in (0.15, geometry.TAPE_HALF))
+    execute(world, [hands._move(above, rotation)], HALF_OPEN)
+    execute(world, [hands._grip(settings.OPEN)], HALF_OPEN)
+    execute(world, [hands._move(at, rotation)], HALF_OPEN)
+    assert world.bodies["tape"].position == pytest.approx(TAPE.position, abs=2e-3)
+    execute(world, [hands._grip(settings.CLOSED)])
+    wall = geometry.TAPE_RADIUS - geometry.TAPE_HOLE_RADIUS
+    assert world.robot.finger_positions.sum() == pytest.approx(wall, abs=3e-3)
+    execute(world, [hands._move(above, rotation)])
+    assert Fact("picked", "tape") in world.facts
+
+
+@pytest.mark.parametrize(("x", "y"), [(0.0, 0.0), (0.03, 0.0), (-0.02, 0.03)])
+def test_a_box_takes_in_what_falls_between_its_walls(x, y):
+    world = dropped(x, y, 0.12)
+    # One that has touched a wall may stand on its edge.
+    low, high = (geometry.BOX_FLOOR + size for size in (geometry.TAPE_HALF, geometry.TAPE_RADIUS))
+    assert low - 1e-3 <= world.bodies["tape"].position.z <= high + 1e-3
+    assert Fact("binned", "tape", "box_green") in world.facts
+    assert world.bodies["box_green"].position == pytest.approx(BOX.position)
+
+
+def test_beside_a_box_is_not_inside():
+    world = dropped(0.0, 0.11, 0.02)
+    assert Fact("lying", "tape") in world.facts
+    assert Fact("binned", "tape", "box_green") not in world.facts
+
+
+def test_what_is_held_over_a_box_is_not_inside():
+    episode = get_episode("PutInBox", "test", 0)
+    world = World(episode.scene, visible=False)
+    hands, box = Hands(world), f"box_{episode.goal.text('colour')}"
+    execute(world, hands.perform(Primitive("pick_cube", "tape")))
+    into = hands.perform(Primitive("put_into", "tape", box))
+    inside = Fact("binned", "tape", box)
+    execute(world, itertools.islice(into, 2))
+    assert inside not in world.facts
+    execute(world, into)
+    assert inside in world.facts
+
+
+@pytest.mark.parametrize("index", [1, 11, 27, 73])  # the last three: where 0.06 would be too high
+def test_a_box_is_open_and_the_hand_does_not_touch_it(index):
+    episode = get_episode("PutInBox", "train", index)
+    env = roboirg.make(episode, cameras=())
+    touched = set()
+
+    def look(env, _demonstration):
+        world = env.session.world
+        for contact in world._physics.get_contacts():
+            names = {body.entity.name for body in contact.bodies}
+            forces = [np.linalg.norm(point.impulse) for point in contact.points]
+            if any(forces) and any(name.startswith("box") for name in names):
+                touched.update(names)
+
+    env.set_frame_hook(look)
+    assert play(env, Mistaken(episode.goal))["status"] == "success"
+    assert touched <= {"tape", f"box_{episode.goal.text('colour')}"}
+
+
+@pytest.mark.parametrize("index", range(4))
+def test_the_other_box_is_a_failure(index):
+    episode = get_episode("PutInBox", "val", index)
+    mine = episode.goal.text("colour")
+    other = {"green": "purple", "purple": "green"}[mine]
+    info = play(roboirg.make(episode, cameras=()), Mistaken(Goal.of(colour=other)))
+    assert info["status"] == "failure"
+    assert info["cause"] == (
+        f"put the tape into the {other} box while due: put the tape into the {mine} box"
+    )
+
+
+def of_number(repeats):
+    episodes = (get_episode("PickByCount", "val", index) for index in range(50))
+    return next(one for one in episodes if one.goal.number("repeats") == repeats)
+
+
+def test_once_too_often_is_a_failure():
+    episode = of_number(1)
+    colour = episode.goal.text("colour")
+    again = Mistaken(Goal.of(colour=colour, repeats=2))
+    info = play(roboirg.make(episode, cameras=()), again)
+    assert info["status"] == "failure"
+    assert info["cause"].startswith(f"picked up the {colour} tape again")
+
+
+def test_once_too_few_runs_out_of_time():
+    episode = of_number(2)
+    once = Mistaken(Goal.of(colour=episode.goal.text("colour"), repeats=1))
+    info = play(roboirg.make(episode, cameras=(), max_steps=700), once)
+    assert info["status"] == "timeout"
+
+
+def test_the_hole_is_seen():
+    """Through the hole the front camera sees the disc on which the roll lies."""
+    disc = SceneObject("target", "target", Point(0.0, 0.0, 0.005), radius=0.05)
+    world = rest(World(Scene((disc, TAPE))), 2)
+    seen = world.cameras.segmentation("front")
+    tape, target = (world.bodies[name].entity.per_scene_id for name in ("tape", "target"))
+    rows, columns = np.nonzero(seen == tape)
+    inside = seen[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
+    middle = inside[:, inside.shape[1] // 2]
+    first, last = np.flatnonzero(middle == tape)[[0, -1]]
+    assert target in middle[first:last]

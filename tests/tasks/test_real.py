@@ -1,0 +1,167 @@
+"""The tasks of the real robot: beside the benchmark, what their scenes hold, and their rules."""
+
+import functools
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from roboirg.conditions import Fact
+from roboirg.episode import BENCHMARK_SUITES, DIFFICULTIES, SUITES, Goal
+from roboirg.errors import SceneRejectedError, UnknownNameError
+from roboirg.judging import Judge, Status
+from roboirg.language import variants
+from roboirg.tasks import all_tasks, every_task, find_tasks, get_task, pick_by_count, put_in_box
+from roboirg.tasks.pick_by_count import WAIT_STEPS
+from roboirg.tasks.placement import Rectangle, Region
+from roboirg.tasks.real_table import draw_tape, left_to_right, on_side
+
+REAL = ("PutInBox", "PickByCount")
+MODULES = {"PutInBox": put_in_box, "PickByCount": pick_by_count}
+PAIRS = {"PutInBox": ("box", {"green", "purple"}), "PickByCount": ("tape", {"yellow", "gray"})}
+SEEDS = 400
+
+each_task = pytest.mark.parametrize("task", REAL)
+
+
+@functools.cache
+def scenes(task):
+    return [MODULES[task].sample(np.random.default_rng(seed), "easy") for seed in range(SEEDS)]
+
+
+def test_the_benchmark_is_eleven_tasks_and_the_real_ones_are_beside_it():
+    assert tuple(all_tasks(("real",))) == REAL
+    assert len(all_tasks()) == 11
+    assert tuple(every_task()) == (*all_tasks(), *REAL)
+    assert {task.suite for task in all_tasks().values()} == set(BENCHMARK_SUITES)
+    assert {task.suite for task in every_task().values()} == set(SUITES)
+    assert not {one.task for one in variants.all_variants()} & set(REAL)
+
+
+def test_tasks_are_meant_by_name_by_suite_or_all_together():
+    assert find_tasks(["all"]) == tuple(all_tasks())
+    assert find_tasks(["StopCube", "real", "PickByCount"]) == ("StopCube", *REAL)
+    assert find_tasks(["PickByCount", "All"]) == (*all_tasks(), "PickByCount")
+    assert set(find_tasks(SUITES)) == set(every_task())
+    for wrong in ("PutInBoxx", "realy"):
+        with pytest.raises(UnknownNameError, match=rf"no task '{wrong}'.*Did you mean"):
+            find_tasks(["all", wrong])
+
+
+@each_task
+def test_difficulties_do_not_differ(task):
+    for seed in range(20):
+        drawn = {MODULES[task].sample(np.random.default_rng(seed), one) for one in DIFFICULTIES}
+        assert len(drawn) == 1
+
+
+@each_task
+def test_one_of_the_pair_is_on_the_robot_s_left_and_one_on_its_right(task):
+    kind, colours = PAIRS[task]
+    orders = Counter()
+    for scene, _ in scenes(task):
+        left, right = sorted(scene.of_kind(kind), key=lambda item: -item.position.y)
+        assert left.position.y > 0.05 > -0.05 > right.position.y
+        assert left_to_right(scene, kind) == (left.colour, right.colour)
+        assert {left.colour, right.colour} == colours
+        orders[left.colour] += 1
+    # 200 expected; five standard deviations of a fair draw are 50.
+    assert all(150 <= count <= 250 for count in orders.values())
+
+
+@each_task
+def test_every_goal_is_as_likely_on_either_side(task):
+    kind, _ = PAIRS[task]
+    found = Counter(
+        (goal, left_to_right(scene, kind).index(goal.text("colour")))
+        for scene, goal in scenes(task)
+    )
+    assert len(found) == 2 * len(get_task(task).goals(scenes(task)[0][0]))
+    expected = SEEDS / len(found)
+    assert all(abs(count - expected) <= 5 * expected**0.5 for count in found.values())
+
+
+def test_regions_are_mirrored():
+    region = Region(0.1, 0.2, 0.01, 0.02)
+    assert on_side(region, "left") == region
+    assert on_side(region, "right") == Region(0.1, -0.2, 0.01, 0.02)
+
+
+def test_a_tape_without_a_place_rejects_the_seed():
+    region, full = Region(0, 0, 0.1, 0.1), [Rectangle(0, 0, 1, 1)]
+    with pytest.raises(SceneRejectedError, match="no place for tape"):
+        draw_tape(np.random.default_rng(0), "tape", "yellow", region, 0.0, full)
+
+
+def judged(task, goal, *steps):
+    """The judge after one evaluation for each set of facts."""
+    scene, _ = scenes(task)[0]
+    judge = Judge(get_task(task).stages(scene, goal), scene)
+    for number, facts in enumerate(steps):
+        judge.update(number, frozenset(facts))
+    return judge
+
+
+def test_the_tape_belongs_into_the_one_box():
+    picked = Fact("picked", "tape")
+    inside = {colour: Fact("binned", "tape", f"box_{colour}") for colour in ("green", "purple")}
+    goal = Goal.of(colour="green")
+    # Dropped beside the boxes, it may be picked up again.
+    dropped = ([picked], [], [Fact("lying", "tape")], [picked], [])
+    assert judged("PutInBox", goal, *dropped).status is Status.ONGOING
+    assert judged("PutInBox", goal, *dropped, [inside["green"]]).status is Status.SUCCESS
+    wrong = judged("PutInBox", goal, [picked], [], [inside["purple"]])
+    assert wrong.status is Status.FAILURE
+    assert (
+        wrong.cause == "put the tape into the purple box while due: put the tape into the green box"
+    )
+    assert judged("PutInBox", goal, [inside["purple"]]).status is Status.FAILURE
+
+
+PICKED, PLACED = Fact("picked", "tape_gray"), Fact("placed", "tape_gray", "target")
+CYCLE = ([PICKED], [], [PLACED])
+OTHER = Fact("picked", "tape_yellow")
+
+
+def waiting(steps):
+    return [[PLACED]] * steps
+
+
+@pytest.mark.parametrize("repeats", [1, 2])
+def test_as_often_as_wanted_and_then_no_more(repeats):
+    goal = Goal.of(colour="gray", repeats=repeats)
+
+    def after(*steps):
+        return judged("PickByCount", goal, *CYCLE * repeats, *steps)
+
+    # The last placement is evaluation 3 N - 1; the wait begins with the next.
+    assert after(*waiting(WAIT_STEPS)).status is Status.ONGOING
+    assert after(*waiting(WAIT_STEPS + 1)).status is Status.SUCCESS
+    again = after(*waiting(WAIT_STEPS - 1), [PICKED])
+    assert again.status is Status.FAILURE
+    assert again.cause.startswith("picked up the gray tape again while due: leave the tapes")
+    assert after([OTHER]).status is Status.FAILURE
+
+
+def test_too_few_is_no_success_however_long_one_waits():
+    goal = Goal.of(colour="gray", repeats=2)
+    judge = judged("PickByCount", goal, *CYCLE, *waiting(3 * WAIT_STEPS))
+    assert (judge.status, judge.index) == (Status.ONGOING, 2)
+
+
+def test_the_other_tape_is_not_to_be_picked():
+    goal = Goal.of(colour="gray", repeats=1)
+    assert judged("PickByCount", goal, [OTHER]).cause.startswith("picked up the yellow tape while")
+    assert judged("PickByCount", goal, [PICKED], [OTHER]).status is Status.FAILURE
+    # Beside the target, and once more.
+    beside = ([PICKED], [Fact("lying", "tape_gray")], *CYCLE, *waiting(WAIT_STEPS + 1))
+    assert judged("PickByCount", goal, *beside).status is Status.SUCCESS
+
+
+def test_failures_are_named():
+    scene, _ = scenes("PickByCount")[0]
+    *_, leave = get_task("PickByCount").stages(scene, Goal.of(colour="gray", repeats=1))
+    assert [rule.failure for rule in leave.forbids] == ["wrong_count", "wrong_object"]
+    scene, _ = scenes("PutInBox")[0]
+    for stage in get_task("PutInBox").stages(scene, Goal.of(colour="green")):
+        assert [rule.failure for rule in stage.forbids] == ["wrong_place"]
