@@ -8,9 +8,9 @@ import pytest
 
 from roboirg.analysis import cards
 from roboirg.analysis.report import render, write_report
+from roboirg.evaluation.course import Course, describe
 from roboirg.evaluation.plan import Plan
 from roboirg.evaluation.record import EventRecord, MentionSpan, Record, Turn
-from roboirg.evaluation.rollout import Course, describe
 from roboirg.evaluation.store import RecordStore, StoreError
 
 pytest.importorskip("jinja2")
@@ -63,11 +63,13 @@ def records() -> list[Record]:
     found = []
     for index, job in enumerate(PLAN.jobs()):
         events = [EventRecord(step=40, kind="picked", subject="cube_red")]
-        course = Course("success", None, steps=80, events=events)
+        course = Course("success", cause=None, steps=80, events=events)
         if index % 3 == 1:
-            course = Course("failure", "picked the wrong cube", steps=50, events=events)
+            course = Course("failure", cause="picked the wrong cube", steps=50, events=events)
         if index % 7 == 6:
-            course = Course("error", "policy: ValueError: <b>&", details="Traceback <x>")
+            course = Course(
+                "error", error="policy", cause="policy: ValueError: <b>&", details="Traceback <x>"
+            )
         found.append(describe(job, course, started_at="now"))
     return found
 
@@ -97,7 +99,7 @@ def test_the_rules_are_filters_only_where_there_are_several() -> None:
         for split in ("test", "val")
         for seed in (0, 7)
     ]
-    many = [describe(job, Course("success", None), started_at="now") for job in jobs]
+    many = [describe(job, Course("success", cause=None), started_at="now") for job in jobs]
     page = Page(render(many))
     assert page.selects == [
         "policy", "task", "setting", "split", "seed", "limit", "outcome", "difficulty",
@@ -114,7 +116,9 @@ def test_the_rules_are_filters_only_where_there_are_several() -> None:
 def test_privileged_policies_are_marked() -> None:
     assert "listener (privileged)" in render(records())
     job = PLAN.jobs()[0].model_copy(update={"policy": "random"})
-    assert "rivileged" not in render([describe(job, Course("success", None), started_at="now")])
+    assert "rivileged" not in render(
+        [describe(job, Course("success", cause=None), started_at="now")]
+    )
 
 
 def test_words_are_escaped() -> None:
@@ -198,7 +202,7 @@ def test_each_difficulty_has_its_overview() -> None:
 
 def test_cells_say_how_sure_they_are() -> None:
     jobs = [job for job in PLAN.jobs() if job.setting in {"explicit", "direct"}]
-    lost = [describe(job, Course("failure", "it fell"), started_at="now") for job in jobs]
+    lost = [describe(job, Course("failure", cause="it fell"), started_at="now") for job in jobs]
     text = render(lost)
     assert re.search(r"0/3 · 0–56<", text)
     assert '<small class="muted">–</small>' in text

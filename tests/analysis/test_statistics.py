@@ -11,8 +11,8 @@ from roboirg.analysis.statistics import (
     make_panels,
     wilson_interval,
 )
+from roboirg.evaluation.course import Course, describe
 from roboirg.evaluation.record import Job, Record
-from roboirg.evaluation.rollout import Course, describe
 
 DIRECT = Variant("direct")
 
@@ -29,7 +29,7 @@ def record(outcome: str, episode: int = 0, setting: str = "explicit", **fields: 
         }
     )
     cause = None if outcome == "success" else "because"
-    return describe(job, Course(outcome, cause), started_at="now")  # type: ignore[arg-type]
+    return describe(job, Course(outcome, cause=cause), started_at="now")  # type: ignore[arg-type]
 
 
 # By hand, z = 1.96: 8 of 10 is 0.8 with weight 0.38415, centre 0.99207 / 1.38415 = 0.71674,

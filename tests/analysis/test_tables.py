@@ -6,8 +6,8 @@ from rich.console import Console
 
 from roboirg.analysis.statistics import EXPLICIT, Cell, Condition, Panel, Variant
 from roboirg.analysis.tables import NO_GAP, gap_text, points, print_failures, print_tables
+from roboirg.evaluation.course import Course, describe
 from roboirg.evaluation.record import Job, Record
-from roboirg.evaluation.rollout import Course, describe
 
 
 def record(
@@ -15,7 +15,7 @@ def record(
 ):
     told = {"setting": "direct", **told}
     job = Job(policy=policy, task="PickXtimes", split="test", episode=episode, **told)
-    return describe(job, Course(outcome, cause), started_at="now")
+    return describe(job, Course(outcome, cause=cause), started_at="now")
 
 
 def failures_text(records: list[Record], most: int = 10) -> str:

@@ -2,48 +2,24 @@
 
 from __future__ import annotations
 
-import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from roboirg.analysis.intervals import Interval, wilson_interval
 from roboirg.evaluation.record import (
     ALL_STAGES,
     DEFAULT_DISTRACTOR,
+    DEFAULT_DISTRACTORS,
     DEFAULT_FRAME,
+    DEFAULT_MESHES,
     Job,
-    Record,
+    Result,
 )
-
-Z_95 = 1.959963984540054
-"""Two-sided 95 % quantile of the normal distribution."""
+from roboirg.observations import DemonstrationFrames
 
 SETTING_ORDER = ("explicit", "direct", "reasoning", "contextual", "spatial")
-
-
-class Interval(NamedTuple):
-    """A 95 % confidence interval of a rate."""
-
-    low: float
-    high: float
-
-
-def wilson_interval(successes: int, trials: int, z: float = Z_95) -> Interval:
-    """Wilson's score interval of a binomial proportion.
-
-    Raises:
-        ValueError: not 0 <= successes <= trials, or no trial.
-    """
-    if not 0 <= successes <= trials or trials == 0:
-        raise ValueError(f"{successes} successes of {trials} trials are not a proportion")
-    rate, weight = successes / trials, z * z / trials
-    centre = (rate + weight / 2) / (1 + weight)
-    half = z * math.sqrt(rate * (1 - rate) / trials + weight / (4 * trials)) / (1 + weight)
-    # At the ends the formula gives 0 and 1 exactly; floating point need not.
-    low = 0.0 if successes == 0 else centre - half
-    high = 1.0 if successes == trials else centre + half
-    return Interval(low, high)
 
 
 class Variant(NamedTuple):
@@ -54,11 +30,12 @@ class Variant(NamedTuple):
     stages: tuple[int, ...] = ALL_STAGES
     distractor: str = DEFAULT_DISTRACTOR
     frame: str = DEFAULT_FRAME
+    distractors: int = DEFAULT_DISTRACTORS
 
     @classmethod
     def of(cls, job: Job) -> Variant:
         """How a job was told."""
-        return cls(job.setting, job.form, job.stages, job.distractor, job.frame)
+        return cls(**{name: getattr(job, name) for name in cls._fields})
 
     @property
     def label(self) -> str:
@@ -70,6 +47,8 @@ class Variant(NamedTuple):
             unusual.append("stages " + ",".join(map(str, self.stages)))
         if self.distractor != DEFAULT_DISTRACTOR:
             unusual.append(f"{self.distractor} distractor")
+        if self.distractors != DEFAULT_DISTRACTORS:
+            unusual.append(f"{self.distractors} distractors")
         if self.frame != DEFAULT_FRAME:
             unusual.append(f"{self.frame} frame")
         return f"{self.setting} ({', '.join(unusual)})" if unusual else self.setting
@@ -90,11 +69,15 @@ class Condition(NamedTuple):
     policy: str
     split: str
     max_steps: int
+    actions: str | None = None
+    demonstration_frames: DemonstrationFrames | None = None
+    observe_every: int | None = None
+    meshes: str = DEFAULT_MESHES
 
     @classmethod
     def of(cls, job: Job) -> Condition:
         """The condition of a job."""
-        return cls(job.policy, job.split, job.max_steps)
+        return cls(**{name: getattr(job, name) for name in cls._fields})
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,7 +161,7 @@ class Panel:
         return min(counts, default=0), max(counts, default=0)
 
 
-def make_panels(records: Sequence[Record], planned: Sequence[Job] = ()) -> tuple[Panel, ...]:
+def make_panels(records: Sequence[Result], planned: Sequence[Job] = ()) -> tuple[Panel, ...]:
     """One panel for each policy (and split and limit), in the order in which they appear.
 
     Args:
@@ -208,7 +191,7 @@ def make_panels(records: Sequence[Record], planned: Sequence[Job] = ()) -> tuple
 
 def _make_panel(
     condition: Condition,
-    records: Sequence[Record],
+    records: Sequence[Result],
     missing: Sequence[Job],
     *,
     label: str,
@@ -221,7 +204,7 @@ def _make_panel(
         for record in records
         if record.setting == "explicit" and record.outcome != "error"
     }
-    groups: dict[tuple[str | None, Variant], list[Record]] = defaultdict(list)
+    groups: dict[tuple[str | None, Variant], list[Result]] = defaultdict(list)
     lacking: dict[tuple[str | None, Variant], int] = defaultdict(int)
     for record in records:
         for row in (record.task, None):
@@ -241,7 +224,7 @@ def _make_panel(
 
 
 def _make_cell(
-    records: Sequence[Record], missing: int, explicit: Mapping[tuple[object, ...], bool]
+    records: Sequence[Result], missing: int, explicit: Mapping[tuple[object, ...], bool]
 ) -> Cell:
     outcomes = [record.outcome for record in records]
     pairs = [
@@ -261,7 +244,7 @@ def _make_cell(
     )
 
 
-def _pair_key(record: Record) -> tuple[object, ...]:
+def _pair_key(record: Result) -> tuple[object, ...]:
     """Same world, same policy, same luck: only the words differ."""
     return (record.task, record.episode, record.policy_seed)
 
@@ -272,4 +255,7 @@ def _label(condition: Condition, conditions: Sequence[Condition], *, privileged:
         label += f" · {condition.split}"
     if len({other.max_steps for other in conditions}) > 1:
         label += f" · at most {condition.max_steps} steps"
+    for name in ("actions", "demonstration_frames", "observe_every", "meshes"):
+        if len({getattr(other, name) for other in conditions}) > 1:
+            label += f" · {name.replace('_', ' ')} {getattr(condition, name)}"
     return label

@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from roboirg.analysis.statistics import EXPLICIT, Cell, Panel, Variant
-from roboirg.evaluation.record import Record
+from roboirg.evaluation.record import Result
 
 MINIMUM_WIDTH = 100
 """Columns to use where the output is not a terminal."""
@@ -81,9 +81,9 @@ def print_tables(panels: Sequence[Panel], console: Console) -> None:
     console.print(legend, style="dim", highlight=False)
 
 
-def print_failures(records: Iterable[Record], console: Console, most: int = MOST_FAILURES) -> None:
+def print_failures(records: Iterable[Result], console: Console, most: int = MOST_FAILURES) -> None:
     """Name the episodes of each policy that did not succeed, and why; the rest are counted."""
-    lost: dict[str, list[Record]] = {}
+    lost: dict[str, list[Result]] = {}
     for record in records:
         if record.outcome != "success":
             lost.setdefault(record.policy, []).append(record)
@@ -100,7 +100,7 @@ def print_failures(records: Iterable[Record], console: Console, most: int = MOST
             console.print(f"  and {len(failures) - most} more", highlight=False)
 
 
-def failure_text(record: Record) -> str:
+def failure_text(record: Result) -> str:
     """Which episode it was, how it was told, and what went wrong."""
     mark = ERROR_MARK if record.outcome == "error" else ""
     where = f"{record.task} {record.split}/{record.episode} {Variant.of(record).label}"

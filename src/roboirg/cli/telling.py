@@ -1,0 +1,162 @@
+"""The commands that tell results: ``roboirg tables`` and ``roboirg compare``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from roboirg.errors import InvalidValueError, UnknownNameError
+
+if TYPE_CHECKING:
+    from roboirg.analysis.samples import Samples
+    from roboirg.analysis.table import Table
+
+# Everything heavy is imported inside the commands, so that --help answers at once.
+
+MINIMUM_WIDTH = 120
+"""Columns to use where the output is not a terminal."""
+SEED = 20_240_607
+"""Of the bootstrap; the same records give the same words."""
+_ALL = "all"
+
+
+def tables(
+    runs: Annotated[
+        list[str] | None,
+        typer.Argument(help="The --out folders of runs; none with --published.", metavar="RUN"),
+    ] = None,
+    which: Annotated[
+        str, typer.Option(help="main, planner, context, real, coverage, or all that apply.")
+    ] = _ALL,
+    format: Annotated[  # noqa: A002
+        str, typer.Option(help="terminal, markdown, latex or csv.")
+    ] = "terminal",
+    published: Annotated[bool, typer.Option(help="Put the paper's own rows beside these.")] = False,
+    chance: Annotated[
+        bool, typer.Option(help="Add what the forgetful listener reaches on average.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for a file of each table, instead of printing.")
+    ] = None,
+) -> None:
+    """Print the paper's tables, made of the records of one or several runs."""
+    from roboirg.analysis.rendering import get_format
+
+    drawing = get_format(format)
+    found = _tables(which, _samples(runs or []), published=published, chance=chance)
+    if out is not None:
+        _write(found, out, drawing.suffix, format)
+    elif format == "terminal":
+        _print(found)
+    else:
+        typer.echo("\n".join(drawing.draw(table) for table in found), nl=False)
+
+
+def compare(
+    first: Annotated[str, typer.Argument(help="A run's folder, or RUN:policy.", metavar="A")],
+    second: Annotated[str, typer.Argument(help="Another, or the same run.", metavar="B")],
+) -> None:
+    """Say which of two policies is better where, on the same episodes, or that nobody can tell."""
+    import numpy as np
+    from rich.console import Console
+    from rich.text import Text
+
+    from roboirg.analysis.comparison import compare as compare_samples
+    from roboirg.analysis.comparison_words import sentences
+
+    ours, theirs = _one_policy(first), _one_policy(second)
+    found = compare_samples(ours, theirs, np.random.default_rng(SEED))
+    names = [found.first.policy, found.second.policy]
+    if names[0] == names[1]:
+        names = [f"{names[0]} ({first})", f"{names[1]} ({second})"]
+    console = Console()
+    if not console.is_terminal:
+        console.width = max(console.width, MINIMUM_WIDTH)
+    for sentence in sentences(found, *names):
+        console.print(Text(sentence), highlight=False)
+
+
+def _tables(which: str, samples: Samples, *, published: bool, chance: bool) -> list[Table]:
+    from roboirg.analysis.paper_tables import WHICH, has_something_to_say, make_table
+
+    if which == _ALL:
+        wanted: list[str] = [
+            one for one in WHICH if published or has_something_to_say(one, samples)
+        ]
+    elif which in WHICH:
+        wanted = [which]
+    else:
+        raise UnknownNameError("table", which, (*WHICH, _ALL))
+    if which not in (_ALL, "coverage") and not published and not samples:
+        raise InvalidValueError(
+            f"There is no run to make the table {which!r} of; give a folder, or --published."
+        )
+    found = [make_table(one, samples, published=published, chance=chance) for one in wanted]
+    if which not in (_ALL, "coverage") and not found[0].rows:
+        raise InvalidValueError(
+            f"The runs hold nothing that belongs into the table {which!r}; --which all shows what "
+            "they have."
+        )
+    return found
+
+
+def _print(found: list[Table]) -> None:
+    from rich.console import Console
+
+    from roboirg.analysis.rendering.terminal import renderable
+
+    console = Console()
+    if not console.is_terminal:
+        console.width = max(console.width, MINIMUM_WIDTH)
+    for table in found:
+        console.print(renderable(table, console), highlight=False)
+
+
+def _write(found: list[Table], folder: Path, suffix: str, name: str) -> None:
+    from roboirg.analysis.rendering import get_format
+    from roboirg.evaluation.store import StoreError, write_atomically
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StoreError(f"Cannot write to {folder}: {error.strerror}.") from error
+    for table in found:
+        path = folder / f"{table.key}{suffix}"
+        write_atomically(path, get_format(name).draw(table))
+        typer.echo(path)
+
+
+def _samples(runs: list[str]) -> Samples:
+    from roboirg.analysis.samples import gather
+    from roboirg.evaluation.plan import read_plan
+    from roboirg.evaluation.store import read_results
+
+    folders = [Path(run) for run in runs]
+    planned = [
+        job for folder in folders if (plan := read_plan(folder)) is not None for job in plan.jobs()
+    ]
+    results = [(str(folder), read_results(folder)) for folder in folders]
+    return gather(results, planned)
+
+
+def _one_policy(text: str) -> Samples:
+    """The samples of a run's folder, or of RUN:policy; policies may have colons in their names."""
+    folder, policy = _split(text)
+    samples = _samples([folder])
+    if policy is None:
+        return samples
+    names = list(dict.fromkeys(who.policy for who, _, _ in samples))
+    if policy not in names:
+        raise UnknownNameError(f"policy in {folder}", policy, names)
+    return {key: sample for key, sample in samples.items() if key[0].policy == policy}
+
+
+def _split(text: str) -> tuple[str, str | None]:
+    if Path(text).is_dir():
+        return text, None
+    for place, sign in enumerate(text):
+        if sign == ":" and Path(text[:place]).is_dir():
+            return text[:place], text[place + 1 :]
+    return text, None

@@ -1,0 +1,91 @@
+"""Results made up for tests: no simulator, no language, no files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from roboirg.analysis.published import TRIALS, published_rows
+from roboirg.analysis.statistics import Variant
+from roboirg.evaluation.record import Result
+
+MakeResult = Callable[..., Result]
+
+
+def make_result(outcome: str = "success", episode: int = 0, **fields: object) -> Result:
+    told = {
+        "policy": "listener",
+        "task": "PickXtimes",
+        "split": "test",
+        "setting": "explicit",
+        "seed": episode,
+        "difficulty": "easy",
+        "privileged": False,
+        "language_version": "1",
+        "environment_version": 1,
+        "package_version": "0",
+        **fields,
+    }
+    error = {"error": "policy"} if outcome == "error" else {}
+    return Result(outcome=outcome, episode=episode, **error, **told)  # type: ignore[arg-type]
+
+
+def with_rate(
+    successes: int,
+    episodes: int,
+    seeds: int,
+    rng: np.random.Generator,
+    variant: Variant,
+    **fields: object,
+) -> Iterable[Result]:
+    """A cell with exactly so many successes, on trials drawn by a generator."""
+    won = np.zeros(episodes * seeds, dtype=bool)
+    won[rng.permutation(len(won))[:successes]] = True
+    for number, success in enumerate(won.tolist()):
+        yield make_result(
+            "success" if success else "failure",
+            number // seeds,
+            policy_seed=number % seeds,
+            **variant._asdict(),
+            **fields,
+        )
+
+
+def like_published(table: str, only: str | None = None) -> list[Result]:
+    """Results with the rates of a published table, with its numbers of episodes and seeds."""
+    episodes, seeds = TRIALS[table]  # type: ignore[index]
+    rng = np.random.default_rng(8)
+    return [
+        result
+        for row in published_rows(table)
+        if only is None or row.model == only
+        for task, rate in row.rates.items()
+        if rate is not None
+        for result in with_rate(
+            round(Fraction(rate) * episodes * seeds / 100),
+            episodes,
+            seeds,
+            rng,
+            row.variant,
+            policy=row.model,
+            task=task,
+        )
+    ]
+
+
+@pytest.fixture(scope="session")
+def result() -> MakeResult:
+    return make_result
+
+
+@pytest.fixture(scope="session")
+def published_like() -> Callable[..., list[Result]]:
+    return like_published
+
+
+@pytest.fixture(scope="session")
+def cell_of() -> Callable[..., Iterable[Result]]:
+    return with_rate

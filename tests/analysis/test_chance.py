@@ -1,0 +1,67 @@
+"""The chance level against the forgetful listener itself, and by hand."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from roboirg.analysis.chance import chance_level, chance_of
+from roboirg.evaluation.plan import say
+from roboirg.evaluation.record import Job
+from roboirg.language.variants import all_variants
+from roboirg.policies.listeners import ForgetfulPolicy
+from roboirg.splits import get_episode
+from roboirg.tasks import all_tasks, get_task
+
+
+def job(task: str, setting: str, episode: int = 2, **fields: object) -> Job:
+    told = {"policy": "any", "split": "test", **fields}
+    return Job(task=task, setting=setting, episode=episode, **told)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("task", all_tasks())
+def test_explicit_commands_leave_nothing_to_chance(task: str) -> None:
+    assert chance_level(job(task, "explicit", episode) for episode in range(10)) == 1
+
+
+@pytest.mark.parametrize("variant", all_variants(), ids="-".join)
+def test_implicit_commands_do(variant) -> None:
+    level = chance_level(job(*variant, episode) for episode in range(10))
+    assert 0 < level < 1
+
+
+@pytest.mark.parametrize(("setting", "form"), [("contextual", "resolved"), ("direct", "resolved")])
+def test_resolved_commands_leave_nothing_to_chance(setting: str, form: str) -> None:
+    assert chance_of(job("PickXtimes", setting, form=form)) == 1
+
+
+def test_by_hand() -> None:
+    """StopCube has the second to the fifth visit, VideoRepick one to three times, told of none."""
+    assert chance_of(job("StopCube", "direct")) == Fraction(1, 4)
+    assert chance_of(job("VideoRepick", "direct")) == Fraction(1, 3)
+
+
+@pytest.mark.parametrize("task", ["PickXtimes", "VideoUnmask", "BinFill"])
+@pytest.mark.parametrize("setting", ["direct", "reasoning", "spatial"])
+def test_it_is_what_the_forgetful_listener_comes_to(task: str, setting: str) -> None:
+    """Its own decisions, with 400 seeds in one episode; only its hands are left out."""
+    told = job(task, setting)
+    episode = get_episode(task, "test", told.episode)
+    env = SimpleNamespace(episode=episode, instruction=say(told))
+    wanted = get_task(task).stages(episode.scene, episode.goal)
+    right = [
+        get_task(task).stages(episode.scene, ForgetfulPolicy(seed=seed).decide(env, "")) == wanted  # type: ignore[arg-type]
+        for seed in range(400)
+    ]
+    level = float(chance_of(told))
+    assert np.mean(right) == pytest.approx(level, abs=0.01 + 3 * np.sqrt(level * (1 - level) / 400))
+
+
+def test_who_plays_and_how_often_makes_no_difference() -> None:
+    jobs = [job("StopCube", "reasoning", episode) for episode in range(4)]
+    again = [one.model_copy(update={"policy": "else", "policy_seed": 3}) for one in jobs[:1]]
+    assert chance_level(jobs + again * 5) == chance_level(jobs)
+    assert chance_level([]) is None
