@@ -7,14 +7,14 @@ import os
 import signal
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from roboirg.errors import RenderDeviceError
+from roboirg.evaluation.course import Course, describe
 from roboirg.evaluation.executors import LocalProcesses
 from roboirg.evaluation.plan import Plan
 from roboirg.evaluation.record import EventRecord, Job, Record
-from roboirg.evaluation.course import Course, describe
 from roboirg.evaluation.runner import run_plan
 
 
@@ -52,6 +52,25 @@ class FakePlay:
         return self.folder is None or len(starts(self.folder, job)) <= self.deaths
 
 
+@dataclass(frozen=True)
+class FakePlayer:
+    """Plays nothing, and films it."""
+
+    folder: Path
+    seconds: float = 0.0
+    fatal: int | None = None
+
+    def in_folder(self, folder: Path) -> FakePlayer:
+        return replace(self, folder=folder)
+
+    def __call__(self, job: Job) -> Record:
+        record = FakePlay(seconds=self.seconds, fatal=self.fatal)(job)
+        film = self.folder / "videos" / f"{job.slug}.mp4"
+        film.parent.mkdir(exist_ok=True)
+        film.write_text(job.slug)
+        return record.model_copy(update={"video": f"videos/{film.name}"})
+
+
 def fake_course(job: Job) -> Course:
     luck = hashlib.sha256(job.slug.encode()).digest()[0]
     events = [EventRecord(step=luck, kind="picked", subject="cube_red")]
@@ -77,9 +96,7 @@ def is_alive(pid: int) -> bool:
     return state not in "ZX"
 
 
-def small_plan(
-    episodes: int = 4, policies: tuple[str, ...] = ("random",), seeds: int = 1
-) -> Plan:
+def small_plan(episodes: int = 4, policies: tuple[str, ...] = ("random",), seeds: int = 1) -> Plan:
     return Plan(
         policies=policies,
         tasks=("PickXtimes",),
@@ -94,4 +111,6 @@ if __name__ == "__main__":
     episodes = int(sys.argv[2]) if len(sys.argv) > 2 else 8
     seeds = int(sys.argv[3]) if len(sys.argv) > 3 else 1
     seconds = float(sys.argv[4]) if len(sys.argv) > 4 else 0.15
-    run_plan(small_plan(episodes, seeds=seeds), folder, FakePlay(folder, seconds), LocalProcesses(2))
+    run_plan(
+        small_plan(episodes, seeds=seeds), folder, FakePlay(folder, seconds), LocalProcesses(2)
+    )

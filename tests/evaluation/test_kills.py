@@ -29,7 +29,14 @@ def test_after_any_number_of_sigkills_the_records_are_those_of_an_undisturbed_ru
     folder.mkdir()
     plan = small_plan(EPISODES, seeds=SEEDS)
     run_plan(plan, undisturbed, FakePlay(), InProcess())
-    command = [sys.executable, evaluation_fakes.__file__, str(folder), str(EPISODES), str(SEEDS), "0.2"]
+    command = [
+        sys.executable,
+        evaluation_fakes.__file__,
+        str(folder),
+        str(EPISODES),
+        str(SEEDS),
+        "0.2",
+    ]
     rng, seen, late = random.Random(0), 0, 0
     for _ in range(KILLS):
         child = subprocess.Popen(command)

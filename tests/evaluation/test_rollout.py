@@ -18,9 +18,9 @@ from roboirg.errors import (
     RenderDeviceError,
 )
 from roboirg.evaluation import rollout
-from roboirg.evaluation.record import Job
 from roboirg.evaluation.course import Course
 from roboirg.evaluation.faults import one_line
+from roboirg.evaluation.record import Job
 from roboirg.evaluation.rollout import Player, load_policy, play_episode
 from roboirg.evaluation.video import Film, VideoOptions
 

@@ -12,9 +12,9 @@ from evaluation_fakes import fake_course, small_plan
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roboirg.evaluation.record import EventRecord, Record
 from roboirg.evaluation.course import describe
 from roboirg.evaluation.lines import key_of
+from roboirg.evaluation.record import EventRecord, Record
 from roboirg.evaluation.store import (
     RECORDS_FILE,
     TORN_FILE,

@@ -8,23 +8,18 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 import roboirg
-from roboirg.cli import language
+from roboirg.cli import language, running, telling
 from roboirg.cli.bench import bench
-from roboirg.cli.options import Distractor, Forms, Frame, Settings, Stages, Tasks, Workers
+from roboirg.cli.options import Distractor, Frame, Split, Stages, Tasks, Video, Workers
+from roboirg.cli.running import INTERRUPTED, USAGE_ERROR, Folder, Out
 from roboirg.errors import InvalidValueError, RoboIRGError
 
-if TYPE_CHECKING:
-    from roboirg.evaluation.plan import Plan
-    from roboirg.evaluation.runner import Summary
-
 # Everything heavy is imported inside the commands, so that --help answers at once.
-
-USAGE_ERROR, INTERRUPTED, TERMINATED = 2, 130, 143
 
 # The base of all that typer raises about the command line has moved between its versions.
 _WrongUsage: type[Exception] = next(
@@ -49,20 +44,6 @@ app.add_typer(language.language_app, name="language")
 app.add_typer(language.export_app, name="export")
 app.command()(bench)
 
-Policies = Annotated[
-    list[str], typer.Option("--policy", help="Built-in name or package.module:Class; repeatable.")
-]
-Split = Annotated[str, typer.Option(help="train, val or test.")]
-Episodes = Annotated[str, typer.Option(help="4: the first four; or a list such as 0,3,5-9.")]
-PolicySeeds = Annotated[str, typer.Option(help="A list of numbers; each plays every episode.")]
-MaxSteps = Annotated[int, typer.Option(help="The policy's limit in control steps (20 a second).")]
-Video = Annotated[str, typer.Option(help="Which episodes to film: off, failures or all.")]
-RetryErrors = Annotated[
-    bool, typer.Option(help="Play episodes again whose newest record is an error.")
-]
-Out = Annotated[str, typer.Option(help="Folder of the run; give the same again to go on.")]
-Folder = Annotated[str, typer.Argument(help="The --out folder of a run.")]
-
 
 def _say_version(wanted: bool) -> None:
     if wanted:
@@ -82,47 +63,11 @@ def _options(*, version: _Version = False) -> None:
     del version
 
 
-@app.command()
-def run(
-    policy: Policies,
-    out: Out,
-    tasks: Tasks = "all",
-    settings: Settings = "all",
-    forms: Forms = "implicit",
-    split: Split = "test",
-    episodes: Episodes = "4",
-    policy_seeds: PolicySeeds = "0",
-    stages: Stages = "1-5",
-    distractor: Distractor = "neutral",
-    frame: Frame = "robot",
-    max_steps: MaxSteps = 1300,
-    video: Video = "off",
-    workers: Workers = None,
-    retry_errors: RetryErrors = True,
-) -> None:
-    """Play episodes and append one record for each to OUT/records.jsonl; resumes by itself."""
-    from roboirg.evaluation.plan import make_plan
-
-    folder = _folder(out)
-    # As `python -m` has it: policies in the working directory can be named.
-    sys.path.insert(0, str(Path.cwd()))
-    plan = make_plan(
-        policy,
-        tasks=tasks,
-        settings=settings,
-        forms=forms,
-        split=split,
-        episodes=episodes,
-        policy_seeds=policy_seeds,
-        stages=stages,
-        distractor=distractor,
-        frame=frame,
-        max_steps=max_steps,
-        video=video,
-    )
-    summary = _run(plan, folder, workers, retry_errors=retry_errors)
-    _print_tables(folder)
-    _complain_of_errors(summary)
+app.command()(running.run)
+app.command()(running.merge)
+app.command()(telling.tables)
+app.command()(telling.compare)
+language.export_app.command("records")(running.export_records)
 
 
 @app.command()
@@ -133,30 +78,31 @@ def report(
     """Print the table of a run and write FOLDER/report.html, one self-contained page."""
     from roboirg.analysis.report import check_report_support
 
-    path = _folder(folder)
+    path = running.folder_of(folder)
     check_report_support()
-    _print_tables(path)
+    running.print_tables_of(path)
     typer.echo(_write_page(path, videos=videos))
 
 
 @app.command()
 def demo(
     out: Out = "runs/demo",
-    episodes: Episodes = "2-2",
+    episodes: Annotated[str, typer.Option(help="4: the first four; or a list.")] = "2-2",
     video: Video = "all",
     workers: Workers = None,
 ) -> None:
     """Oracle, listener and forgetful on every task and setting, filmed; ends with a page."""
     from roboirg.analysis.report import check_report_support
+    from roboirg.evaluation.executors import choose_executor
     from roboirg.evaluation.plan import make_plan
 
-    folder = _folder(out)
+    folder = running.folder_of(out)
     plan = make_plan(DEMO_POLICIES, episodes=episodes, video=video)
     check_report_support()
-    summary = _run(plan, folder, workers, retry_errors=True)
-    _print_tables(folder)
+    summary = running.play(plan, folder, choose_executor(workers), retry=True)
+    running.print_tables_of(folder)
     typer.echo(_write_page(folder, videos=True))
-    _complain_of_errors(summary)
+    running.complain(summary, folder)
 
 
 @app.command()
@@ -170,9 +116,9 @@ def doctor() -> None:
 @app.command("tasks")
 def list_tasks() -> None:
     """List the tasks, their suites and their settings."""
-    from roboirg.tasks import all_tasks
+    from roboirg.tasks import every_task
 
-    for task in all_tasks().values():
+    for task in every_task().values():
         typer.echo(f"{task.name:<16} {task.suite:<12} {', '.join(task.settings)}")
 
 
@@ -190,13 +136,12 @@ def build_splits(
     from roboirg.episode import SPLITS
     from roboirg.evaluation.acceptance import check_kept, find_seeds, merged, slots_of
     from roboirg.evaluation.executors import core_count
-    from roboirg.evaluation.plan import parse_names, says_all
     from roboirg.evaluation.split_summary import followed, print_summary
     from roboirg.evaluation.store import write_atomically
-    from roboirg.tasks import all_tasks, get_task
+    from roboirg.evaluation.words import parse_names, says_all
+    from roboirg.tasks import find_tasks
 
-    typed = tuple(all_tasks()) if says_all(tasks) else parse_names("task", tasks)
-    names = [get_task(name).name for name in typed]
+    names = find_tasks(parse_names("task", tasks))
     wanted = SPLITS if says_all(split) else (splits.check_split(split),)
     check_kept(names, wanted, splits.shipped())
     if out is not None and not Path(out).parent.is_dir():
@@ -252,7 +197,7 @@ def instruct(
     frame: Frame = "robot",
 ) -> None:
     """Print what is said to the robot, turn by turn."""
-    from roboirg.evaluation.plan import parse_stages, says_all
+    from roboirg.evaluation.words import parse_stages, says_all
     from roboirg.language import instruct as make_instruction
     from roboirg.splits import get_episode
     from roboirg.tasks import get_task
@@ -299,77 +244,7 @@ def _explain(error: Exception) -> int:
     return USAGE_ERROR
 
 
-def _folder(text: str) -> Path:
-    if not text.strip():
-        raise InvalidValueError("The folder of the run is an empty text; give it a name.")
-    return Path(text)
-
-
-def _run(plan: Plan, out: Path, workers: int | None, *, retry_errors: bool) -> Summary:
-    from rich.console import Console
-
-    from roboirg.evaluation.executors import choose_executor
-    from roboirg.evaluation.progress import ConsoleReporter
-    from roboirg.evaluation.rollout import Player
-    from roboirg.evaluation.runner import Terminated, run_plan
-    from roboirg.evaluation.video import check_video_support
-
-    if plan.video != "off":
-        check_video_support()
-    executor = choose_executor(workers)
-    try:
-        with ConsoleReporter(Console()) as reporter:
-            summary = run_plan(
-                plan,
-                out,
-                Player(out, plan.video),
-                executor,
-                retry_errors=retry_errors,
-                reporter=reporter,
-            )
-    except KeyboardInterrupt as interrupt:
-        typer.echo(
-            f"Stopped; {out} keeps what ended. The same command goes on from there.", err=True
-        )
-        sys.exit(TERMINATED if isinstance(interrupt, Terminated) else INTERRUPTED)
-    if summary.unfilmed:
-        typer.echo(
-            f"{len(summary.unfilmed)} of {summary.played} films could not be written, the verdicts "
-            f"stand; the first: {summary.unfilmed[0].film_lost}",
-            err=True,
-        )
-    return summary
-
-
-def _print_tables(folder: Path) -> None:
-    from rich.console import Console
-
-    from roboirg.analysis.statistics import make_panels
-    from roboirg.analysis.tables import print_failures, print_tables
-    from roboirg.evaluation.plan import read_plan
-    from roboirg.evaluation.store import read_records
-
-    plan, records, console = read_plan(folder), read_records(folder), Console()
-    print_tables(make_panels(records, plan.jobs() if plan else ()), console)
-    print_failures(records, console)
-
-
 def _write_page(folder: Path, *, videos: bool) -> Path:
     from roboirg.analysis.report import write_report
-    from roboirg.evaluation.plan import read_plan
 
-    plan = read_plan(folder)
-    return write_report(folder, planned=plan.jobs() if plan else (), videos=videos)
-
-
-def _complain_of_errors(summary: Summary) -> None:
-    if not summary.errors:
-        return
-    first = summary.errors[0]
-    typer.echo(
-        f"roboirg: {len(summary.errors)} of {len(summary.records)} episodes ended in an error "
-        f"and are in no rate; the first ({first.task} {first.split}/{first.episode} "
-        f"{first.setting}): {first.cause}",
-        err=True,
-    )
-    sys.exit(USAGE_ERROR)
+    return write_report(folder, planned=running.planned_jobs(folder), videos=videos)

@@ -11,6 +11,8 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+import socket
+import sys
 import tempfile
 import time
 from collections import deque
@@ -31,6 +33,9 @@ from roboirg.evaluation.workers import Seat
 POLL_S = 1.0
 PATIENCE_S = 300.0
 """How long a cluster may have no free CPU at all before the run gives up."""
+CONNECT_S = 10.0
+MOST_STILLBORN = 3
+"""So many seats for each that is wanted may fail to begin, one after the other."""
 
 
 @runtime_checkable
@@ -114,6 +119,7 @@ def _connected(ray: ModuleType, address: str | None) -> Iterator[None]:
     if ray.is_initialized():
         yield  # by whoever calls us, whose it stays
         return
+    _check_reachable(address)
     try:
         ray.init(address=address, logging_level=logging.WARNING, log_to_driver=False)
     except (ConnectionError, RuntimeError, ValueError) as error:
@@ -125,8 +131,27 @@ def _connected(ray: ModuleType, address: str | None) -> Iterator[None]:
         ray.shutdown()
 
 
+def _own_paths() -> list[str]:
+    """Where modules are found here that are not installed, such as policies of the user's."""
+    prefixes = tuple({sys.prefix, sys.base_prefix})
+    return [path for path in sys.path if path and not path.startswith(prefixes)]
+
+
 def _filming(play: object) -> Filming | None:
     return play if isinstance(play, Filming) else None
+
+
+def _check_reachable(address: str | None) -> None:
+    """Complain now if nobody listens: Ray would wait for minutes, and then end this process."""
+    host, _, port = (address or "").removeprefix("ray://").rpartition(":")
+    if not host or not port.isdigit():
+        return  # a word, such as "auto"
+    try:
+        socket.create_connection((host, int(port)), timeout=CONNECT_S).close()
+    except OSError as error:
+        raise RoboIRGError(
+            f"The Ray cluster {address!r} cannot be joined: {error.strerror or error}."
+        ) from error
 
 
 class _RemoteSeat:
@@ -158,12 +183,16 @@ class _Company:
 
     def __init__(self, ray: ModuleType, play: Play, episode_timeout_s: float, size: int) -> None:
         self._ray, self._play, self._episode_timeout_s = ray, play, episode_timeout_s
-        self._actor = ray.remote(num_cpus=1, max_restarts=0, scheduling_strategy="SPREAD")(
-            _RemoteSeat
-        )
+        self._actor = ray.remote(
+            num_cpus=1,
+            max_restarts=0,
+            scheduling_strategy="SPREAD",
+            runtime_env={"env_vars": {"PYTHONPATH": os.pathsep.join(_own_paths())}},
+        )(_RemoteSeat)
         # What is awaited, with the seat it comes from and the job; None while it finds a place.
         self._awaited: dict[Any, tuple[Any, Job | None]] = {}
         self._idle: list[Any] = []
+        self._size, self._stillborn = size, 0
         for _ in range(size):
             self._open_seat()
 
@@ -202,14 +231,28 @@ class _Company:
         try:
             played = self._ray.get(reference)
         except (self._ray.exceptions.RayActorError, self._ray.exceptions.RaySystemError) as error:
+            if job is None:
+                self._bear(error)
             self._open_seat()
             return None if job is None else _lost(job, error)
         self._idle.append(seat)
         if job is None:
+            self._stillborn = 0
             return None
         self._keep_films(played)
         record: Record = played.record
         return record
+
+    def _bear(self, error: BaseException) -> None:
+        """A seat could not begin: its machine went, or it can never begin anywhere."""
+        self._stillborn += 1
+        if self._stillborn >= MOST_STILLBORN * self._size:
+            # The last line of Ray's text is the exception itself.
+            words = str(error).strip().splitlines()[-1].strip()
+            raise RoboIRGError(
+                f"No worker of the Ray cluster can begin ({words}); every machine needs roboirg, "
+                "and whatever the policies import."
+            ) from error
 
     def _keep_films(self, played: _Played) -> None:
         filming = _filming(self._play)

@@ -50,8 +50,8 @@ INCIDENTALS = frozenset(
         "video",
     }
 )
-"""Times, costs, paths, lost films, tries, and which code and plan it was: all that may differ between
-two runs of the same command."""
+"""Times, costs, paths, lost films, tries, code and plan: all that may differ where the same command
+is run twice."""
 
 
 class _Data(BaseModel):

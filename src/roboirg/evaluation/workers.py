@@ -115,7 +115,10 @@ class Worker:
         if self.board.is_overdue:
             what = f"the {self.board.phase} did not come back in time"
         elif time.monotonic() - self.started > episode_timeout_s:
-            what = f"the episode took longer than {episode_timeout_s:g} s (now in the {self.board.phase})"
+            what = (
+                f"the episode took longer than {episode_timeout_s:g} s "
+                f"(now in the {self.board.phase})"
+            )
         else:
             return None
         self.process.kill()

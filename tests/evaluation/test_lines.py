@@ -1,0 +1,135 @@
+"""Older schemas, damaged lines, and very many of them."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from evaluation_fakes import FakePlay, small_plan
+
+from roboirg.evaluation.executors import InProcess
+from roboirg.evaluation.lines import key_of
+from roboirg.evaluation.record import ERROR_KINDS, Job, Record, Result
+from roboirg.evaluation.runner import run_plan
+from roboirg.evaluation.store import (
+    RECORDS_FILE,
+    RecordStore,
+    read_contents,
+    read_index,
+    read_records,
+    read_results,
+)
+
+NEW_IN_2 = [
+    "distractors",
+    "actions",
+    "demonstration_frames",
+    "observe_every",
+    "meshes",
+    "error",
+    "attribution",
+    "code",
+    "plan",
+    "attempt",
+    "policy_metadata",
+    "usage",
+    "timings",
+]
+
+
+def first_schema(record: Record, **changes: Any) -> bytes:
+    data = {**record.model_dump(mode="json"), "schema_version": 1, **changes}
+    for name in NEW_IN_2:
+        del data[name]
+    return json.dumps(data).encode() + b"\n"
+
+
+def write(folder: Path, *lines: bytes) -> Path:
+    (folder / RECORDS_FILE).write_bytes(b"".join(lines))
+    return folder
+
+
+def test_records_of_the_first_schema_are_read(tmp_path: Path) -> None:
+    record = FakePlay()(small_plan().jobs()[0])
+    write(tmp_path, first_schema(record))
+    (read,) = read_records(tmp_path)
+    assert read.identity == record.identity
+    assert (read.outcome, read.events, read.schema_version) == (record.outcome, record.events, 2)
+    assert list(read_index(tmp_path)) == [key_of(record)]
+    with RecordStore(tmp_path) as store:
+        assert list(store.stored) == [key_of(record)]
+
+
+@pytest.mark.parametrize(
+    ("cause", "kind"),
+    [
+        ("policy: ValueError: no", "policy"),
+        ("invalid action: nan", "invalid_action"),
+        ("environment: boom", "environment"),
+        ("environment: worker died (signal 9)", "infrastructure"),
+    ],
+)
+def test_errors_of_the_first_schema_get_their_kind(tmp_path: Path, cause: str, kind: str) -> None:
+    assert kind in ERROR_KINDS
+    record = FakePlay()(small_plan().jobs()[0])
+    write(tmp_path, first_schema(record, outcome="error", cause=cause))
+    assert read_records(tmp_path)[0].error == kind
+
+
+def test_a_damaged_line_costs_itself_and_is_told(tmp_path: Path) -> None:
+    run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
+    lines = (tmp_path / RECORDS_FILE).read_bytes().splitlines(keepends=True)
+    write(tmp_path, *lines[:2], lines[2][:40] + b"\x00\xff\n", *lines[3:])
+    contents = read_contents(tmp_path / RECORDS_FILE)
+    assert (len(contents.records), contents.damaged, contents.torn) == (7, (3,), b"")
+    summary = run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
+    assert summary.played == 1
+    assert len(read_records(tmp_path)) == 8
+
+
+def test_results_are_records_without_the_course(tmp_path: Path) -> None:
+    run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
+    records, results = read_records(tmp_path), read_results(tmp_path)
+    for record, result in zip(records, results, strict=True):
+        assert type(result) is Result
+        assert dict(result) == {name: getattr(record, name) for name in Result.model_fields}
+
+
+def test_the_index_knows_a_job_by_all_its_fields() -> None:
+    job = small_plan().jobs()[0]
+    assert len(key_of(job)) == len(Job.model_fields)
+    others = {"stages": (1, 5), "demonstration_frames": 4, "actions": "ee_pose", "meshes": "light"}
+    for name, value in others.items():
+        assert key_of(job.model_copy(update={name: value})) != key_of(job)
+
+
+MANY = 100_000
+
+
+def test_very_many_records_need_little_memory(tmp_path: Path) -> None:
+    (record,) = [FakePlay()(small_plan(1).jobs()[0])]
+    # Long ones: what an episode of BinFill has in events.
+    record = record.model_copy(update={"events": record.events * 40})
+    line = record.model_dump_json().encode()
+    seed = b'"policy_seed":0'
+    assert line.count(seed) == 1
+    with (tmp_path / RECORDS_FILE).open("wb") as file:
+        for number in range(MANY):
+            file.write(line.replace(seed, b'"policy_seed":%d' % number) + b"\n")
+    code = (
+        "import pathlib, resource, sys\n"
+        "from roboirg.evaluation.store import RecordStore\n"
+        "with RecordStore(pathlib.Path(sys.argv[1])) as store:\n"
+        "    count = len(store.stored)\n"
+        "print(count, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=True
+    )
+    count, kilobytes = map(int, done.stdout.split())
+    assert count == MANY
+    assert kilobytes < 500_000

@@ -1,0 +1,87 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from evaluation_fakes import FakePlay, small_plan
+
+from roboirg.errors import InvalidValueError
+from roboirg.evaluation.executors import InProcess
+from roboirg.evaluation.merging import merge_runs
+from roboirg.evaluation.record import Record
+from roboirg.evaluation.runner import run_plan
+from roboirg.evaluation.store import RecordStore, StoreError, read_records
+
+
+def fill(folder: Path, *records: Record) -> Path:
+    with RecordStore(folder) as store:
+        for record in records:
+            store.append(record)
+    return folder
+
+
+def some(count: int = 4) -> list[Record]:
+    return [FakePlay()(job) for job in small_plan(count).jobs()]
+
+
+def test_two_halves_make_the_whole(tmp_path: Path) -> None:
+    whole = tmp_path / "whole"
+    run_plan(small_plan(), whole, FakePlay(), InProcess())
+    records = read_records(whole)
+    parts = [fill(tmp_path / "a", *records[:5]), fill(tmp_path / "b", *records[3:])]
+    merged = merge_runs(parts, tmp_path / "out")
+    assert (merged.added, merged.doubled, merged.disputed) == (8, 2, ())
+    assert read_records(tmp_path / "out") == records
+    again = merge_runs(parts, tmp_path / "out")
+    assert (again.added, again.doubled) == (0, 10)
+
+
+def test_a_verdict_beats_an_error_and_the_first_verdict_a_later_one(tmp_path: Path) -> None:
+    one, two, *_ = some()
+    error = one.model_copy(update={"outcome": "error", "error": "connection"})
+    other = {"success": "failure", "failure": "success"}[two.outcome]
+    disputed = two.model_copy(update={"outcome": other})
+    merged = merge_runs(
+        [fill(tmp_path / "a", error, two), fill(tmp_path / "b", one, disputed)], tmp_path / "out"
+    )
+    assert {record.outcome for record in read_records(tmp_path / "out")} == {
+        one.outcome,
+        two.outcome,
+    }
+    assert merged.disputed == (disputed,)
+
+
+def test_films_come_along(tmp_path: Path) -> None:
+    record = some()[0].model_copy(update={"video": "videos/x.mp4"})
+    lost = some()[1].model_copy(update={"video": "videos/gone.mp4"})
+    source = fill(tmp_path / "a", record, lost)
+    (source / "videos").mkdir()
+    (source / "videos/x.mp4").write_bytes(b"film")
+    (source / "videos/x.jpg").write_bytes(b"poster")
+    merge_runs([source], tmp_path / "out")
+    assert (tmp_path / "out/videos/x.mp4").read_bytes() == b"film"
+    assert (tmp_path / "out/videos/x.jpg").read_bytes() == b"poster"
+    assert [record.video for record in read_records(tmp_path / "out")] == ["videos/x.mp4", None]
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "words"),
+    [
+        ("language_version", "0.9", "language version is '0.9' here"),
+        ("environment_version", 7, "environment version is 7 here"),
+        ("policy_version", "old", "version of policy random is 'old' here"),
+        ("seed", 5, "seed of PickXtimes test 0 is 5 here"),
+    ],
+)
+def test_versions_are_not_mixed(tmp_path: Path, field: str, value: object, words: str) -> None:
+    record = some()[0]
+    odd = record.model_copy(update={field: value})
+    with pytest.raises(StoreError, match=f"do not go together: the {words}"):
+        merge_runs([fill(tmp_path / "a", record), fill(tmp_path / "b", odd)], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_run_is_not_merged_into_itself(tmp_path: Path) -> None:
+    folder = fill(tmp_path / "a", *some())
+    with pytest.raises(InvalidValueError, match="is one of the runs"):
+        merge_runs([folder], tmp_path / "b/../a")

@@ -1,0 +1,47 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from evaluation_fakes import FakePlay, small_plan
+
+from roboirg.errors import InvalidValueError
+from roboirg.evaluation.parquet import write_parquet
+from roboirg.evaluation.record import Attribution, Record
+
+
+def test_a_table_holds_every_field_of_every_record(tmp_path: Path) -> None:
+    why = Attribution(kind="grounding", failure="wrong_object", step=4, sentence="Green.")
+    records = [FakePlay()(job) for job in small_plan().jobs()]
+    records[0] = records[0].model_copy(
+        update={
+            "attribution": why,
+            "demonstration_frames": 4,
+            "usage": {"calls": 2.0},
+            "error": "connection",
+        }
+    )
+    path = tmp_path / "records.parquet"
+    assert write_parquet(iter(records), path) == len(records)
+    table = pd.read_parquet(path)
+    assert tuple(table.columns) == tuple(Record.model_fields)
+    for row, record in zip(table.to_dict("records"), records, strict=True):
+        assert (row["policy"], row["episode"], row["outcome"]) == (
+            record.policy,
+            record.episode,
+            record.outcome,
+        )
+        assert json.loads(row["goal"]) == json.loads(record.model_dump_json())["goal"]
+        assert [event["kind"] for event in row["events"]] == [one.kind for one in record.events]
+        assert list(row["stages"]) == list(record.stages)
+    assert table.attribution[0]["failure"] == "wrong_object"
+    assert table.attribution[1] is None
+    assert table.demonstration_frames[0] == "4"
+    assert json.loads(table.usage[0]) == {"calls": 2.0}
+
+
+def test_a_file_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(InvalidValueError, match="Cannot write"):
+        write_parquet([], tmp_path / "nowhere" / "x.parquet")

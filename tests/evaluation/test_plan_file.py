@@ -1,0 +1,98 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from roboirg.errors import InvalidValueError, UnknownNameError
+from roboirg.evaluation.plan import make_plan
+from roboirg.evaluation.plan_file import named_plans, read_plan_file
+from roboirg.language import STAGE_SETS
+from roboirg.tasks import all_tasks
+
+
+def write(folder: Path, text: str) -> str:
+    path = folder / "plan.yaml"
+    path.write_text(text)
+    return str(path)
+
+
+@pytest.mark.parametrize("name", named_plans())
+def test_every_named_plan_can_be_played(name: str) -> None:
+    plan = make_plan(["random"], **read_plan_file(name))
+    assert plan.jobs()
+    assert make_plan(["random"], **read_plan_file(name)).fingerprint == plan.fingerprint
+
+
+def test_the_papers_protocol_is_the_papers() -> None:
+    plan = make_plan(["random"], **read_plan_file("paper"))
+    assert plan.tasks == tuple(all_tasks())
+    assert (plan.settings, plan.forms) == ("all", ("implicit", "resolved"))
+    assert plan.policy_seeds == (7, 42, 0)
+    assert plan.episodes == tuple(range(50))
+    assert plan.max_steps == 1300
+    told = {(job.task, job.setting, job.form) for job in plan.jobs()}
+    # 40 implicit variants and their resolved forms, and the explicit setting once.
+    assert len(told) == 40 + 40 + 11
+    context = make_plan(["random"], **read_plan_file("paper-context"))
+    assert {job.stages for job in context.jobs()} == set(STAGE_SETS)
+    assert len(context.jobs()) == 3 * 4 * 50 * 3
+
+
+@pytest.mark.parametrize(
+    ("text", "typed"),
+    [
+        ("episodes: 4", {"episodes": "4"}),
+        ("episodes: [7]", {"episodes": "7,"}),
+        ("episodes: [0, 3]", {"episodes": "0,3"}),
+        ("policies: oracle", {"policies": ["oracle"]}),
+        ("policies: [oracle, 'a,b:C']", {"policies": ["oracle", "a,b:C"]}),
+        ("stages: [1, 5]", {"stages": "1,5"}),
+        ("stages: [[1, 5], [1, 2, 5]]", {"stages": "1,5;1,2,5"}),
+        ("video: off", {"video": "off"}),
+        ("max_steps: 20", {"max_steps": 20}),
+        ("actions: null", {}),
+        ("settings: [direct, spatial]", {"settings": "direct,spatial"}),
+    ],
+)
+def test_values_are_those_that_would_be_typed(
+    tmp_path: Path, text: str, typed: dict[str, object]
+) -> None:
+    assert read_plan_file(write(tmp_path, text)) == typed
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("episode: 4", r"no key of a plan .* 'episode'; .*Did you mean 'episodes'\?"),
+        ("- oracle", r"is of type list; it has to be a mapping"),
+        ("", r"is of type NoneType"),
+        ("tasks: [", r"is no YAML"),
+    ],
+)
+def test_what_is_no_plan_is_one_sentence(tmp_path: Path, text: str, sentence: str) -> None:
+    with pytest.raises(InvalidValueError, match=sentence) as caught:
+        read_plan_file(write(tmp_path, text))
+    assert "\n" not in str(caught.value)
+
+
+def test_values_that_cannot_be_are_told_as_on_the_command_line(tmp_path: Path) -> None:
+    options = read_plan_file(write(tmp_path, "tasks: [PickXtime]"))
+    with pytest.raises(UnknownNameError, match="Did you mean 'PickXtimes'"):
+        make_plan(["random"], **options)
+
+
+def test_an_unknown_plan_is_told_with_the_nearest() -> None:
+    with pytest.raises(UnknownNameError, match="Did you mean 'paper-context'"):
+        read_plan_file("paper-contxt")
+    with pytest.raises(InvalidValueError, match="cannot be read"):
+        read_plan_file("nowhere/plan.yaml")
+
+
+def test_a_plan_and_its_file_are_the_same_plan(tmp_path: Path) -> None:
+    plan = make_plan(["random"], tasks="BinFill", episodes="0,2", stages="1,5;1-5", tries=3)
+    path = write(tmp_path, yaml.safe_dump(plan.model_dump(mode="json")))
+    options = read_plan_file(path)
+    again = make_plan(options.pop("policies"), **options)
+    assert again == plan
