@@ -1,0 +1,23 @@
+"""Models by provider, each through the provider's own client library."""
+
+from __future__ import annotations
+
+from roboirg.policies.planning.models.model import Model, ModelOptions, Query, Reply
+
+__all__ = ["Model", "ModelOptions", "Query", "Reply", "make_model"]
+
+
+def make_model(options: ModelOptions) -> Model:
+    """A connection to a model; nothing is sent before the first question.
+
+    Raises:
+        MissingDependencyError: the provider's client library is not installed, or the variable
+            that is to hold the key is not set.
+    """
+    if options.provider == "google":
+        from roboirg.policies.planning.models.google import GoogleModel
+
+        return GoogleModel(options)
+    from roboirg.policies.planning.models.openai_compatible import OpenAIModel
+
+    return OpenAIModel(options)

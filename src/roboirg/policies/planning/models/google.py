@@ -1,0 +1,135 @@
+"""Google's models through Google's own client library."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from roboirg.errors import (
+    MissingDependencyError,
+    PolicyConnectionError,
+    PolicyReplyError,
+    RoboIRGError,
+)
+from roboirg.policies.planning.content import Part, Picture, png
+from roboirg.policies.planning.models.model import ModelOptions, Query, Reply
+from roboirg.policies.planning.models.waiting import timed_out, within
+
+if TYPE_CHECKING:
+    from google.genai import types
+
+BUSY = (408, 429, 502, 503, 504)
+"""HTTP statuses of a service that is there but cannot answer now."""
+LONGEST_WORDS = 300
+
+
+class GoogleModel:
+    """Asks through ``google-genai``; pictures and clips travel inside the request.
+
+    Nothing is uploaded to the file service, so nothing is left there when an episode breaks off.
+    """
+
+    def __init__(self, options: ModelOptions) -> None:
+        try:
+            from google import genai
+            from google.genai import errors, types
+        except ImportError as error:
+            raise MissingDependencyError(
+                f"Models of provider 'google' need the library google-genai ({error}); run: "
+                "pip install 'roboirgbench[vlm]'."
+            ) from error
+        self._options = options
+        self._key = options.key()
+        self._errors = errors
+        self._what = f"Model {options.model!r} at {options.address()}"
+        http = types.HttpOptions(
+            base_url=options.base_url,
+            timeout=int(1000 * options.timeout_s),
+            retry_options=types.HttpRetryOptions(
+                attempts=options.retries + 1, http_status_codes=list(BUSY)
+            ),
+        )
+        self._client = genai.Client(vertexai=False, api_key=self._key, http_options=http)
+
+    def answer(self, query: Query) -> Reply:
+        """Ask; see `Model`."""
+        contents = self._contents(query)
+        config = self._config(query)
+
+        def send() -> types.GenerateContentResponse:
+            return self._client.models.generate_content(
+                model=self._options.model, contents=contents, config=config
+            )
+
+        try:
+            return _read(within(self._options.timeout_s, send, self._what))
+        except RoboIRGError:
+            raise
+        except Exception as error:  # noqa: BLE001 - the library lets through those of its HTTP client
+            # Not chained: what the service says may hold the key, and tracebacks are recorded.
+            raise self._explained(error) from None
+
+    def close(self) -> None:
+        """Let go of the connection."""
+        self._client.close()
+
+    def _contents(self, query: Query) -> list[Any]:
+        from google.genai import types
+
+        return [
+            types.Content(role=turn.role, parts=[self._part(part) for part in turn.parts])
+            for turn in query.turns
+        ]
+
+    def _part(self, part: Part) -> types.Part:
+        from google.genai import types
+
+        if isinstance(part, str):
+            return types.Part(text=part)
+        if isinstance(part, Picture):
+            return types.Part(inline_data=types.Blob(data=png(part), mime_type="image/png"))
+        fps = self._options.sampling_fps
+        return types.Part(
+            inline_data=types.Blob(data=part.file, mime_type="video/mp4"),
+            video_metadata=None if fps is None else types.VideoMetadata(fps=fps),
+        )
+
+    def _config(self, query: Query) -> types.GenerateContentConfig:
+        from google.genai import types
+
+        options = self._options
+        structured = query.schema is not None and options.structured
+        return types.GenerateContentConfig(
+            system_instruction=query.system,
+            temperature=options.temperature,
+            max_output_tokens=options.max_output_tokens,
+            response_mime_type="application/json" if structured else None,
+            response_json_schema=query.schema if structured else None,
+        )
+
+    def _explained(self, error: Exception) -> RoboIRGError:
+        kind = type(error).__name__
+        words = " ".join(str(error).replace(self._key, "…").split())[:LONGEST_WORDS]
+        if "Timeout" in kind and "Connect" not in kind:
+            return timed_out(self._what, self._options.timeout_s)
+        if isinstance(error, self._errors.APIError):
+            if error.code in BUSY:
+                return PolicyConnectionError(f"{self._what} is not available: {words}")
+            return PolicyReplyError(f"{self._what} refused or failed: {words}")
+        if type(error).__module__.startswith(("httpx", "httpcore", "requests", "builtins")) and (
+            isinstance(error, OSError) or "Connect" in kind or "Protocol" in kind or "Read" in kind
+        ):
+            return PolicyConnectionError(f"{self._what} cannot be reached ({kind}: {words}).")
+        return PolicyReplyError(f"{self._what} answered with something else ({kind}: {words}).")
+
+
+def _read(response: types.GenerateContentResponse) -> Reply:
+    """The words of the first candidate, thoughts left out but counted as output."""
+    candidates = response.candidates or []
+    content = candidates[0].content if candidates else None
+    parts = (content.parts or []) if content is not None else []
+    text = "".join(part.text for part in parts if part.text and not part.thought)
+    usage = response.usage_metadata
+    if usage is None:
+        return Reply(text)
+    output = (usage.candidates_token_count or 0) + (usage.thoughts_token_count or 0)
+    return Reply(text, usage.prompt_token_count or 0, output)

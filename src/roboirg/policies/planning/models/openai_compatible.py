@@ -1,0 +1,138 @@
+"""Any endpoint that speaks OpenAI's dialect: OpenAI itself, vLLM, and many others."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterator
+from typing import Any
+
+from roboirg.errors import (
+    MissingDependencyError,
+    PolicyConnectionError,
+    PolicyReplyError,
+    RoboIRGError,
+)
+from roboirg.policies.planning.content import Clip, Part, Picture, Turn, evenly, png
+from roboirg.policies.planning.models.model import ModelOptions, Query, Reply
+from roboirg.policies.planning.models.waiting import timed_out, within
+
+OPENAI = "https://api.openai.com/v1"
+BUSY = frozenset({408, 409, 429, 502, 503, 504})
+"""HTTP statuses of a service that is there but cannot answer now."""
+LONGEST_WORDS = 300
+
+
+class OpenAIModel:
+    """Asks through the ``openai`` library's chat completions."""
+
+    def __init__(self, options: ModelOptions) -> None:
+        try:
+            import openai
+        except ImportError as error:
+            raise MissingDependencyError(
+                f"Models of provider 'openai' need its client library ({error}); run: "
+                "pip install 'roboirgbench[vlm]'."
+            ) from error
+        self._openai = openai
+        self._options = options
+        self._key = options.key()
+        self._what = f"Model {options.model!r} at {options.address()}"
+        self._client = openai.OpenAI(
+            api_key=self._key,
+            base_url=options.base_url or OPENAI,
+            timeout=options.timeout_s,
+            max_retries=options.retries,
+        )
+
+    def answer(self, query: Query) -> Reply:
+        """Ask; see `Model`."""
+        request = self._request(query)
+
+        def send() -> Any:  # noqa: ANN401 - what the library makes of whatever arrives
+            return self._client.chat.completions.create(**request)
+
+        try:
+            return self._read(within(self._options.timeout_s, send, self._what))
+        except (self._openai.OpenAIError, ValueError) as error:
+            # The library lets a broken JSON through as it is.
+            # Not chained: what the service says may hold the key, and tracebacks are recorded.
+            raise self._explained(error) from None
+
+    def close(self) -> None:
+        """Let go of the connection."""
+        self._client.close()
+
+    def _request(self, query: Query) -> dict[str, Any]:
+        options = self._options
+        request: dict[str, Any] = {
+            "model": options.model,
+            "messages": [
+                {"role": "system", "content": query.system},
+                *(self._message(turn) for turn in query.turns),
+            ],
+        }
+        if options.temperature is not None:
+            request["temperature"] = options.temperature
+        if options.max_output_tokens is not None:
+            request["max_tokens"] = options.max_output_tokens
+        if query.schema is not None and options.structured:
+            form = {"name": "answer", "strict": True, "schema": dict(query.schema)}
+            request["response_format"] = {"type": "json_schema", "json_schema": form}
+        return request
+
+    def _message(self, turn: Turn) -> dict[str, Any]:
+        if turn.role == "model":
+            return {"role": "assistant", "content": "".join(map(str, turn.parts))}
+        content = [piece for part in turn.parts for piece in self._pieces(part)]
+        return {"role": "user", "content": content}
+
+    def _pieces(self, part: Part) -> Iterator[dict[str, Any]]:
+        if isinstance(part, str):
+            yield {"type": "text", "text": part}
+        elif isinstance(part, Picture):
+            yield _image(part)
+        elif self._options.video == "mp4":
+            yield {"type": "video_url", "video_url": {"url": _data_url("video/mp4", part.file)}}
+        else:
+            yield from map(_image, _pictures(part, self._options.clip_frames))
+
+    def _read(self, completion: Any) -> Reply:  # noqa: ANN401 - anything may have arrived
+        try:
+            text = completion.choices[0].message.content or ""
+            usage = completion.usage
+            if usage is None:
+                return Reply(str(text))
+            return Reply(str(text), int(usage.prompt_tokens), int(usage.completion_tokens))
+        except (AttributeError, IndexError, TypeError, ValueError) as error:
+            raise PolicyReplyError(
+                f"{self._what} answered with something that is no chat completion "
+                f"({type(error).__name__}: {error})."
+            ) from None
+
+    def _explained(self, error: Exception) -> RoboIRGError:
+        openai = self._openai
+        if isinstance(error, openai.APITimeoutError):
+            return timed_out(self._what, self._options.timeout_s)
+        words = " ".join(str(error).replace(self._key, "…").split())[:LONGEST_WORDS]
+        if isinstance(error, openai.APIConnectionError):
+            reason = error.__cause__ or error
+            return PolicyConnectionError(
+                f"{self._what} cannot be reached ({type(reason).__name__}: {words})."
+            )
+        if isinstance(error, openai.APIStatusError) and error.status_code in BUSY:
+            return PolicyConnectionError(f"{self._what} is not available: {words}")
+        if isinstance(error, openai.APIStatusError):
+            return PolicyReplyError(f"{self._what} refused or failed: {words}")
+        return PolicyReplyError(f"{self._what} answered with something else ({words}).")
+
+
+def _pictures(clip: Clip, most: int) -> list[Picture]:
+    return [Picture(pixels) for pixels in evenly(clip.frames, most)]
+
+
+def _image(picture: Picture) -> dict[str, Any]:
+    return {"type": "image_url", "image_url": {"url": _data_url("image/png", png(picture))}}
+
+
+def _data_url(kind: str, content: bytes) -> str:
+    return f"data:{kind};base64,{base64.b64encode(content).decode()}"

@@ -1,0 +1,90 @@
+"""The words that models are told: data in ``prompts/``, versioned by their hash."""
+
+from __future__ import annotations
+
+import hashlib
+import tomllib
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from roboirg.errors import InvalidValueError
+
+FOLDER = "prompts"
+SHARED = "subgoals"
+"""The file with the forms that subgoals have, which all planners are told."""
+FINGERPRINT_LENGTH = 12
+"""Hexadecimal digits."""
+
+
+@dataclass(frozen=True)
+class Prompts:
+    """The words for one kind of question.
+
+    Attributes:
+        texts: by name, nested as in the file.
+        fingerprint: of the file, so that records of other words can be told apart.
+        origin: which file it is, for complaints.
+    """
+
+    texts: dict[str, Any]
+    fingerprint: str
+    origin: str
+
+    def __getitem__(self, name: str) -> Template:
+        """The words of that name; a dot goes into a table.
+
+        Raises:
+            InvalidValueError: the file has no such words.
+        """
+        found: Any = self.texts
+        for part in name.split("."):
+            found = found.get(part) if isinstance(found, dict) else None
+        if not isinstance(found, str):
+            raise InvalidValueError(f"Prompts {self.origin}: there is no text {name!r}.")
+        return Template(found.strip())
+
+    def fill(self, name: str, /, **fields: str) -> str:
+        """The words of that name with their fields filled.
+
+        Raises:
+            InvalidValueError: there are no such words, or they have a field nobody fills.
+        """
+        try:
+            return self[name].substitute(fields)
+        except (KeyError, ValueError) as error:
+            raise InvalidValueError(
+                f"Prompts {self.origin}: text {name!r} has a field that cannot be filled "
+                f"({error}); it may have {', '.join(f'${field}' for field in fields) or 'none'}."
+            ) from error
+
+    def lines(self, name: str) -> tuple[str, ...]:
+        """A list of texts."""
+        found = self.texts.get(name)
+        if not isinstance(found, list) or not all(isinstance(line, str) for line in found):
+            raise InvalidValueError(f"Prompts {self.origin}: {name!r} is no list of texts.")
+        return tuple(found)
+
+
+def load_prompts(name: str, file: str | None = None) -> Prompts:
+    """Our own words of that name, or somebody's from a file with the same entries.
+
+    Raises:
+        InvalidValueError: the file cannot be read or is not TOML.
+    """
+    if file is None:
+        origin = f"{name}.toml"
+        content = resources.files(__package__).joinpath(FOLDER, origin).read_bytes()
+    else:
+        origin = file
+        try:
+            content = Path(file).read_bytes()
+        except OSError as error:
+            raise InvalidValueError(f"Prompts {file!r} cannot be read ({error}).") from error
+    try:
+        texts = tomllib.loads(content.decode())
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InvalidValueError(f"Prompts {origin!r} are not TOML ({error}).") from error
+    return Prompts(texts, hashlib.sha256(content).hexdigest()[:FINGERPRINT_LENGTH], origin)

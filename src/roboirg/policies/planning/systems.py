@@ -1,0 +1,173 @@
+"""Systems: a policy, perhaps with a planner in front, as a file; those of the paper are at hand."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlencode
+
+from pydantic import BaseModel, ConfigDict
+
+from roboirg.errors import InvalidValueError, UnknownNameError
+from roboirg.policies.base import Policy
+from roboirg.policies.planning.planned import put_in_front
+from roboirg.policies.planning.planners import make_planner
+from roboirg.policies.planning.validation import checked
+from roboirg.policies.urls import is_url, split_url
+
+PACKAGE, FOLDER = "roboirg.policies", "systems"
+SUFFIX = ".toml"
+
+SERVER, VLM, MODEL = "server", "vlm", "model"
+POLICY, PLANNER = "policy.", "planner."
+SHORT: Mapping[str, str] = {VLM: "planner.model.base_url", MODEL: "planner.model.model"}
+"""Options with names of their own, and the entries that they set."""
+OPTIONS = (SERVER, *SHORT, "policy.OPTION", "planner.OPTION", "planner.model.OPTION")
+
+
+class Published(BaseModel):
+    """Where a system comes from and how its servers are started.
+
+    Attributes:
+        checkpoint: of the policy, in its public release.
+        server: the command that serves the policy, in the release's repository.
+        vlm: the command that serves the planner's model, if there is one to serve.
+        flags: what RoboMME's own client is given for this system and not for others.
+        differs: what is not the same here, in words.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    checkpoint: str
+    server: str
+    vlm: str | None = None
+    flags: str
+    differs: str = ""
+
+
+class System(BaseModel):
+    """A system to be evaluated.
+
+    Attributes:
+        name: as on the command line.
+        about: one sentence.
+        policy: spec of the policy that acts.
+        planner: ``kind`` and options of the planner in front of it, or None.
+        published: where it comes from; None for own systems.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str
+    about: str
+    policy: str
+    planner: dict[str, Any] | None = None
+    published: Published | None = None
+
+
+def load_system(
+    name_or_file: str, overrides: Mapping[str, str] | None = None, seed: int = 0
+) -> Policy:
+    """A system as a policy; nothing is connected.
+
+    Args:
+        name_or_file: a name such as ``GroundSG-QwenVL``, or a TOML file with the same entries.
+        overrides: ``server`` (host:port of the policy), ``vlm`` (URL of the planner's model),
+            ``model`` (its name), ``policy.OPTION``, ``planner.OPTION``, ``planner.model.OPTION``.
+        seed: of the policy's own random choices.
+
+    Raises:
+        UnknownNameError: there is no such system or option.
+        InvalidValueError: the file cannot be read, or an option has a value that it cannot have.
+    """
+    return build_system(find_system(name_or_file, overrides or {}), seed)
+
+
+def all_systems() -> tuple[str, ...]:
+    """The names of the systems at hand."""
+    files = resources.files(PACKAGE).joinpath(FOLDER).iterdir()
+    return tuple(sorted(_stem(one.name) for one in files if one.name.endswith(SUFFIX)))
+
+
+def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
+    """A system with some entries overridden; see `load_system`."""
+    if name_or_file in all_systems():
+        file = resources.files(PACKAGE).joinpath(FOLDER, f"{name_or_file}{SUFFIX}")
+        content = file.read_bytes()
+    elif name_or_file.endswith(SUFFIX):
+        try:
+            content = Path(name_or_file).read_bytes()
+        except OSError as error:
+            raise InvalidValueError(f"System {name_or_file!r} cannot be read ({error}).") from error
+    else:
+        raise UnknownNameError("system", name_or_file, [*all_systems(), f"FILE{SUFFIX}"])
+    try:
+        entries = tomllib.loads(content.decode())
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InvalidValueError(f"System {name_or_file!r} is not TOML ({error}).") from error
+    origin = f"system {name_or_file}"
+    return _overridden(checked(System, entries, origin), overrides, origin)
+
+
+def build_system(system: System, seed: int) -> Policy:
+    """A system as a policy; nothing is connected.
+
+    Raises:
+        UnknownNameError: there is no such planner, policy or option.
+        InvalidValueError: an option has a value that it cannot have.
+    """
+    from roboirg.policies.loading import make_policy  # the loader knows of systems
+
+    policy = make_policy(system.policy, seed)
+    if system.planner is None:
+        return policy
+    options = dict(system.planner)
+    kind = str(options.pop("kind", ""))
+    planner = make_planner(kind, options, f"the planner of system {system.name}")
+    return put_in_front(planner, policy, system.name)
+
+
+def _overridden(system: System, overrides: Mapping[str, str], origin: str) -> System:
+    policy, planner = system.policy, system.planner
+    for option, value in overrides.items():
+        entry = SHORT.get(option, option)
+        if option == SERVER or option.startswith(POLICY):
+            policy = _policy_with(policy, option, value, origin)
+        elif not entry.startswith(PLANNER):
+            raise UnknownNameError(f"option of {origin}", option, OPTIONS)
+        elif planner is None:
+            raise InvalidValueError(f"Option {option!r}: {origin} has no planner.")
+        else:
+            planner = _nested(planner, entry.removeprefix(PLANNER).split("."), value)
+    return system.model_copy(update={"policy": policy, "planner": planner})
+
+
+def _policy_with(spec: str, option: str, value: str, origin: str) -> str:
+    """A policy's URL with another server or another option."""
+    if not is_url(spec):
+        raise InvalidValueError(
+            f"Option {option!r}: the policy of {origin} is {spec!r}, which is no URL."
+        )
+    url = split_url(spec)
+    place, options = url.place, dict(url.options)
+    if option == SERVER:
+        place = value
+    else:
+        options[option.removeprefix(POLICY)] = value
+    query = urlencode(options)
+    return f"{url.scheme}://{place}" + (f"?{query}" if query else "")
+
+
+def _nested(entries: Mapping[str, Any], path: list[str], value: str) -> dict[str, Any]:
+    first, *rest = path
+    if not rest:
+        return {**entries, first: value}
+    held = entries.get(first, {})
+    return {**entries, first: _nested(held if isinstance(held, dict) else {}, rest, value)}
+
+
+def _stem(name: str) -> str:
+    return name.removesuffix(SUFFIX)

@@ -1,0 +1,236 @@
+"""Models that answer as they are told, over real HTTP, in OpenAI's and in Google's dialect."""
+
+import base64
+import hashlib
+import io
+import json
+import re
+import threading
+import time
+from collections.abc import Callable
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from types import SimpleNamespace
+
+import av
+import numpy as np
+
+from roboirg.language import instruct
+from roboirg.policies.planning.listener import ListenerOptions, VLMListener
+from roboirg.policies.planning.models import ModelOptions
+
+TOKENS = 100, 7
+"""Input and output tokens of every reply."""
+KEY_VARIABLE, KEY = "PLANNING_TEST_KEY", "sk-very-secret-0123456789"
+
+
+class Late:
+    """Answer after so many seconds; drip=True sends a space now and then meanwhile."""
+
+    def __init__(self, seconds, drip=False):
+        self.seconds, self.drip = seconds, drip
+
+
+class Status:
+    """Answer with an HTTP error."""
+
+    def __init__(self, code, words="something went wrong"):
+        self.code, self.words = code, words
+
+
+class Garbage:
+    """Answer with what is no reply at all."""
+
+    def __init__(self, body, kind="application/json"):
+        self.body, self.kind = body, kind
+
+
+class FakeVLM(ThreadingHTTPServer):
+    """Answers with what a function says of the request, and keeps all requests.
+
+    Attributes:
+        answer: from a request (path, headers, body) to a text, or one of the mishaps above.
+        requests: bodies, in the order of arrival.
+    """
+
+    daemon_threads = True
+
+    def __init__(self, answer):
+        super().__init__(("127.0.0.1", 0), _Handler)
+        self.answer = answer
+        self.requests, self.headers, self.paths = [], [], []
+
+    @property
+    def url(self):
+        return f"http://127.0.0.1:{self.server_port}"
+
+
+class _Handler(BaseHTTPRequestHandler):
+    protocol_version = "HTTP/1.1"
+    wbufsize = -1  # whole replies at once: header and body apart wait 40 ms for each other
+
+    def log_message(self, *args):
+        pass
+
+    def do_POST(self):
+        body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
+        self.server.requests.append(body)
+        self.server.headers.append(dict(self.headers))
+        self.server.paths.append(self.path)
+        said = self.server.answer(body)
+        try:
+            self._send(said)
+        except (BrokenPipeError, ConnectionResetError):
+            self.close_connection = True
+
+    def _send(self, said):
+        google = "generateContent" in self.path
+        if isinstance(said, Status):
+            error = {"error": {"message": said.words, "code": said.code, "status": "BAD"}}
+            return self._reply(said.code, json.dumps(error).encode(), "application/json")
+        if isinstance(said, Garbage):
+            return self._reply(200, said.body, said.kind)
+        if isinstance(said, Late) and said.drip:
+            self.send_response(200)
+            self.send_header("Content-Type", "application/json")
+            self.send_header("Content-Length", "100000")
+            self.end_headers()
+            end = time.monotonic() + said.seconds
+            while time.monotonic() < end:
+                self.wfile.write(b" ")
+                self.wfile.flush()
+                time.sleep(0.05)
+            self.close_connection = True
+            return None
+        if isinstance(said, Late):
+            time.sleep(said.seconds)
+            said = "{}"
+        reply = google_reply(said) if google else openai_reply(said)
+        return self._reply(200, json.dumps(reply).encode(), "application/json")
+
+    def _reply(self, code, body, kind):
+        self.send_response(code)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+
+def openai_reply(text):
+    message = {"role": "assistant", "content": text}
+    return {
+        "id": "1",
+        "object": "chat.completion",
+        "created": 0,
+        "model": "fake",
+        "choices": [{"index": 0, "message": message, "finish_reason": "stop"}],
+        "usage": {
+            "prompt_tokens": TOKENS[0],
+            "completion_tokens": TOKENS[1],
+            "total_tokens": sum(TOKENS),
+        },
+    }
+
+
+def google_reply(text):
+    return {
+        "candidates": [
+            {
+                "content": {
+                    "role": "model",
+                    "parts": [{"text": "(thinking)", "thought": True}, {"text": text}],
+                },
+                "finishReason": "STOP",
+            }
+        ],
+        "usageMetadata": {
+            "promptTokenCount": TOKENS[0],
+            "candidatesTokenCount": TOKENS[1] - 2,
+            "thoughtsTokenCount": 2,
+        },
+    }
+
+
+@contextmanager
+def fake_vlm(answer: Callable):
+    """A running server; `answer` may be a list of replies, the last of which stays."""
+    if isinstance(answer, list):
+        left = list(answer)
+        reply = lambda _body: left.pop(0) if len(left) > 1 else left[0]  # noqa: E731
+    else:
+        reply = answer
+    server = FakeVLM(reply)
+    thread = threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True)
+    thread.start()
+    try:
+        yield server
+    finally:
+        server.shutdown()
+        server.server_close()
+        thread.join()
+
+
+def model_options(server, provider="openai", **more):
+    url = f"{server.url}/v1" if provider == "openai" else server.url
+    settings = {"model": "fake", "base_url": url, "retries": 0, "timeout_s": 10.0, **more}
+    return ModelOptions(provider=provider, **settings)
+
+
+def make_listener(server, provider="openai", **more):
+    own = {key: more.pop(key) for key in list(more) if key in ListenerOptions.model_fields}
+    return VLMListener(ListenerOptions(model=model_options(server, provider, **more), **own))
+
+
+def words_of(body):
+    """All words of a request, the last turn's last."""
+    if "contents" in body:
+        return "\n".join(
+            part["text"] for turn in body["contents"] for part in turn["parts"] if "text" in part
+        )
+    texts = []
+    for message in body["messages"]:
+        content = message["content"]
+        pieces = [{"type": "text", "text": content}] if isinstance(content, str) else content
+        texts += [piece["text"] for piece in pieces if piece["type"] == "text"]
+    return "\n".join(texts)
+
+
+def stand_in(episode, setting="explicit", shade=0):
+    """As much of an environment as a listener looks at before its hands move."""
+    picture = np.full((256, 256, 3), shade, np.uint8)
+    return SimpleNamespace(
+        episode=episode,
+        instruction=instruct(episode, setting),
+        picture=lambda camera: picture,
+        grounded=True,
+    )
+
+
+def golden(body):
+    """A request with every picture and clip replaced by a description of its content."""
+    if isinstance(body, dict):
+        if "data" in body:
+            # The library's spelling of it is its own business.
+            kind = body.get("mimeType") or body["mime_type"]
+            return {"mimeType": kind, "data": _described(kind, body["data"])}
+        return {key: golden(held) for key, held in body.items()}
+    if isinstance(body, list):
+        return [golden(held) for held in body]
+    found = re.fullmatch(r"data:(.*?);base64,(.*)", body) if isinstance(body, str) else None
+    return _described(found[1], found[2]) if found else body
+
+
+def _described(kind, data):
+    frames, rate = decoded(base64.urlsafe_b64decode(data.replace("+", "-").replace("/", "_")))
+    if kind == "video/mp4":
+        return f"<{kind}, {len(frames)} frames of {frames.shape[1:3]} at {rate}>"
+    digest = hashlib.sha256(frames[0].tobytes()).hexdigest()[:8]
+    return f"<{kind}, {frames.shape[1:3]}, pixels {digest}>"
+
+
+def decoded(content):
+    """Frames (T, height, width, 3) of a file, and its rate."""
+    with av.open(io.BytesIO(content)) as container:
+        rate = container.streams.video[0].average_rate
+        frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+    return np.stack(frames), rate

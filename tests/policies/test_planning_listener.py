@@ -1,0 +1,410 @@
+"""A model says what is meant, over real HTTP; what it may know, and what comes of its answers."""
+
+import contextlib
+import itertools
+import json
+import math
+import os
+import re
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from planning_fakes import (
+    KEY,
+    KEY_VARIABLE,
+    TOKENS,
+    Garbage,
+    Late,
+    Status,
+    fake_vlm,
+    golden,
+    make_listener,
+    stand_in,
+    words_of,
+)
+
+import roboirg
+from roboirg.errors import (
+    MissingDependencyError,
+    PolicyConnectionError,
+    PolicyReplyError,
+    PolicyTimeoutError,
+)
+from roboirg.language import instruct, resolve
+from roboirg.policies import play
+from roboirg.policies.planning.asking import UnparsableReply
+from roboirg.policies.planning.listener import NotUnderstood
+from roboirg.policies.planning.models import ModelOptions
+from roboirg.policies.planning.slots import full_answer, slots_of
+from roboirg.splits import SIZES, get_episode
+from roboirg.tasks import every_task
+
+SPLITS = tuple(SIZES)
+EPISODES = 3
+
+
+def heard(body):
+    """The instruction in a request."""
+    return re.search(r"What was said to the robot, in full:\n(.*)", words_of(body))[1]
+
+
+def hearing(episode):
+    """Answers as the resolver understands the words of the request."""
+
+    def answer(body):
+        (goal,) = resolve(heard(body), episode.scene, episode.task).goals
+        return json.dumps(full_answer(goal, slots_of(episode.task)))
+
+    return answer
+
+
+@pytest.mark.parametrize("task", every_task())
+def test_every_goal_of_every_split_can_be_answered_and_nothing_else(task):
+    slots = slots_of(task)
+    seen = {
+        goal
+        for split in SPLITS
+        for index in range(SIZES[split])
+        for goal in every_task()[task].goals(get_episode(task, split, index).scene)
+    }
+    assert set(slots.goals.values()) == seen
+    for goal in seen:
+        assert slots.read(json.dumps(full_answer(goal, slots))) == goal
+
+
+@pytest.mark.parametrize("task", every_task())
+def test_the_schema_allows_every_answer(task):
+    slots = slots_of(task)
+    properties = slots.schema()["properties"]
+    for goal in slots.goals.values():
+        for name, value in full_answer(goal, slots).items():
+            schema = properties[name]
+            if schema["type"] == "array":
+                assert schema["minItems"] <= len(value) <= schema["maxItems"]
+                assert set(value) <= set(schema["items"]["enum"])
+            else:
+                assert value in schema["enum"]
+                assert schema["type"] == ("integer" if isinstance(value, int) else "string")
+
+
+@given(
+    st.recursive(
+        st.none()
+        | st.booleans()
+        | st.integers(-3, 9)
+        | st.floats()
+        | st.sampled_from(["red", "blue", "Red ", "before", "x"]),
+        lambda inner: (
+            st.lists(inner, max_size=3)
+            | st.dictionaries(st.sampled_from(["colour", "colours", "repeats", "visit"]), inner)
+        ),
+    )
+)
+def test_any_reply_is_a_goal_or_unparsable(reply):
+    for task in every_task():
+        slots = slots_of(task)
+        with contextlib.suppress(UnparsableReply):
+            assert slots.read(json.dumps(reply)) in slots.goals.values()
+
+
+@pytest.mark.parametrize(
+    ("reply", "words"),
+    [
+        ("red, three times", "no JSON object"),
+        ('{"colour": "red"}', "'repeats' is missing"),
+        ('{"colour": "pink", "repeats": 2}', "'colour' cannot be \"pink\".*blue, green, red"),
+        ('{"colour": "red", "repeats": true}', "'repeats' cannot be true"),
+        ('{"colour": "red", "repeats": "two"}', "'repeats' cannot be \"two\""),
+        ('{"colour": "red", "repeats": 2.0}', "'repeats' cannot be 2.0"),
+    ],
+)
+def test_wrong_replies_are_explained(reply, words):
+    with pytest.raises(UnparsableReply, match=words):
+        slots_of("PickXtimes").read(reply)
+
+
+def test_values_that_do_not_go_together_are_no_goal():
+    for task, reply in [
+        ("BinFill", {"red": 0, "blue": 0, "green": 0}),
+        ("VideoUnmask", {"colours": ["red", "red"]}),
+    ]:
+        with pytest.raises(UnparsableReply, match="meant together"):
+            slots_of(task).read(json.dumps(reply))
+
+
+def test_fences_words_and_capitals_around_an_answer_do_no_harm():
+    goal = slots_of("PickXtimes").read(
+        'Let {me} think.\n```json\n{"why": "x", "colour": " Red", "repeats": 2}\n```'
+    )
+    assert dict(goal.as_mapping()) == {"colour": "red", "repeats": 2}
+
+
+def test_a_listener_that_is_told_the_truth_decides_on_the_true_goal_in_all_settings():
+    """Nothing else than the words of the request tells it."""
+    asked = 0
+    with fake_vlm(["{}"]) as server:
+        policy = make_listener(server)
+        for task, known in every_task().items():
+            for setting, index in itertools.product(known.settings, range(EPISODES)):
+                episode = get_episode(task, "test", index)
+                env = stand_in(episode, setting)
+                server.answer = hearing(episode)
+                assert policy.decide(env, env.instruction.text) == episode.goal
+                asked += 1
+        policy.close()
+    assert asked == len(server.requests) == policy.usage()["calls"]
+    assert asked == EPISODES * sum(len(known.settings) for known in every_task().values())
+
+
+def test_random_answers_reach_the_chance_level():
+    """A goal at random out of all that a task has is right as often as can be counted exactly."""
+    rng = np.random.default_rng(5)
+    rounds, right, expected, variance = 0, 0, 0.0, 0.0
+    with fake_vlm(["{}"]) as server:
+        policy = make_listener(server)
+        for task in every_task():
+            slots = slots_of(task)
+            goals = list(slots.goals.values())
+
+            def guess(_body, goals=goals, slots=slots):
+                return json.dumps(full_answer(goals[int(rng.integers(len(goals)))], slots))
+
+            server.answer = guess
+            for index in range(40):
+                episode = get_episode(task, "test", index)
+                with contextlib.suppress(NotUnderstood):
+                    right += policy.decide(stand_in(episode), "Do it.") == episode.goal
+                rounds += 1
+                chance = 1 / len(goals)
+                expected += chance
+                variance += chance * (1 - chance)
+        policy.close()
+    assert rounds == 40 * len(every_task())
+    assert abs(right - expected) < 4 * math.sqrt(variance)
+
+
+def test_a_listener_tells_what_a_policy_may_know_and_nothing_of_the_scene():
+    """The same words get the same request in every scene of a task that looks alike."""
+    requests = set()
+    with fake_vlm(["{}"]) as server:
+        for index in range(8):
+            env = stand_in(get_episode("PickXtimes", "test", index))
+            with pytest.raises(NotUnderstood):
+                make_listener(server).decide(env, "Do that again.")
+            requests.add(json.dumps(server.requests[0]))
+            server.requests.clear()
+    assert len(requests) == 1
+
+
+def test_unparsable_replies_are_retried_once_then_counted():
+    env = stand_in(get_episode("PickXtimes", "test", 0))
+    goal = env.episode.goal
+    good = json.dumps(full_answer(goal, slots_of("PickXtimes")))
+    with fake_vlm(["no idea", good]) as server:
+        policy = make_listener(server)
+        assert policy.decide(env, "Do it.") == goal
+        assert policy.usage() == usage(calls=2)
+        first, second = server.requests
+        *same, said, complaint = second["messages"]
+        assert same == first["messages"]
+        assert said == {"role": "assistant", "content": "no idea"}
+        assert "no JSON object" in complaint["content"][0]["text"]
+    with fake_vlm(["no idea", "", good]) as server:
+        policy = make_listener(server)
+        with pytest.raises(NotUnderstood):
+            policy.decide(env, "Do it.")
+        assert policy.usage() == usage(calls=2, unparsed=1)
+        assert policy.decide(env, "Do it.") == goal
+        assert policy.usage() == usage(calls=3, unparsed=1)
+
+
+def usage(calls, unparsed=0, impossible=0):
+    return {
+        "calls": calls,
+        "input_tokens": calls * TOKENS[0],
+        "output_tokens": calls * TOKENS[1],
+        "unparsed": unparsed,
+        "impossible": impossible,
+    }
+
+
+def test_what_is_not_in_the_scene_is_counted_and_nothing_is_done():
+    episode = next(
+        one
+        for one in (get_episode("PickXtimes", "test", index) for index in range(50))
+        if len(one.scene.of_kind("cube")) == 1
+    )
+    (there,) = {cube.colour for cube in episode.scene.of_kind("cube")}
+    absent = next(colour for colour in ("red", "green", "blue") if colour != there)
+    with fake_vlm([json.dumps({"colour": absent, "repeats": 1})]) as server:
+        policy = make_listener(server)
+        policy.attach(stand_in(episode))
+        policy.reset("Do it.", {})
+        assert policy.usage() == usage(calls=1, impossible=1)
+        assert policy.metadata["understood"] == {"colour": absent, "repeats": 1}
+
+
+def test_a_new_episode_has_a_new_account():
+    with fake_vlm(["?"]) as server:
+        policy = make_listener(server, input_price=2.0, output_price=10.0)
+        policy.attach(stand_in(get_episode("PickXtimes", "test", 0)))
+        for _ in range(2):
+            policy.reset("Do it.", {})
+            cost = (2 * TOKENS[0] * 2.0 + 2 * TOKENS[1] * 10.0) / 1e6
+            assert policy.usage() == {**usage(2, unparsed=1), "cost_usd": pytest.approx(cost)}
+            assert policy.metadata["understood"] is None
+
+
+@pytest.mark.parametrize("provider", ["openai", "google"])
+@pytest.mark.parametrize(
+    ("mishap", "error", "words"),
+    [
+        (Status(401, f"bad key {KEY}"), PolicyReplyError, "bad key …"),
+        (Status(400), PolicyReplyError, "something went wrong"),
+        (Status(429), PolicyConnectionError, "not available"),
+        (Status(503), PolicyConnectionError, "not available"),
+        (Late(30), PolicyTimeoutError, "did not answer within 0.5 s"),
+        (Late(30, drip=True), PolicyTimeoutError, "did not answer within 0.5 s"),
+        (Garbage(b"<html>", "text/html"), PolicyReplyError, "fake"),
+        (Garbage(b'{"no": 1}'), (PolicyReplyError, NotUnderstood), ".*"),
+        (Garbage(b"{"), PolicyReplyError, "fake"),
+    ],
+)
+def test_mishaps_have_their_own_errors(provider, mishap, error, words, monkeypatch):
+    monkeypatch.setenv(KEY_VARIABLE, KEY)
+    with fake_vlm([mishap]) as server:
+        policy = make_listener(server, provider, timeout_s=0.5, api_key_env=KEY_VARIABLE)
+        with pytest.raises(error, match=words) as raised:
+            policy.decide(stand_in(get_episode("StopCube", "test", 0)), "Stop.")
+        assert KEY not in str(raised.value)
+        assert raised.value.__cause__ is None
+        sent = json.dumps(server.headers)
+        assert KEY in sent
+
+
+@pytest.mark.parametrize("provider", ["openai", "google"])
+def test_nobody_at_home_is_a_connection_error(provider):
+    with fake_vlm(["{}"]) as server:
+        policy = make_listener(server, provider)
+    with pytest.raises(PolicyConnectionError, match="cannot be reached"):
+        policy.decide(stand_in(get_episode("StopCube", "test", 0)), "Stop.")
+
+
+def test_a_key_goes_only_where_it_is_meant_to_and_never_into_records(monkeypatch):
+    monkeypatch.setenv("OPENAI_API_KEY", KEY)
+    monkeypatch.setenv(KEY_VARIABLE, KEY)
+    episode = get_episode("StopCube", "test", 0)
+    with fake_vlm(hearing(episode)) as server:
+        env = stand_in(episode)
+        make_listener(server).decide(env, env.instruction.text)
+        assert KEY not in json.dumps(server.headers)
+        policy = make_listener(server, api_key_env=KEY_VARIABLE)
+        policy.decide(env, env.instruction.text)
+        assert KEY in json.dumps(server.headers[1])
+    told = json.dumps([policy.metadata, policy.usage(), policy.version])
+    assert KEY not in told
+    assert server.url in told
+
+
+def test_a_missing_key_stops_the_run_in_one_sentence(monkeypatch):
+    monkeypatch.delenv(KEY_VARIABLE, raising=False)
+    monkeypatch.delenv("GOOGLE_API_KEY", raising=False)
+    for options, name in [
+        (ModelOptions(model="m", api_key_env=KEY_VARIABLE), KEY_VARIABLE),
+        (ModelOptions(provider="google", model="m"), "GOOGLE_API_KEY"),
+    ]:
+        with pytest.raises(MissingDependencyError, match=name):
+            options.key()
+
+
+def test_versions_tell_words_and_options_apart_but_not_addresses():
+    with fake_vlm(["{}"]) as server:
+        version = make_listener(server).version
+        assert version.startswith("fake ")
+        assert make_listener(server, base_url="http://elsewhere/v1", timeout_s=3).version == version
+        assert make_listener(server, frames=3).version != version
+        assert make_listener(server, temperature=0.5).version != version
+
+
+def video(steps):
+    frames = np.arange(steps, dtype=np.uint8)[:, None, None, None] * np.ones(
+        (1, 256, 256, 3), np.uint8
+    )
+    return {"front_rgb": frames[::8], "joint_positions": np.zeros((steps, 7), np.float32)}
+
+
+@pytest.mark.parametrize("provider", ["openai", "google"])
+@pytest.mark.parametrize("shown", [0, 100])
+def test_requests_are_as_captured(provider, shown):
+    episode = get_episode("VideoPlaceOrder", "test", 0)
+    with fake_vlm(hearing(episode)) as server:
+        policy = make_listener(server, provider, frames=4, reasoning=True)
+        policy._demonstration = video(shown)
+        policy.decide(stand_in(episode, shade=9), instruct(episode, "direct").text)
+    assert policy.usage() == usage(1)
+    name = f"listener-{provider}-{'video' if shown else 'none'}"
+    check_capture(name, golden(server.requests[0]))
+
+
+def check_capture(name, body):
+    """Compare with the capture of that name; written anew where ROBOIRG_CAPTURE=1 says so."""
+    file = Path(__file__).parent / "captures" / "planning" / f"{name}.json"
+    if os.environ.get("ROBOIRG_CAPTURE") == "1":
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps(body, indent=1, ensure_ascii=False) + "\n")
+    assert body == json.loads(file.read_text())
+
+
+def test_two_listeners_do_not_mix():
+    one, two = (get_episode("PickXtimes", "test", index) for index in (0, 2))
+    with fake_vlm(hearing(one)) as first, fake_vlm(["?"]) as second:
+        here, there = make_listener(first), make_listener(second)
+        here.attach(stand_in(one))
+        there.attach(stand_in(two))
+        env = stand_in(one)
+        assert here.decide(env, env.instruction.text) == one.goal
+        there.reset("Do it.", video(16))
+        assert here.usage() == usage(1)
+        assert there.usage() == usage(2, unparsed=1)
+        assert here.understood == one.goal
+        assert there.understood is None
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize(
+    ("task", "setting"),
+    [("PickXtimes", "direct"), ("VideoUnmask", "spatial"), ("StopCube", "reasoning")],
+)
+def test_the_hands_do_what_the_model_understood(task, setting):
+    episode = get_episode(task, "test", 0)
+    with fake_vlm(hearing(episode)) as server:
+        policy = make_listener(server, frames=2, frames_every=20)
+        env = roboirg.make(task, setting=setting, cameras=policy.cameras, demonstration_frames=20)
+        assert play(env, policy)["status"] == "success"
+        (request,) = server.requests
+        kinds = Counter(
+            part["type"] for message in request["messages"][1:] for part in message["content"]
+        )
+        video_shown = len(episode.demonstration) > 0
+        assert kinds["image_url"] == 1 + (2 if video_shown else 0)
+        assert (
+            policy.metadata["understood"] == json.loads(json.dumps(dict(episode.goal.as_mapping())))
+            or policy.understood == episode.goal
+        )
+
+
+@pytest.mark.sim
+def test_without_an_answer_the_robot_rests_until_time_is_up():
+    with fake_vlm(["I would rather not."]) as server:
+        policy = make_listener(server)
+        env = roboirg.make(
+            "PickXtimes", cameras=policy.cameras, demonstration_frames=8, max_steps=60
+        )
+        info = play(env, policy)
+    assert info["status"] == "timeout"
+    assert not [event for event in info["events"] if event["kind"] == "picked"]
+    assert policy.usage()["unparsed"] == 1

@@ -1,0 +1,257 @@
+"""Points, key frames, forms of subgoals, pictures and what two share: without any model."""
+
+import itertools
+import re
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from planning_fakes import decoded
+
+from roboirg.errors import InvalidValueError
+from roboirg.observations import DemonstrationFrames
+from roboirg.policies.planning.asking import UnparsableReply, json_object, text_of
+from roboirg.policies.planning.content import Clip, Picture, evenly, mp4, png, summary
+from roboirg.policies.planning.keyframes import NEAR, merged
+from roboirg.policies.planning.points import (
+    LONGEST_SUBGOAL,
+    from_boxes,
+    from_points,
+    pixel,
+    says_finished,
+    without_places,
+)
+from roboirg.policies.planning.prompts import load_prompts
+from roboirg.policies.planning.sharing import (
+    Excerpt,
+    both_cameras,
+    both_frames,
+    both_histories,
+    cut_history,
+)
+from roboirg.splits import get_episode
+from roboirg.tasks import every_task
+
+thousandths = st.integers(0, 1000)
+PROMPTS = ("listener", "qwen", "gemini", "memer", "subgoals")
+
+
+@given(st.lists(st.tuples(thousandths, thousandths), max_size=5))
+def test_points_are_scaled_row_first_all_at_once(points):
+    """One pass: what is a pixel already is not taken for a thousandth again."""
+    expected = " and ".join(f"at <{pixel(y)}, {pixel(x)}>" for y, x in points)
+    texts = " and ".join(f"at <{y}, {x}>" for y, x in points)
+    boxes = " and ".join(f"at <|box_start|>({y},{x})<|box_end|>" for y, x in points)
+    bare = " and ".join(f"at ({y}, {x})" for y, x in points)
+    assert from_points(f"Go {texts}") == f"go {expected}".strip()
+    assert from_boxes(f"Go {boxes}<|im_end|>") == f"go {expected}".strip()
+    assert from_boxes(f'"Go\n{bare}."') == f"go {expected}".strip()
+
+
+@given(thousandths)
+def test_a_pixel_is_floored_and_stays_in_the_picture(value):
+    assert pixel(value) == min(int(Fraction(256 * value, 1000)), 255)
+
+
+def test_examples_of_points():
+    assert [pixel(value) for value in (0, 3, 4, 500, 999, 1000)] == [0, 0, 1, 128, 255, 255]
+    assert from_points("from <500, 300> to <128, 76>") == "from <128, 76> to <32, 19>"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "  \n", "go at <1001, 3>", "go at <3>", "go at <|box_start|>(3)<|box_end|>", "{}"),
+        *("<y, x>", "x" * (LONGEST_SUBGOAL + 1)),
+    ],
+)
+def test_broken_subgoals_are_unparsable(text):
+    for read in (from_points, from_boxes):
+        if text == "go at <1001, 3>" and read is from_boxes:
+            text = "go at (1001,3)"
+        with pytest.raises(UnparsableReply):
+            read(text)
+
+
+def test_places_are_left_out_to_compare():
+    assert without_places("press the button at <3, 200> to stop") == "press the button to stop"
+
+
+@given(st.lists(st.integers(0, 200)), st.integers(0, 20))
+def test_merged_key_frames(steps, near):
+    kept = merged(steps, near)
+    assert set(kept) <= set(steps)
+    assert kept == tuple(sorted(kept))
+    assert merged(reversed(steps), near) == kept == merged(kept, near)
+    assert all(later - sooner > near for sooner, later in itertools.pairwise(kept))
+    # Every frame is in a chain of near ones that has exactly one representative.
+    ordered = sorted(set(steps))
+    breaks = sum(b - a > near for a, b in itertools.pairwise(ordered))
+    assert len(kept) == (breaks + 1 if ordered else 0)
+
+
+@pytest.mark.parametrize(
+    ("steps", "kept"),
+    [
+        ([], ()),
+        ([4], (4,)),
+        ([2, 10], (10,)),
+        ([2, 11], (2, 11)),
+        ([0, 8, 16], (8,)),
+        ([0, 8, 16, 24], (16,)),
+        ([30, 0, 2, 32, 4], (2, 32)),
+    ],
+)
+def test_examples_of_merging(steps, kept):
+    assert NEAR == 8
+    assert merged(steps) == kept
+
+
+def test_every_subgoal_of_every_task_has_a_form_that_planners_know():
+    forms = load_prompts("subgoals").lines("forms")
+    patterns = [_pattern(form) for form in forms]
+    used = set()
+    for task in every_task():
+        for index in range(40):
+            for stage in get_episode(task, "train", index).stages:
+                for at in ("at <3, 200>", ""):
+                    text = " ".join(stage.subgoal.replace("{at}", at).split())
+                    found = {n for n, one in enumerate(patterns) if one.fullmatch(text)}
+                    assert found, text
+                    used |= found
+                    assert not says_finished(text)
+    assert used == set(range(len(forms))), "a form that no task has"
+
+
+def _pattern(form):
+    parts = re.split(r"(\{[^}]*\}| ?\[at\])", form)
+    return re.compile(
+        "".join(
+            "(" + part[1:-1] + ")" if part.startswith("{")
+            else r"( at <\d+, \d+>)?" if part.endswith("[at]")
+            else re.escape(part)
+            for part in parts
+        )
+    )  # fmt: skip
+
+
+def test_complete_is_no_subgoal():
+    assert says_finished("all tasks completed")
+    assert says_finished("the task is complete")
+
+
+@given(st.integers(1, 60), st.integers(1, 12))
+def test_chosen_frames_are_spread_evenly(length, most):
+    frames = np.arange(length, dtype=np.uint8)[:, None, None, None]
+    kept = evenly(frames, most).ravel().tolist()
+    assert len(kept) == min(length, most) == len(set(kept))
+    assert kept == sorted(kept)
+    assert kept[0] == 0
+    if most > 1:
+        assert kept[-1] == length - 1
+        gaps = np.diff(kept)
+        assert not len(gaps) or gaps.max() - gaps.min() <= 1
+    clip = summary(frames, most, length)
+    assert len(kept) / clip.rate == Fraction(length, 30)
+
+
+def test_a_picture_and_a_clip_become_files():
+    rng = np.random.default_rng(1)
+    pixels = rng.integers(0, 256, (256, 256, 3), np.uint8)
+    frames, _ = decoded(png(Picture(pixels)))
+    assert np.array_equal(frames[0], pixels)
+    shades = np.arange(0, 250, 10, dtype=np.uint8)[:, None, None, None]
+    shown = np.broadcast_to(shades, (25, 256, 256, 3))
+    content = mp4(Clip(shown))
+    frames, rate = decoded(content)
+    assert rate == 30
+    assert frames.shape == shown.shape
+    assert np.abs(frames.astype(int) - shown).max() < 4
+    assert mp4(Clip(shown)) == content
+
+
+@pytest.mark.parametrize("text", ["", "none", "[1]", "{", "{]}", '{"a": {"b": }'])
+def test_no_object_is_unparsable(text):
+    with pytest.raises(UnparsableReply, match="no JSON object"):
+        json_object(text)
+
+
+@pytest.mark.parametrize("value", [None, 3, "", " ", ["x"]])
+def test_a_field_without_words_is_unparsable(value):
+    with pytest.raises(UnparsableReply, match="'a' has to hold words"):
+        text_of({"a": value}, "a")
+
+
+def test_prompts_are_versioned_and_can_be_replaced(tmp_path):
+    assert len({load_prompts(name).fingerprint for name in PROMPTS}) == len(PROMPTS)
+    file = tmp_path / "mine.toml"
+    file.write_text('again = "no: $why"\nsystem = "x $nobody"\n')
+    mine = load_prompts("qwen", str(file))
+    assert mine.fill("again", why="so") == "no: so"
+    assert mine.fingerprint != load_prompts("qwen").fingerprint
+    with pytest.raises(InvalidValueError, match=r"'goal'"):
+        mine.fill("goal", instruction="x")
+    with pytest.raises(InvalidValueError, match=r"'system' .*nobody.*\$why"):
+        mine.fill("system", why="so")
+    file.write_text("= 3")
+    with pytest.raises(InvalidValueError, match="not TOML"):
+        load_prompts("qwen", str(file))
+    with pytest.raises(InvalidValueError, match="cannot be read"):
+        load_prompts("qwen", str(tmp_path / "none.toml"))
+
+
+wishes = st.sampled_from(["all", "none"]) | st.integers(1, 12)
+
+
+@given(wishes, wishes, st.integers(0, 40))
+def test_each_sees_the_pictures_of_the_video_that_it_asked_for(
+    one: DemonstrationFrames, other: DemonstrationFrames, steps
+):
+    drawn = both_frames(one, other)
+    every = {"all": 1}.get(drawn, drawn)
+    shown = {"joint_positions": np.arange(steps)}
+    if drawn != "none":
+        shown["front_rgb"] = np.arange(steps)[::every]
+    for wish in (one, other):
+        excerpt = Excerpt(shown, drawn, wish)
+        assert len(excerpt["joint_positions"]) == steps
+        if wish == "none":
+            assert set(excerpt) == {"joint_positions"}
+            assert "front_rgb" not in excerpt
+        else:
+            assert len(excerpt) == 2
+            stride = {"all": 1}.get(wish, wish)
+            assert excerpt["front_rgb"].tolist() == list(range(0, steps, stride))
+
+
+@given(
+    st.none() | st.integers(1, 6),
+    st.none() | st.integers(1, 6),
+    st.lists(st.integers(1, 20), max_size=6),
+)
+def test_each_sees_the_moments_that_it_asked_for(one, other, chunks):
+    every = both_histories(one, other)
+    step = looked = 0
+    seen = {True: [], False: []}
+    for chunk in chunks:
+        looks = () if every is None else tuple(
+            at for at in range(step + 1, step + chunk + 1) if at % every == 0
+        )  # fmt: skip
+        step += chunk
+        observation = {"now": step} if every is None else {"now": step, "history": looks}
+        for wish, who in ((one, True), (other, False)):
+            cut = cut_history(observation, looked, every, wish)
+            assert cut["now"] == step
+            assert ("history" in cut) == (wish is not None)
+            seen[who] += cut.get("history", ())
+        looked += len(looks)
+    for wish, who in ((one, True), (other, False)):
+        expected = [] if wish is None else list(range(wish, step + 1, wish))
+        assert seen[who] == expected
+
+
+def test_cameras_are_united_in_the_usual_order():
+    assert both_cameras(("wrist",), ("front",)) == ("front", "wrist")
+    assert both_cameras((), ()) == ()

@@ -1,0 +1,452 @@
+"""Planners in front of a policy: when they ask, what they show, and what comes of the answers."""
+
+import base64
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from planning_fakes import KEY, KEY_VARIABLE, TOKENS, decoded, fake_vlm, golden, model_options
+
+import roboirg
+from roboirg.errors import InvalidValueError
+from roboirg.policies import Policy, PrivilegedPolicy, play
+from roboirg.policies.oracle import OraclePolicy
+from roboirg.policies.planning.planned import PlannedPolicy, put_in_front
+from roboirg.policies.planning.planners.gemini import GeminiOptions, GeminiPlanner
+from roboirg.policies.planning.planners.memer import MemerOptions, MemerPlanner
+from roboirg.policies.planning.planners.oracle import OracleOptions, OraclePlanner
+from roboirg.policies.planning.planners.qwen import QwenOptions, QwenPlanner
+
+CHUNK = 16
+GO = "pick up the red cube at <|box_start|>(500,250)<|box_end|>"
+SUBGOAL = "pick up the red cube at <128, 64>"
+KINDS = {
+    "qwen": (QwenPlanner, QwenOptions),
+    "gemini": (GeminiPlanner, GeminiOptions),
+    "memer": (MemerPlanner, MemerOptions),
+}
+ANSWERS = {
+    "qwen": GO,
+    "gemini": json.dumps({"description": "x", "subgoal_sequence": [], "subgoal":
+                          "Pick up the red cube at <500, 250>"}),
+    "memer": json.dumps({"current_subtask": GO, "keyframe_positions": []}),
+}  # fmt: skip
+
+
+class Follower:
+    """Does as it is told: nothing, so many rows at a time."""
+
+    cameras = ()
+    demonstration_frames = "none"
+
+    def __init__(self, rows=CHUNK):
+        self.rows, self.told, self.seen = rows, [], []
+
+    def reset(self, instruction, demonstration):
+        self.shown = dict(demonstration)
+
+    def follow(self, subgoal):
+        self.told.append(subgoal)
+
+    def act(self, observation):
+        self.seen.append(observation)
+        return np.zeros((self.rows, 8))
+
+    def usage(self):
+        return {"calls": 1, "cost_usd": 0.5}
+
+    metadata = {"checkpoint": "seven"}  # noqa: RUF012
+
+
+class Fingers(OraclePolicy):
+    """The oracle's hands, which listen and do what they would do anyway."""
+
+    def __init__(self):
+        super().__init__()
+        self.told = []
+
+    def follow(self, subgoal):
+        self.told.append(subgoal)
+
+
+def make_planner(kind, server, provider="openai", **more):
+    planner_class, options_class = KINDS[kind]
+    own = {key: more.pop(key) for key in list(more) if key in options_class.model_fields}
+    return planner_class(options_class(model=model_options(server, provider, **more), **own))
+
+
+def moment(step):
+    """What is seen at a step: its number as a shade of grey."""
+    return {"front_rgb": np.full((256, 256, 3), step % 256, np.uint8)}
+
+
+def video(steps, every=1):
+    return {
+        "front_rgb": np.stack([moment(step)["front_rgb"] for step in range(0, steps, every)]),
+        "joint_positions": np.zeros((steps, 7)),
+    }
+
+
+NO_VIDEO = {"front_rgb": np.zeros((0, 256, 256, 3), np.uint8), "joint_positions": np.zeros((0, 7))}
+
+
+def drive(planner, steps, chunk=CHUNK, demonstration=NO_VIDEO, instruction="Do it."):
+    """An episode of so many steps; the subgoal at each chunk's first step."""
+    policy = PlannedPolicy(planner, Follower(chunk))
+    policy.reset(instruction, demonstration)
+    every = policy.observe_every
+    for step in range(0, steps + 1, chunk):
+        observation = moment(step)
+        if every is not None:
+            observation["history"] = tuple(
+                moment(at)
+                for at in range(max(step - chunk + 1, 1), step + 1)
+                if at % every == 0 and step
+            )
+        policy.act(observation)
+    return policy
+
+
+def asked_at(server, kind, answer, steps, chunk=CHUNK, **options):
+    """The steps at which a planner asks, found by an account that only grows when it does."""
+    planner = make_planner(kind, server, **options)
+    server.answer = lambda body: answer
+    at = []
+    plan = planner.plan
+
+    def watched(observation, step):
+        before = planner.usage()["calls"]
+        subgoal = plan(observation, step)
+        if planner.usage()["calls"] > before:
+            at.append(step)
+        return subgoal
+
+    planner.plan = watched
+    drive(planner, steps, chunk)
+    return at
+
+
+def pictures(body):
+    """The shades of all pictures in a request, in order."""
+    shades = []
+    for message in body["messages"][1:]:
+        for part in message["content"] if isinstance(message["content"], list) else ():
+            if part["type"] == "image_url":
+                content = base64.b64decode(part["image_url"]["url"].partition(",")[2])
+                shades.append(int(decoded(content)[0][0, 0, 0, 0]))
+    return shades
+
+
+def clip(body):
+    """The frames of the last clip in a request to Google."""
+    (part,) = [part for part in body["contents"][-1]["parts"] if "inlineData" in part]
+    assert "video/mp4" in part["inlineData"].values()
+    return decoded(base64.b64decode(part["inlineData"]["data"].replace("-", "+").replace("_", "/")))
+
+
+@pytest.mark.parametrize(
+    ("kind", "answer", "options", "steps"),
+    [
+        ("qwen", GO, {}, range(0, 321, 16)),
+        ("qwen", GO, {"keep": 3}, range(0, 321, 48)),
+        ("qwen", "press the button at (3,4)", {}, [0, *range(96, 321, 16)]),
+        ("qwen", "press the button at (3,4) to stop", {}, range(0, 321, 16)),
+        ("qwen", "press the first button at (3,4)", {}, [0, *range(112, 321, 16)]),
+        ("qwen", "press the second button at (3,4)", {}, [0, *range(256, 321, 16)]),
+        ("qwen", "press the second button at (3,4)", {"holds": ()}, range(0, 321, 16)),
+        ("memer", ANSWERS["memer"], {}, range(0, 321, 16)),
+        ("gemini", ANSWERS["gemini"], {}, [0, 96, 144, 192, 240, 288]),
+        ("gemini", ANSWERS["gemini"], {"first_pause": 0}, range(0, 321, 48)),
+    ],
+)
+def test_planners_ask_when_the_facts_say_so(kind, answer, options, steps):
+    with fake_vlm(["x"]) as server:
+        assert asked_at(server, kind, answer, 320, **options) == list(steps)
+
+
+@pytest.mark.parametrize(
+    ("answer", "second"),
+    [("press the button", 100), ("press the first button", 110), ("press the second button", 260)],
+)
+def test_the_last_step_of_a_hold_belongs_to_it(answer, second):
+    with fake_vlm(["x"]) as server:
+        assert asked_at(server, "qwen", answer, 280, chunk=10)[1] == second
+
+
+def test_a_hold_ends_when_another_subgoal_is_due():
+    """First button until 100, second until 250: as with MME-VLA's ButtonUnmaskSwap."""
+    answers = ["press the first button", "press the second button", "pick up the container"]
+    with fake_vlm(answers) as server:
+        policy = drive(make_planner("qwen", server), 300)
+        told = policy.policy.told
+        assert told == [answers[0]] * 7 + [answers[1]] * 9 + [answers[2]] * 3
+
+
+def test_gemini_asks_once_in_a_period_whatever_the_chunks():
+    with fake_vlm(["x"]) as server:
+        answer = ANSWERS["gemini"]
+        assert asked_at(server, "gemini", answer, 220, chunk=10) == [0, 100, 150, 200]
+        assert asked_at(server, "gemini", answer, 220, chunk=50) == [0, 100, 150, 200]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_subgoals_have_pixels_and_are_passed_on(kind):
+    with fake_vlm([ANSWERS[kind]]) as server:
+        assert drive(make_planner(kind, server), 32).policy.told == [SUBGOAL] * 3
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_useless_reply_leaves_the_last_subgoal(kind):
+    with fake_vlm(["{}", "{}", ANSWERS[kind], "{}"]) as server:
+        planner = make_planner(kind, server, **({"first_pause": 0} if kind == "gemini" else {}))
+        policy = drive(planner, 64)
+        assert policy.policy.told == [SUBGOAL] * 4  # none at first
+        usage = planner.usage()
+        assert usage["unparsed"] == (2 if kind == "gemini" else 4)
+        assert usage["calls"] == len(server.requests) == 1 + 2 * usage["unparsed"]
+
+
+def test_qwen_shows_video_task_history_and_picture():
+    answers = [GO, GO.replace("500", "700"), "put it down", GO]
+    with fake_vlm(answers) as server:
+        drive(make_planner("qwen", server, video="mp4"), 48, demonstration=video(60))
+        contents = [body["messages"][1]["content"] for body in server.requests]
+        assert [pictures(body) for body in server.requests] == [[0], [16], [32], [48]]
+    kinds = [[part["type"] for part in content] for content in contents]
+    assert kinds == [["text", "video_url", "text", "text", "text", "image_url", "text"]] * 4
+    frames, rate = decoded(base64.b64decode(contents[0][1]["video_url"]["url"].partition(",")[2]))
+    assert len(frames) == 10
+    assert len(frames) / rate == 60 / 30
+    shades = frames[:, 0, 0, 0].astype(int)
+    assert np.abs(shades - np.linspace(0, 59, 10).round()).max() < 4
+    told = [content[3]["text"] for content in contents]
+    assert "nothing has been done" in told[0]
+    # The same words at another place are not another subgoal.
+    assert told[1] == told[2] == f"Subgoals so far, in order: 1. {GO}"
+    assert told[3] == f"Subgoals so far, in order: 1. {GO}; 2. put it down"
+
+
+def test_gemini_converses_in_clips():
+    with fake_vlm([ANSWERS["gemini"]]) as server:
+        drive(make_planner("gemini", server, "google", sampling_fps=5), 144,
+              demonstration=video(20))  # fmt: skip
+        first, second, third = server.requests
+    assert server.paths[0].endswith("models/fake:generateContent")
+    assert [len(body["contents"]) for body in server.requests] == [1, 3, 5]
+    assert third["contents"][:3] == second["contents"]
+    frames, rate = clip(first)
+    assert (len(frames), rate) == (21, 30)  # the demonstration and the first frame
+    shades = clip(second)[0][:, 0, 0, 0].astype(int)
+    assert np.abs(shades - np.arange(1, 97)).max() < 4
+    assert len(clip(third)[0]) == 48
+    assert third["contents"][1]["role"] == "model"
+
+
+def test_gemini_shows_a_picture_where_there_is_no_clip():
+    with fake_vlm([ANSWERS["gemini"]]) as server:
+        planner = make_planner("gemini", server, period=3, first_pause=0)
+        drive(planner, 6, chunk=3)
+        assert [pictures(body) for body in server.requests] == [[0], [0, 3], [0, 3, 6]]
+
+
+def test_gemini_shows_what_an_unusable_answer_missed_once_more():
+    answers = [ANSWERS["gemini"], "?", "?", ANSWERS["gemini"]]
+    with fake_vlm(answers) as server:
+        drive(make_planner("gemini", server, "google", first_pause=0), 96)
+        assert len(clip(server.requests[-1])[0]) == 96
+        assert len(server.requests[-1]["contents"]) == 3
+
+
+def test_gemini_forgets_the_last_episode():
+    with fake_vlm([ANSWERS["gemini"]]) as server:
+        planner = make_planner("gemini", server)
+        drive(planner, 112, instruction="First.")
+        before = len(server.requests)
+        drive(planner, 0, instruction="Second.")
+        (body,) = server.requests[before:]
+        assert pictures(body) == [0]
+        assert "First." not in json.dumps(body)
+        assert planner.usage()["calls"] == 1
+        planner = make_planner("gemini", server, "google")
+        drive(planner, 112)
+        drive(planner, 0, demonstration=video(20))
+        assert len(clip(server.requests[-1])[0]) == 21
+
+
+@pytest.mark.parametrize("last", ["all tasks completed", "the task is finished"])
+def test_gemini_keeps_the_last_subgoal_where_the_model_says_all_is_done(last):
+    done = json.dumps({"description": "x", "subgoal": last})
+    with fake_vlm([ANSWERS["gemini"], done]) as server:
+        assert set(drive(make_planner("gemini", server), 144).policy.told) == {SUBGOAL}
+
+
+def test_memer_shows_recent_frames_and_remembers_what_it_chose():
+    def choose(*positions):
+        return json.dumps({"current_subtask": GO, "keyframe_positions": positions})
+
+    with fake_vlm([choose(1), choose(8, 2), choose(1), choose(), choose(8)]) as server:
+        planner = make_planner("memer", server)
+        drive(planner, 64)
+        shown = [pictures(body) for body in server.requests]
+    recent = [[0], *(list(range(end - 14, end + 1, 2)) for end in (16, 32, 48, 64))]
+    # 0; 0, 4, 16 make 4 and 16, where 16 and 18 make 18; then 64 besides.
+    memory = [[], [0], [4, 16], [4, 18], [4, 18]]
+    assert shown == [kept + new for kept, new in zip(memory, recent, strict=True)]
+    assert list(planner.memory) == [4, 18, 64]
+
+
+@pytest.mark.parametrize("positions", [[0], [9], ["1"], [True], "1", None])
+def test_memer_refuses_positions_that_there_are_not(positions):
+    with fake_vlm([json.dumps({"current_subtask": GO, "keyframe_positions": positions})]) as server:
+        planner = make_planner("memer", server)
+        drive(planner, 16)
+        assert planner.usage()["unparsed"] == 2
+        assert planner.memory == {}
+
+
+def test_memer_may_be_told_to_keep_the_newest_key_frames_only():
+    choose = json.dumps({"current_subtask": GO, "keyframe_positions": [1]})
+    with fake_vlm([choose]) as server:
+        planner = make_planner("memer", server, most=2)
+        drive(planner, 96)
+        assert list(planner.memory) == [66, 82]
+
+
+@pytest.mark.parametrize("subgoals", ["simple", "grounded"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_requests_are_as_captured(kind, subgoals):
+    provider = "google" if kind == "gemini" else "openai"
+    with fake_vlm([ANSWERS[kind]]) as server:
+        planner = make_planner(
+            kind, server, provider, subgoals=subgoals, video="mp4", max_output_tokens=128
+        )
+        drive(planner, 96 if kind == "gemini" else 16, demonstration=video(60),
+              instruction="Put the red one into the bin.")  # fmt: skip
+        name = f"planner-{kind}-{subgoals}"
+        check_capture(name, [golden(server.requests[0]), golden(server.requests[-1])])
+
+
+def check_capture(name, body):
+    """Compare with the capture of that name; written anew where ROBOIRG_CAPTURE=1 says so."""
+    file = Path(__file__).parent / "captures" / "planning" / f"{name}.json"
+    if os.environ.get("ROBOIRG_CAPTURE") == "1":
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps(body, indent=1, ensure_ascii=False) + "\n")
+    assert body == json.loads(file.read_text())
+
+
+def test_together_they_are_a_policy_and_costs_add_up(monkeypatch):
+    monkeypatch.setenv(KEY_VARIABLE, KEY)
+    with fake_vlm([GO]) as server:
+        planner = make_planner("qwen", server, input_price=1.0, api_key_env=KEY_VARIABLE)
+        policy = drive(planner, 32)
+        assert isinstance(policy, Policy)
+        assert not isinstance(policy, PrivilegedPolicy)
+        assert policy.usage() == {
+            "calls": 4,
+            "input_tokens": 3 * TOKENS[0],
+            "output_tokens": 3 * TOKENS[1],
+            "unparsed": 0,
+            "cost_usd": pytest.approx(0.5 + 3 * TOKENS[0] / 1e6),
+        }
+        assert policy.metadata["policy"] == {"checkpoint": "seven"}
+        assert policy.metadata["planner"]["model"]["model"] == "fake"
+        told = json.dumps([policy.metadata, policy.usage(), policy.version])
+        assert KEY not in told
+        assert KEY in json.dumps(server.headers)
+        policy.close()
+
+
+def test_two_policies_do_not_mix():
+    with fake_vlm([GO]) as one, fake_vlm(["put it down"]) as two:
+        first, second = make_planner("qwen", one), make_planner("qwen", two)
+        here, there = PlannedPolicy(first, Follower()), PlannedPolicy(second, Follower())
+        for policy, words in ((here, "One."), (there, "Two.")):
+            policy.reset(words, NO_VIDEO)
+        for step in (0, 16, 32):
+            for policy in (here, there):
+                policy.act(moment(step))
+        assert here.policy.told == [SUBGOAL] * 3
+        assert there.policy.told == ["put it down"] * 3
+        assert all("One." in json.dumps(body) for body in one.requests)
+        assert not any("put it down." in json.dumps(body) for body in one.requests)
+        assert len(one.requests) == len(two.requests) == 3
+
+
+def test_who_cannot_follow_cannot_be_led():
+    class Deaf(Follower):
+        follow = None
+
+    class Headstrong:
+        def reset(self, instruction, demonstration): ...
+        def act(self, observation): ...
+
+    with pytest.raises(InvalidValueError, match=r"Headstrong has no method follow"):
+        put_in_front(OraclePlanner(), Headstrong())
+
+
+class Wishful(Follower):
+    cameras = ("wrist",)
+    actions = "waypoint"
+    demonstration_frames = 6
+
+
+def test_wishes_of_both_are_met():
+    with fake_vlm(["x"]) as server:
+        together = PlannedPolicy(make_planner("gemini", server, observe_every=4), Wishful())
+        assert together.cameras == ("front", "wrist")
+        assert together.actions == "waypoint"
+        assert together.demonstration_frames == 2
+        assert together.observe_every == 4
+        assert together.grounded is False
+        # Only what is seen tells how long a way point takes.
+        assert PlannedPolicy(make_planner("qwen", server), Wishful()).observe_every == 1
+        assert PlannedPolicy(OraclePlanner(), Follower()).grounded is True
+        assert (
+            PlannedPolicy(OraclePlanner(OracleOptions(subgoals="simple")), Follower()).grounded
+            is False
+        )
+
+
+def test_the_oracle_needs_an_environment_that_names_pixels():
+    policy = put_in_front(OraclePlanner(), Follower())
+    assert isinstance(policy, PrivilegedPolicy)
+    with pytest.raises(InvalidValueError, match="grounded=True"):
+        policy.attach(roboirg.make("PickXtimes", cameras=()))
+
+
+@pytest.mark.sim
+def test_the_oracles_subgoals_are_those_of_the_episode():
+    env = roboirg.make("PickXtimes", cameras=(), grounded=True, demonstration_frames="none")
+    policy = put_in_front(OraclePlanner(), Fingers())
+    policy.policy.demonstration_frames = policy.demonstration_frames = "none"
+    assert play(env, policy)["status"] == "success"
+    told = list(dict.fromkeys(policy.policy.told))
+    expected = [stage.subgoal.split(" {at}")[0] for stage in env.episode.stages]
+    assert [subgoal.split(" at <")[0] for subgoal in told] == expected
+    assert all(" at <" in subgoal for subgoal in told)
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize("kind", KINDS)
+def test_planners_play_whole_episodes(kind):
+    with fake_vlm([ANSWERS[kind]]) as server:
+        more = {"observe_every": 8} if kind == "gemini" else {}
+        policy = put_in_front(make_planner(kind, server, **more), Fingers())
+        env = roboirg.make(
+            "PickXtimes",
+            cameras=policy.cameras,
+            demonstration_frames=policy.demonstration_frames,
+            observe_every=policy.observe_every,
+        )
+        info = play(env, policy)
+        assert info["status"] == "success"
+        assert set(policy.policy.told) == {SUBGOAL}
+        usage = policy.usage()
+        assert usage["unparsed"] == 0
+        assert usage["calls"] == len(server.requests)
+        most = info["steps"] // 48 + 1 if kind == "gemini" else len(policy.policy.told)
+        assert 1 <= usage["calls"] <= most
+        policy.close()

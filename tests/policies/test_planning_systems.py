@@ -1,0 +1,269 @@
+"""Names on the command line, and the systems of the paper as configurations."""
+
+import json
+import re
+import subprocess
+import sys
+
+import pytest
+from planning_fakes import KEY, fake_vlm, stand_in
+from wire_servers import MmeVlaServer, unpack
+
+import roboirg
+from roboirg.errors import InvalidValueError, UnknownNameError
+from roboirg.policies import Policy, PrivilegedPolicy, load_policy_class, make_policy, play
+from roboirg.policies.loading import (
+    is_privileged,
+    policy_version,
+    wanted_cameras,
+    wanted_demonstration_frames,
+    wanted_history,
+)
+from roboirg.policies.planning import specs
+from roboirg.policies.planning.listener import VLMListener
+from roboirg.policies.planning.planned import PlannedPolicy
+from roboirg.policies.planning.systems import all_systems, find_system, load_system
+from roboirg.splits import get_episode
+
+PAPER = ("FrameS-Modul", "GroundSG-Gemini", "GroundSG-QwenVL", "GroundSG-oracle", "MemER",
+         "TTT-Expert", "pi0.5")  # fmt: skip
+PLANNERS = {
+    "GroundSG-Gemini": "gemini",
+    "GroundSG-QwenVL": "qwen",
+    "GroundSG-oracle": "oracle",
+    "MemER": "memer",
+}
+FACTS = {
+    "pi0.5": ("pi05_baseline", "pi05_baseline", "--args.no-use-history"),
+    "TTT-Expert": ("mme_vla_suite", "recurrent-ttt-expert", ""),
+    "FrameS-Modul": ("mme_vla_suite", "perceptual-framesamp-modul", ""),
+    "GroundSG-oracle": ("mme_vla_suite", "symbolic-grounded-subgoal", "--args.use-oracle"),
+    "GroundSG-QwenVL": ("mme_vla_suite", "symbolic-grounded-subgoal", "--args.use-qwenvl"),
+    "GroundSG-Gemini": ("mme_vla_suite", "symbolic-grounded-subgoal", "--args.use-gemini"),
+    "MemER": ("mme_vla_suite", "symbolic-grounded-subgoal", "--args.use-memer"),
+}
+LISTENER = "vlm-listener:openai?base_url=http://localhost:8000/v1&model=qwen"
+
+
+def test_the_papers_systems_are_at_hand():
+    assert all_systems() == PAPER
+
+
+@pytest.mark.parametrize("name", PAPER)
+def test_a_system_is_a_policy_offline(name):
+    policy = load_system(name)
+    assert isinstance(policy, Policy)
+    assert isinstance(policy, PrivilegedPolicy) == (name == "GroundSG-oracle")
+    assert isinstance(policy, PlannedPolicy) == (name in PLANNERS)
+    if name in PLANNERS:
+        assert policy.metadata["planner"]["kind"] == PLANNERS[name]
+        assert policy.grounded == (name == "GroundSG-oracle")
+        assert policy.policy.options.subgoals == "grounded"
+    low = policy.policy if name in PLANNERS else policy
+    assert low.options.history == (name in {"TTT-Expert", "FrameS-Modul"})
+    assert low.options.execute == 16
+    policy.close()
+
+
+@pytest.mark.parametrize("name", PAPER)
+def test_commands_are_those_of_the_release(name):
+    config, folder, flag = FACTS[name]
+    published = find_system(name, {}).published
+    assert f"--policy.config={config} " in published.server + " "
+    assert re.search(rf"--policy\.dir=runs/ckpts/{config}/{folder}/79999 ", published.server)
+    assert "--seed=7" in published.server
+    assert flag in published.flags
+    assert bool(flag) == bool(published.flags)
+    assert ("grounded_subgoal" in published.flags) == (name in PLANNERS)
+    assert (published.vlm is not None) == (name in {"GroundSG-QwenVL", "MemER"})
+    port = re.search(r"--port=(\d+)", published.server)[1]
+    assert f"localhost:{port}" in find_system(name, {}).policy
+
+
+def test_a_spec_overrides_entries():
+    spec = (
+        "system:GroundSG-QwenVL?server=gpu:9001&vlm=http://other:8000/v1&model=mine"
+        "&planner.keep=2&planner.model.timeout_s=7.5&policy.execute=8"
+    )
+    policy = make_policy(spec, 3)
+    assert policy.policy.options.execute == 8
+    assert "gpu:9001" in find_system("GroundSG-QwenVL", {"server": "gpu:9001"}).policy
+    assert policy.policy.options.version == "symbolic-grounded-subgoal-79999"
+    options = policy.planner.options
+    assert (options.keep, options.model.timeout_s, options.model.model) == (2, 7.5, "mine")
+    assert options.model.base_url == "http://other:8000/v1"
+    assert policy.metadata["system"] == "GroundSG-QwenVL"
+
+
+@pytest.mark.parametrize("spec", [*(f"system:{name}" for name in PAPER), LISTENER])
+def test_a_factory_has_what_a_class_would_have(spec):
+    factory, policy = load_policy_class(spec), make_policy(spec, 5)
+    for wanted in (wanted_cameras, wanted_demonstration_frames, wanted_history):
+        assert wanted(factory) == wanted(policy)
+    assert factory.actions == policy.actions if hasattr(policy, "actions") else True
+    assert factory.grounded == getattr(policy, "grounded", False)
+    assert hasattr(factory, "attach") == hasattr(policy, "attach") == is_privileged(spec)
+    assert policy_version(spec) == factory.version == policy.version != "unknown"
+    assert factory.version == load_policy_class(spec).version
+
+
+def test_a_listener_by_its_spec():
+    policy = make_policy(f"{LISTENER}&frames=4&timeout_s=9&reasoning=yes", 5)
+    assert isinstance(policy, VLMListener)
+    assert (policy.options.frames, policy.options.reasoning) == (4, True)
+    assert policy.options.model.timeout_s == 9
+    assert is_privileged(LISTENER)
+
+
+@pytest.mark.parametrize(
+    ("spec", "error", "words"),
+    [
+        ("system:GroundSG-Qwen", UnknownNameError, "Did you mean 'GroundSG-QwenVL'"),
+        ("system:", InvalidValueError, "names no system"),
+        ("system:none.toml", InvalidValueError, "cannot be read"),
+        ("system:pi0.5?vlm=http://x", InvalidValueError, "has no planner"),
+        ("system:pi0.5?sever=x:1", UnknownNameError, "Did you mean 'server'"),
+        ("system:MemER?planner.kep=2", UnknownNameError, "Did you mean 'keep'"),
+        ("system:MemER?planner.keep=0", InvalidValueError, "keep is '0'.*greater than"),
+        ("system:MemER?planner.kind=x", UnknownNameError, "planner 'x'; known: oracle"),
+        ("system:MemER?planner.model.vidio=x", UnknownNameError, "Did you mean 'model.video'"),
+        ("system:MemER?policy.exekute=3", UnknownNameError, "Did you mean 'execute'"),
+        ("system:MemER?server", InvalidValueError, r"\?name=value"),
+        ("system:MemER?vlm=a&vlm=b", InvalidValueError, "'vlm' twice"),
+        ("vlm-listener:opnai?model=x", InvalidValueError, "provider is 'opnai'"),
+        ("vlm-listener:openai", InvalidValueError, "option model is missing"),
+        (
+            "vlm-listener:openai?model=x&frame=3",
+            UnknownNameError,
+            "option of vlm-listener: 'frame'.*mean 'frames'",
+        ),
+        ("vlm-listener:openai?model=x&frames=no", InvalidValueError, "frames is 'no'"),
+        ("vlm-listener:openai?model=x&prompts=none.toml", InvalidValueError, "cannot be read"),
+        ("vlm-listener:openai?model=x&base_url=http://me:pw@h/v1", InvalidValueError, "//…@h/v1"),
+        (
+            "vlm-listener:openai?model=x&base_url=http://h/%3Fkey=1",
+            InvalidValueError,
+            "api_key_env",
+        ),
+        ("vlm-listener:openai?model=x&base_url=localhost:80", InvalidValueError, "http://"),
+        ("sistem", UnknownNameError, "system:NAME"),
+    ],
+)
+def test_wrong_specs_are_explained(spec, error, words):
+    with pytest.raises(error, match=words):
+        load_policy_class(spec)
+
+
+def test_other_specs_are_not_ours():
+    for spec in ("oracle", "package.module:Class", "mme-vla://localhost:8001", "x"):
+        assert specs.find(spec) is None
+
+
+def test_own_systems_are_files(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text('name = "mine"\nabout = "x"\npolicy = "random"\n[planner]\nkind = "oracle"\n')
+    with pytest.raises(InvalidValueError, match="RandomPolicy has no method follow"):
+        load_system(str(file))
+    with pytest.raises(InvalidValueError, match="no URL"):
+        load_system(str(file), {"server": "x:1"})
+    file.write_text('name = "mine"\nabout = "x"\npolicy = "random"\n')
+    assert load_system(str(file), seed=4).seed == 4
+    file.write_text('name = "mine"\npolicy = "random"\n')
+    with pytest.raises(InvalidValueError, match="option about is missing"):
+        load_system(str(file))
+    file.write_text("name = ")
+    with pytest.raises(InvalidValueError, match="not TOML"):
+        load_system(str(file))
+
+
+def test_nothing_is_asked_of_libraries_before_the_first_question():
+    program = (
+        "import sys\n"
+        "class Refuse:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name.split('.')[0] in ('openai', 'google', 'av', 'sapien'):\n"
+        "            raise ImportError(name)\n"
+        "sys.meta_path.insert(0, Refuse())\n"
+        "from roboirg.policies import load_policy_class\n"
+        "from roboirg.policies.planning.systems import all_systems\n"
+        f"specs = [{LISTENER!r}, 'vlm-listener:google?model=x']\n"
+        "specs += [f'system:{name}' for name in all_systems()]\n"
+        "made = [load_policy_class(spec)(seed=1) for spec in specs]\n"
+        "from types import SimpleNamespace\n"
+        "from roboirg.errors import MissingDependencyError\n"
+        "from roboirg.policies.planning.models import make_model, ModelOptions\n"
+        "for provider in ('openai', 'google'):\n"
+        "    try:\n"
+        "        make_model(ModelOptions(provider=provider, model='m', base_url='http://x'))\n"
+        "    except MissingDependencyError as error:\n"
+        "        print(error)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], check=False, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("pip install 'roboirgbench[vlm]'") == 2
+
+
+def test_a_spec_drives_a_listener_and_its_records_hold_no_key(monkeypatch):
+    monkeypatch.setenv("MY_KEY", KEY)
+    with fake_vlm(['{"visit": 3}']) as server:
+        spec = f"vlm-listener:openai?base_url={server.url}/v1&model=m&api_key_env=MY_KEY"
+        policy = make_policy(spec, 1)
+        policy.attach(stand_in(get_episode("StopCube", "test", 0)))
+        policy.reset("Stop it.", {})
+        assert policy.metadata["understood"] == {"visit": 3}
+        assert KEY in json.dumps(server.headers)
+        assert KEY not in json.dumps([policy.metadata, policy.usage(), policy_version(spec)])
+        policy.close()
+
+
+class NoMemory(MmeVlaServer):
+    """The baseline and the symbolic models do not look at what was buffered."""
+
+    def infer(self, message):
+        self.frames, self.newest = 1, message["observation/image"]
+        return super().infer(message)
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize("name", PAPER)
+def test_every_system_plays_a_whole_episode(name):
+    """Against a policy server and a model's server on real sockets, each by its own protocol."""
+    vlm_answers = {
+        "GroundSG-QwenVL": "put it down",
+        "GroundSG-Gemini": '{"description": "x", "subgoal_sequence": [], "subgoal": "put it down"}',
+        "MemER": '{"current_subtask": "put it down", "keyframe_positions": [1]}',
+    }
+    remembers = name in {"TTT-Expert", "FrameS-Modul"}
+    server = MmeVlaServer() if remembers else NoMemory()
+    with server, fake_vlm([vlm_answers.get(name, "")]) as vlm:
+        overrides = {"server": server.place, "policy.timeout": "20"}
+        if name in vlm_answers:
+            overrides["vlm"] = vlm.url
+        policy = load_system(name, overrides)
+        env = roboirg.make(
+            "PickXtimes",
+            setting="direct",
+            cameras=wanted_cameras(policy),
+            demonstration_frames=wanted_demonstration_frames(policy),
+            observe_every=wanted_history(policy),
+            grounded=getattr(policy, "grounded", False),
+            max_steps=40,
+        )
+        try:
+            info = play(env, policy)
+        finally:
+            policy.close()
+        messages = [unpack(data) for data in server.messages]
+    assert info["status"] == "timeout"
+    asked = [message for message in messages if "prompt" in message]
+    assert len(asked) == 3
+    subgoals = [message.get("grounded_subgoal") for message in asked]
+    if name == "GroundSG-oracle":
+        assert all(re.fullmatch(r"pick up the \w+ cube at <\d+, \d+> .*", one) for one in subgoals)
+    else:
+        assert subgoals == ["put it down" if name in vlm_answers else None] * 3
+    assert any("add_buffer" in message for message in messages) == remembers
+    calls = {"GroundSG-QwenVL": 3, "GroundSG-Gemini": 1, "MemER": 3}
+    assert len(vlm.requests) == calls.get(name, 0)
