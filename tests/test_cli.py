@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from roboirg.cli import app as cli
+from roboirg.evaluation.course import Course, describe
+from roboirg.evaluation.plan import read_plan
 from roboirg.evaluation.record import Job
-from roboirg.evaluation.rollout import Course, describe
 from roboirg.evaluation.store import RecordStore
 
 RUN = ("run", "--policy", "random", "--tasks", "PickXtimes")
@@ -41,9 +42,9 @@ def roboirg(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
 class CannedPlayer:
     """Stands in for `Player`: no simulator, and the outcome that the test asks for."""
 
-    course = Course("success", None, steps=7)
+    course = Course("success", cause=None, steps=7)
 
-    def __init__(self, folder: Path, video: str) -> None:
+    def __init__(self, folder: Path, video: str, **_options: object) -> None:
         del folder, video
 
     def __call__(self, job: Job):
@@ -53,7 +54,7 @@ class CannedPlayer:
 @pytest.fixture
 def canned(monkeypatch: pytest.MonkeyPatch) -> type[CannedPlayer]:
     monkeypatch.setattr("roboirg.evaluation.rollout.Player", CannedPlayer)
-    monkeypatch.setattr(CannedPlayer, "course", Course("success", None, steps=7))
+    monkeypatch.setattr(CannedPlayer, "course", Course("success", cause=None, steps=7))
     return CannedPlayer
 
 
@@ -74,6 +75,15 @@ def canned(monkeypatch: pytest.MonkeyPatch) -> type[CannedPlayer]:
         (("--episodes", "four"), "'four' is no episode"),
         (("--policy", "listner"), "Did you mean 'listener'?"),
         (("--workers", "-1"), "workers is -1; it must be at least 1."),
+        (("--plan", "papr"), "Did you mean 'paper'?"),
+        (("--executor", "slurm"), "There is no executor 'slurm'; known: local, ray."),
+        (("--address", "auto"), "only --executor ray has one."),
+        (("--meshes", "lite"), "Did you mean 'light'?"),
+        (("--actions", "joints"), "known: joint_angle, ee_pose, waypoint."),
+        (("--tries", "0"), "tries is 0; it must be at least 1."),
+        (("--retry-on", "conection"), "Did you mean 'connection'?"),
+        (("--policy-timeout-s", "0"), "it must be more than 0 seconds."),
+        (("--observe-every", "0"), "observe_every is 0;"),
     ],
 )
 def test_what_is_wrong_is_one_sentence_and_exit_code_2(
@@ -182,13 +192,15 @@ def test_run_then_report(roboirg, tmp_path: Path) -> None:
 def test_errors_are_told_and_are_exit_code_2(
     roboirg, tmp_path: Path, canned: type[CannedPlayer]
 ) -> None:
-    canned.course = Course("error", "invalid action: Action value 3 is nan", steps=2)
+    canned.course = Course(
+        "error", "invalid_action", "invalid action: Action value 3 is nan", steps=2
+    )
     command = (*RUN, "--episodes", "1", "--workers", "0", "--out", tmp_path)
     said = roboirg(*command)
     assert said.code == 2
     assert "5 of 5 episodes ended in an error" in said.err
     assert "Action value 3 is nan" in said.err
-    canned.course = Course("success", None)
+    canned.course = Course("success", cause=None)
     assert roboirg(*command).code == 0
 
 
@@ -231,7 +243,7 @@ def test_instructions_are_printed(roboirg) -> None:
 def test_failures_are_named_below_the_table(
     roboirg, tmp_path: Path, canned: type[CannedPlayer]
 ) -> None:
-    canned.course = Course("failure", "pressed the button too early")
+    canned.course = Course("failure", cause="pressed the button too early")
     said = roboirg(*RUN, "--episodes", "3", "--workers", "0", "--out", tmp_path)
     assert said.code == 0
     assert "random: 15 episodes without success" in said.out
@@ -320,3 +332,44 @@ def test_help_needs_nothing_heavy() -> None:
 def test_python_dash_m_is_the_command() -> None:
     command = [sys.executable, "-m", "roboirg", "tasks"]
     assert b"VideoUnmask" in subprocess.run(command, check=True, capture_output=True).stdout
+
+
+def test_what_is_typed_goes_before_what_the_plan_says(
+    roboirg, tmp_path: Path, canned: type[CannedPlayer]
+) -> None:
+    del canned
+    plan = tmp_path / "plan.yaml"
+    plan.write_text("policies: [random]\ntasks: StopCube\nsettings: explicit\nepisodes: 3\n")
+    said = roboirg("run", "--plan", plan, "--episodes", "2", "--workers", "0", "--out", tmp_path)
+    assert said.code == 0
+    made = read_plan(tmp_path)
+    assert made is not None
+    assert (made.policies, made.tasks, made.episodes) == (("random",), ("StopCube",), (0, 1))
+
+
+def test_a_run_without_a_policy_is_told(roboirg, tmp_path: Path) -> None:
+    said = roboirg("run", "--plan", "paper", "--out", tmp_path)
+    assert said.code == 2
+    assert "No policy is given" in said.err
+
+
+def test_a_dry_run_counts_and_plays_nothing(roboirg, tmp_path: Path) -> None:
+    words = ("run", "--plan", "paper", "--policy", "random", "--dry-run", "--out", tmp_path / "out")
+    said = roboirg(*words)
+    assert said.code == 0
+    assert "150 + 150" in said.out
+    assert "13650 episodes, 0 of them are there already." in " ".join(said.out.split())
+    assert not (tmp_path / "out").exists()
+
+
+def test_runs_are_merged_and_exported(roboirg, tmp_path: Path, canned: type[CannedPlayer]) -> None:
+    del canned
+    for name, episodes in (("a", "0-2"), ("b", "2-4")):
+        words = ("--tasks", "StopCube", "--settings", "explicit", "--episodes", episodes)
+        out = ("--workers", "0", "--out", tmp_path / name)
+        assert roboirg("run", "--policy", "random", *words, *out).code == 0
+    said = roboirg("merge", tmp_path / "a", tmp_path / "b", "--out", tmp_path / "c")
+    assert said.out.startswith("5 records came to")
+    assert "1 were there already" in said.out
+    said = roboirg("export", "records", tmp_path / "c", "--out", tmp_path / "c.parquet")
+    assert said.out.startswith("5 records:")
