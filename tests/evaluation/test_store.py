@@ -171,3 +171,36 @@ def test_atomic_writing_replaces_and_leaves_no_part(tmp_path: Path) -> None:
         write_atomically(tmp_path / "x.txt", text)
     assert [path.name for path in tmp_path.iterdir()] == ["x.txt"]
     assert (tmp_path / "x.txt").read_text() == "two"
+
+
+def test_a_full_disk_is_one_sentence_and_costs_no_record(tmp_path: Path) -> None:
+    lines = fill(tmp_path / "whole", some_records()).splitlines(keepends=True)
+    # The kernel takes a part of the fourth record and refuses the rest, as a full disk does.
+    limit = sum(map(len, lines[:3])) + 100
+    code = (
+        "import pathlib, resource, sys\n"
+        "from evaluation_fakes import FakePlay, small_plan\n"
+        "from roboirg.evaluation.executors import InProcess\n"
+        "from roboirg.evaluation.runner import run_plan\n"
+        "from roboirg.evaluation.store import StoreError\n"
+        "def play(job):\n"
+        "    return FakePlay()(job).model_copy(update={'started_at': 'now'})\n"
+        f"resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))\n"
+        "try:\n"
+        "    run_plan(small_plan(), pathlib.Path(sys.argv[1]), play, InProcess())\n"
+        "except StoreError as error:\n"
+        "    print(error)\n"
+    )
+    folder = tmp_path / "run"
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(folder)],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parent)},
+    )
+    assert done.stdout == f"Cannot write to {folder / RECORDS_FILE}: File too large.\n"
+    kept = read_contents(folder / RECORDS_FILE)
+    assert (len(kept.records), kept.torn) == (3, b"")
+    with RecordStore(folder) as store:
+        assert len(store.stored) == 3

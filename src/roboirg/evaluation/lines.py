@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import operator
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -77,14 +78,15 @@ class _Version(msgspec.Struct):
 Key = tuple[object, ...]
 """A job's identity: the values of its fields."""
 
-_FIELDS = tuple(Job.model_fields)
+_identity = operator.attrgetter(*Job.model_fields)
 _decoder = msgspec.json.Decoder(Stored)
 _version_decoder = msgspec.json.Decoder(_Version)
 
 
 def key_of(one: Job | Stored) -> Key:
     """The identity of a job, a record, or what is read of one."""
-    return tuple(getattr(one, name) for name in _FIELDS)
+    key: Key = _identity(one)
+    return key
 
 
 def read_stored(line: bytes, path: Path, number: int) -> Stored:

@@ -89,11 +89,16 @@ def run_plan(
         _check_versions(store.stored.values(), folder)
         _check_policies(plan, store.stored.values(), folder)
         write_plan(plan, folder)
-        todo = [job for job in jobs if _is_due(store, job, retry_errors=retry_errors)]
+        keys = [key_of(job) for job in jobs]
+        todo = [
+            job
+            for job, key in zip(jobs, keys, strict=True)
+            if _is_due(store.stored.get(key), retry_errors=retry_errors)
+        ]
         listener.begin(len(jobs), len(jobs) - len(todo))
         course = _Run(plan, store, listener)
         course.play(todo, play, executor)
-        found = [store.stored.get(key_of(job)) for job in jobs]
+        found = [store.stored.get(key) for key in keys]
         return Summary(
             total=len(jobs),
             played=len(course.tries),
@@ -171,8 +176,7 @@ class _Run:
         )
 
 
-def _is_due(store: RecordStore, job: Job, *, retry_errors: bool) -> bool:
-    stored = store.stored.get(key_of(job))
+def _is_due(stored: Stored | None, *, retry_errors: bool) -> bool:
     return stored is None or (retry_errors and stored.outcome == "error")
 
 
