@@ -153,25 +153,28 @@ class Plan(BaseModel):
             contextual, spatial = setting == "contextual", setting == "spatial"
             for form in self.forms if setting != "explicit" else ("implicit",):
                 for stages in self.stages if contextual else (ALL_STAGES,):
-                    for seed in seeds:
-                        yield Job(
-                            policy=policy,
-                            task=task,
-                            split=self.split,
-                            episode=episode,
-                            setting=setting,
-                            form=form,
-                            stages=stages,
-                            distractor=self.distractor if contextual else DEFAULT_DISTRACTOR,
-                            distractors=self.distractors if contextual else DEFAULT_DISTRACTORS,
-                            frame=self.frame if spatial else DEFAULT_FRAME,
-                            policy_seed=seed,
-                            max_steps=self.max_steps,
-                            actions=self.actions,
-                            demonstration_frames=self.demonstration_frames,
-                            observe_every=self.observe_every,
-                            meshes=self.meshes,
-                        )
+                    job = Job(
+                        policy=policy,
+                        task=task,
+                        split=self.split,
+                        episode=episode,
+                        setting=setting,
+                        form=form,
+                        stages=stages,
+                        distractor=self.distractor if contextual else DEFAULT_DISTRACTOR,
+                        distractors=self.distractors if contextual else DEFAULT_DISTRACTORS,
+                        frame=self.frame if spatial else DEFAULT_FRAME,
+                        policy_seed=seeds[0],
+                        max_steps=self.max_steps,
+                        actions=self.actions,
+                        demonstration_frames=self.demonstration_frames,
+                        observe_every=self.observe_every,
+                        meshes=self.meshes,
+                    )
+                    yield job
+                    # Copying is quicker, and there may be very many.
+                    for seed in seeds[1:]:
+                        yield job.model_copy(update={"policy_seed": seed})
 
     def _distinct_words(self) -> Iterator[Job]:
         """One job for each way of telling that could turn out not to be possible."""

@@ -42,6 +42,9 @@ RECORDS_FILE = "records.jsonl"
 TORN_FILE = "records.torn"
 LOCK_FILE = ".lock"
 
+_BUFFER = 1 << 20
+"""Bytes that are read at once."""
+
 Kind = TypeVar("Kind", bound=Result)
 Parsed = TypeVar("Parsed")
 
@@ -239,7 +242,7 @@ class _Lines:
             StoreError: the file cannot be read, or whatever `parse` raises.
         """
         try:
-            file = self._path.open("rb")
+            file = self._path.open("rb", buffering=_BUFFER)
         except FileNotFoundError:
             return
         except OSError as error:
