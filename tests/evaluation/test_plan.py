@@ -7,7 +7,7 @@ import pytest
 from roboirg.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.plan import Plan, make_plan, read_plan, write_plan
 from roboirg.evaluation.record import Job
-from roboirg.evaluation.words import parse_episodes, parse_numbers, parse_stages
+from roboirg.evaluation.words import parse_episodes, parse_numbers, parse_policies, parse_stages
 from roboirg.language import expressible
 from roboirg.splits import get_episode
 from roboirg.tasks import all_tasks
@@ -139,3 +139,10 @@ def test_a_record_has_the_slug_of_its_job() -> None:
     assert type(record.identity) is Job
     assert record.slug == job.slug
     assert job.slug.startswith("a-b-c-D-PickXtimes-test-0-explicit-implicit-")
+
+
+def test_addresses_keep_their_commas() -> None:
+    specs = ["random,oracle", "mme-vla://a:8001,b:8001?history=no", "random"]
+    assert parse_policies(specs) == ("random", "oracle", "mme-vla://a:8001,b:8001?history=no")
+    with pytest.raises(InvalidValueError, match="No policy was given"):
+        parse_policies([])

@@ -17,7 +17,7 @@ from roboirg.policies.loading import (
     wanted_demonstration_frames,
     wanted_history,
 )
-from roboirg.tasks import all_tasks
+from roboirg.tasks import every_task
 
 
 @pytest.mark.parametrize("name", BUILTIN)
@@ -225,18 +225,18 @@ def decided(policy_class, task, setting, episode, seed=0):
 
 
 @pytest.mark.sim
-@pytest.mark.parametrize("task", all_tasks())
+@pytest.mark.parametrize("task", every_task())
 def test_the_listener_always_understands(task):
-    for setting in all_tasks()[task].settings:
+    for setting in every_task()[task].settings:
         for episode in range(12):
             heard, meant = decided(ListenerPolicy, task, setting, episode)
             assert heard == meant
 
 
 @pytest.mark.sim
-@pytest.mark.parametrize("task", all_tasks())
+@pytest.mark.parametrize("task", every_task())
 def test_the_forgetful_listener_understands_what_is_explicit_and_guesses_the_rest(task):
-    for setting in all_tasks()[task].settings:
+    for setting in every_task()[task].settings:
         pairs = [
             decided(ForgetfulPolicy, task, setting, episode, seed)
             for episode in range(12)

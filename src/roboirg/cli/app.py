@@ -13,7 +13,7 @@ from typing import Annotated
 import typer
 
 import roboirg
-from roboirg.cli import language, running, telling
+from roboirg.cli import language, policies, running, telling
 from roboirg.cli.bench import bench
 from roboirg.cli.options import Distractor, Frame, Split, Stages, Tasks, Video, Workers
 from roboirg.cli.running import INTERRUPTED, USAGE_ERROR, Folder, Out
@@ -67,6 +67,8 @@ app.command()(running.run)
 app.command()(running.merge)
 app.command()(telling.tables)
 app.command()(telling.compare)
+app.command()(policies.serve)
+app.command("check-policy")(policies.check_policy)
 language.export_app.command("records")(running.export_records)
 
 

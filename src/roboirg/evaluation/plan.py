@@ -29,6 +29,7 @@ from roboirg.evaluation.words import (
     parse_episodes,
     parse_names,
     parse_numbers,
+    parse_policies,
     parse_stage_sets,
     says_all,
 )
@@ -228,7 +229,7 @@ def make_plan(
     """A checked plan from words as they are typed.
 
     Args:
-        policies: names.
+        policies: names or addresses; names may be separated by commas.
         tasks: names separated by commas, or ``all``, alone or among them.
         settings: names separated by commas, or ``all``, alone or among them.
         forms: names separated by commas.
@@ -247,7 +248,7 @@ def make_plan(
         raise UnknownNameError("video mode", video, VIDEO_MODES)
     try:
         plan = Plan(
-            policies=parse_names("policy", ",".join(policies)),
+            policies=parse_policies(policies),
             tasks=_task_names(tasks),
             settings="all" if says_all(settings) else parse_names("setting", settings),
             forms=parse_names("form", forms),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from roboirg import language, splits
 from roboirg.errors import InvalidValueError
@@ -27,6 +27,23 @@ def parse_names(kind: str, text: str) -> tuple[str, ...]:
     if not names:
         raise InvalidValueError(f"No {kind} was given.")
     return names
+
+
+def parse_policies(specs: Iterable[str]) -> tuple[str, ...]:
+    """Policies, each once; several names may stand in one text, separated by commas.
+
+    Raises:
+        InvalidValueError: there is none.
+    """
+    # Addresses and their options have commas of their own.
+    parts = (
+        (spec.strip(),) if "://" in spec or "?" in spec else parse_names("policy", spec)
+        for spec in specs
+    )
+    policies = tuple(dict.fromkeys(name for names in parts for name in names))
+    if not policies:
+        raise InvalidValueError("No policy was given.")
+    return policies
 
 
 def says_all(text: str) -> bool:

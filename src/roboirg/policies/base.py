@@ -28,8 +28,10 @@ class Policy(Protocol):
     All of these are optional, and so are the following. ``version`` (text) and ``metadata``
     (JSON values by name; read after `reset`) go into the records. ``usage()`` is called when the
     episode has ended and gives what it cost: ``calls``, ``input_tokens``, ``output_tokens``,
-    ``cost_usd``. ``close()`` is called after that. ``grounded = True`` has the environment name
-    the pixels of subgoals, for privileged policies that pass them on.
+    ``cost_usd``. ``close()`` is called after that. ``deterministic = False`` says that equal
+    episodes with equal seeds may differ; `roboirg check-policy` then does not complain of it.
+    ``grounded = True`` has the environment name the pixels of subgoals, for privileged policies
+    that pass them on.
     """
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:

@@ -8,10 +8,10 @@ import inspect
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, cast
 
 from roboirg.actions import JOINT_ANGLE, ActionSpace, find_action_space
-from roboirg.errors import InvalidValueError, UnknownNameError
+from roboirg.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.observations import (
     CAMERAS,
     DemonstrationFrames,
@@ -20,6 +20,7 @@ from roboirg.observations import (
     check_observe_every,
 )
 from roboirg.policies.base import Policy
+from roboirg.policies.urls import is_url
 
 BUILTIN: Mapping[str, str] = {
     "oracle": "roboirg.policies.oracle:OraclePolicy",
@@ -28,19 +29,42 @@ BUILTIN: Mapping[str, str] = {
     "random": "roboirg.policies.random:RandomPolicy",
 }
 
+SCHEMES: Mapping[str, str] = {
+    "openpi": "roboirg.policies.remote.openpi:OpenpiPolicy",
+    "mme-vla": "roboirg.policies.remote.mme_vla:MmeVlaPolicy",
+    "challenge": "roboirg.policies.remote.challenge:ChallengePolicy",
+    "challenge+http": "roboirg.policies.remote.challenge:ChallengeHttpPolicy",
+    "lerobot": "roboirg.policies.lerobot:LeRobotPolicy",
+}
+"""Policies named by a URL, by its scheme: classes made with ``(url, seed=)``, without a network."""
+
 FINGERPRINT_LENGTH = 12
 """Hexadecimal digits."""
 
 
 def load_policy_class(spec: str) -> type[Any]:
-    """The class that a spec names: a built-in name, or ``package.module:Class``.
+    """The class that a spec names: a built-in name, ``package.module:Class``, or a URL.
+
+    Of ``system:NAME`` and ``vlm-listener:PROVIDER`` (`roboirg.policies.planning.specs`) something
+    that makes policies and has a class's attributes.
 
     Raises:
-        UnknownNameError: it is neither.
-        InvalidValueError: the module or the class cannot be imported, or is not a policy.
+        UnknownNameError: it is none of them, or the URL gives an option that there is not.
+        InvalidValueError: the module or the class cannot be imported, or is not a policy; or
+            the URL is malformed.
     """
+    if ":" in spec:
+        from roboirg.policies.planning import specs  # which loads policies itself
+
+        factory = specs.find(spec)
+        if factory is not None:
+            return cast("type[Any]", factory)  # it has all that is asked of a class here
+    if is_url(spec):
+        policy_class = _url_class(spec)
+        _check_wishes(spec, policy_class(spec))
+        return policy_class
     if spec not in BUILTIN and ":" not in spec:
-        raise UnknownNameError("policy", spec, [*BUILTIN, "package.module:Class"])
+        raise UnknownNameError("policy", spec, [*BUILTIN, "package.module:Class", *_examples()])
     module_name, _, name = BUILTIN.get(spec, spec).partition(":")
     module = _module(spec, module_name)
     if not hasattr(module, name):
@@ -59,15 +83,19 @@ def make_policy(spec: str, seed: int) -> Policy:
     """A policy from its spec.
 
     Args:
-        spec: ``oracle``, ``listener``, ``forgetful``, ``random``, or ``package.module:Class``,
-            which is called with ``seed=`` if it takes it, else without arguments.
+        spec: ``oracle``, ``listener``, ``forgetful``, ``random``; ``package.module:Class``,
+            which is called with ``seed=`` if it takes it, else without arguments; or a URL.
         seed: of the policy's own random choices.
 
     Raises:
-        UnknownNameError: there is no such built-in policy.
-        InvalidValueError: the module or the class cannot be imported, or is not a policy.
+        UnknownNameError: there is no such built-in policy, scheme or option.
+        InvalidValueError: the module or the class cannot be imported, or is not a policy; or
+            the URL is malformed.
     """
     policy_class = load_policy_class(spec)
+    if is_url(spec):
+        remote: Policy = policy_class(spec, seed=seed)
+        return remote
     policy: Policy = policy_class(seed=seed) if "seed" in _takes(policy_class) else policy_class()
     return policy
 
@@ -75,7 +103,8 @@ def make_policy(spec: str, seed: int) -> Policy:
 def is_privileged(spec: str) -> bool:
     """Whether a spec names a policy that looks behind the scenes."""
     try:
-        return hasattr(load_policy_class(spec), "attach")
+        policy_class = load_policy_class(spec)
+        return hasattr(policy_class(spec) if is_url(spec) else policy_class, "attach")
     except InvalidValueError:
         return False
 
@@ -84,12 +113,15 @@ def policy_version(spec: str) -> str:
     """What tells a policy from an earlier one of the same name.
 
     Its class attribute ``version`` if it has one (a checkpoint's name, say), else a fingerprint of
-    the file that defines it; ``built-in``, or ``unknown`` if nothing can be found out.
+    the file that defines it; ``built-in``, or ``unknown`` if nothing can be found out. Of a URL
+    what its option ``version`` says: nothing is connected to find out more.
     """
     if spec in BUILTIN:
         return "built-in"
     try:
         policy_class = load_policy_class(spec)
+        if is_url(spec):
+            return str(getattr(policy_class(spec), "version", "unknown"))
         version = getattr(policy_class, "version", None)
         if version is not None:
             return str(version)
@@ -166,13 +198,34 @@ def _check_class(spec: str, policy_class: type[Any]) -> None:
                 f"Policy {spec!r}: {name}() is called with seed= at most, but needs "
                 f"{parameter.name!r}; give it a default."
             )
+    _check_wishes(spec, policy_class)
+
+
+def _check_wishes(spec: str, policy: object) -> None:
+    """Complain of what a class, or a policy, asks for."""
     for attribute, wanted in _WISHES.items():
-        # What a property says is known when there is an object.
-        if not hasattr(inspect.getattr_static(policy_class, attribute, ()), "__get__"):
+        # What a property of a class says is known when there is an object.
+        if not inspect.isclass(policy) or not hasattr(
+            inspect.getattr_static(policy, attribute, ()), "__get__"
+        ):
             try:
-                wanted(policy_class)
+                wanted(policy)
             except InvalidValueError as error:
                 raise InvalidValueError(f"Policy {spec!r}: {error}") from error
+
+
+def _url_class(spec: str) -> type[Any]:
+    """The class of a URL's scheme."""
+    scheme = spec.partition("://")[0]
+    if scheme not in SCHEMES:
+        raise UnknownNameError("policy scheme", scheme, SCHEMES)
+    module_name, _, name = SCHEMES[scheme].partition(":")
+    found: type[Any] = getattr(_module(spec, module_name), name)
+    return found
+
+
+def _examples() -> list[str]:
+    return [*(f"{scheme}://…" for scheme in SCHEMES), "system:NAME", "vlm-listener:PROVIDER"]
 
 
 def _takes(policy_class: type[Any]) -> Mapping[str, inspect.Parameter]:
@@ -185,6 +238,8 @@ def _takes(policy_class: type[Any]) -> Mapping[str, inspect.Parameter]:
 def _module(spec: str, name: str) -> ModuleType:
     try:
         return importlib.import_module(name)
+    except MissingDependencyError:
+        raise
     except (Exception, SystemExit) as error:
         words = " ".join(f"{type(error).__name__}: {error}".split())
         raise InvalidValueError(

@@ -1,0 +1,254 @@
+"""Servers that die, stall, restart, answer late or garbage: named errors, and the next episode."""
+
+import socket
+import threading
+import time
+
+import numpy as np
+import pytest
+from wire_episode import INSTRUCTION, moment, video
+from wire_servers import (
+    ChallengeHttpServer,
+    ChallengeServer,
+    MmeVlaServer,
+    WireServer,
+    pack,
+)
+
+from roboirg.errors import (
+    InvalidValueError,
+    PolicyConnectionError,
+    PolicyReplyError,
+    PolicyTimeoutError,
+)
+from roboirg.policies import make_policy
+
+GARBAGE = [
+    ("Traceback …\nValueError: the weights melted\n", "error: ValueError: the weights melted."),
+    ("", "error: an empty text"),
+    (b"\xc1\xff\x00", "something else than a message: the bytes are no msgpack"),
+    (b"", "something else than a message"),
+    (pack([1, 2]), "the message is no map but of type list"),
+    (pack({b"x": 2}), "key b.x. that is no text"),
+    (pack({1: 2}), "int is not allowed"),
+    ({"action": np.zeros((20, 8))}, "without 'actions'; it holds 'action'"),
+    ({}, "it holds nothing"),
+    ({"actions": np.zeros((20, 7))}, r"shape \(n, 8\).*got shape \(20, 7\)"),
+    ({"actions": np.zeros((0, 8))}, r"got shape \(0, 8\)"),
+    ({"actions": np.full((20, 8), np.nan)}, "every value has to be a finite number"),
+    ({"actions": "left"}, "array of 8 real numbers; got str"),
+    ({"actions": None}, "got NoneType"),
+    (
+        {"actions": {b"__ndarray__": True, b"data": b"xx", b"dtype": "|O", b"shape": [1]}},
+        "dtype '|O' are not accepted",
+    ),
+    (
+        {"actions": {b"__ndarray__": True, b"data": b"xx", b"dtype": "<f8", b"shape": [9, 8]}},
+        r"shape \[9, 8\] has 2 bytes",
+    ),
+    ({"actions": np.zeros((200_000, 8))}, "more than 1 MiB; option max_reply_mib"),
+]
+PROTOCOLS = {
+    "openpi": WireServer,
+    "mme-vla": MmeVlaServer,
+    "challenge": ChallengeServer,
+    "challenge+http": ChallengeHttpServer,
+}
+
+
+def episode(policy, *, steps=1):
+    policy.reset(INSTRUCTION, video(2))
+    return [policy.act(moment(2 + n, history=(moment(2 + n),) * n)) for n in range(steps)]
+
+
+def before_inference(protocol):
+    """Messages of an episode before the first request for actions."""
+    return {"openpi": 0, "mme-vla": 2}.get(protocol, 1)
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+@pytest.mark.parametrize(("reply", "words"), GARBAGE)
+def test_garbage_is_told_and_the_next_episode_works(protocol, reply, words):
+    if protocol == "challenge+http" and isinstance(reply, str):
+        pytest.skip("text comes with status 500 there")
+    if protocol == "challenge+http" and reply == {}:
+        reply = pack(reply)
+    faults = [None] * before_inference(protocol) + [reply]
+    with PROTOCOLS[protocol](faults=faults) as server:
+        policy = make_policy(f"{protocol}://{server.place}?max_reply_mib=1", 0)
+        with pytest.raises(PolicyReplyError, match=words) as caught:
+            episode(policy)
+        assert server.place in str(caught.value)
+        policy.close()
+        following = make_policy(f"{protocol}://{server.place}", 1)
+        assert len(episode(following)) == 1
+        following.close()
+
+
+@pytest.mark.parametrize("protocol", ["mme-vla", "challenge", "challenge+http"])
+def test_a_reset_has_to_be_confirmed(protocol):
+    with PROTOCOLS[protocol](faults=[{"reset_finished": False}]) as server:
+        policy = make_policy(f"{protocol}://{server.place}", 0)
+        with pytest.raises(PolicyReplyError, match="did not confirm 'reset'"):
+            episode(policy)
+        episode(policy)
+        policy.close()
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_a_server_that_answers_late_is_not_waited_for(protocol):
+    with PROTOCOLS[protocol](faults=[None] * before_inference(protocol) + [1.0]) as server:
+        policy = make_policy(f"{protocol}://{server.place}?timeout=0.3", 0)
+        start = time.monotonic()
+        with pytest.raises(PolicyTimeoutError, match=r"within 0\.3 s"):
+            episode(policy)
+        assert time.monotonic() - start < 5
+        time.sleep(1)
+        # The late answer must not become the next one's.
+        following = make_policy(f"{protocol}://{server.place}", 0)
+        first = episode(following)[0]
+        following.close()
+        assert np.array_equal(first, episode(policy)[0])
+        policy.close()
+
+
+@pytest.mark.parametrize("protocol", ["mme-vla", "challenge", "challenge+http"])
+def test_a_server_that_dies_ends_the_episode(protocol):
+    with PROTOCOLS[protocol](faults=[None] * before_inference(protocol) + ["die"]) as server:
+        policy = make_policy(f"{protocol}://{server.place}", 0)
+        with pytest.raises(PolicyConnectionError, match="ended the connection"):
+            episode(policy)
+        with pytest.raises(PolicyConnectionError, match=r"call reset\(\)"):
+            policy.act(moment(0, history=()))
+        assert len(episode(policy, steps=2)) == 2
+        policy.close()
+
+
+def test_a_stateless_server_is_asked_once_more():
+    with WireServer(faults=["die"]) as server:
+        policy = make_policy(f"openpi://{server.place}", 0)
+        assert len(episode(policy)) == 1
+        assert server.messages[0] == server.messages[1]
+        policy.close()
+    with WireServer(faults=["die", "die"]) as server:
+        policy = make_policy(f"openpi://{server.place}", 0)
+        with pytest.raises(PolicyConnectionError, match="ended the connection"):
+            episode(policy)
+        policy.close()
+
+
+def test_a_server_that_stalls_while_it_is_sent_to():
+    listener = socket.create_server(("127.0.0.1", 0))
+    policy = make_policy(f"openpi://127.0.0.1:{listener.getsockname()[1]}?timeout=0.5", 0)
+    answers = threading.Thread(target=_accept_and_sleep, args=(listener,))
+    answers.start()
+    start = time.monotonic()
+    policy.reset(INSTRUCTION, {})
+    with pytest.raises(PolicyTimeoutError, match=r"did not take in a message within 0\.5 s"):
+        policy.act(moment(0, size=2048))  # more than the kernel's buffers take
+    assert time.monotonic() - start < 2.5
+    policy.close()
+    answers.join()
+
+
+def _accept_and_sleep(listener):
+    """Shake hands, send the metadata, and never read again."""
+    import base64
+    import hashlib
+
+    peer, _ = listener.accept()
+    peer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    head = peer.recv(65536).decode()
+    key = next(line.split(": ")[1] for line in head.split("\r\n") if "Sec-WebSocket-Key" in line)
+    digest = hashlib.sha1((key + "258EAFA5-E914-47DA-95CA-C5AB0DC85B11").encode()).digest()  # noqa: S324
+    peer.sendall(
+        b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        b"Sec-WebSocket-Accept: " + base64.b64encode(digest) + b"\r\n\r\n" + b"\x82\x01\x80"
+    )
+    time.sleep(2.5)
+    peer.close()
+    listener.close()
+
+
+def test_a_server_that_says_nothing_at_first():
+    with WireServer() as server:
+        server.silent.set()
+        policy = make_policy(f"openpi://{server.place}?connect=0.3", 0)
+        with pytest.raises(PolicyTimeoutError, match=r"did not send its metadata within 0\.3 s"):
+            policy.reset(INSTRUCTION, {})
+        server.silent.clear()
+        episode(policy)
+        policy.close()
+
+
+def test_a_surplus_reply_is_not_taken_for_the_next():
+    class Twice(MmeVlaServer):
+        async def _converse(self, websocket):
+            self.messages.append(await websocket.recv())
+            for _ in range(2):
+                await websocket.send(pack({"reset_finished": True, "add_buffer_finished": True}))
+            await super()._converse(websocket)
+
+    with Twice() as server:
+        policy = make_policy(f"mme-vla://{server.place}", 0)
+        policy.reset(INSTRUCTION, video(0))
+        time.sleep(0.3)  # until the surplus has come
+        with pytest.raises(PolicyReplyError, match="nobody had asked for"):
+            policy.act(moment(0, history=()))
+        policy.close()
+
+
+def test_a_server_that_starts_late_or_again_is_found():
+    with socket.create_server(("127.0.0.1", 0)) as reserved:
+        port = reserved.getsockname()[1]
+    policy = make_policy(f"mme-vla://127.0.0.1:{port}?connect=10", 0)
+    server = MmeVlaServer(port=port)
+    timer = threading.Timer(0.5, server.__enter__)
+    timer.start()
+    episode(policy)
+    timer.join()
+    server.__exit__()
+    with pytest.raises(PolicyConnectionError):
+        policy.act(moment(3, history=(moment(3),)))
+    with MmeVlaServer(port=port) as again:
+        assert episode(policy)[0][0, :2].tolist() == [3, 2]
+        assert again.connections == 1
+    policy.close()
+
+
+def test_nobody_there_is_told_in_one_sentence():
+    policy = make_policy("openpi://127.0.0.1:9?connect=0.2", 0)
+    with pytest.raises(
+        PolicyConnectionError,
+        match=r"^Policy server openpi://127\.0\.0\.1:9 cannot be reached \(nothing listens there\)",
+    ):
+        policy.reset(INSTRUCTION, {})
+
+
+@pytest.mark.parametrize("server_class", [WireServer, ChallengeHttpServer])
+def test_a_server_may_want_a_key(server_class, monkeypatch):
+    scheme = "openpi" if server_class is WireServer else "challenge+http"
+    with server_class(token="sesame") as server:  # noqa: S106
+        policy = make_policy(f"{scheme}://{server.place}", 0)
+        with pytest.raises(PolicyConnectionError, match="HTTP status 401"):
+            policy.reset(INSTRUCTION, {})
+        policy = make_policy(f"{scheme}://{server.place}?api_key_env=SERVER_KEY", 0)
+        monkeypatch.delenv("SERVER_KEY", raising=False)
+        with pytest.raises(InvalidValueError, match=r"SERVER_KEY .* holds no key"):
+            policy.reset(INSTRUCTION, {})
+        monkeypatch.setenv("SERVER_KEY", "sesame")
+        policy.reset(INSTRUCTION, {})
+        policy.close()
+
+
+def test_connections_are_closed_and_none_is_left_over():
+    with WireServer() as server:
+        for _ in range(3):
+            policy = make_policy(f"openpi://{server.place}", 0)
+            episode(policy)
+            policy.close()
+            policy.close()
+        deadline = time.monotonic() + 5
+        while server.open and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert (server.connections, server.open) == (3, 0)

@@ -1,0 +1,183 @@
+"""What remote policies send, byte for byte, and what they make of the replies.
+
+The captures were written with the codec of openpi itself: see captures/make.py.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from wire_episode import INSTRUCTION, moment, video
+from wire_servers import ChallengeHttpServer, ChallengeServer, MmeVlaServer, WireServer, unpack
+
+from roboirg.errors import InvalidValueError
+from roboirg.policies import Policy, make_policy
+from roboirg.policies.base import SubgoalFollower
+
+CAPTURES = Path(__file__).with_name("captures")
+NOW, LATER, LATEST = moment(3, history=()), moment(4), moment(5, history=(moment(4), moment(5)))
+
+
+def captured(protocol):
+    found = sorted(CAPTURES.glob(f"{protocol}-[0-9]*.msgpack"))
+    assert found
+    return [path.read_bytes() for path in found]
+
+
+def test_openpi_sends_these_bytes():
+    with WireServer() as server:
+        policy = make_policy(f"openpi://{server.place}", 0)
+        policy.reset(INSTRUCTION, video(3))
+        assert policy.act(moment(3)).shape == (20, 8)
+        policy.close()
+        assert server.messages == captured("openpi")
+
+
+def test_mme_vla_sends_these_bytes():
+    with MmeVlaServer() as server:
+        policy = make_policy(f"mme-vla://{server.place}?part=2&execute=2", 0)
+        policy.reset(INSTRUCTION, video(3))
+        first = policy.act(NOW)
+        policy.follow("Pick up the red cube at <12, 34>")
+        second = policy.act(LATEST)
+        policy.close()
+        assert server.messages == captured("mme-vla")
+    # Frames in memory, start of the turn, brightness of the newest frame, inferences, row.
+    brightness = [NOW["front_rgb"].mean(), LATEST["front_rgb"].mean()]
+    assert first[:, :5].tolist() == [[4, 3, brightness[0], 1, row] for row in range(2)]
+    assert second[:, :5].tolist() == [[6, 3, brightness[1], 2, row] for row in range(2)]
+
+
+@pytest.mark.parametrize("server_class", [ChallengeServer, ChallengeHttpServer])
+def test_challenge_sends_these_bytes(server_class):
+    http = server_class is ChallengeHttpServer
+    with server_class() as server:
+        policy = make_policy(f"challenge{'+http' if http else ''}://{server.place}", 0)
+        policy.reset(INSTRUCTION, video(3))
+        assert (policy.act(NOW) == 4).all()
+        assert (policy.act(LATEST) == 6).all()
+        assert policy.metadata == {
+            "server": server.place,
+            "name": "submission",
+            "version": "phase-1",
+        }
+        assert policy.version == "phase-1"
+        policy.close()
+        reset, *requests = captured("challenge")
+        if http:
+            assert server.messages == [
+                ("/reset", reset),
+                *(("/infer", request) for request in requests),
+            ]
+        else:
+            assert server.messages == [reset, *requests]
+
+
+def test_without_history_mme_vla_is_sent_no_frames():
+    class Baseline(MmeVlaServer):
+        def infer(self, message):
+            return {"actions": np.ones((20, 8), np.float32)}
+
+    with Baseline() as server:
+        policy = make_policy(f"mme-vla://{server.place}?history=no&subgoals=none", 0)
+        policy.reset(INSTRUCTION, {})
+        assert policy.act(moment(0)).shape == (16, 8)
+        assert [set(unpack(data)) for data in server.messages] == [
+            {"reset"},
+            {"observation/image", "observation/wrist_image", "observation/state", "prompt"},
+        ]
+        with pytest.raises(InvalidValueError, match="subgoals=none"):
+            policy.follow("pick up the cube")
+        policy.close()
+
+
+@pytest.mark.parametrize(
+    ("option", "sent"),
+    [("simple", ("pick up the cube", None)), ("grounded", (None, "pick up the cube"))],
+)
+def test_a_subgoal_goes_where_the_checkpoint_expects_it(option, sent):
+    with MmeVlaServer() as server:
+        policy = make_policy(f"mme-vla://{server.place}?subgoals={option}", 0)
+        assert isinstance(policy, SubgoalFollower)
+        for _ in range(2):
+            policy.reset(INSTRUCTION, video(0))
+            policy.act(moment(0, history=()))
+            policy.follow("Pick up the cube")
+            policy.act(moment(2, history=(moment(1), moment(2))))
+        policy.close()
+        assert server.subgoals == [(None, None), sent] * 2
+        assert server.prompts == [INSTRUCTION.lower()] * 4
+
+
+@pytest.mark.parametrize(
+    ("length", "parts"), [(0, [1]), (1, [2]), (15, [16]), (16, [16, 1]), (40, [16, 16, 9])]
+)
+def test_a_video_arrives_in_parts_with_the_acting_frame(length, parts):
+    with MmeVlaServer() as server:
+        policy = make_policy(f"mme-vla://{server.place}", 0)
+        policy.reset(INSTRUCTION, video(length))
+        rows = policy.act(moment(length, history=()))
+        policy.close()
+        assert (server.parts, server.frames, server.start) == (parts, length + 1, length)
+        assert rows[0, :2].tolist() == [length + 1, length]
+
+
+def test_a_history_longer_than_a_part_is_sent_in_parts():
+    with MmeVlaServer() as server:
+        policy = make_policy(f"mme-vla://{server.place}?part=4&execute=9", 0)
+        policy.reset(INSTRUCTION, video(0))
+        policy.act(moment(0, history=()))
+        policy.act(moment(9, history=[moment(number) for number in range(1, 10)]))
+        policy.close()
+        assert server.parts == [1, 4, 4, 1]
+
+
+def test_an_episode_longer_than_the_memory_is_told():
+    with MmeVlaServer() as server:
+        policy = make_policy(f"mme-vla://{server.place}?part=512", 0)
+        policy.reset(INSTRUCTION, video(4096))
+        with pytest.raises(InvalidValueError, match=r"4097 frames, and .* counts to 4096"):
+            policy.act(moment(0, history=()))
+        policy.close()
+
+
+def test_the_video_is_read_only_if_it_is_sent():
+    class Unread(dict):
+        def __getitem__(self, field):
+            assert not field.endswith("wrist_rgb"), "nobody sends the wrist's video"
+            return super().__getitem__(field)
+
+    with MmeVlaServer() as server:
+        policy = make_policy(f"mme-vla://{server.place}", 0)
+        policy.reset(INSTRUCTION, Unread(video(2)))
+        policy.act(moment(2, history=()))
+        policy.close()
+        assert server.frames == 3
+
+
+def test_keys_and_cameras_of_an_openpi_checkpoint_can_be_named():
+    with WireServer() as server:
+        policy = make_policy(
+            f"openpi://{server.place}?front=base&wrist=&state=q&prompt=say&execute=3", 0
+        )
+        assert policy.cameras == ("front",)
+        policy.reset(INSTRUCTION, {})
+        assert policy.act(moment(0)).shape == (3, 8)
+        policy.close()
+        assert list(unpack(server.messages[0])) == ["base", "q", "say"]
+
+
+def test_actions_may_be_poses():
+    class Poses(WireServer):
+        def answer(self, message):
+            return {"actions": np.ones((2, 7), np.float32)}
+
+    with Poses() as server:
+        policy = make_policy(f"openpi://{server.place}?actions=ee_pose", 0)
+        assert isinstance(policy, Policy)
+        assert policy.actions == "ee_pose"
+        policy.reset(INSTRUCTION, {})
+        rows = policy.act(moment(0))
+        assert (rows.shape, rows.dtype) == ((2, 7), np.float64)
+        rows[0] = 0  # a copy: what is received is read-only
+        policy.close()

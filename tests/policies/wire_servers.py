@@ -1,0 +1,287 @@
+"""Policy servers on real sockets, written from the protocols' descriptions, with faults to order.
+
+Nothing here is the benchmark's own: not the codec, not the server. As the published servers do,
+they compute in the event loop, so that nothing else is answered meanwhile.
+"""
+
+import asyncio
+import contextlib
+import http
+import socket
+import threading
+import time
+import traceback
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+import msgpack
+import numpy as np
+from websockets.asyncio.server import serve
+from websockets.exceptions import ConnectionClosed
+
+CHUNK = 20
+
+
+def encode(value):
+    if isinstance(value, np.ndarray):
+        return {
+            b"__ndarray__": True,
+            b"data": value.tobytes(),
+            b"dtype": value.dtype.str,
+            b"shape": value.shape,
+        }
+    raise TypeError(type(value))
+
+
+def decode(value):
+    if b"__ndarray__" in value:
+        flat = np.frombuffer(value[b"data"], np.dtype(value[b"dtype"]))
+        return flat.reshape(value[b"shape"])
+    return value
+
+
+def pack(message):
+    return msgpack.packb(message, default=encode)
+
+
+def unpack(data):
+    return msgpack.unpackb(data, object_hook=decode)
+
+
+class WireServer:
+    """A server whose policy is the method `answer`.
+
+    `faults` are consumed one for each message: None for none; "die" drops the connection, "stall"
+    says nothing, a number answers so many seconds late, bytes or text are sent as they are, and a
+    dictionary is sent instead of the reply.
+    """
+
+    def __init__(self, port=0, token=None, faults=()):
+        self.metadata = {}
+        self.port, self.token, self.faults = port, token, list(faults)
+        self.messages, self.connections, self.open = [], 0, 0
+        self.silent = threading.Event()
+        self._ready = threading.Event()
+        self._thread = threading.Thread(target=lambda: asyncio.run(self._main()), daemon=True)
+
+    def answer(self, message):
+        return {"actions": np.full((CHUNK, 8), 0.25)}
+
+    def __enter__(self):
+        self._thread.start()
+        assert self._ready.wait(10)
+        return self
+
+    def __exit__(self, *_):
+        self._loop.call_soon_threadsafe(self._stop.set)
+        self._thread.join(10)
+
+    @property
+    def place(self):
+        return f"127.0.0.1:{self.port}"
+
+    async def _main(self):
+        self._loop, self._stop = asyncio.get_running_loop(), asyncio.Event()
+        async with serve(
+            self._handle,
+            "127.0.0.1",
+            self.port,
+            compression=None,
+            max_size=None,
+            process_request=self._request,
+            close_timeout=0.5,
+        ) as server:
+            self.port = server.sockets[0].getsockname()[1]
+            self._ready.set()
+            await self._stop.wait()
+
+    def _request(self, connection, request):
+        if request.path == "/healthz":
+            return connection.respond(http.HTTPStatus.OK, "OK\n")
+        if self.token and request.headers.get("Authorization") != f"Api-Key {self.token}":
+            return connection.respond(http.HTTPStatus.UNAUTHORIZED, "no\n")
+        return None
+
+    async def _handle(self, websocket):
+        self.connections += 1
+        self.open += 1
+        try:
+            if self.silent.is_set():
+                await self._stop.wait()
+                return
+            await websocket.send(pack(self.metadata))
+            await self._converse(websocket)
+        except ConnectionClosed:
+            pass
+        finally:
+            self.open -= 1
+
+    async def _converse(self, websocket):
+        while True:
+            data = await websocket.recv()
+            self.messages.append(data)
+            fault = self.faults.pop(0) if self.faults else None
+            if fault == "die":
+                websocket.transport.abort()
+                return
+            if fault == "stall":
+                await self._stop.wait()
+                return
+            if isinstance(fault, int | float):
+                await asyncio.sleep(fault)
+                fault = None
+            try:
+                reply = self.answer(unpack(data))
+            except Exception:  # noqa: BLE001
+                with contextlib.suppress(ConnectionClosed):
+                    await websocket.send(traceback.format_exc())
+                    await websocket.close(1011, "Internal server error.")
+                return
+            if isinstance(fault, dict):
+                fault = pack(fault)
+            await websocket.send(pack(reply) if fault is None else fault)
+
+
+class MmeVlaServer(WireServer):
+    """One memory for all connections, which has to hold the current frame before an inference.
+
+    The answer tells what the server knows: row n, column 0 is the frames in memory, column 1 where
+    the policy's turn began, column 2 the brightness of the newest frame, column 3 inferences since
+    the reset, column 4 counts the rows.
+    """
+
+    def __init__(self, *args, delay=0.0, **kwargs):
+        super().__init__(*args, **kwargs)
+        self.delay = delay
+        self.forget()
+        self.parts, self.prompts, self.subgoals = [], [], []
+        self.bytes = 0
+
+    def forget(self):
+        self.frames, self.start, self.newest, self.inferences = 0, 0, None, 0
+
+    def answer(self, message):
+        time.sleep(self.delay)
+        if message.get("reset"):
+            self.forget()
+            return {"reset_finished": True, "reset_time_ms": 0.1}
+        if message.get("add_buffer"):
+            return self.remember(message)
+        return self.infer(message)
+
+    def remember(self, message):
+        images, state = message["images"], message["state"]
+        assert images.dtype == np.uint8, images.dtype
+        assert images.ndim == 5, images.shape
+        assert images.shape[1] == 1, images.shape
+        assert state.shape == (len(images), 8), state.shape
+        assert state.dtype == np.float32, state.dtype
+        assert not images.flags.writeable
+        self.frames += len(images)
+        assert self.frames <= 4096, "step index out of the table"
+        if self.start == 0:
+            self.start = message["exec_start_idx"]
+        self.newest = images[-1, 0]
+        self.parts.append(len(images))
+        self.bytes += images.nbytes
+        return {"add_buffer_finished": True, "add_buffer_time_ms": 0.1}
+
+    def infer(self, message):
+        assert self.frames > 0, "the memory is empty"
+        assert np.array_equal(self.newest, message["observation/image"]), "not the newest frame"
+        assert message["observation/state"].shape == (8,)
+        self.inferences += 1
+        self.prompts.append(message["prompt"])
+        self.subgoals.append((message.get("simple_subgoal"), message.get("grounded_subgoal")))
+        rows = np.zeros((CHUNK, 8))
+        rows[:, :4] = self.frames, self.start, self.newest.mean(), self.inferences
+        rows[:, 4] = np.arange(CHUNK)
+        return {"actions": rows, "infer_time_ms": 0.1}
+
+
+class ChallengeServer(WireServer):
+    """Remembers how much it was shown; gives three rows."""
+
+    def __init__(self, *args, **kwargs):
+        super().__init__(*args, **kwargs)
+        self.metadata = {"name": "submission", "version": "phase-1"}
+        self.seen, self.resets = 0, 0
+
+    def answer(self, message):
+        if message.get("reset"):
+            self.seen, self.resets = 0, self.resets + 1
+            return {"reset_finished": True}
+        assert message["is_first_step"] == (self.seen == 0)
+        assert isinstance(message["task_goal"], list)
+        lengths = {len(value) for key, value in message.items() if key.endswith("_list")}
+        assert len(lengths) == 1, lengths
+        self.seen += lengths.pop()
+        return {"actions": np.full((3, 8), float(self.seen))}
+
+
+class ChallengeHttpServer:
+    """The challenge's other interface; the same faults."""
+
+    def __init__(self, token=None, faults=()):
+        self.policy = ChallengeServer(faults=faults)
+        self.token, self.messages, self.faults = token, [], list(faults)
+        owner = self
+
+        class Handler(BaseHTTPRequestHandler):
+            protocol_version = "HTTP/1.1"
+
+            def do_GET(self):
+                owner.get(self)
+
+            def do_POST(self):
+                owner.post(self)
+
+            def log_message(self, *_):
+                pass
+
+        self._server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        self._server.daemon_threads = True
+        self.place = f"127.0.0.1:{self._server.server_address[1]}"
+
+    def __enter__(self):
+        self._thread = threading.Thread(target=self._server.serve_forever, args=(0.02,))
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self._server.shutdown()
+        self._thread.join()
+        self._server.server_close()
+
+    def send(self, handler, status, body, kind="application/msgpack"):
+        handler.send_response(status)
+        handler.send_header("Content-Type", kind)
+        handler.send_header("Content-Length", str(len(body)))
+        handler.end_headers()
+        handler.wfile.write(body)
+
+    def get(self, handler):
+        if self.token and handler.headers.get("Authorization") != f"Api-Key {self.token}":
+            return self.send(handler, 401, b"no", "text/plain")
+        if handler.path == "/metadata":
+            return self.send(handler, 200, pack(self.policy.metadata))
+        return self.send(handler, 200, b"OK\n", "text/plain")
+
+    def post(self, handler):
+        body = handler.rfile.read(int(handler.headers["Content-Length"]))
+        if not body and handler.path != "/reset":
+            return self.send(handler, 400, b"empty", "text/plain")
+        self.messages.append((handler.path, body))
+        fault = self.faults.pop(0) if self.faults else None
+        if fault == "die":
+            handler.close_connection = True
+            return handler.connection.shutdown(socket.SHUT_RDWR)
+        if isinstance(fault, int | float):
+            time.sleep(fault)
+            fault = None
+        if isinstance(fault, bytes):
+            return self.send(handler, 200, fault)
+        try:
+            message = {"reset": True} if handler.path == "/reset" else unpack(body)
+            return self.send(handler, 200, pack(fault or self.policy.answer(message)))
+        except Exception:  # noqa: BLE001
+            return self.send(handler, 500, traceback.format_exc().encode(), "text/plain")
