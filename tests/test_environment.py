@@ -288,6 +288,24 @@ def test_history_costs_only_the_pictures_that_are_wanted(monkeypatch):
     assert len(drawn) == 1 + 2 + 1
 
 
+def test_history_may_have_fewer_cameras(monkeypatch):
+    drawn, picture = [], Cameras.picture
+    monkeypatch.setattr(
+        Cameras, "picture", lambda self, name: drawn.append(name) or picture(self, name)
+    )
+    env = roboirg.make("PickXtimes", observe_every=8, history_cameras=("front",))
+    env.reset()
+    drawn.clear()
+    observation, *_ = env.step_chunk(np.tile(HOME_ACTION, (20, 1)))
+    assert observation in env.observation_space
+    assert drawn == ["front", "front", "front", "wrist"]
+    for seen in observation["history"]:
+        assert "front_rgb" in seen
+        assert "wrist_rgb" not in seen
+    with pytest.raises(InvalidValueError, match="history_cameras has 'wrist', but cameras is"):
+        roboirg.make("PickXtimes", cameras=("front",), history_cameras=("wrist",))
+
+
 def test_gymnasium_s_checker_is_content_with_history():
     env = roboirg.make("VideoUnmask", cameras=(), observe_every=1)
     with warnings.catch_warnings():

@@ -24,7 +24,7 @@ from roboirg.simulation.device import describe, find_render_device
 from roboirg.simulation.grounding import Grounding
 from roboirg.simulation.play import Play
 from roboirg.simulation.rendering import find_rendering
-from roboirg.simulation.senses import Senses, Wishes, sensed_space
+from roboirg.simulation.senses import Senses, Wishes, recalled_space, sensed_space
 from roboirg.simulation.session import Session
 from roboirg.splits import get_episode
 
@@ -82,6 +82,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         demonstration_frames: which pictures the video has: "all", "none", or n for every n-th.
         observe_every: n adds `history`, the observations after every n-th control step since the
             last observation, to each.
+        history_cameras: whose pictures those have; the same as observations by default.
         meshes: "faithful", or "light" for quicker pictures that differ a little from RoboMME's.
         max_steps: control steps that the policy has.
         render_mode: None or "rgb_array" (front and wrist side by side).
@@ -116,6 +117,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         grounded: bool = False,
         demonstration_frames: DemonstrationFrames = "all",
         observe_every: int | None = None,
+        history_cameras: Sequence[str] | None = None,
         meshes: str = "faithful",
         max_steps: int = MAX_STEPS,
         render_mode: str | None = None,
@@ -138,10 +140,12 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
             calibration,
             demonstration_frames,
             observe_every,
+            history_cameras,
             find_rendering(meshes),
         ).checked()
         self.cameras = tuple(self._wishes.cameras)
         self.demonstration_frames, self.observe_every = demonstration_frames, observe_every
+        self.history_cameras = tuple(self._wishes.of_history.cameras)
         if not isinstance(max_steps, int) or max_steps < 1:
             raise InvalidValueError(
                 f"max_steps is {max_steps!r}; it has to be a whole number of at least 1."
@@ -279,12 +283,11 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         return self._play
 
     def _make_observation_space(self) -> spaces.Dict:
-        fields = {
-            **sensed_space(self._wishes),
-            "instruction": spaces.Text(LONGEST_INSTRUCTION, charset=PRINTABLE),
-        }
+        said = {"instruction": spaces.Text(LONGEST_INSTRUCTION, charset=PRINTABLE)}
+        fields = {**sensed_space(self._wishes), **said}
         if self.observe_every is not None:
-            fields["history"] = spaces.Sequence(spaces.Dict(fields))
+            recalled = spaces.Dict({**recalled_space(self._wishes), **said})
+            fields["history"] = spaces.Sequence(recalled)
         return spaces.Dict(fields)
 
     def _show(self, recording: Recording | None) -> Recording:
@@ -341,17 +344,15 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     def _remember(self) -> None:
         """Keep an observation from within a chunk, if one is wanted now."""
         if self.observe_every is not None and self._playing.steps % self.observe_every == 0:
-            self._playing.history.append(self._look())
+            recalled = self._playing.senses.recall()
+            self._playing.history.append({**recalled, "instruction": self.instruction.text})
 
     def _observe(self) -> dict[str, Any]:
-        observation = self._look()
+        observation = {**self._playing.senses.read(), "instruction": self.instruction.text}
         if self.observe_every is not None:
             observation["history"] = tuple(self._playing.history)
             self._playing.history.clear()
         return observation
-
-    def _look(self) -> dict[str, Any]:
-        return {**self._playing.senses.read(), "instruction": self.instruction.text}
 
     def _info(self) -> dict[str, Any]:
         play, judge = self._playing, self.session.judge

@@ -18,6 +18,7 @@ from roboirg.policies.loading import (
     wanted_cameras,
     wanted_demonstration_frames,
     wanted_history,
+    wanted_history_cameras,
 )
 from roboirg.policies.planning import specs
 from roboirg.policies.planning.listener import VLMListener
@@ -248,6 +249,7 @@ def test_every_system_plays_a_whole_episode(name):
             cameras=wanted_cameras(policy),
             demonstration_frames=wanted_demonstration_frames(policy),
             observe_every=wanted_history(policy),
+            history_cameras=wanted_history_cameras(policy),
             grounded=getattr(policy, "grounded", False),
             max_steps=40,
         )

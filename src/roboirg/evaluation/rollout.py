@@ -42,6 +42,7 @@ from roboirg.policies.loading import (
     wanted_cameras,
     wanted_demonstration_frames,
     wanted_history,
+    wanted_history_cameras,
 )
 from roboirg.splits import get_episode
 
@@ -124,6 +125,7 @@ class Needs(NamedTuple):
         actions: the space in which it acts.
         demonstration_frames: which pictures of the video.
         observe_every: after how many control steps it wants to look.
+        history_cameras: whose pictures it wants of that; None for all of them.
         grounded: whether it passes on subgoals with pixels.
     """
 
@@ -131,6 +133,7 @@ class Needs(NamedTuple):
     actions: ActionSpace
     demonstration_frames: DemonstrationFrames = "all"
     observe_every: int | None = None
+    history_cameras: tuple[str, ...] | None = None
     grounded: bool = False
 
 
@@ -207,6 +210,7 @@ def needs_of(policy: Policy, job: Job) -> Needs:
         actions,
         wanted_demonstration_frames(policy) if frames is None else frames,
         wanted_history(policy) if every is None else every,
+        wanted_history_cameras(policy),
         bool(getattr(policy, "grounded", False)),
     )
 
@@ -230,6 +234,7 @@ def make_env(job: Job, needs: Needs) -> RoboIRGEnv:
         grounded=needs.grounded,
         demonstration_frames=needs.demonstration_frames,
         observe_every=needs.observe_every,
+        history_cameras=needs.history_cameras,
         meshes=job.meshes,
         max_steps=job.max_steps,
     )

@@ -23,7 +23,8 @@ class Policy(Protocol):
 
     Pictures of the demonstration are drawn when they are read. ``demonstration_frames = 4`` has
     only every fourth of them, ``"none"`` none. A policy that acts in chunks and wants to see what
-    happened meanwhile sets ``observe_every = n``: then every observation holds ``history``.
+    happened meanwhile sets ``observe_every = n``: then every observation holds ``history``,
+    with the pictures of all its cameras, or only of ``history_cameras``.
 
     All of these are optional, and so are the following. ``version`` (text) and ``metadata``
     (JSON values by name; read after `reset`) go into the records. ``usage()`` is called when the

@@ -167,11 +167,25 @@ def wanted_history(policy: object) -> int | None:
     return check_observe_every(getattr(policy, "observe_every", None))
 
 
+def wanted_history_cameras(policy: object) -> tuple[str, ...] | None:
+    """The pictures that a policy, or a class of policies, wants in the history.
+
+    Returns:
+        None for all that it wants of the present.
+
+    Raises:
+        InvalidValueError: its ``history_cameras`` are not different names of cameras.
+    """
+    chosen = getattr(policy, "history_cameras", None)
+    return None if chosen is None else check_cameras(chosen)
+
+
 _WISHES: Mapping[str, Callable[[object], object]] = {
     "cameras": wanted_cameras,
     "actions": wanted_actions,
     "demonstration_frames": wanted_demonstration_frames,
     "observe_every": wanted_history,
+    "history_cameras": wanted_history_cameras,
 }
 
 

@@ -11,6 +11,7 @@ from roboirg.policies.loading import (
     wanted_actions,
     wanted_demonstration_frames,
     wanted_history,
+    wanted_history_cameras,
 )
 
 if TYPE_CHECKING:
@@ -50,6 +51,7 @@ def _check(env: RoboIRGEnv, policy: Policy) -> None:
     wishes: dict[str, object] = {
         "demonstration_frames": wanted_demonstration_frames(policy),
         "observe_every": wanted_history(policy),
+        "history_cameras": wanted_history_cameras(policy),
     }
     for attribute, wish in wishes.items():
         given = getattr(env, attribute)

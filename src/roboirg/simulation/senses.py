@@ -35,6 +35,7 @@ class Wishes(NamedTuple):
         calibration: whether with extrinsic and intrinsic matrices.
         demonstration_frames: which pictures the video has: all, none, or every n-th.
         observe_every: after how many control steps there is an observation in ``history``.
+        history_cameras: whose pictures these have; None for those of `cameras`.
         rendering: how pictures are made.
     """
 
@@ -43,7 +44,14 @@ class Wishes(NamedTuple):
     calibration: bool = False
     demonstration_frames: DemonstrationFrames = "all"
     observe_every: int | None = None
+    history_cameras: Sequence[str] | None = None
     rendering: Rendering = FAITHFUL
+
+    @property
+    def of_history(self) -> Wishes:
+        """What the observations in ``history`` hold."""
+        cameras = self.cameras if self.history_cameras is None else self.history_cameras
+        return self._replace(cameras=cameras)
 
     def checked(self) -> Wishes:
         """These wishes, if they can be fulfilled.
@@ -55,6 +63,11 @@ class Wishes(NamedTuple):
         check_demonstration_frames(self.demonstration_frames)
         check_observe_every(self.observe_every)
         cameras = check_cameras(self.cameras)
+        for camera in check_cameras(self.of_history.cameras):
+            if camera not in cameras:
+                raise InvalidValueError(
+                    f"history_cameras has {camera!r}, but cameras is {cameras}; name it there too."
+                )
         for name, wanted in (("depth", self.depth), ("calibration", self.calibration)):
             if not isinstance(wanted, bool):
                 raise InvalidValueError(f"{name} is {wanted!r}; it has to be True or False.")
@@ -81,15 +94,22 @@ class Senses:
         self._world = world
         self._wishes = wishes
         self._drawn = tuple(drawn_space(wishes))
+        self._drawn_before = tuple(drawn_space(wishes.of_history))
         self.proprioception = Proprioception(world.robot)
 
     def read(self) -> dict[str, Any]:
         """The observation without the instruction."""
-        if self._drawn:
+        return self._read(self._wishes.cameras, self._drawn)
+
+    def recall(self) -> dict[str, Any]:
+        """The same as ``history`` will hold it."""
+        return self._read(self._wishes.of_history.cameras, self._drawn_before)
+
+    def _read(self, cameras: Sequence[str], drawn: Sequence[str]) -> dict[str, Any]:
+        if drawn:
             # All cameras begin before the first picture is waited for.
-            self._world.cameras.draw(self._wishes.cameras)
-        drawn = {field: draw(self._world, field) for field in self._drawn}
-        return {**drawn, **self.feel()}
+            self._world.cameras.draw(cameras)
+        return {**{field: draw(self._world, field) for field in drawn}, **self.feel()}
 
     def feel(self) -> dict[str, Any]:
         """The part of the observation for which nothing is drawn."""
@@ -143,6 +163,11 @@ def felt_space(wishes: Wishes) -> dict[str, spaces.Space[Any]]:
 def sensed_space(wishes: Wishes) -> dict[str, spaces.Space[Any]]:
     """The space of each field that `Senses.read` gives."""
     return {**drawn_space(wishes), **felt_space(wishes)}
+
+
+def recalled_space(wishes: Wishes) -> dict[str, spaces.Space[Any]]:
+    """The space of each field that `Senses.recall` gives."""
+    return {**drawn_space(wishes.of_history), **felt_space(wishes)}
 
 
 def stack_felt(moments: Sequence[dict[str, Any]], wishes: Wishes) -> dict[str, NDArray[Any]]:

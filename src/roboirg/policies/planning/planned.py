@@ -46,6 +46,7 @@ class PlannedPolicy:
             wanted_cameras,
             wanted_demonstration_frames,
             wanted_history,
+            wanted_history_cameras,
         )
 
         if not isinstance(policy, SubgoalFollower):
@@ -60,6 +61,10 @@ class PlannedPolicy:
         self.demonstration_frames: DemonstrationFrames = both_frames(*self._frames)
         self._looks = _observe_every(planner), wanted_history(policy)
         self.observe_every = both_histories(*self._looks)
+        recalled = wanted_history_cameras(policy)
+        self.history_cameras = both_cameras(
+            wanted_cameras(policy) if recalled is None else recalled, _cameras(planner)
+        )
         if self.actions == WAYPOINT.name and self.observe_every is None:
             # Only what is seen tells how many control steps a way point took.
             self.observe_every = 1

@@ -44,6 +44,7 @@ class PolicyFactory:
             wanted_cameras,
             wanted_demonstration_frames,
             wanted_history,
+            wanted_history_cameras,
         )
 
         self.spec, self._build = spec, build
@@ -52,6 +53,7 @@ class PolicyFactory:
         self.actions = wanted_actions(sample).name
         self.demonstration_frames = wanted_demonstration_frames(sample)
         self.observe_every = wanted_history(sample)
+        self.history_cameras = wanted_history_cameras(sample)
         self.grounded = bool(getattr(sample, "grounded", False))
         self.version = str(getattr(sample, "version", "unknown"))
 

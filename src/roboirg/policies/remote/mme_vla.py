@@ -57,6 +57,7 @@ class MmeVlaPolicy(RemotePolicy):
         super().__init__(url, seed)
         self.demonstration_frames = "all" if self.options.history else "none"
         self.observe_every = 1 if self.options.history else None
+        self.history_cameras = ("front",)
         self._demonstration: Demonstration | None = None
         self._subgoal: str | None = None
         self._remembered = 0
