@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import ctypes
 import re
 import signal
+import time
 from collections import Counter
 from pathlib import Path
 
 import chaos
 import pytest
+from evaluation_fakes import FakePlay, small_plan
 
 from roboirg.evaluation.executors import LocalProcesses
 from roboirg.evaluation.faults import Fault, blame
@@ -107,15 +110,11 @@ def _seed(job: Job) -> int:
 
 
 def sleepy(job: Job) -> Record:
-    import time
-
     time.sleep(3600)
     raise AssertionError(job)
 
 
 def test_an_episode_that_takes_too_long_is_ended_and_named(tmp_path: Path) -> None:
-    from evaluation_fakes import small_plan
-
     plan = small_plan(1)
     executor = LocalProcesses(2, episode_timeout_s=0.5)
     summary = run_plan(plan, tmp_path, sleepy, executor)
@@ -128,9 +127,24 @@ def test_an_episode_that_takes_too_long_is_ended_and_named(tmp_path: Path) -> No
         assert record.duration_s >= 0.5
 
 
-def test_a_worker_is_gone_after_it_was_overdue() -> None:
-    from evaluation_fakes import small_plan
+def crashing(job: Job) -> Record:
+    ctypes.string_at(0)
+    raise AssertionError(job)
 
+
+def test_a_crash_in_the_simulators_native_code_is_the_worlds(tmp_path: Path) -> None:
+    plan = small_plan(1)
+    summary = run_plan(plan, tmp_path, crashing, LocalProcesses(2))
+    assert (summary.total, len(summary.errors)) == (2, 2)
+    for record in read_records(tmp_path):
+        # Such a crash may pass, so it was tried again.
+        assert (record.error, record.attempt) == ("environment", 2)
+        assert record.cause == (
+            f"environment: the process died of signal {signal.SIGSEGV:d} in the world"
+        )
+
+
+def test_a_worker_is_gone_after_it_was_overdue() -> None:
     worker = Worker.hire(sleepy, small_plan(1).jobs()[0])
     assert worker.overdue(3600) is None
     record = worker.overdue(0.0)
@@ -161,8 +175,6 @@ class Unreachable:
         self.policy = policy
 
     def __call__(self, job: Job) -> Record:
-        from evaluation_fakes import FakePlay
-
         record = FakePlay()(job)
         if job.policy != self.policy:
             return record
@@ -171,8 +183,6 @@ class Unreachable:
 
 
 def test_a_policy_that_cannot_be_reached_is_left_and_the_others_go_on(tmp_path: Path) -> None:
-    from evaluation_fakes import small_plan
-
     plan = small_plan(50, ("random", "oracle"))
     summary = run_plan(plan, tmp_path, Unreachable("random"), LocalProcesses(1))
     assert summary.unreachable == ("random",)
