@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from roboirg.errors import InvalidValueError, UnknownNameError
+from roboirg.evaluation.lines import key_of
 from roboirg.evaluation.plan import Plan, make_plan, read_plan, write_plan
 from roboirg.evaluation.record import Job
 from roboirg.evaluation.words import parse_episodes, parse_numbers, parse_policies, parse_stages
@@ -146,3 +147,19 @@ def test_addresses_keep_their_commas() -> None:
     assert parse_policies(specs) == ("random", "oracle", "mme-vla://a:8001,b:8001?history=no")
     with pytest.raises(InvalidValueError, match="No policy was given"):
         parse_policies([])
+
+
+def test_a_policy_may_have_a_name_of_its_own() -> None:
+    address = "mme-vla://localhost:8001?history=no"
+    plan = make_plan([f"pi0.5={address}", "oracle"], tasks="StopCube", episodes="1")
+    assert plan.specs == {"pi0.5": address, "oracle": "oracle"}
+    here, *_ = plan.jobs()
+    assert (here.policy, here.policy_spec) == ("pi0.5", address)
+    there = make_plan(["pi0.5=mme-vla://elsewhere:9000"], tasks="StopCube", episodes="1").jobs()[0]
+    # The server is not who it is.
+    assert key_of(here) == key_of(there)
+    assert here.slug == there.slug
+    with pytest.raises(InvalidValueError, match="Two policies are named 'a': oracle and random"):
+        make_plan(["a=oracle", "a=random"])
+    with pytest.raises(UnknownNameError, match="Did you mean 'listener'"):
+        make_plan(["mine=listner"])

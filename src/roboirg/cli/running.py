@@ -26,7 +26,10 @@ _MINIMUM_WIDTH = 100
 
 Policies = Annotated[
     list[str] | None,
-    typer.Option("--policy", help="Built-in name, package.module:Class or address; repeatable."),
+    typer.Option(
+        "--policy",
+        help="Built-in name, package.module:Class or address; or NAME=one of these; repeatable.",
+    ),
 ]
 PlanName = Annotated[
     str | None,

@@ -128,8 +128,8 @@ def describe(
         goal=dict(episode.goal.as_mapping()),
         # Exactly what a reader of the file will find.
         metadata=json.loads(json.dumps(dict(instruction.metadata))),
-        privileged=is_privileged(job.policy),
-        policy_version=policy_version(job.policy),
+        privileged=is_privileged(job.policy_spec),
+        policy_version=policy_version(job.policy_spec),
         policy_metadata=course.policy_metadata,
         events=tuple(course.events),
         video=video,

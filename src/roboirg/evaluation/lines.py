@@ -18,6 +18,7 @@ from roboirg.evaluation.record import (
     DEFAULT_FRAME,
     DEFAULT_MAX_STEPS,
     DEFAULT_MESHES,
+    IDENTITY,
     SCHEMA_VERSION,
     ErrorKind,
     Job,
@@ -78,7 +79,7 @@ class _Version(msgspec.Struct):
 Key = tuple[object, ...]
 """A job's identity: the values of its fields."""
 
-_identity = operator.attrgetter(*Job.model_fields)
+_identity = operator.attrgetter(*IDENTITY)
 _decoder = msgspec.json.Decoder(Stored)
 _version_decoder = msgspec.json.Decoder(_Version)
 

@@ -25,6 +25,7 @@ _TEXTS = [
     "actions",
     "demonstration_frames",
     "meshes",
+    "spec",
     "difficulty",
     "outcome",
     "error",

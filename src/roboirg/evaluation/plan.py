@@ -32,6 +32,7 @@ from roboirg.evaluation.words import (
     parse_policies,
     parse_stage_sets,
     says_all,
+    split_name,
 )
 from roboirg.language.instruction import FORMS, SETTINGS, Instruction
 from roboirg.observations import (
@@ -58,7 +59,8 @@ class Plan(BaseModel):
     """Which policies play which episodes, told how.
 
     Attributes:
-        policies: built-in names, ``package.module:Class``, or addresses.
+        policies: built-in names, ``package.module:Class``, or addresses, each perhaps with a name
+            of its own before it, ``NAME=SPEC``.
         tasks: names.
         settings: names, or ``"all"`` for those in which each episode can be told.
         forms: implicit, resolved or both.
@@ -106,6 +108,21 @@ class Plan(BaseModel):
     retry_on: tuple[ErrorKind, ...] = PASSING
 
     @property
+    def specs(self) -> dict[str, str]:
+        """What makes each policy, by its name.
+
+        Raises:
+            InvalidValueError: two policies have the same name.
+        """
+        specs: dict[str, str] = {}
+        for name, spec in map(split_name, self.policies):
+            if specs.setdefault(name, spec) != spec:
+                raise InvalidValueError(
+                    f"Two policies are named {name!r}: {specs[name]} and {spec}."
+                )
+        return specs
+
+    @property
     def fingerprint(self) -> str:
         """Tells this plan from every other."""
         return hashlib.sha256(self.model_dump_json().encode()).hexdigest()[:FINGERPRINT_LENGTH]
@@ -117,8 +134,8 @@ class Plan(BaseModel):
             UnknownNameError: a policy, task, setting, … does not exist; names the nearest.
             InvalidValueError: a number is out of range, or a task lacks a setting.
         """
-        for name in self.policies:
-            policies.load_policy_class(name)
+        for spec in self.specs.values():
+            policies.load_policy_class(spec)
         self._check_options()
         for task in self.tasks:
             for index in (min(self.episodes), max(self.episodes)):
@@ -133,7 +150,7 @@ class Plan(BaseModel):
         """Every episode to play, once: by policy, task, episode, setting, form, seed."""
         return tuple(
             job
-            for policy in self.policies
+            for policy in self.specs.items()
             for task in self.tasks
             for episode in self.episodes
             for job in self._jobs_of(policy, task, episode, seeds=self.policy_seeds)
@@ -146,8 +163,9 @@ class Plan(BaseModel):
         return self.settings
 
     def _jobs_of(
-        self, policy: str, task: str, episode: int, *, seeds: tuple[int, ...]
+        self, policy: tuple[str, str], task: str, episode: int, *, seeds: tuple[int, ...]
     ) -> Iterator[Job]:
+        name, spec = policy
         # Options that say nothing in a setting keep their defaults there: the same words are
         # the same job, and are played once.
         for setting in self.settings_of(task, episode):
@@ -155,7 +173,7 @@ class Plan(BaseModel):
             for form in self.forms if setting != "explicit" else ("implicit",):
                 for stages in self.stages if contextual else (ALL_STAGES,):
                     job = Job(
-                        policy=policy,
+                        policy=name,
                         task=task,
                         split=self.split,
                         episode=episode,
@@ -171,6 +189,7 @@ class Plan(BaseModel):
                         demonstration_frames=self.demonstration_frames,
                         observe_every=self.observe_every,
                         meshes=self.meshes,
+                        spec=None if spec == name else spec,
                     )
                     yield job
                     # Copying is quicker, and there may be very many.
@@ -183,7 +202,7 @@ class Plan(BaseModel):
         usual = self.settings == "all" and self.frame == DEFAULT_FRAME
         for task in self.tasks:
             for episode in self.episodes[:1] if usual else self.episodes:
-                yield from self._jobs_of("", task, episode, seeds=(0,))
+                yield from self._jobs_of(("", ""), task, episode, seeds=(0,))
 
     def _check_options(self) -> None:
         _check_names("form", self.forms, FORMS)

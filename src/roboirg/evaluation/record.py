@@ -44,6 +44,7 @@ INCIDENTALS = frozenset(
         "duration_s",
         "film_lost",
         "plan",
+        "spec",
         "started_at",
         "timings",
         "usage",
@@ -59,10 +60,10 @@ class _Data(BaseModel):
 
 
 class Job(_Data):
-    """One episode to play: the identity of its record. Jobs are hashable and compare by value.
+    """One episode to play. All fields but `spec` are the identity of its record.
 
     Attributes:
-        policy: built-in name or ``package.module:Class``.
+        policy: its name, which is often its spec.
         task: name of the task.
         split: train, val or test.
         episode: 0-based position in the split.
@@ -79,6 +80,7 @@ class Job(_Data):
         demonstration_frames: which pictures of the video are prescribed; None as the policy says.
         observe_every: after how many control steps there is a picture; None as the policy says.
         meshes: faithful or light.
+        spec: what makes the policy, where that is not its name: an address may change.
     """
 
     policy: str
@@ -97,6 +99,12 @@ class Job(_Data):
     demonstration_frames: DemonstrationFrames | None = None
     observe_every: int | None = None
     meshes: str = DEFAULT_MESHES
+    spec: str | None = None
+
+    @property
+    def policy_spec(self) -> str:
+        """What makes the policy: a built-in name, ``package.module:Class``, or an address."""
+        return self.spec or self.policy
 
     @property
     def slug(self) -> str:
@@ -104,8 +112,12 @@ class Job(_Data):
         words = (self.policy, self.task, self.split, str(self.episode), self.setting, self.form)
         readable = re.sub(r"[^A-Za-z0-9]+", "-", "-".join(words)).strip("-")[:100]
         # Of the fields alone, so that a record (which is a job) has its job's slug.
-        identity = repr([(name, getattr(self, name)) for name in Job.model_fields])
+        identity = repr([(name, getattr(self, name)) for name in IDENTITY])
         return f"{readable}-{hashlib.sha256(identity.encode()).hexdigest()[:8]}"
+
+
+IDENTITY = tuple(name for name in Job.model_fields if name != "spec")
+"""The fields that tell one job from another."""
 
 
 class Turn(_Data):
@@ -217,8 +229,8 @@ class Result(Job):
 
     @property
     def identity(self) -> Job:
-        """The job this is the result of."""
-        return Job(**{name: getattr(self, name) for name in Job.model_fields})
+        """The job this is the result of, whatever made the policy."""
+        return Job(**{name: getattr(self, name) for name in IDENTITY})
 
 
 class Record(Result):

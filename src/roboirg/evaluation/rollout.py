@@ -248,7 +248,7 @@ def load_policy(job: Job) -> Policy:
     """
     episode = get_episode(job.task, job.split, job.episode)
     seeds = np.random.SeedSequence((job.policy_seed, episode.seed))
-    return policies.make_policy(job.policy, seed=int(seeds.generate_state(1)[0]))
+    return policies.make_policy(job.policy_spec, seed=int(seeds.generate_state(1)[0]))
 
 
 def _play(

@@ -133,18 +133,17 @@ class _Run:
 
     def _play_once(self, todo: Sequence[Job], play: Play, executor: Executor) -> list[Job]:
         """Play jobs; those that are to be played afterwards."""
-        open_jobs, again = dict.fromkeys(todo), []
+        open_jobs, again = {key_of(job): job for job in todo}, []
         with contextlib.closing(_iterate(executor, todo, play)) as records:
             for record in records:
-                job = record.identity
-                open_jobs.pop(job, None)
+                job = open_jobs.pop(key_of(record))
                 self._keep(job, record)
                 if self._is_to_be_tried_again(job, record):
                     again.append(job)
                 if self._has_lost_touch(record):
                     # The rest of the world goes on without it.
                     self._tell_unreachable(record)
-                    again += open_jobs
+                    again += open_jobs.values()
                     break
         return [job for job in again if job.policy not in self.unreachable]
 
@@ -219,7 +218,7 @@ def _check_versions(records: Iterable[Stored], folder: Path) -> None:
 
 def _check_policies(plan: Plan, records: Iterable[Stored], folder: Path) -> None:
     """Refuse to mix what two policies of the same name did."""
-    versions = {name: policy_version(name) for name in plan.policies}
+    versions = {name: policy_version(spec) for name, spec in plan.specs.items()}
     for policy, version in {(record.policy, record.policy_version) for record in records}:
         now = versions.get(policy, version)
         if version != now:

@@ -46,6 +46,12 @@ def parse_policies(specs: Iterable[str]) -> tuple[str, ...]:
     return policies
 
 
+def split_name(policy: str) -> tuple[str, str]:
+    """A policy's name and its spec; without a name of its own, that is the spec."""
+    found = re.fullmatch(r"([\w.+ -]+)=(.+)", policy)
+    return (policy, policy) if found is None else (found[1].strip(), found[2].strip())
+
+
 def says_all(text: str) -> bool:
     """Whether a list of names is, or contains, the word for all of them."""
     return WHOLE in (word.strip().lower() for word in text.split(","))
