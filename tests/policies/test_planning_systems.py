@@ -12,18 +12,17 @@ from wire_servers import MmeVlaServer, unpack
 import roboirg
 from roboirg.errors import InvalidValueError, UnknownNameError
 from roboirg.policies import Policy, PrivilegedPolicy, load_policy_class, make_policy, play
-from roboirg.policies.loading import (
-    is_privileged,
-    policy_version,
+from roboirg.policies.loading import is_privileged, policy_version
+from roboirg.policies.planning import specs
+from roboirg.policies.planning.listener import VLMListener
+from roboirg.policies.planning.planned import PlannedPolicy
+from roboirg.policies.planning.systems import all_systems, find_system, load_system
+from roboirg.policies.wishes import (
     wanted_cameras,
     wanted_demonstration_frames,
     wanted_history,
     wanted_history_cameras,
 )
-from roboirg.policies.planning import specs
-from roboirg.policies.planning.listener import VLMListener
-from roboirg.policies.planning.planned import PlannedPolicy
-from roboirg.policies.planning.systems import all_systems, find_system, load_system
 from roboirg.splits import get_episode
 
 PAPER = ("FrameS-Modul", "GroundSG-Gemini", "GroundSG-QwenVL", "GroundSG-oracle", "MemER",

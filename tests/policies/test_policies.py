@@ -7,11 +7,10 @@ import roboirg
 from roboirg.actions import JOINT_ANGLE, WAYPOINT, check_chunk
 from roboirg.errors import InvalidValueError, UnknownNameError
 from roboirg.policies import Policy, PrivilegedPolicy, load_policy_class, make_policy
+from roboirg.policies.classes import BUILTIN
 from roboirg.policies.listeners import ForgetfulPolicy, ListenerPolicy
-from roboirg.policies.loading import (
-    BUILTIN,
-    is_privileged,
-    policy_version,
+from roboirg.policies.loading import is_privileged, policy_version
+from roboirg.policies.wishes import (
     wanted_actions,
     wanted_cameras,
     wanted_demonstration_frames,

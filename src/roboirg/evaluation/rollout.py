@@ -37,7 +37,7 @@ from roboirg.evaluation.video import Film, VideoOptions
 from roboirg.evaluation.watching import Phase, watched
 from roboirg.observations import DemonstrationFrames, Observation
 from roboirg.policies.base import Policy, PrivilegedPolicy
-from roboirg.policies.loading import (
+from roboirg.policies.wishes import (
     wanted_actions,
     wanted_cameras,
     wanted_demonstration_frames,

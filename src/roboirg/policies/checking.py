@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from roboirg.actions import ActionSpace, check_chunk
 from roboirg.errors import MissingDependencyError, RoboIRGError
 from roboirg.policies.base import Policy
-from roboirg.policies.loading import (
-    make_policy,
+from roboirg.policies.loading import make_policy
+from roboirg.policies.synthetic import MadeUpEpisode, Studio
+from roboirg.policies.wishes import (
     wanted_actions,
     wanted_cameras,
     wanted_demonstration_frames,
     wanted_history,
 )
-from roboirg.policies.synthetic import MadeUpEpisode, Studio
 
 if TYPE_CHECKING:
     from rich.console import Console

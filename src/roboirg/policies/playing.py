@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 from roboirg.errors import InvalidValueError
 from roboirg.observations import Observation
 from roboirg.policies.base import Policy, PrivilegedPolicy
-from roboirg.policies.loading import (
+from roboirg.policies.wishes import (
     wanted_actions,
     wanted_demonstration_frames,
     wanted_history,

@@ -19,6 +19,13 @@ from roboirg.policies.planning.sharing import (
     both_histories,
     cut_history,
 )
+from roboirg.policies.wishes import (
+    wanted_actions,
+    wanted_cameras,
+    wanted_demonstration_frames,
+    wanted_history,
+    wanted_history_cameras,
+)
 
 if TYPE_CHECKING:
     from roboirg.environment import RoboIRGEnv
@@ -40,14 +47,6 @@ class PlannedPolicy:
     """
 
     def __init__(self, planner: Planner, policy: Policy, name: str | None = None) -> None:
-        # Here, because the loader knows of planners.
-        from roboirg.policies.loading import (
-            wanted_actions,
-            wanted_cameras,
-            wanted_demonstration_frames,
-            wanted_history,
-            wanted_history_cameras,
-        )
 
         if not isinstance(policy, SubgoalFollower):
             raise InvalidValueError(

@@ -19,6 +19,13 @@ from roboirg.policies.base import Policy
 from roboirg.policies.planning.listener import ListenerOptions, VLMListener
 from roboirg.policies.planning.models import ModelOptions
 from roboirg.policies.planning.validation import checked
+from roboirg.policies.wishes import (
+    wanted_actions,
+    wanted_cameras,
+    wanted_demonstration_frames,
+    wanted_history,
+    wanted_history_cameras,
+)
 
 if TYPE_CHECKING:
     from roboirg.environment import RoboIRGEnv
@@ -39,13 +46,6 @@ class PolicyFactory:
     """
 
     def __init__(self, spec: str, build: Build, sample: Policy) -> None:
-        from roboirg.policies.loading import (
-            wanted_actions,
-            wanted_cameras,
-            wanted_demonstration_frames,
-            wanted_history,
-            wanted_history_cameras,
-        )
 
         self.spec, self._build = spec, build
         self.__name__ = spec

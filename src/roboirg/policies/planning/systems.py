@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict
 
 from roboirg.errors import InvalidValueError, UnknownNameError
 from roboirg.policies.base import Policy
+from roboirg.policies.classes import find_class, make_from_class
 from roboirg.policies.planning.planned import put_in_front
 from roboirg.policies.planning.planners import make_planner
 from roboirg.policies.planning.validation import checked
@@ -119,9 +120,7 @@ def build_system(system: System, seed: int) -> Policy:
         UnknownNameError: there is no such planner, policy or option.
         InvalidValueError: an option has a value that it cannot have.
     """
-    from roboirg.policies.loading import make_policy  # the loader knows of systems
-
-    policy = make_policy(system.policy, seed)
+    policy = make_from_class(system.policy, find_class(system.policy), seed)
     if system.planner is None:
         return policy
     options = dict(system.planner)

@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from roboirg.actions import check_chunk
 from roboirg.observations import Observation
 from roboirg.policies.base import Policy
-from roboirg.policies.loading import wanted_actions
+from roboirg.policies.wishes import (
+    wanted_actions,
+)
 
 Message = Mapping[str, Any]
 Answer = Callable[[Message], dict[str, Any]]
