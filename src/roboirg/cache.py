@@ -29,9 +29,9 @@ OFF = "off"
 USUAL_GIB = 2.0
 _GIB = 2**30
 
-Kind = Literal["actions", "frames"]
-_SHARES: dict[Kind, float] = {"actions": 1 / 16, "frames": 15 / 16}
-"""Of the size. Frames are large and quick to draw again; they must not drive out actions."""
+Kind = Literal["actions", "frames", "meshes"]
+_SHARES: dict[Kind, float] = {"actions": 1 / 16, "frames": 14 / 16, "meshes": 1 / 16}
+"""Of the size. Frames are large and quick to draw again; they must not drive out the others."""
 
 _MAGIC = b"roboirg1"
 _HEAD_SIZE = len(_MAGIC) + hashlib.sha256().digest_size
@@ -53,6 +53,11 @@ class Cache:
     def __init__(self, folder: Path | None, limit: int) -> None:
         self._folder = folder
         self._limit = limit
+
+    @property
+    def keeps(self) -> bool:
+        """Whether anything is kept at all."""
+        return self._folder is not None
 
     def read(self, key: str) -> memoryview | None:
         """What was kept under a key; None if it is not there (any more) or damaged."""

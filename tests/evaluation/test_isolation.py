@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import re
 import signal
 import time
@@ -13,6 +14,7 @@ import chaos
 import pytest
 from evaluation_fakes import FakePlay, small_plan
 
+from roboirg.errors import RoboIRGError
 from roboirg.evaluation.executors import LocalProcesses
 from roboirg.evaluation.faults import Fault, blame
 from roboirg.evaluation.plan import Plan
@@ -142,6 +144,23 @@ def test_a_crash_in_the_simulators_native_code_is_the_worlds(tmp_path: Path) -> 
         assert record.cause == (
             f"environment: the process died of signal {signal.SIGSEGV:d} in the world"
         )
+
+
+class Homeless:
+    """Cannot be received by another process."""
+
+    def __call__(self, job: Job) -> Record:
+        raise AssertionError(job)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return os._exit, (3,)
+
+
+def test_processes_that_cannot_start_end_the_run(tmp_path: Path) -> None:
+    words = r"No worker process can start \(environment: .* exit code 3 in the start\)"
+    with pytest.raises(RoboIRGError, match=words):
+        run_plan(small_plan(50), tmp_path, Homeless(), LocalProcesses(2))
+    assert len(read_records(tmp_path)) < 10
 
 
 def test_a_worker_is_gone_after_it_was_overdue() -> None:

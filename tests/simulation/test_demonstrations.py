@@ -150,6 +150,30 @@ def test_nothing_is_drawn_before_it_is_read(drawn):
     same(plain, dict(video))
 
 
+def test_all_pictures_are_drawn_in_one_replay(drawn, monkeypatch):
+    replays, play = [], Session.play_demonstration
+    options = {"cameras": ("front", "wrist"), "depth": True, "demonstration_frames": 5}
+    _, _, info = reset(**options)
+    alone = dict(reset(**options)[2]["demonstration"])
+    drawn.clear()
+    monkeypatch.setattr(
+        Session,
+        "play_demonstration",
+        lambda self, *args: (replays.append(self), play(self, *args))[1],
+    )
+    video = info["demonstration"]
+    wrist = video["wrist_rgb"]
+    assert (len(replays), drawn) == (1, ["wrist"] * 14)
+    video.draw()
+    assert (len(replays), drawn) == (2, ["wrist"] * 14 + ["front"] * 14)
+    assert "not drawn" not in repr(video)
+    assert video["wrist_rgb"] is wrist
+    same(alone, dict(video))
+    pickle.dumps(video)
+    video.draw()
+    assert len(replays) == 2
+
+
 def test_every_nth_picture_or_none_if_that_is_wanted(drawn):
     _, _, info = reset(cameras=("front",))
     _, _, few = reset(cameras=("front",), demonstration_frames=7)
@@ -170,7 +194,9 @@ def story(task=SHORT):
     """All that an environment and a run tell."""
     _, observation, info = reset(task, cameras=("front", "wrist"), depth=True, grounded=True)
     job = Job(policy=f"{__name__}:Viewer", task=task, split="test", episode=1, setting="direct")
-    record = Player(None)(job).model_dump(exclude={"started_at", "duration_s", "details"})
+    record = Player(None)(job).model_dump(
+        exclude={"started_at", "duration_s", "timings", "details"}
+    )
     video = dict(info.pop("demonstration"))
     return {**observation, **video, "first": observation["front_rgb"]}, info, record
 

@@ -55,8 +55,10 @@ def _reset(episode: Episode, *, frames: bool) -> float:
     env = roboirg.make(episode)
     _, info = env.reset()
     if frames:
+        video = info["demonstration"]
+        video.draw()
         for camera in CAMERAS:
-            info["demonstration"][f"{camera}_rgb"].sum()
+            video[f"{camera}_rgb"].sum()
     return time.perf_counter() - start
 
 

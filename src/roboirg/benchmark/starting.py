@@ -4,23 +4,15 @@ from __future__ import annotations
 
 import json
 import multiprocessing
-import pathlib
+import os
 import subprocess
 import sys
 import time
 from multiprocessing.synchronize import Barrier
-from typing import Literal
 
-import roboirg
 from roboirg.benchmark import stepping
+from roboirg.benchmark.process import Path
 from roboirg.benchmark.workloads import STEPS, over_the_table
-from roboirg.observations import CAMERAS
-from roboirg.simulation.rendering import FAITHFUL, STOCK
-from roboirg.simulation.session import Session
-from roboirg.splits import get_episode
-
-Path = Literal["ours", "stock"]
-TASK = "PickXtimes"
 
 
 def process_start(path: Path) -> float:
@@ -59,6 +51,7 @@ def throughput(workers: int) -> float:
 
 
 _ROUNDS = 3
+_NO_BYTECODE = "PYTHONDONTWRITEBYTECODE"
 
 
 def _work(barrier: Barrier) -> None:
@@ -70,47 +63,11 @@ def _work(barrier: Barrier) -> None:
 
 
 def _in_process(path: Path, what: str) -> dict[str, float]:
-    command = [sys.executable, "-m", "roboirg.benchmark.starting", path, what]
-    done = subprocess.run(command, check=True, capture_output=True, text=True)  # noqa: S603
+    command = [sys.executable, "-m", "roboirg.benchmark.process", path, what]
+    # As an installed package, with what Python has compiled before.
+    variables = {key: value for key, value in os.environ.items() if key != _NO_BYTECODE}
+    done = subprocess.run(  # noqa: S603
+        command, check=True, capture_output=True, text=True, env=variables
+    )
     told: dict[str, float] = json.loads(done.stdout)
     return told
-
-
-def _most_resident() -> float:
-    """The most memory that this process has held, GiB.
-
-    From Linux's status file: what `resource` tells may be the parent's before the fork.
-    """
-    status = pathlib.Path("/proc/self/status").read_text(encoding="ascii")
-    line = next(line for line in status.splitlines() if line.startswith("VmHWM"))
-    return int(line.split()[1]) / 2**20
-
-
-def _observe(path: Path, index: int) -> None:
-    if path == "ours":
-        roboirg.make(TASK, episode=index).reset()
-        return
-    session = Session(get_episode(TASK, "test", index), visible=True, rendering=STOCK)
-    session.play_demonstration(lambda _stage: None)
-    session.world.cameras.pictures(CAMERAS)
-    for camera in CAMERAS:
-        session.world.cameras.segmentation(camera)
-
-
-def _main(path: Path, what: str) -> None:
-    told: dict[str, float] = {}
-    start = time.perf_counter()
-    _observe(path, 0)
-    if what == "next":
-        if path == "ours":
-            start = time.perf_counter()
-            _observe(path, 1)
-        told["seconds"] = time.perf_counter() - start
-    elif what == "memory":
-        stepping.eager(over_the_table(), FAITHFUL)
-        told["gibibytes"] = _most_resident()
-    sys.stdout.write(json.dumps(told))
-
-
-if __name__ == "__main__":
-    _main("stock" if sys.argv[1] == "stock" else "ours", sys.argv[2])

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from roboirg.benchmark import resetting, starting, stepping
+from roboirg.benchmark import engine, resetting, starting, stepping
 from roboirg.benchmark.workloads import Workload, as_in_demonstrations, over_the_table
 from roboirg.simulation.rendering import LIGHT
 
@@ -74,6 +74,8 @@ def measures() -> tuple[Measure, ...]:
             Measure(name, partial(timing, "ours"), partial(timing, "stock"), "stock", goal, "s")
             for name, timing, goal in started
         ),
+        Measure("run engine, of an episode", engine.engine, engine.episode, "episode", 50),
+        Measure("resuming with 100,000 records", engine.resume, None, "", 3, "s"),
         Measure("memory of a process", starting.memory, None, "", 0.5, "GiB"),
         Measure(
             "steps a second of 2 processes",

@@ -28,14 +28,12 @@ from roboirg.evaluation.executors import NO_LIMIT_S
 from roboirg.evaluation.faults import cause
 from roboirg.evaluation.record import Job, Record
 from roboirg.evaluation.rollout import Play
-from roboirg.evaluation.workers import Seat
+from roboirg.evaluation.workers import MOST_STILLBORN, Seat
 
 POLL_S = 1.0
 PATIENCE_S = 300.0
 """How long a cluster may have no free CPU at all before the run gives up."""
 CONNECT_S = 10.0
-MOST_STILLBORN = 3
-"""So many seats for each that is wanted may fail to begin, one after the other."""
 
 
 @runtime_checkable

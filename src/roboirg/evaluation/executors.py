@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from multiprocessing.connection import wait
 from typing import Protocol
 
-from roboirg.errors import InvalidValueError
+from roboirg.errors import InvalidValueError, RoboIRGError
 from roboirg.evaluation.record import Job, Record
 from roboirg.evaluation.rollout import Play
-from roboirg.evaluation.workers import POLL_S, Worker
+from roboirg.evaluation.workers import MOST_STILLBORN, POLL_S, Worker
 
 NO_LIMIT_S = float("inf")
 
@@ -68,8 +68,12 @@ class LocalProcesses:
             raise InvalidValueError(f"workers is {self.workers}; it must be at least 1.")
 
     def run(self, jobs: Sequence[Job], play: Play) -> Iterator[Record]:
-        """Yield one record for each job, as they end."""
-        waiting = deque(jobs)
+        """Yield one record for each job, as they end.
+
+        Raises:
+            RoboIRGError: no process can start, or whatever would end every other job too.
+        """
+        waiting, stillborn = deque(jobs), 0
         # With a process on every core, Mesa's own threads would only take turns.
         crowded = self.workers >= core_count()
         crew: list[Worker] = []
@@ -79,6 +83,9 @@ class LocalProcesses:
                 while waiting and len(crew) < self.workers:
                     crew.append(Worker.hire(play, waiting.popleft(), crowded=crowded))
                 for worker, record in self._ended(crew):
+                    stillborn = stillborn + 1 if worker.is_stillborn else 0
+                    if stillborn >= MOST_STILLBORN * self.workers:
+                        raise RoboIRGError(f"No worker process can start ({record.cause}).")
                     if worker.is_gone:
                         crew.remove(worker)
                     elif waiting:

@@ -30,6 +30,9 @@ from roboirg.evaluation.watching import Board, Phase, use_board, watched
 GRACE_S = 2.0
 """How long a worker may take to go when it is told to."""
 
+MOST_STILLBORN = 3
+"""So many processes for each that is wanted may fail to start, one after the other."""
+
 POLL_S = 0.25
 """How often a supervisor looks whether somebody is overdue."""
 
@@ -130,6 +133,11 @@ class Worker:
     def is_gone(self) -> bool:
         """Whether it has died or been killed."""
         return self.connection.closed
+
+    @property
+    def is_stillborn(self) -> bool:
+        """Whether it is gone without ever having begun to play."""
+        return self.is_gone and self.board.phase == "start"
 
     def dismiss(self) -> None:
         """Let it go: it has nothing to do, so closing the pipe ends it."""

@@ -93,5 +93,6 @@ def _digest(root: Path) -> str:
     digest = hashlib.sha256()
     for name in _FILES:
         digest.update(name.encode())
-        digest.update(hashlib.sha256((root / name).read_bytes()).digest())
+        with (root / name).open("rb") as file:
+            digest.update(hashlib.file_digest(file, "sha256").digest())
     return digest.hexdigest()

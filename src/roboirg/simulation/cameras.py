@@ -7,7 +7,8 @@ Drawing is most of the cost of a step on a CPU, so only what a camera can see is
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from roboirg.simulation.culling import FAR, NEAR, Bodies
 from roboirg.simulation.rendering import FAITHFUL, Rendering
-from roboirg.simulation.shaders import slim_shader, stand_in_table
+from roboirg.simulation.shaders import COLOUR, STOCK_COLOUR, slim_shader, stand_in_table
 
 SIZE = 256
 """Width and height of a picture, pixels."""
@@ -28,9 +29,9 @@ FIELD_OF_VIEW = math.pi / 2
 FRONT_EYE = (0.3, 0.0, 0.4)
 FRONT_TARGET = (0.0, 0.0, -0.2)
 
-STOCK_COLOUR, COLOUR, GEOMETRY = "Color", "ColorRaw", "PositionSegmentation"
-"""What the shaders write in one go: RGBA, which the stock shader completes in a second pass; and
-x, y, z in mm in the camera's frame (x right, y up, z backward) with the id of the entity, int16."""
+GEOMETRY = "PositionSegmentation"
+"""What the shaders write besides the colours: x, y, z in mm in the camera's frame (x right, y up,
+z backward) with the id of the entity, int16."""
 
 
 @dataclass
@@ -70,6 +71,7 @@ class Cameras:
         self._bodies = Bodies(scene)
         self._culling = rendering.culling
         self._last: dict[str, _Drawn] = {}
+        self._looks_back = False
 
     def picture(self, camera: str) -> NDArray[np.uint8]:
         """What the camera sees now, RGB, shape (256, 256, 3)."""
@@ -103,8 +105,11 @@ class Cameras:
     def draw(self, cameras: Sequence[str]) -> None:
         """Have cameras begin to draw what they see now, as far as something has moved.
 
-        It is drawn in the background; nothing may move until a picture has been fetched.
+        It is drawn in the background. What is read later is of now if nothing has moved by then,
+        or within `looking_back`.
         """
+        if self._looks_back:
+            return
         poses = self._bodies.poses()
         due = []
         for camera in cameras:
@@ -118,6 +123,15 @@ class Cameras:
             self._scene.update_render()
         for component, view in due:
             self._draw(component, poses, view)
+
+    @contextmanager
+    def looking_back(self) -> Iterator[None]:
+        """Within it, what is read is what was last drawn, whatever has moved since."""
+        self._looks_back = True
+        try:
+            yield
+        finally:
+            self._looks_back = False
 
     def _draw(
         self,

@@ -7,17 +7,18 @@ one piece before the next is planned. Rules and step counts: RoboMME.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from roboirg.actions import EE_POSE, JOINT_ANGLE, POSE_SIZE, WAYPOINT, ActionSpace
 from roboirg.errors import MotionPlanningError
-from roboirg.simulation.planning import Planner, ToolPose
 from roboirg.simulation.robot import Robot
 from roboirg.simulation.settings import CLOSED, GRIPPER_STEPS, OPEN
+
+if TYPE_CHECKING:
+    from roboirg.simulation.planning import Planner, ToolPose
 
 Piece = NDArray[np.float64]
 """Joint actions (n, 8), n >= 1: joint targets and the gripper."""
@@ -60,7 +61,7 @@ class ToolPoses:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-        self._planner = Planner(robot)
+        self._planner = _make_planner(robot)
 
     def pieces(self, action: NDArray[np.float64]) -> Iterator[Piece]:
         """One control step.
@@ -80,7 +81,7 @@ class Waypoints:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-        self._planner = Planner(robot)
+        self._planner = _make_planner(robot)
         self._gripper = OPEN
 
     def pieces(self, action: NDArray[np.float64]) -> Iterator[Piece]:
@@ -104,6 +105,10 @@ class Waypoints:
 
 def tool_pose(action: NDArray[np.float64]) -> ToolPose:
     """The pose in an action that begins with x, y, z, roll, pitch, yaw (extrinsic x-y-z)."""
+    from scipy.spatial.transform import Rotation
+
+    from roboirg.simulation.planning import ToolPose
+
     return ToolPose(action[:3], Rotation.from_euler("xyz", action[3:POSE_SIZE]))
 
 
@@ -111,6 +116,13 @@ def in_words(action: NDArray[np.float64]) -> str:
     """The same pose for people to read."""
     x, y, z, roll, pitch, yaw = (_short(number) for number in action[:POSE_SIZE])
     return f"({x}, {y}, {z}) with roll {roll}, pitch {pitch}, yaw {yaw}"
+
+
+def _make_planner(robot: Robot) -> Planner:
+    # It takes a third of a second to import, and who commands joints does not need it.
+    from roboirg.simulation.planning import Planner
+
+    return Planner(robot)
 
 
 def _short(number: float) -> str:

@@ -17,7 +17,7 @@ import sapien.render
 from numpy.typing import NDArray
 
 from roboirg.simulation.device import render_system
-from roboirg.simulation.shaders import stand_in_table
+from roboirg.simulation.shaders import COLOUR, STOCK_COLOUR, slim_shader, stand_in_table
 
 MARGIN = 0.002
 """Metres by which boxes are grown before the test."""
@@ -115,7 +115,9 @@ def keeps_records() -> bool:
     thing, eye = sapien.Entity(), sapien.Entity()
     thing.add_component(body)
     thing.set_pose(sapien.Pose([1.0, 0.0, 0.0]))
-    camera = sapien.render.RenderCameraComponent(2, 2)
+    # With the usual shader, which then need not be compiled again.
+    shader = slim_shader()
+    camera = sapien.render.RenderCameraComponent(2, 2, shader or "")
     eye.add_component(camera)
     for entity in (thing, eye):
         scene.add_entity(entity)
@@ -124,7 +126,7 @@ def keeps_records() -> bool:
     def shows() -> bool:
         scene.update_render()
         camera.take_picture()
-        return bool(camera.get_picture("Color")[..., 0].any())
+        return bool(camera.get_picture(STOCK_COLOUR if shader is None else COLOUR)[..., 0].any())
 
     seen = [shows()]
     for mode in (_LEFT_OUT, _DRAWN):

@@ -6,7 +6,7 @@ import functools
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sapien
@@ -14,7 +14,6 @@ import sapien.physx
 import sapien.render
 from numpy.typing import NDArray
 from sapien.wrapper.urdf_loader import URDFLoader
-from scipy.spatial.transform import Rotation
 
 from roboirg.actions import ARM_JOINTS
 from roboirg.episode import ROBOT_BASE
@@ -22,6 +21,9 @@ from roboirg.simulation import settings
 from roboirg.simulation.assets import find_model_files
 from roboirg.simulation.meshes import finish, link_shapes
 from roboirg.simulation.rendering import FAITHFUL, Rendering
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 FINGERS = ("panda_leftfinger", "panda_rightfinger")
 TOOL_LINK = "panda_hand_tcp"
@@ -137,6 +139,9 @@ class Robot:
 
 def rotation_of(pose: sapien.Pose) -> Rotation:
     """The rotation of a pose; SAPIEN's quaternions have the scalar first, SciPy's last."""
+    # SciPy takes a quarter of a second to import, and only planning needs it.
+    from scipy.spatial.transform import Rotation
+
     w, x, y, z = np.asarray(pose.q, dtype=np.float64)
     return Rotation.from_quat([x, y, z, w])
 

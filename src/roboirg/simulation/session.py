@@ -15,7 +15,6 @@ from roboirg.errors import MotionPlanningError
 from roboirg.judging import Event, Judge, Status, changes
 from roboirg.simulation.bodies import Body
 from roboirg.simulation.demonstration.recording import Move, Recording
-from roboirg.simulation.hands import Hands
 from roboirg.simulation.rendering import FAITHFUL, Rendering
 from roboirg.simulation.settings import HOME_ACTION
 from roboirg.simulation.world import World
@@ -107,6 +106,11 @@ class Session:
 
     def _planned(self) -> Iterator[Move]:
         """What the oracle's hands do; each piece is planned when the one before has been done."""
+        if not self.episode.demonstration:
+            return
+        # What plans takes a third of a second to import; who only replays does not need it.
+        from roboirg.simulation.hands import Hands
+
         hands = Hands(self.world)
         for index, stage in enumerate(self.episode.demonstration):
             for piece in hands.perform(stage.primitive):

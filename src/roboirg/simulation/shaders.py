@@ -26,6 +26,8 @@ from roboirg.cache import cache_folder
 from roboirg.simulation.derived import write_whole
 
 STOCK_SHADER = "minimal"
+STOCK_COLOUR, COLOUR = "Color", "ColorRaw"
+"""The pictures that hold RGBA: the stock shader completes its own in a second pass."""
 _COMMON = "common"
 _BACKGROUND = ("composite.vert", "composite0.frag")
 """The pass that puts the environment behind everything."""

@@ -5,7 +5,10 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import math
+import os
 import struct
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -52,42 +55,13 @@ class Frames:
     every: int = 1
     rendering: Rendering = FAITHFUL
 
-    def read(self) -> NDArray[Any]:
-        """The pictures with a leading axis; the same whether they are drawn or read back."""
-        frames = np.empty(self._shape(), self.space.dtype)
-        if not frames.size:
-            return frames
-        cache, key = open_cache("frames"), self._key()
-        content = cache.read(key)
-        if content is not None:
-            _decompress(content, frames)
-        else:
-            self._draw(frames)
-            cache.write(key, _compress(frames))
-        return frames
-
-    def _shape(self) -> tuple[int, ...]:
+    def empty(self) -> NDArray[Any]:
+        """An array for all of them, with a leading axis."""
         count = math.ceil(self.recording.length_of_video(self.episode) / self.every)
-        return (count, *(self.space.shape or ()))
+        return np.empty((count, *(self.space.shape or ())), self.space.dtype)
 
-    def _draw(self, frames: NDArray[Any]) -> None:
-        """Replay the demonstration and draw what is due."""
-        session = Session(self.episode, visible=True, rendering=self.rendering)
-        steps = 0
-
-        def look(stage: Stage) -> None:
-            del stage
-            nonlocal steps
-            if steps % self.every == 0:
-                frames[steps // self.every] = draw(session.world, self.field)
-            steps += 1
-
-        if session.play_demonstration(look, self.recording).end != self.recording.end:
-            raise RuntimeError(
-                f"The demonstration of {self.episode.key} did not replay to the same end."
-            )
-
-    def _key(self) -> str:
+    def key(self) -> str:
+        """What they are kept under."""
         parts = (
             recording_key(self.episode),
             self.recording.end,
@@ -96,6 +70,62 @@ class Frames:
             str(self.every),
         )
         return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+def read_frames(wanted: Sequence[Frames]) -> list[NDArray[Any]]:
+    """Pictures of one demonstration; the same whether they are drawn or read back.
+
+    Args:
+        wanted: which; those that have to be drawn are drawn in one replay.
+    """
+    cache = open_cache("frames")
+    arrays = [frames.empty() for frames in wanted]
+    missing = []
+    for frames, array in zip(wanted, arrays, strict=True):
+        content = cache.read(frames.key()) if array.size else None
+        if content is not None:
+            _decompress(content, array)
+        elif array.size:
+            missing.append((frames, array))
+    if missing:
+        _draw(missing)
+    for frames, array in missing if cache.keeps else ():
+        cache.write(frames.key(), _compress(array))
+    return arrays
+
+
+def _draw(wanted: Sequence[tuple[Frames, NDArray[Any]]]) -> None:
+    """Replay the demonstration and draw what is due into the arrays.
+
+    The world goes on while pictures are drawn; they are fetched before the next ones begin.
+    """
+    (first, _), *_ = wanted
+    session = Session(first.episode, visible=True, rendering=first.rendering)
+    world, cameras = session.world, session.world.cameras
+    due = tuple(dict.fromkeys(frames.field.rpartition("_")[0] for frames, _ in wanted))
+    steps = begun = 0
+
+    def fetch() -> None:
+        with cameras.looking_back():
+            for frames, array in wanted:
+                array[begun - 1] = draw(world, frames.field)
+
+    def look(stage: Stage) -> None:
+        del stage
+        nonlocal steps, begun
+        if steps % first.every == 0:
+            if begun:
+                fetch()
+            cameras.draw(due)
+            begun += 1
+        steps += 1
+
+    end = session.play_demonstration(look, first.recording).end
+    fetch()
+    if end != first.recording.end:
+        raise RuntimeError(
+            f"The demonstration of {first.episode.key} did not replay to the same end."
+        )
 
 
 def rendering_key(rendering: Rendering) -> str:
@@ -131,13 +161,18 @@ def _compress(frames: NDArray[Any]) -> bytes:
 
 def _decompress(content: memoryview, frames: NDArray[Any]) -> None:
     """Fill an array with what was compressed."""
-    decompressor = zstandard.ZstdDecompressor()
+    chunks = []
     place = 0
     for start in range(0, len(frames), CHUNK):
         (length,) = _LENGTH.unpack_from(content, place)
         place += _LENGTH.size
-        part = frames[start : start + CHUNK]
-        # At once: as a stream it takes three times as long.
-        raw = decompressor.decompress(content[place : place + length])
-        part[:] = np.frombuffer(raw, part.dtype).reshape(part.shape)
+        chunks.append((content[place : place + length], frames[start : start + CHUNK]))
         place += length
+
+    def fill(chunk: memoryview, part: NDArray[Any]) -> None:
+        with zstandard.ZstdDecompressor().stream_reader(chunk) as reader:
+            reader.readinto(part.data.cast("B"))
+
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        for _ in threads.map(fill, *zip(*chunks, strict=True)):
+            pass

@@ -8,7 +8,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from roboirg.episode import Episode
-from roboirg.simulation.demonstration.frames import Frames
+from roboirg.simulation.demonstration.frames import Frames, read_frames
 from roboirg.simulation.demonstration.recording import Recording
 from roboirg.simulation.senses import Wishes, drawn_space, stack_felt
 
@@ -17,7 +17,8 @@ class Video(Mapping[str, NDArray[Any]]):
     """A demonstration as a mapping from an observation's fields to arrays.
 
     Pictures are drawn when they are read for the first time, at any later moment, and then kept.
-    A pickle holds all of them as a plain dictionary.
+    Who wants more than one field of them calls `draw` first, which takes less time. A pickle
+    holds all of them as a plain dictionary.
 
     Args:
         felt: the fields that are not drawn, with a leading axis T.
@@ -38,8 +39,16 @@ class Video(Mapping[str, NDArray[Any]]):
     def __getitem__(self, field: str) -> NDArray[Any]:
         """All of a field; KeyError if observations have no such field."""
         if field not in self._arrays:
-            self._arrays[field] = self._frames[field].read()
+            self._read((field,))
         return self._arrays[field]
+
+    def draw(self) -> None:
+        """Draw all pictures that have not been read yet, in one replay for all cameras."""
+        self._read([field for field in self._frames if field not in self._arrays])
+
+    def _read(self, fields: Sequence[str]) -> None:
+        arrays = read_frames([self._frames[field] for field in fields])
+        self._arrays.update(zip(fields, arrays, strict=True))
 
     def __iter__(self) -> Iterator[str]:
         yield from self._frames
@@ -53,6 +62,7 @@ class Video(Mapping[str, NDArray[Any]]):
         return field in self._frames or field in self._arrays
 
     def __reduce__(self) -> tuple[type[dict[str, Any]], tuple[dict[str, Any]]]:
+        self.draw()
         return dict, (dict(self),)
 
     def __repr__(self) -> str:
