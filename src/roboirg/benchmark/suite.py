@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from roboirg.benchmark import engine, resetting, starting, stepping
+from roboirg.benchmark import engine, remote, resetting, starting, stepping
 from roboirg.benchmark.workloads import Workload, as_in_demonstrations, over_the_table
 from roboirg.simulation.rendering import LIGHT
 
@@ -73,6 +73,15 @@ def measures() -> tuple[Measure, ...]:
         *(
             Measure(name, partial(timing, "ours"), partial(timing, "stock"), "stock", goal, "s")
             for name, timing, goal in started
+        ),
+        Measure(
+            "steps a second of a remote policy",
+            remote.over_loopback,
+            remote.in_process,
+            "in process",
+            0.9,
+            unit="1/s",
+            inverse=True,
         ),
         Measure("run engine, of an episode", engine.engine, engine.episode, "episode", 50),
         Measure("resuming with 100,000 records", engine.resume, None, "", 3, "s"),
