@@ -16,6 +16,7 @@ import roboirg
 from roboirg.cli import language, policies, running, telling
 from roboirg.cli.bench import bench
 from roboirg.cli.options import Distractor, Frame, Split, Stages, Tasks, Video, Workers
+from roboirg.cli.real import real_app
 from roboirg.cli.running import INTERRUPTED, USAGE_ERROR, Folder, Out
 from roboirg.errors import InvalidValueError, RoboIRGError
 
@@ -42,6 +43,7 @@ app = typer.Typer(
 
 app.add_typer(language.language_app, name="language")
 app.add_typer(language.export_app, name="export")
+app.add_typer(real_app, name="real")
 app.command()(bench)
 
 

@@ -1,0 +1,134 @@
+"""What operators say is stored at once, can be taken back, and is never lost."""
+
+import pytest
+
+from roboirg.analysis.paper_tables import make_table
+from roboirg.analysis.report import render
+from roboirg.analysis.samples import gather
+from roboirg.errors import InvalidValueError
+from roboirg.evaluation.course import Course, describe
+from roboirg.evaluation.record import Record
+from roboirg.evaluation.store import RecordStore, read_records, read_results
+from roboirg.real.failures import failure_choices
+from roboirg.real.ledger import UNSCORED, VOID, WITHDRAWN, Ledger, said_of
+
+
+def fresh(plan, folder):
+    return Ledger.read(plan, folder)
+
+
+def played(trial):
+    course = Course(outcome="error", error="infrastructure", cause=UNSCORED, steps=321)
+    return describe(trial.job, course, started_at="2026-01-01T00:00:00+00:00", duration_s=16.0)
+
+
+def test_a_score_is_a_record_like_any_other(small):
+    plan, folder = small
+    first, second, third, _ = plan.trials
+    ledger = fresh(plan, folder)
+    choices = failure_choices(second.episode)
+    ledger.score(first, "success", operator="ann", note="shaky")
+    ledger.score(second, choices[0].key, operator="ann")
+    ledger.score(third, "dropped", operator="ann", note="slipped")
+    found = {record.identity: record for record in read_records(folder)}
+    assert len(found) == 3
+    record = found[first.job]
+    assert (record.outcome, record.attribution, record.events) == ("success", None, ())
+    assert said_of(record) == {
+        "action": "score", "operator": "ann", "note": "shaky", "trial": first.name,
+        "plan": plan.fingerprint,
+    }  # fmt: skip
+    record = found[second.job]
+    assert (record.outcome, record.attribution.failure) == ("failure", "wrong_place")
+    assert record.attribution.kind == "grounding"
+    assert record.cause == record.attribution.sentence
+    record = found[third.job]
+    assert (record.attribution.kind, record.attribution.failure) == ("execution", "dropped")
+    assert "slipped" in record.cause
+    assert record.plan == plan.fingerprint
+    # All that reads records reads these.
+    assert Record.model_validate_json(record.model_dump_json()) == record
+    table = make_table("real", gather([("run", read_results(folder))]))
+    assert table.rows
+    assert "slipped" in render(read_records(folder))
+
+
+def test_what_was_played_keeps_its_times_when_it_is_scored(small):
+    plan, folder = small
+    trial = plan.trials[0]
+    ledger = fresh(plan, folder)
+    ledger.add(trial, played(trial), {"robot": "arm"})
+    assert fresh(plan, folder).state(trial.name) == "waiting"
+    fresh(plan, folder).score(trial, "success", operator="ann")
+    record = fresh(plan, folder).newest(trial.name)
+    assert (record.steps, record.duration_s, record.outcome) == (321, 16.0, "success")
+    assert said_of(record)["robot"] == "arm"
+
+
+def test_undo_brings_back_what_was_before(small):
+    plan, folder = small
+    first, second, *_ = plan.trials
+    ledger = fresh(plan, folder)
+    ledger.add(first, played(first), {"robot": "arm"})
+    ledger.score(second, "dropped", operator="ann")
+    ledger.score(first, "success", operator="ann")
+    ledger.score(first, "misplaced", operator="ann")
+    steps = [
+        (first.name, "scored", "success"),
+        (first.name, "waiting", "error"),
+        (second.name, "open", "error"),
+    ]
+    for name, state, outcome in steps:
+        assert fresh(plan, folder).undo(operator="bob") == name
+        now = fresh(plan, folder)
+        assert now.state(name) == state
+        newest = {one.identity: one for one in read_records(folder)}[plan.trial(name).job]
+        assert newest.outcome == outcome
+    # A score that was taken back from a trial that nobody had played is in no rate.
+    assert newest.cause == WITHDRAWN
+    with pytest.raises(InvalidValueError, match="no score to take back"):
+        fresh(plan, folder).undo(operator="bob")
+    # Everything that ever was is still in the file.
+    assert len((folder / "records.jsonl").read_text().splitlines()) == 7
+
+
+def test_a_score_that_was_played_over_is_not_taken_back(small):
+    plan, folder = small
+    trial = plan.trials[0]
+    ledger = fresh(plan, folder)
+    ledger.score(trial, "void", operator="ann", note="the lamp fell")
+    assert fresh(plan, folder).state(trial.name) == "void"
+    assert ledger.newest(trial.name).cause == f"{VOID}; the lamp fell"
+    ledger.add(trial, played(trial), {})
+    with pytest.raises(InvalidValueError, match="played again since"):
+        fresh(plan, folder).undo(operator="ann")
+
+
+def test_trials_come_in_order_those_that_were_played_first(small):
+    plan, folder = small
+    ledger = fresh(plan, folder)
+    assert ledger.to_score() == plan.trials[0]
+    ledger.add(plan.trials[2], played(plan.trials[2]), {})
+    assert ledger.to_score() == plan.trials[2]
+    ledger.score(plan.trials[2], "success", operator="ann")
+    assert ledger.to_score() == plan.trials[0]
+    for trial in plan.trials:
+        ledger.score(trial, "success", operator="ann")
+    assert fresh(plan, folder).to_score() is None
+
+
+def test_what_cannot_happen_is_refused_and_nothing_is_stored(small):
+    plan, folder = small
+    with pytest.raises(InvalidValueError, match="cannot fail by 'wrong_count'"):
+        fresh(plan, folder).score(plan.trials[0], "wrong_count", operator="ann")
+    assert not (folder / "records.jsonl").exists()
+
+
+def test_the_page_and_the_loop_take_turns(small):
+    plan, folder = small
+    import threading
+
+    store = RecordStore(folder)
+    threading.Timer(0.3, store.close).start()
+    fresh(plan, folder).score(plan.trials[0], "success", operator="ann")
+    assert fresh(plan, folder).state(plan.trials[0].name) == "scored"
