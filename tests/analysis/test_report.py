@@ -1,16 +1,26 @@
+"""What the page holds, read from its text; what it does is in test_page.py."""
+
 from __future__ import annotations
 
+import functools
+import json
 import re
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import pytest
+import typer
+from typer.testing import CliRunner
 
-from roboirg.analysis import cards
-from roboirg.analysis.report import render, write_report
+from roboirg.analysis.page import films
+from roboirg.analysis.page.columns import UNATTRIBUTED
+from roboirg.analysis.page.entries import Run
+from roboirg.analysis.report import make_view, render, render_runs, write_report
+from roboirg.cli.telling import report
 from roboirg.evaluation.course import Course, describe
-from roboirg.evaluation.plan import Plan
-from roboirg.evaluation.record import EventRecord, MentionSpan, Record, Turn
+from roboirg.evaluation.plan import Plan, write_plan
+from roboirg.evaluation.record import Attribution, EventRecord, MentionSpan, Record, Turn
 from roboirg.evaluation.store import RecordStore, StoreError
 
 pytest.importorskip("jinja2")
@@ -18,239 +28,383 @@ pytest.importorskip("jinja2")
 PLAN = Plan(
     policies=("listener", "forgetful"), tasks=("PickXtimes", "VideoUnmask"), episodes=(0, 1, 2)
 )
-VOID = {"meta", "link", "input", "br"}
+VOID = {"meta", "link", "input", "br", "wbr"}
+WRONG = Attribution(
+    kind="grounding", failure="wrong_object", subject="cube_blue", step=40, sentence="Wrong cube."
+)
 
 
 class Page(HTMLParser):
-    """Collects what the tests ask about and checks that tags are closed."""
+    """Takes the page apart and checks that tags are closed."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
-        self.open: list[str] = []
-        self.cards: list[dict[str, str | None]] = []
-        self.marks: list[str] = []
-        self.videos: list[dict[str, str | None]] = []
+        self.open: list[tuple[str, dict[str, str | None]]] = []
+        self.scripts: dict[str, str] = {}
+        self.notices: list[tuple[str, str]] = []
         self.links: list[str] = []
-        self.selects: list[str | None] = []
-        self.cells: list[dict[str, str | None]] = []
+        self.text = ""
         self.feed(text)
         assert self.open == []
+        self.data: dict[str, Any] = json.loads(self.scripts["data"])
+        self.details = [json.loads(line) for line in self.scripts["details"].splitlines()]
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         fields = dict(attrs)
         if tag not in VOID:
-            self.open.append(tag)
-        if tag == "article":
-            self.cards.append(fields)
-        if tag == "select":
-            self.selects.append(fields["name"])
-        if str(fields.get("class", "")).startswith("cell"):
-            self.cells.append(fields)
-        if tag == "video":
-            self.videos.append(fields)
+            self.open.append((tag, fields))
+        if tag == "li" and fields.get("class") in ("warning", "note"):
+            self.notices.append((str(fields["class"]), ""))
         self.links += [str(fields[name]) for name in ("src", "href", "poster") if name in fields]
 
     def handle_endtag(self, tag: str) -> None:
         # `li` and the like are written with their end tags too.
-        assert self.open.pop() == tag
+        assert self.open.pop()[0] == tag
 
     def handle_data(self, data: str) -> None:
-        if self.open and self.open[-1] == "mark":
-            self.marks.append(data)
+        tag, fields = self.open[-1] if self.open else ("", {})
+        if tag == "script":
+            self.scripts[str(fields.get("id"))] = self.scripts.get(str(fields.get("id")), "") + data
+        elif tag != "style":
+            self.text += data
+            if any(name == "li" and own.get("class") for name, own in self.open) and self.notices:
+                kind, words = self.notices[-1]
+                self.notices[-1] = (kind, words + data)
+
+    def column(self, name: str) -> list[Any]:
+        """The values of a column in words."""
+        values = self.data["columns"][name]
+        known = {choice["name"]: choice["values"] for choice in self.data["choices"]}
+        return [known[name][value] if value >= 0 else None for value in values]
+
+    def said(self, place: int) -> str:
+        return str(self.data["strings"][place])
+
+    def notes(self, *words: str) -> list[str]:
+        """What cells say whose place contains all words, among everything."""
+        cells = self.data["matrix"]["levels"][0]["cells"]
+        return ["; ".join(c["note"]) for c in cells if all(w in c["note"][0] for w in words)]
 
 
-def records() -> list[Record]:
+def records(plan: Plan = PLAN) -> list[Record]:
     found = []
-    for index, job in enumerate(PLAN.jobs()):
+    for index, job in enumerate(plan.jobs()):
         events = [EventRecord(step=40, kind="picked", subject="cube_red")]
         course = Course("success", cause=None, steps=80, events=events)
         if index % 3 == 1:
             course = Course("failure", cause="picked the wrong cube", steps=50, events=events)
         if index % 7 == 6:
             course = Course(
-                "error", error="policy", cause="policy: ValueError: <b>&", details="Traceback <x>"
+                "error", error="policy", cause="policy: ValueError: </script><b>&", details="T <x>"
             )
-        found.append(describe(job, course, started_at="now"))
+        record = describe(job, course, started_at="2026-01-02T03:04:05+00:00")
+        if record.outcome == "failure" and index % 2:
+            record = record.model_copy(update={"attribution": WRONG})
+        elif record.outcome == "failure":
+            record = record.model_copy(update={"attribution": None})
+        found.append(record)
     return found
 
 
+@functools.cache
+def usual() -> str:
+    """The page about all of it; it takes a second or two."""
+    return render(records(), planned=PLAN.jobs())
+
+
+def store(folder: Path, found: list[Record]) -> Path:
+    with RecordStore(folder) as file:
+        for record in found:
+            file.append(record)
+    return folder
+
+
 def test_every_episode_is_there_and_nothing_comes_from_outside() -> None:
-    text = render(records(), planned=PLAN.jobs())
+    text = usual()
     page = Page(text)
-    assert len(page.cards) == len(PLAN.jobs())
+    assert len(page.details) == len(PLAN.jobs()) == len(set(page.data["columns"]["key"]))
     for outcome in ("success", "failure", "error"):
-        assert sum(card["data-outcome"] == outcome for card in page.cards) == sum(
-            record.outcome == outcome for record in records()
-        )
+        expected = sum(record.outcome == outcome for record in records())
+        assert page.column("outcome").count(outcome) == expected
     assert all(link.startswith(("#", "data:")) for link in page.links)
     assert not re.search(r"https?:|@import|url\(", text)
+    assert "default-src 'none'" in text
 
 
-def test_the_rules_are_filters_only_where_there_are_several() -> None:
-    one = render(records())
-    filters = ["policy", "task", "setting", "outcome", "difficulty"]
-    assert Page(one).selects == ["level", *filters]
-    assert Page(render(records()[:1])).selects == filters
-    assert "policy seed" not in one
+def test_columns_have_the_order_of_the_overview_and_do_not_depend_on_the_file() -> None:
+    page = Page(render(records()[::-1], planned=PLAN.jobs()))
+    policies = [f"{name} (privileged)" for name in PLAN.policies]
+    assert list(dict.fromkeys(page.column("policy"))) == policies == page.data["matrix"]["policies"]
+    assert page.column("setting")[:2] == ["explicit", "direct"]
+    assert render(records()[::-1], planned=PLAN.jobs()) == usual()
 
-    jobs = [
-        job.model_copy(update={"split": split, "policy_seed": seed, "max_steps": 100 + seed})
-        for job in PLAN.jobs()[:2]
-        for split in ("test", "val")
-        for seed in (0, 7)
-    ]
-    many = [describe(job, Course("success", cause=None), started_at="now") for job in jobs]
-    page = Page(render(many))
-    assert page.selects == [
-        "policy", "task", "setting", "split", "seed", "limit", "outcome", "difficulty",
-    ]  # fmt: skip
-    assert {(card["data-split"], card["data-seed"], card["data-limit"]) for card in page.cards} == {
-        ("test", "0", "100"), ("test", "7", "107"), ("val", "0", "100"), ("val", "7", "107"),
+
+def test_failures_are_told_apart_by_kind() -> None:
+    page = Page(usual())
+    found = {
+        (outcome, failure)
+        for outcome, failure in zip(page.column("outcome"), page.column("failure"), strict=True)
+    }
+    assert found == {
+        ("success", None),
+        ("failure", "wrong_object"),
+        ("failure", UNATTRIBUTED),
+        ("error", "policy"),
+    }
+    (choice,) = [one for one in page.data["choices"] if one["name"] == "failure"]
+    assert dict(zip(choice["values"], choice["groups"], strict=True)) == {
+        "wrong_object": "grounding", UNATTRIBUTED: UNATTRIBUTED, "policy": "error",
     }  # fmt: skip
-    assert {(cell["data-split"], cell["data-limit"]) for cell in page.cells} == {
-        ("test", "100"), ("test", "107"), ("val", "100"), ("val", "107"),
-    }  # fmt: skip
-    assert "policy seed 7" in render(many)
+    # Names of all groups differ, since an episode's failure is the index of one.
+    assert len(set(choice["values"])) == len(choice["values"])
 
 
-def test_privileged_policies_are_marked() -> None:
-    assert "listener (privileged)" in render(records())
-    job = PLAN.jobs()[0].model_copy(update={"policy": "random"})
-    assert "rivileged" not in render(
-        [describe(job, Course("success", cause=None), started_at="now")]
+def test_words_cannot_end_the_script() -> None:
+    text = usual()
+    assert "</script><b>" not in text
+    page = Page(text)
+    assert "policy: ValueError: </script><b>&" in page.data["strings"]
+    assert "T <x>" in page.data["strings"]
+
+
+def test_mentions_explicit_and_resolved_form_are_there() -> None:
+    plan = Plan(
+        policies=("listener",), tasks=("PickXtimes",), episodes=(0,), forms=("implicit", "resolved")
     )
+    found = records(plan)
+    page = Page(render(found))
+    for record in found:
+        row = page.data["columns"]["key"].index(record.slug[-8:])
+        details = page.details[row]
+        assert len(details.get("mentions", [])) == len(record.mentions)
+        for (at, start, end, *_), mention in zip(
+            details.get("mentions", []), record.mentions, strict=True
+        ):
+            text = page.said(details["turns"][at][1])
+            assert text[start:end] == record.instruction[mention.utterance].text[start:end]
+        assert ("command" in details) == (record.setting != "explicit")
+        implicit = record.setting != "explicit" and record.form == "implicit"
+        assert ("resolved" in details) == implicit
+        if implicit:
+            twin = next(
+                one for one in found if one.setting == record.setting and one.form == "resolved"
+            )
+            said = " ".join(turn.text for turn in twin.instruction)
+            assert page.said(details["resolved"]) == said
 
 
-def test_words_are_escaped() -> None:
-    text = render(records())
-    assert "policy: ValueError: &lt;b&gt;&amp;" in text
-    assert "Traceback &lt;x&gt;" in text
+def test_the_resolved_form_is_said_again_where_it_was_not_played() -> None:
+    plan = Plan(policies=("listener",), tasks=("PickXtimes",), episodes=(0,), settings=("direct",))
+    (record,) = records(plan)
+    (details,) = Page(page := render([record])).details
+    assert "resolved" in details
+    resolved = Page(page).said(details["resolved"])
+    assert resolved != " ".join(turn.text for turn in record.instruction)
+    # Another version of the language may have said something else.
+    (other,) = Page(render([record.model_copy(update={"language_version": "0.1"})])).details
+    assert "resolved" not in other
 
 
-def test_mentions_are_marked_at_their_characters() -> None:
-    record = records()[0].model_copy(
-        update={
-            "instruction": (Turn(stage="introduction", text="I see a red cube & it."),),
-            "mentions": (
-                MentionSpan(
-                    utterance=0, start=18 + 1, end=21, role="anaphor", expression="it",
-                    slot="colour", value="red",
-                ),
-                MentionSpan(
-                    utterance=0, start=6, end=16, role="antecedent", expression=None,
-                    slot="colour", value="red",
-                ),
-                MentionSpan(  # the same words for a second value
-                    utterance=0, start=6, end=16, role="antecedent", expression=None,
-                    slot="colour", value="blue",
-                ),
-            ),
-        }
-    )  # fmt: skip
-    text = render([record])
-    assert Page(text).marks == ["first named", "referred to", "a red cube", "it"]
-    assert "antecedent: colour red, blue" in text
+def test_stages_are_found_again_from_the_events() -> None:
+    plan = Plan(
+        policies=("listener",), tasks=("PickXtimes",), episodes=(0,), settings=("explicit",)
+    )
+    (job,) = plan.jobs()
+    colour = describe(job, Course(), started_at="now").goal["colour"]
+    events = [
+        EventRecord(step=-1, kind="still", subject="robot"),
+        EventRecord(step=30, kind="picked", subject=f"cube_{colour}"),
+    ]
+    record = describe(job, Course("failure", cause="x", steps=50, events=events), started_at="now")
+    (details,) = Page(text := render([record])).details
+    steps = [step for _, step in details["stages"]]
+    assert steps[0] == 30
+    assert set(steps[1:]) == {None}
+    assert "{at}" not in text
+    (other,) = Page(render([record.model_copy(update={"environment_version": -1})])).details
+    assert "stages" not in other
 
 
-def test_films_are_inside_and_wait_to_be_played(tmp_path: Path) -> None:
-    (tmp_path / "videos").mkdir()
-    (tmp_path / "videos" / "x.mp4").write_bytes(b"film")
-    (tmp_path / "videos" / "x.jpg").write_bytes(b"poster")
-    first, second, *_ = records()
-    filmed = first.model_copy(update={"video": "videos/x.mp4"})
-    lost = second.model_copy(update={"video": "videos/gone.mp4"})
-    (video,) = Page(render([filmed, lost], tmp_path)).videos
-    assert video["preload"] == "none"
-    assert video["src"] == "data:video/mp4;base64,ZmlsbQ=="
-    assert video["poster"] == "data:image/jpeg;base64,cG9zdGVy"
-    assert Page(render([filmed])).videos == []
+def test_what_is_amiss_is_said_first() -> None:
+    jobs = PLAN.jobs()
+    found = records()[:-5]
+    page = Page(render(found, planned=jobs))
+    warnings = " ".join(words for kind, words in page.notices if kind == "warning")
+    errors = sum(record.outcome == "error" for record in found)
+    assert f"Incomplete: 5 of {len(jobs)} planned" in warnings
+    assert f"{errors} of {len(found)} episodes ended in an error ({errors} policy)" in warnings
+    assert any("are still to be played" in note for note in page.notes("all tasks"))
+    cells = page.data["matrix"]["levels"][0]["cells"]
+    assert sum(cell.get("missing", 0) for cell in cells if cell["at"][1] > 0) == 5
+    assert Page(render([one for one in found if one.outcome != "error"])).notices == []
 
 
-def test_many_films_stay_beside_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_versions_that_differ_stand_apart() -> None:
+    one, other = records()[0], records()[1]
+    mixed = [one, other.model_copy(update={"language_version": "9.9"})]
+    page = Page(render(mixed))
+    assert any("Mixed versions of the language" in words for _, words in page.notices)
+    assert len(page.data["matrix"]["policies"]) == 2
+    again = [one, one.model_copy(update={"policy_version": "2", "episode": 9})]
+    assert any("several versions: 2, built-in" in words for _, words in Page(render(again)).notices)
+
+
+def test_one_policy_alone_is_said_to_be_alone() -> None:
+    one = [record for record in records() if record.policy == "listener"]
+    assert [kind for kind, words in Page(render(one)).notices if "One policy alone" in words]
+    assert not [words for _, words in Page(usual()).notices if "alone" in words]
+
+
+def test_cells_say_how_sure_they_are_and_each_difficulty_has_its_own() -> None:
+    page = Page(usual())
+    levels = {level["difficulty"]: level["cells"] for level in page.data["matrix"]["levels"]}
+    assert list(levels)[:2] == ["", "easy"]
+    assert all(levels.values())
+    (note,) = page.notes("listener (privileged), PickXtimes, direct")
+    assert re.search(r"\d+ % success: \d of \d trials, \d episodes", note)
+    assert "95 % interval" in note
+    assert "points to explicit on" in note
+    lost = [
+        describe(job, Course("failure", cause="it fell"), started_at="now")
+        for job in PLAN.jobs()
+        if job.setting in {"explicit", "direct"}
+    ]
+    (note,) = Page(render(lost)).notes("listener (privileged), PickXtimes, direct")
+    assert "nothing succeeded either: that says nothing" in note
+
+
+def test_films_are_inside_or_beside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "videos").mkdir()
     (tmp_path / "videos" / "a b.mp4").write_bytes(b"film")
     (tmp_path / "videos" / "a b.jpg").write_bytes(b"poster")
     first, second, *_ = records()
     filmed = first.model_copy(update={"video": "videos/a b.mp4"})
-    lost = second.model_copy(update={"video": "videos/gone.mp4"})
-    assert "they are beside it" not in render([filmed, lost], tmp_path)
-    monkeypatch.setattr(cards, "MOST_FILM_BYTES", 3)
-    text = render([filmed, lost], tmp_path)
-    assert "they are beside it" in text
-    (video,) = Page(text).videos
-    assert (video["src"], video["poster"]) == ("videos/a%20b.mp4", "videos/a%20b.jpg")
+    lost = second.model_copy(update={"video": "videos/gone.mp4", "film_lost": "no room"})
+
+    page = Page(render([filmed, lost], tmp_path))
+    key = filmed.slug[-8:]
+    assert page.scripts[f"film-{key}"] == "data:video/mp4;base64,ZmlsbQ=="
+    assert page.scripts[f"poster-{key}"] == "data:image/jpeg;base64,cG9zdGVy"
+    assert [details.get("film") for details in page.details] == ["#", None]
+    assert page.said(page.details[1]["lost"]) == "no room"
+    assert "but beside it" not in page.text
+    assert not [name for name in Page(render([filmed])).scripts if name.startswith("film")]
+
+    monkeypatch.setattr(films, "MOST_FILM_BYTES", 3)
+    page = Page(render([filmed, lost], tmp_path))
+    assert page.details[0]["film"] == "videos/a%20b.mp4"
+    assert page.details[0]["poster"] == "videos/a%20b.jpg"
+    assert "but beside it" in page.text
 
 
-def test_cards_and_filters_have_the_order_of_the_overview() -> None:
-    page = Page(render(records()[::-1], planned=PLAN.jobs()))
-    assert list(dict.fromkeys(card["data-policy"] for card in page.cards)) == list(PLAN.policies)
-    assert list(dict.fromkeys(cell["data-policy"] for cell in page.cells)) == list(PLAN.policies)
-    assert [card["data-setting"] for card in page.cards][:2] == ["explicit", "direct"]
-    assert render(records()[::-1], planned=PLAN.jobs()) == render(records(), planned=PLAN.jobs())
+def test_the_served_page_never_holds_films(tmp_path: Path) -> None:
+    (tmp_path / "videos").mkdir()
+    (tmp_path / "videos" / "x.mp4").write_bytes(b"film")
+    store(tmp_path, [records()[0].model_copy(update={"video": "videos/x.mp4"})])
+    (details,) = Page(make_view(tmp_path)).details
+    assert details["film"] == "videos/x.mp4"
 
 
-def test_each_difficulty_has_its_overview() -> None:
-    cells = Page(render(records(), planned=PLAN.jobs())).cells
-    per_level = {
-        level: sum(cell["data-difficulty"] == level for cell in cells)
-        for level in ("", "easy", "medium")
-    }
-    assert len(cells) == sum(per_level.values())
-    assert all(per_level.values())
-    assert any("listener (privileged), all tasks, easy, direct: " in str(c["title"]) for c in cells)
-
-
-def test_cells_say_how_sure_they_are() -> None:
-    jobs = [job for job in PLAN.jobs() if job.setting in {"explicit", "direct"}]
-    lost = [describe(job, Course("failure", cause="it fell"), started_at="now") for job in jobs]
-    text = render(lost)
-    assert re.search(r"0/3 · 0–56<", text)
-    assert '<small class="muted">–</small>' in text
-    for cell in Page(text).cells:
-        is_gap = cell["data-setting"] == "direct"
-        assert ("points to explicit" in str(cell["aria-label"])) == is_gap
-        assert ("the gap says nothing" in str(cell["aria-label"])) == is_gap
-
-
-def test_intermediate_references_have_a_colour_of_their_own() -> None:
-    told = next(record for record in records() if record.setting == "explicit")
-    assert "leads to the goal" not in render([told])
-    mention = MentionSpan(
-        utterance=0, start=0, end=3, role="antecedent", expression=None, slot="reference", value=2
+def test_two_runs_are_held_against_each_other(tmp_path: Path) -> None:
+    ours, theirs = tmp_path / "ours", tmp_path / "theirs"
+    (tmp_path / "theirs" / "videos").mkdir(parents=True)
+    (theirs / "videos" / "x.mp4").write_bytes(b"film")
+    found = records()
+    store(ours, found)
+    store(theirs, [found[0].model_copy(update={"video": "videos/x.mp4"}), *found[1:-4]])
+    write_plan(PLAN, theirs)
+    page = Page(
+        write_report(
+            ours, videos=True, against=theirs, planned=PLAN.jobs(), planned_against=PLAN.jobs()
+        ).read_text()
     )
-    text = render([told.model_copy(update={"mentions": (mention,)})])
-    assert "leads to the goal" in text
-    assert 'class="antecedent huereference"' in text
+    policies = page.data["matrix"]["policies"]
+    assert policies == [
+        "listener, ours (privileged)", "forgetful, ours (privileged)",
+        "listener, theirs (privileged)", "forgetful, theirs (privileged)",
+    ]  # fmt: skip
+    assert page.data["sides"] == [0, 2]
+    keys = page.data["columns"]["key"]
+    assert len(set(keys)) == len(keys) == 2 * len(found) - 4
+    # The films of the other run carry a key of their own.
+    assert page.scripts[f"film-{found[0].slug[-8:]}-2"].startswith("data:video")
+    pairs = page.data["columns"]["pair"]
+    # Both policies of both runs, but for the last four.
+    assert sorted(map(pairs.count, set(pairs))) == [3] * 4 + [4] * (len(found) // 2 - 4)
+    assert any("Incomplete: 4 of" in words for _, words in page.notices)
+    said = next(one for one in page.data["comparisons"] if [one["left"], one["right"]] == [0, 2])
+    assert "listener, ours (privileged) against listener, theirs" in said["said"][0]
+
+
+def test_films_of_another_run_are_found_from_the_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(films, "MOST_FILM_BYTES", 0)
+    (tmp_path / "b" / "videos").mkdir(parents=True)
+    (tmp_path / "b" / "videos" / "x.mp4").write_bytes(b"film")
+    store(tmp_path / "a", [records()[0]])
+    store(tmp_path / "b", [records()[0].model_copy(update={"video": "videos/x.mp4"})])
+    page = Page(write_report(tmp_path / "a", against=tmp_path / "b").read_text())
+    assert page.details[1]["film"] == "../b/videos/x.mp4"
+    assert (tmp_path / "a" / page.details[1]["film"]).is_file()
+
+
+def test_the_command_prints_the_table_and_writes_the_page(tmp_path: Path) -> None:
+    app = typer.Typer()
+    app.command()(report)
+    found = [one for one in records() if one.setting in {"explicit", "direct"}]
+    for name in ("ours", "theirs"):
+        write_plan(PLAN, store(tmp_path / name, found))
+    asked = [str(tmp_path / "ours"), "--against", str(tmp_path / "theirs"), "--no-videos"]
+    done = CliRunner().invoke(app, asked, catch_exceptions=False)
+    assert done.exit_code == 0
+    assert "success rate in %" in done.output
+    assert done.output.strip().endswith(str(tmp_path / "ours" / "report.html"))
+    page = Page((tmp_path / "ours" / "report.html").read_text())
+    assert len(page.data["matrix"]["policies"]) == 4
+    missing = len(PLAN.jobs()) - len(found)
+    assert any(f"Incomplete: {2 * missing} of" in words for _, words in page.notices)
+    with pytest.raises(StoreError, match="There are no records"):
+        CliRunner().invoke(app, [*asked[:2], str(tmp_path)], catch_exceptions=False)
+
+
+def test_what_cannot_be_compared_says_why() -> None:
+    (one, *_), (_, other, *_) = records(), records()
+    runs = [Run("a", [one]), Run("b", [other.model_copy(update={"language_version": "9"})])]
+    (said,) = Page(render_runs(runs)).data["comparisons"]
+    assert "same version can be compared" in said["said"][0]
 
 
 def test_the_head_says_which_run_it_was(tmp_path: Path) -> None:
     folder = tmp_path / "tuesday"
-    folder.mkdir()
     first, second, *_ = records()
-    with RecordStore(folder) as store:
-        store.append(first.model_copy(update={"started_at": "2026-01-02T03:04:05+00:00"}))
-        store.append(second.model_copy(update={"started_at": "2026-01-02T03:09:05+00:00"}))
+    store(
+        folder,
+        [first, second.model_copy(update={"started_at": "2026-01-02T03:09:05+00:00"})],
+    )
     text = write_report(folder).read_text()
+    assert "<title>tuesday – RoboIRGBench</title>" in text
     assert "<dd>tuesday</dd>" in text
     assert "<dd>2026-01-02 03:04 to 03:09 UTC</dd>" in text
     assert "<dt>step limit</dt><dd>1300</dd>" in text
+    assert "<dt>environment</dt><dd>0</dd>" in text
 
 
-@pytest.mark.parametrize(
-    ("steps", "expected"),
-    [(1, [0]), (99, [0, 1, 2, 3, 4]), (245, [0, 5, 10]), (1300, [0, 20, 40, 60])],
-)
-def test_the_time_line_has_a_scale(steps: int, expected: list[int]) -> None:
-    record = records()[0].model_copy(update={"steps": steps, "events": ()})
-    ticks = cards._ticks(record)
-    assert [tick.seconds for tick in ticks] == expected
-    assert all(0 <= tick.left <= 100 for tick in ticks)
+def test_an_unknown_task_is_shown_too() -> None:
+    turn = Turn(stage="command", text="Do it.")
+    mention = MentionSpan(
+        utterance=0, start=3, end=5, role="anaphor", expression="it", slot="x", value=1
+    )
+    odd = records()[1].model_copy(
+        update={"task": "Homemade", "instruction": (turn,), "mentions": (mention,)}
+    )
+    page = Page(render([odd]))
+    assert page.column("task") == ["Homemade"]
+    assert "stages" not in page.details[0]
 
 
 def test_the_page_is_written_whole_and_the_same_again(tmp_path: Path) -> None:
-    with RecordStore(tmp_path) as store:
-        for record in records():
-            store.append(record)
+    store(tmp_path, records())
     path = write_report(tmp_path)
     first = path.read_bytes()
     assert write_report(tmp_path).read_bytes() == first

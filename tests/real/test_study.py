@@ -39,7 +39,11 @@ def study(tmp_path_factory):
     assert {path.name for path in folder.iterdir()} == {
         "plan.json", "trials.csv", "demonstrations.csv", "sheet.pdf",
     }  # fmt: skip
-    process = start("run", folder, "--score", "operator")
+    # A busy machine must not make a policy late.
+    limits = folder.parent / "limits.json"
+    limits.write_text('{"policy_timeout_s": 60}')
+    play = ("run", folder, "--score", "operator", "--limits", limits)
+    process = start(*play)
     records = folder / "records.jsonl"
     deadline = time.monotonic() + 120
     while not (records.exists() and records.read_text().count("\n") >= 4):
@@ -49,7 +53,7 @@ def study(tmp_path_factory):
     process.wait(timeout=30)
     killed = records.read_bytes()
     assert killed.count(b"\n") < 12
-    text = finished("run", folder, "--score", "operator")
+    text = finished(*play)
     assert records.read_bytes().startswith(killed[: killed.rindex(b"\n")])
     played = 12 - killed.count(b"\n")
     assert f"{played} trials were played, 0 of them ended in an error." in text

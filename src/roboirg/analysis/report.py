@@ -2,40 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import json
+import os
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, get_args
+from typing import TYPE_CHECKING, Any
 
-from roboirg.analysis.cards import Media, make_card
-from roboirg.analysis.overview import FEW, Level, make_levels, present
-from roboirg.analysis.statistics import EXPLICIT, Condition, Panel, Variant, make_panels
-from roboirg.episode import DIFFICULTIES, SPLITS
+from roboirg.analysis.page.columns import Columns, make_columns
+from roboirg.analysis.page.entries import Entries, Run, make_entries
+from roboirg.analysis.page.films import Films
+from roboirg.analysis.page.matrix import make_matrix
+from roboirg.analysis.page.notices import comparisons, facts_of, notices_of
 from roboirg.errors import MissingDependencyError
-from roboirg.evaluation.record import Job, Outcome, Record
+from roboirg.evaluation.record import Job, Record
 from roboirg.evaluation.store import read_records, write_atomically
+from roboirg.evaluation.video import LAST_FRAME_REPEATS, VideoOptions
 
 if TYPE_CHECKING:
     import jinja2
 
 REPORT_FILE = "report.html"
+FILMING = VideoOptions()
+"""As `roboirg run` films, so that the page finds the moment of an event in a film."""
 TEMPLATE = "report.html.j2"
+STYLES = ("base", "overview", "filters", "episodes", "pairs")
+SCRIPTS = (
+    "dom",
+    "store",
+    "tip",
+    "overview",
+    "filters",
+    "words",
+    "timeline",
+    "detail",
+    "pager",
+    "episodes",
+    "pairs",
+    "main",
+)
+"""Parts of the style sheet and of the script, in their order."""
 
 
-class Choice(NamedTuple):
-    """A filter: its name in the page's data, what it is called, and what it offers."""
-
-    name: str
-    label: str
-    values: tuple[str, ...]
-
-
-def write_report(folder: Path, *, planned: Sequence[Job] = (), videos: bool = True) -> Path:
+def write_report(
+    folder: Path,
+    *,
+    planned: Sequence[Job] = (),
+    videos: bool = True,
+    against: Path | None = None,
+    planned_against: Sequence[Job] = (),
+) -> Path:
     """Write ``report.html`` into a run's folder, whole or not at all.
 
     Args:
         folder: of the run.
         planned: jobs that should be there; the page says which cells lack some.
         videos: put the films into the page.
+        against: folder of a run to compare with, episode by episode.
+        planned_against: jobs that should be there.
 
     Returns:
         The path of the page.
@@ -44,11 +67,29 @@ def write_report(folder: Path, *, planned: Sequence[Job] = (), videos: bool = Tr
         StoreError: there are no records, or they cannot be read.
         MissingDependencyError: Jinja is not installed.
     """
+    check_report_support()
     path = folder / REPORT_FILE
-    records = read_records(folder)
-    media = folder if videos else None
-    write_atomically(path, render(records, media, planned, name=folder.resolve().name))
+    runs = [_run(folder, planned, videos=videos)]
+    if against is not None:
+        link = f"{os.path.relpath(against, folder)}/"
+        runs.append(_run(against, planned_against, videos=videos, link=link))
+    write_atomically(path, render_runs(_distinct(runs, folder, against)))
     return path
+
+
+def make_view(folder: Path, planned: Sequence[Job] = ()) -> str:
+    """The page about a run as it is served: its films stay beside it.
+
+    Args:
+        folder: of the run.
+        planned: jobs that should be there.
+
+    Raises:
+        StoreError: there are no records, or they cannot be read.
+        MissingDependencyError: Jinja is not installed.
+    """
+    check_report_support()
+    return render_runs([_run(folder, planned, videos=True)], embed=False)
 
 
 def render(
@@ -58,68 +99,48 @@ def render(
     *,
     name: str = "",
 ) -> str:
-    """The page as text.
+    """The page about one run as text.
 
     Args:
         records: one for each identity.
-        folder: where the films are; None leaves them out. More than `MOST_FILM_BYTES` of them
-            are linked to, by their paths in it, rather than embedded.
+        folder: where the films are; None leaves them out. More than
+            `roboirg.analysis.page.films.MOST_FILM_BYTES` of them are linked to, by their paths in
+            it, rather than embedded.
         planned: jobs that should be there.
         name: of the run.
 
     Raises:
         MissingDependencyError: Jinja is not installed.
     """
-    panels = make_panels(records, planned)
-    ordered = _in_order(records, panels)
-    variants = sorted(
-        {variant for panel in panels for variant in panel.variants}, key=Variant.sort_key
-    )
-    media = Media.of(records, folder)
-    levels = make_levels(ordered, panels, variants)
+    return render_runs([Run(name, records, folder, planned)])
+
+
+def render_runs(runs: Sequence[Run], *, embed: bool = True) -> str:
+    """The page about one run, or two of them held against each other.
+
+    Args:
+        runs: one or two.
+        embed: put films into the page, if they are not too much together.
+
+    Raises:
+        MissingDependencyError: Jinja is not installed.
+    """
     template = _environment().get_template(TEMPLATE)
+    entries = make_entries(runs)
+    films = Films.of(entries.all, embed=embed)
+    columns = make_columns(entries, films)
     return template.render(
-        variants=[variant.label for variant in variants],
-        levels=levels,
-        cards=[make_card(number, record, media) for number, record in enumerate(ordered, 1)],
-        films_are_beside=not media.embeds,
-        facts=_facts(records, name),
-        few=FEW,
-        choices=_choices(ordered),
-        several={
-            name: len({getattr(record, name) for record in records}) > 1
-            for name in ("policy_seed", "max_steps")
-        },
-        counts={
-            outcome: sum(record.outcome == outcome for record in records)
-            for outcome in get_args(Outcome)
-        },
-        devices=sorted({record.render_device for record in records if record.render_device}),
-        **_to_explain(records, panels, levels),
+        styles=STYLES,
+        scripts=SCRIPTS,
+        name=" against ".join(run.name for run in runs),
+        count=len(entries.all),
+        facts=facts_of(runs),
+        notices=notices_of(entries),
+        films_are_beside=films.count > 0 and not films.embeds,
+        films=columns.films,
+        data=_json(_data(entries, columns)),
+        details="\n".join(map(_safe, columns.details)),
     )
-
-
-def _to_explain(
-    records: Sequence[Record], panels: Sequence[Panel], levels: Sequence[Level]
-) -> dict[str, bool]:
-    """What the page's legends have to explain, because it occurs."""
-    return {
-        "has_references": any(
-            mention.slot not in record.goal for record in records for mention in record.mentions
-        ),
-        "has_privileged": any(record.privileged for record in records),
-        "has_gaps": any(
-            cell.gap is not None and variant != EXPLICIT
-            for panel in panels
-            for (_, variant), cell in panel.cells.items()
-        ),
-        "has_floors": any(
-            cell is not None and cell.gap_is_muted
-            for level in levels
-            for row in level.rows
-            for cell in row.cells
-        ),
-    }
 
 
 def check_report_support() -> None:
@@ -137,6 +158,35 @@ def check_report_support() -> None:
         ) from error
 
 
+def _data(entries: Entries, columns: Columns) -> dict[str, Any]:
+    return {
+        "choices": [choice._asdict() for choice in columns.choices],
+        "columns": columns.columns,
+        "strings": columns.strings.texts,
+        "words": columns.words,
+        "matrix": make_matrix(entries),
+        "comparisons": comparisons(entries),
+        "sides": _sides(entries),
+        "film": {"every": FILMING.every, "rate": FILMING.rate, "repeats": LAST_FRAME_REPEATS},
+    }
+
+
+def _sides(entries: Entries) -> list[int]:
+    """Whom to hold against each other first: a policy and itself in the other run, or the next."""
+    names = list(entries.names)
+    twins = [place for place, who in enumerate(names) if place and who.policy == names[0].policy]
+    return [0, twins[0] if twins else min(1, len(names) - 1)]
+
+
+def _json(value: object) -> str:
+    return _safe(json.dumps(value, ensure_ascii=False, separators=(",", ":"), allow_nan=False))
+
+
+def _safe(text: str) -> str:
+    """JSON that can stand in a script element: no text in it ends the element."""
+    return text.replace("<", "\\u003c")
+
+
 def _environment() -> jinja2.Environment:
     check_report_support()
     import jinja2
@@ -150,67 +200,16 @@ def _environment() -> jinja2.Environment:
     )
 
 
-def _in_order(records: Sequence[Record], panels: Sequence[Panel]) -> list[Record]:
-    """Policies and tasks as in the overview, then episodes, then settings."""
-    conditions = [panel.condition for panel in panels]
-    tasks = list(dict.fromkeys(task for panel in panels for task in panel.tasks))
-    return sorted(
-        records,
-        key=lambda record: (
-            conditions.index(Condition.of(record)),
-            tasks.index(record.task),
-            record.episode,
-            Variant.of(record).sort_key(),
-            record.policy_seed,
-        ),
-    )
+def _run(folder: Path, planned: Sequence[Job], *, videos: bool, link: str = "") -> Run:
+    media = folder if videos else None
+    return Run(folder.resolve().name, read_records(folder), media, planned, link)
 
 
-def _facts(records: Sequence[Record], name: str) -> list[tuple[str, str]]:
-    """What the head of the page says about the run."""
-    times = sorted(record.started_at[:16].replace("T", " ") for record in records)
-    facts = [
-        ("run", name),
-        ("played", _span(times[0], times[-1]) if times else ""),
-        ("split", _said(records, "split")),
-        ("step limit", _said(records, "max_steps")),
-        ("roboirg", _said(records, "package_version")),
-        ("language", _said(records, "language_version")),
-        ("environment", _said(records, "environment_version")),
-    ]
-    return [(label, value) for label, value in facts if value]
-
-
-def _span(first: str, last: str) -> str:
-    """From one time to another, such as 2026-01-02 03:04; the day only once."""
-    if first == last:
-        return f"{first} UTC"
-    day, _, minute = last.partition(" ")
-    return f"{first} to {minute if first.startswith(day) else last} UTC"
-
-
-def _said(records: Sequence[Record], name: str) -> str:
-    return ", ".join(map(str, sorted({getattr(record, name) for record in records})))
-
-
-def _choices(records: Sequence[Record]) -> list[Choice]:
-    """The filters; of the rules under which was played only those of which there are several."""
-    variants = sorted({Variant.of(record) for record in records}, key=Variant.sort_key)
-    settings = tuple(variant.label for variant in variants)
-    rules = (
-        Choice("split", "split", present(records, "split", SPLITS)),
-        Choice("seed", "policy seed", _numbers(record.policy_seed for record in records)),
-        Choice("limit", "step limit", _numbers(record.max_steps for record in records)),
-    )
+def _distinct(runs: Sequence[Run], *folders: Path | None) -> list[Run]:
+    """The runs under different names."""
+    if len({run.name for run in runs}) == len(runs):
+        return list(runs)
     return [
-        Choice("policy", "policy", tuple(dict.fromkeys(record.policy for record in records))),
-        Choice("task", "task", tuple(dict.fromkeys(record.task for record in records))),
-        Choice("setting", "setting", settings),
-        *(rule for rule in rules if len(rule.values) > 1),
-        Choice("outcome", "outcome", present(records, "outcome", get_args(Outcome))),
-        Choice("difficulty", "difficulty", present(records, "difficulty", DIFFICULTIES)),
+        Run(str(folder), run.records, run.folder, run.planned, run.link)
+        for run, folder in zip(runs, [one for one in folders if one is not None], strict=True)
     ]
-
-
-def _numbers(values: Iterable[int]) -> tuple[str, ...]:
-    return tuple(map(str, sorted(set(values))))

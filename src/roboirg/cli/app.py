@@ -17,7 +17,7 @@ from roboirg.cli import language, policies, running, telling
 from roboirg.cli.bench import bench
 from roboirg.cli.options import Distractor, Frame, Split, Stages, Tasks, Video, Workers
 from roboirg.cli.real import real_app
-from roboirg.cli.running import INTERRUPTED, USAGE_ERROR, Folder, Out
+from roboirg.cli.running import INTERRUPTED, USAGE_ERROR, Out
 from roboirg.errors import InvalidValueError, RoboIRGError
 
 # Everything heavy is imported inside the commands, so that --help answers at once.
@@ -67,25 +67,14 @@ def _options(*, version: _Version = False) -> None:
 
 app.command()(running.run)
 app.command()(running.merge)
+app.command()(telling.report)
+app.command()(telling.view)
 app.command()(telling.tables)
+app.command()(telling.figures)
 app.command()(telling.compare)
 app.command()(policies.serve)
 app.command("check-policy")(policies.check_policy)
 language.export_app.command("records")(running.export_records)
-
-
-@app.command()
-def report(
-    folder: Folder,
-    videos: Annotated[bool, typer.Option(help="Put the films into the page.")] = True,
-) -> None:
-    """Print the table of a run and write FOLDER/report.html, one self-contained page."""
-    from roboirg.analysis.report import check_report_support
-
-    path = running.folder_of(folder)
-    check_report_support()
-    running.print_tables_of(path)
-    typer.echo(_write_page(path, videos=videos))
 
 
 @app.command()

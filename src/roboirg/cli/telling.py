@@ -1,7 +1,8 @@
-"""The commands that tell results: ``roboirg tables`` and ``roboirg compare``."""
+"""The commands that tell results: ``report``, ``view``, ``tables``, ``figures`` and ``compare``."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,6 +13,7 @@ from roboirg.errors import InvalidValueError, UnknownNameError
 if TYPE_CHECKING:
     from roboirg.analysis.samples import Samples
     from roboirg.analysis.table import Table
+    from roboirg.evaluation.record import Job, Result
 
 # Everything heavy is imported inside the commands, so that --help answers at once.
 
@@ -20,6 +22,77 @@ MINIMUM_WIDTH = 120
 SEED = 20_240_607
 """Of the bootstrap; the same records give the same words."""
 _ALL = "all"
+
+
+def report(
+    folder: Annotated[str, typer.Argument(help="The --out folder of a run.", metavar="RUN")],
+    against: Annotated[
+        str | None, typer.Option(help="Another run, to compare with episode by episode.")
+    ] = None,
+    videos: Annotated[bool, typer.Option(help="Put the films into the page.")] = True,
+) -> None:
+    """Print the table of a run and write RUN/report.html, one self-contained page."""
+    from roboirg.analysis.report import check_report_support, write_report
+    from roboirg.cli import running
+
+    path, other = running.folder_of(folder), None if against is None else Path(against)
+    check_report_support()
+    running.print_tables_of(path)
+    page = write_report(
+        path,
+        planned=running.planned_jobs(path),
+        videos=videos,
+        against=other,
+        planned_against=() if other is None else running.planned_jobs(other),
+    )
+    typer.echo(page)
+
+
+def view(
+    folder: Annotated[str, typer.Argument(help="The --out folder of a run.", metavar="RUN")],
+    port: Annotated[int, typer.Option(help="On loopback; 0 chooses a free one.")] = 0,
+) -> None:
+    """Serve the page of a run with its films on this machine, until Ctrl-C."""
+    from roboirg.analysis.page.serving import PageServer
+    from roboirg.analysis.report import make_view
+    from roboirg.cli import running
+
+    path = running.folder_of(folder)
+
+    def make_page() -> str:
+        return make_view(path, running.planned_jobs(path))
+
+    with PageServer(path, make_page, port) as server:
+        # What is wrong with the run is said here, not in the browser.
+        server.page()
+        typer.echo(f"{server.address}  Ctrl-C ends it.")
+        try:
+            server.serve_forever()
+        except KeyboardInterrupt:
+            typer.echo("", err=True)
+
+
+def figures(
+    runs: Annotated[list[str], typer.Argument(help="The --out folders of runs.", metavar="RUN...")],
+    out: Annotated[Path, typer.Option(help="Folder for the pictures; made if it is missing.")],
+    which: Annotated[
+        str,
+        typer.Option(
+            help="averages, forms, expressions, context, failures; several with commas, or all "
+            "that apply."
+        ),
+    ] = _ALL,
+    published: Annotated[bool, typer.Option(help="Put the paper's own values in.")] = False,
+) -> None:
+    """Draw the paper's figures of one or several runs, as PNG, SVG and PDF."""
+    from roboirg.analysis.figures import FIGURES, Content, write_figures
+    from roboirg.analysis.figures.drawing import check_figure_support
+
+    check_figure_support()
+    names = FIGURES if which == _ALL else tuple(word.strip() for word in which.split(","))
+    content = Content.of(*_runs(runs))
+    for path in write_figures(content, out, names, published=published):
+        typer.echo(path)
 
 
 def tables(
@@ -130,6 +203,12 @@ def _write(found: list[Table], folder: Path, suffix: str, name: str) -> None:
 
 def _samples(runs: list[str]) -> Samples:
     from roboirg.analysis.samples import gather
+
+    return gather(*_runs(runs))
+
+
+def _runs(runs: list[str]) -> tuple[list[tuple[str, Sequence[Result]]], list[Job]]:
+    """The results of runs, each with its folder, and the jobs of their plans."""
     from roboirg.evaluation.plan import read_plan
     from roboirg.evaluation.store import read_results
 
@@ -137,8 +216,10 @@ def _samples(runs: list[str]) -> Samples:
     planned = [
         job for folder in folders if (plan := read_plan(folder)) is not None for job in plan.jobs()
     ]
-    results = [(str(folder), read_results(folder)) for folder in folders]
-    return gather(results, planned)
+    results: list[tuple[str, Sequence[Result]]] = [
+        (str(folder), read_results(folder)) for folder in folders
+    ]
+    return results, planned
 
 
 def _one_policy(text: str) -> Samples:

@@ -1,0 +1,100 @@
+"""Print how long a page of many episodes takes to make, to open and to filter.
+
+python scripts/bench_page.py RUN [--episodes 10000] [--browser /usr/bin/chromium]
+
+The episodes of a run are taken as often as it needs, each time with another policy seed. Needs
+Playwright for Python and a Chromium.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import os
+import shutil
+import statistics
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from roboirg.analysis.report import render
+from roboirg.evaluation.record import Record
+from roboirg.evaluation.store import read_records
+
+BROWSERS = ("chromium", "google-chrome", "chromium-browser")
+REPEATS = 5
+FILTERS: dict[str, dict[str, str]] = {
+    "task": {"task": "StopCube"},
+    "outcome": {"outcome": "failure"},
+    "words, common": {"words": "cube"},
+    "words, none": {"words": "no such words at all"},
+    "everything again": {},
+    "two policies": {"view": "pairs"},
+}
+
+FILTER = """async (hash) => {
+  const begun = performance.now();
+  history.replaceState(null, "", hash);
+  dispatchEvent(new HashChangeEvent("hashchange"));
+  await new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
+  return performance.now() - begun;
+}"""
+"""Filter; the milliseconds until the next picture is painted."""
+
+
+def many(records: tuple[Record, ...], number: int) -> list[Record]:
+    """So many records, each a copy with a policy seed of its own."""
+    copies = (
+        record.model_copy(update={"policy_seed": seed, "video": None})
+        for seed in itertools.count()
+        for record in records
+    )
+    return list(itertools.islice(copies, number))
+
+
+def measure(page: Any, path: Path) -> None:  # noqa: ANN401 - Playwright may be missing
+    """Open and filter, several times each; print the medians in milliseconds."""
+    opened = []
+    for _ in range(REPEATS):
+        begun = time.perf_counter()
+        page.goto(path.as_uri())
+        page.wait_for_selector("#rows li")
+        opened.append(1000 * (time.perf_counter() - begun))
+    print(f"open, until the list is there: {statistics.median(opened):.0f} ms")
+    print(f"open, by the page's own clock: {page.evaluate('roboirg.counters.openMs'):.0f} ms")
+    for name, filters in FILTERS.items():
+        words = "&".join(f"{key}={value}" for key, value in filters.items())
+        times = [page.evaluate(FILTER, f"#?{words}") for _ in range(REPEATS)]
+        print(
+            f"filter, {name}: {statistics.median(times):.0f} ms "
+            f"({page.evaluate('roboirg.counters.matched')} match, "
+            f"{page.evaluate('document.querySelectorAll(`*`).length')} elements)"
+        )
+
+
+def main() -> None:
+    """Make the page in a temporary folder and measure it."""
+    from playwright.sync_api import sync_playwright
+
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("run", type=Path)
+    parser.add_argument("--episodes", type=int, default=10_000)
+    parser.add_argument("--browser", default=next(filter(None, map(shutil.which, BROWSERS)), None))
+    given = parser.parse_args()
+    records = many(read_records(given.run), given.episodes)
+    begun = time.perf_counter()
+    text = render(records)
+    print(f"{len(records)} episodes, {len(text) / 1e6:.1f} MB, made in "
+          f"{time.perf_counter() - begun:.1f} s")  # fmt: skip
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+        path = Path(folder) / "page.html"
+        path.write_text(text)
+        arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
+        browser = playwright.chromium.launch(executable_path=given.browser, args=arguments)
+        measure(browser.new_page(viewport={"width": 1280, "height": 900}), path)
+        browser.close()
+
+
+if __name__ == "__main__":
+    main()

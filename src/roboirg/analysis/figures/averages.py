@@ -1,0 +1,85 @@
+"""Figure: the average over tasks in each setting, for each policy."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from roboirg.analysis.figures.content import Content
+from roboirg.analysis.figures.drawing import (
+    COLUMN_INCHES,
+    GHOST,
+    clear_axes,
+    draw_ghost,
+    draw_point,
+    legend_below,
+    new_figure,
+    percent_axis,
+)
+from roboirg.analysis.published import published_rows
+from roboirg.analysis.statistics import SETTING_ORDER, Variant
+from roboirg.analysis.summary import ALL
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+HEIGHT_INCHES = 2.5
+LEGEND_LINE_INCHES = 0.16
+SPREAD = 0.62
+"""The width over which the points of one setting lie, in distances between settings."""
+GHOST_PLACE = 0.42
+LEGEND_COLUMNS = 2
+
+
+def draw_averages(content: Content, *, published: bool = False) -> Figure | None:
+    """Draw the unweighted means over tasks with their intervals; None without any."""
+    settings = [
+        setting
+        for setting in SETTING_ORDER
+        if any((who, ALL, Variant(setting)) in content.summaries for who in content.names)
+    ]
+    if not settings:
+        return None
+    ghosts = published_rows("main") if published else ()
+    models = list(dict.fromkeys(row.model for row in ghosts))
+    lines = -(-(len(content.names) + len(models)) // LEGEND_COLUMNS)
+    figure = new_figure(COLUMN_INCHES, HEIGHT_INCHES + LEGEND_LINE_INCHES * lines)
+    axes = figure.subplots()
+    for number, who in enumerate(content.names):
+        for place, setting in enumerate(settings):
+            one = content.summaries.get((who, ALL, Variant(setting)))
+            if one is not None and one.rate is not None:
+                at = place + _offset(number, len(content.names))
+                draw_point(axes, at, float(one.rate), one.interval, number, content.name(who))
+    for row in ghosts:
+        if row.variant.setting in settings:
+            at = settings.index(row.variant.setting) + GHOST_PLACE
+            number = models.index(row.model)
+            draw_ghost(axes, at, float(row.average), number, f"{row.model} (published)")
+    _set_axes(axes, content, settings, room=GHOST_PLACE if ghosts else 0.0)
+    legend_below(figure, axes, LEGEND_COLUMNS)
+    return figure
+
+
+def _set_axes(axes: Axes, content: Content, settings: list[str], room: float) -> None:
+    percent_axis(axes)
+    clear_axes(axes, grid="y")
+    axes.set_xticks(range(len(settings)), [_label(content, setting) for setting in settings])
+    axes.set_xlim(-0.5, len(settings) - 0.5 + (0.1 if room else 0))
+    for edge in range(1, len(settings)):
+        axes.axvline(edge - 0.5 + (0.05 if room else 0), color=GHOST, linewidth=0.3, alpha=0.5)
+
+
+def _label(content: Content, setting: str) -> str:
+    """The setting and over how many tasks it is a mean."""
+    counts = {
+        len(one.tasks)
+        for (_, scope, told), one in content.summaries.items()
+        if scope == ALL and told == Variant(setting) and one.rate is not None
+    }
+    words = "–".join(map(str, sorted({min(counts, default=0), max(counts, default=0)})))
+    return f"{setting}\n({words} task{'' if words == '1' else 's'})"
+
+
+def _offset(number: int, count: int) -> float:
+    return SPREAD * ((number + 0.5) / count - 0.5)

@@ -1,0 +1,108 @@
+"""Figure: success by how much of the contextual discourse is spoken."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from roboirg.analysis.figures.content import Content, by_key
+from roboirg.analysis.figures.drawing import (
+    COLOURS,
+    COLUMN_INCHES,
+    GHOST,
+    clear_axes,
+    draw_ghost,
+    draw_point,
+    legend_below,
+    new_figure,
+    percent_axis,
+)
+from roboirg.analysis.published import published_rows
+from roboirg.analysis.samples import Contestant, Samples
+from roboirg.analysis.statistics import Variant
+from roboirg.analysis.summary import ALL
+from roboirg.language import STAGE_SETS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+HEIGHT_INCHES = 2.4
+LEGEND_LINE_INCHES = 0.16
+SHIFT = 0.08
+LEGEND_COLUMNS = 2
+
+
+def draw_context(content: Content, *, published: bool = False) -> Figure | None:
+    """Draw the means over the tasks that were played with every set; None with one set or none."""
+    sets = [
+        stages
+        for stages in STAGE_SETS
+        if any(_is(told, stages) for told in _courses(content.samples).values())
+    ]
+    samples, tasks = _shared(content.samples, sets)
+    if not tasks:
+        return None
+    found = by_key(samples)
+    ghosts = published_rows("context") if published else ()
+    models = list(dict.fromkeys(row.model for row in ghosts))
+    names = [who for who in content.names if any(own == who for own, _, _ in found)]
+    lines = -(-(len(names) + len(models)) // LEGEND_COLUMNS)
+    figure = new_figure(COLUMN_INCHES, HEIGHT_INCHES + LEGEND_LINE_INCHES * lines)
+    axes = figure.subplots()
+    for number, who in enumerate(names):
+        course = []
+        for place, stages in enumerate(sets):
+            one = found.get((who, ALL, Variant("contextual", stages=stages)))
+            if one is not None and one.rate is not None:
+                at = place + SHIFT * (number - (len(names) - 1) / 2)
+                course.append((at, 100 * float(one.rate)))
+                draw_point(axes, at, float(one.rate), one.interval, number, content.name(who))
+        axes.plot(*zip(*course, strict=True), color=COLOURS[number % len(COLOURS)], linewidth=0.8)
+    for model in models:
+        rows = {row.variant.stages: float(row.average) for row in ghosts if row.model == model}
+        known = [(place, rows[stages]) for place, stages in enumerate(sets) if stages in rows]
+        for at, value in known:
+            draw_ghost(axes, at, value, models.index(model), f"{model} (published)")
+        axes.plot(*zip(*known, strict=True), color=GHOST, linewidth=0.6, linestyle=":", zorder=1)
+    _set_axes(axes, sets, tasks)
+    legend_below(figure, axes, LEGEND_COLUMNS)
+    return figure
+
+
+def _set_axes(axes: Axes, sets: list[tuple[int, ...]], tasks: list[str]) -> None:
+    percent_axis(axes)
+    clear_axes(axes, grid="y")
+    axes.set_xticks(range(len(sets)), [",".join(map(str, stages)) for stages in sets])
+    axes.set_xlim(-0.4, len(sets) - 0.6)
+    axes.set_xlabel(f"stages that are spoken; mean over {', '.join(tasks)}", wrap=True)
+
+
+def _courses(samples: Samples) -> dict[Contestant, set[Variant]]:
+    """The sets that each contestant was told, of those who were told several."""
+    usual = {Variant("contextual", stages=stages) for stages in STAGE_SETS}
+    told: dict[Contestant, set[Variant]] = {}
+    for (who, _, variant), sample in samples.items():
+        if variant in usual and sample.trials:
+            told.setdefault(who, set()).add(variant)
+    return {who: own for who, own in told.items() if len(own) > 1}
+
+
+def _is(told: set[Variant], stages: tuple[int, ...]) -> bool:
+    return Variant("contextual", stages=stages) in told
+
+
+def _shared(samples: Samples, sets: list[tuple[int, ...]]) -> tuple[Samples, list[str]]:
+    """Of those who were told several sets: the tasks that all of them played with every set."""
+    names = _courses(samples)
+    wanted = {Variant("contextual", stages=stages) for stages in sets}
+    kept = {
+        key: sample
+        for key, sample in samples.items()
+        if key[0] in names and key[2] in wanted and sample.trials
+    }
+    tasks = [
+        task
+        for task in dict.fromkeys(task for _, task, _ in kept)
+        if all((who, task, told) in kept for who in names for told in wanted)
+    ]
+    return {key: sample for key, sample in kept.items() if key[1] in tasks}, tasks

@@ -1,0 +1,126 @@
+"""Figure: why episodes failed, by policy and setting."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from roboirg.analysis.figures.content import Content
+from roboirg.analysis.figures.drawing import COLUMN_INCHES, PAGE_INCHES, clear_axes, new_figure
+from roboirg.analysis.samples import Contestant
+from roboirg.analysis.statistics import Variant
+from roboirg.evaluation.record import Result
+from roboirg.judging.finding import EXECUTION, GROUNDING
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+ROW_INCHES, MARGIN_INCHES, LEGEND_LINE_INCHES = 0.2, 0.55, 0.16
+UNKNOWN = "not attributed"
+COLOURS: Mapping[str, str] = {
+    **dict(zip(GROUNDING, ("#7f2704", "#c0510a", "#ee8130", "#fbb477", "#fddfbf"), strict=True)),
+    **dict(
+        zip(
+            EXECUTION,
+            ("#08306b", "#20578f", "#3f85bd", "#74b0d8", "#a9d0e8", "#d9ebf6"),
+            strict=True,
+        )
+    ),
+    UNKNOWN: "#bbbbbb",
+}
+"""Shades of orange for grounding, of blue for execution."""
+MOST_PANELS = 2
+LEGEND_COLUMNS = {1: 2, 2: 4}
+WIDE_ENOUGH = 6.0
+"""Percent from which on a part has room for its number."""
+_DARK = frozenset((*GROUNDING[:2], *EXECUTION[:3]))
+
+Counts = Mapping[tuple[Contestant, Variant], Counter[str]]
+
+
+def draw_failures(content: Content) -> Figure | None:
+    """Draw the shares of episodes that failed in each way; None if none did."""
+    counts, played = _counts(content)
+    if not any(counts.values()):
+        return None
+    names = [who for who in content.names if any(own == who for own, _ in played)]
+    told = sorted({variant for _, variant in played}, key=Variant.sort_key)
+    across = min(MOST_PANELS, len(names))
+    down = -(-len(names) // across)
+    kinds = [kind for kind in COLOURS if any(own[kind] for own in counts.values())]
+    columns = LEGEND_COLUMNS[across]
+    figure = new_figure(
+        PAGE_INCHES if across > 1 else COLUMN_INCHES,
+        down * (ROW_INCHES * len(told) + MARGIN_INCHES)
+        + LEGEND_LINE_INCHES * (-(-len(kinds) // columns) + 1),
+    )
+    axes = figure.subplots(down, across, squeeze=False, sharey=True).ravel()
+    for panel, who in zip(axes, names, strict=False):
+        for place, variant in enumerate(told):
+            _draw_bar(panel, place, counts.get((who, variant)), played[who, variant])
+        panel.set_title(content.name(who), fontsize=8.5, loc="left", fontweight="bold")
+        panel.set_xlabel("share of the episodes with a verdict, %")
+        panel.set_xlim(0, 100)
+        panel.set_xticks(range(0, 101, 25))
+        clear_axes(panel, grid="x")
+    for panel in axes[len(names) :]:
+        panel.set_visible(False)
+    axes[0].set_yticks(range(len(told)), [variant.label for variant in told])
+    axes[0].set_ylim(len(told) - 0.5, -0.5)
+    _add_legend(figure, kinds, columns)
+    return figure
+
+
+def failure_name(result: Result) -> str:
+    """Which failure it was."""
+    return UNKNOWN if result.attribution is None else result.attribution.failure
+
+
+def _counts(content: Content) -> tuple[Counts, Counter[tuple[Contestant, Variant]]]:
+    counts: dict[tuple[Contestant, Variant], Counter[str]] = defaultdict(Counter)
+    played: Counter[tuple[Contestant, Variant]] = Counter()
+    for (who, _, variant), sample in content.samples.items():
+        played[who, variant] += sample.trials
+    for who, result in content.results:
+        if result.outcome == "failure":
+            counts[who, Variant.of(result)][failure_name(result)] += 1
+    return counts, played
+
+
+def _draw_bar(axes: Axes, place: int, counts: Counter[str] | None, played: int) -> None:
+    if not played:
+        axes.text(1, place, "–", va="center", fontsize=7, color="#777777")
+        return
+    if not counts:
+        axes.text(1, place, "none", va="center", fontsize=6.5, color="#777777")
+    left = 0.0
+    for kind, colour in COLOURS.items():
+        count = (counts or Counter())[kind]
+        if not count:
+            continue
+        width = 100 * count / played
+        axes.barh(
+            place, width, left=left, height=0.78, color=colour, edgecolor="white", linewidth=0.5
+        )
+        if width >= WIDE_ENOUGH:
+            axes.text(
+                left + width / 2, place, str(count), ha="center", va="center", fontsize=6.5,
+                color="white" if kind in _DARK else "black",
+            )  # fmt: skip
+        left += width
+
+
+def _add_legend(figure: Figure, kinds: list[str], columns: int) -> None:
+    from matplotlib.patches import Patch
+
+    def words(kind: str) -> str:
+        group = "grounding: " if kind in GROUNDING else "execution: " if kind in EXECUTION else ""
+        return group + kind.replace("_", " ")
+
+    figure.legend(
+        [Patch(facecolor=COLOURS[kind], edgecolor="white") for kind in kinds],
+        [words(kind) for kind in kinds],
+        loc="outside lower center", ncols=columns, columnspacing=1.0, handletextpad=0.4,
+    )  # fmt: skip

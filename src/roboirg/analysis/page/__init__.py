@@ -1,0 +1,1 @@
+"""The page about a run: what is in it, and how it is served."""

@@ -1,0 +1,63 @@
+"""How films get onto the page: in it, or beside it."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import PurePosixPath
+from typing import NamedTuple
+from urllib.parse import quote
+
+from roboirg.analysis.page.entries import Entry
+
+MOST_FILM_BYTES = 60_000_000
+"""Films that weigh more together stay beside the page."""
+POSTER_SUFFIX = ".jpg"
+
+
+class Film(NamedTuple):
+    """A film and its last picture, as data URIs or as paths from the page."""
+
+    source: str
+    poster: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Films:
+    """Which films there are.
+
+    Attributes:
+        embeds: whether they become part of the page.
+        count: how many there are.
+    """
+
+    embeds: bool
+    count: int
+
+    @classmethod
+    def of(cls, entries: Iterable[Entry], *, embed: bool = True) -> Films:
+        """Into the page, if that is wanted and they are not too much together."""
+        weights = [
+            path.stat().st_size
+            for one in entries
+            if one.run.folder is not None and one.record.video is not None
+            if (path := one.run.folder / one.record.video).is_file()
+        ]
+        return cls(embed and sum(weights) <= MOST_FILM_BYTES, len(weights))
+
+    def film(self, entry: Entry) -> Film | None:
+        """The film of an episode; None without one."""
+        name = entry.record.video
+        source = None if name is None else self._link(entry, name, "video/mp4")
+        if name is None or source is None:
+            return None
+        poster = str(PurePosixPath(name).with_suffix(POSTER_SUFFIX))
+        return Film(source, self._link(entry, poster, "image/jpeg"))
+
+    def _link(self, entry: Entry, name: str, kind: str) -> str | None:
+        if entry.run.folder is None or not (path := entry.run.folder / name).is_file():
+            return None
+        if not self.embeds:
+            return quote(f"{entry.run.link}{name}")
+        return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"

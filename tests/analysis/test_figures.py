@@ -1,0 +1,204 @@
+"""The figures: that they are there, say what the records say, and are the same again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from roboirg.analysis.figures import FIGURES, Content, write_figures
+from roboirg.analysis.figures.failures import COLOURS, UNKNOWN, draw_failures
+from roboirg.analysis.figures.forms import PARTS, draw_forms
+from roboirg.analysis.published import published_rows
+from roboirg.analysis.statistics import Variant
+from roboirg.analysis.summary import ALL
+from roboirg.cli.telling import figures
+from roboirg.errors import InvalidValueError, UnknownNameError
+from roboirg.evaluation.course import Course, describe
+from roboirg.evaluation.plan import Plan
+from roboirg.evaluation.record import Attribution, Result
+from roboirg.evaluation.store import RecordStore
+from roboirg.judging.finding import EXECUTION, GROUNDING
+
+pytest.importorskip("matplotlib")
+
+from matplotlib.axes import Axes
+from matplotlib.patches import Rectangle
+
+PLAN = Plan(
+    policies=("listener", "forgetful"),
+    tasks=("PickXtimes", "VideoUnmask"),
+    episodes=(0, 1, 2),
+    forms=("implicit", "resolved"),
+)
+
+
+def results() -> list[Result]:
+    """The listener succeeds; the forgetful fails where it has to remember."""
+    found = []
+    for number, job in enumerate(PLAN.jobs()):
+        lost = job.policy == "forgetful" and job.form == "implicit" and job.setting != "explicit"
+        kind = "execution" if number % 2 else "grounding"
+        failure = (EXECUTION if number % 2 else GROUNDING)[number % 5]
+        attribution = Attribution(kind=kind, failure=failure, step=9, sentence="So.")
+        record = describe(job, Course("failure" if lost else "success", cause=None), started_at="n")
+        found.append(record.model_copy(update={"attribution": attribution if lost else None}))
+    return found
+
+
+def content(found: list[Result] | None = None, **options: object) -> Content:
+    return Content.of([("run", results() if found is None else found)], **options)  # type: ignore[arg-type]
+
+
+def texts(path: Path) -> str:
+    """The words of an SVG file, which are in its comments where letters are outlines."""
+    return path.read_text()
+
+
+def test_all_figures_that_apply_are_written_and_are_the_same_again(tmp_path: Path) -> None:
+    paths = write_figures(content(planned=PLAN.jobs()), tmp_path / "a" / "b")
+    names = {path.name for path in paths}
+    assert {f"{name}.{ending}" for name in ("averages", "forms", "failures")
+            for ending in ("png", "svg", "pdf")} <= names  # fmt: skip
+    assert "expressions.png" in names
+    # Nothing is known about contexts of other lengths.
+    assert not {name for name in names if name.startswith("context")}
+    again = write_figures(content(results()[::-1], planned=PLAN.jobs()), tmp_path / "again")
+    for first, second in zip(paths, again, strict=True):
+        assert first.read_bytes() == second.read_bytes(), first.name
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("averages", ["listener", "forgetful", "explicit", "(2 tasks)"]),
+        (
+            "forms",
+            ["only resolved", "all tasks", "counting", "permanence", "−100 [−100, −", "±0 ["],
+        ),
+        ("failures", ["grounding: wrong object", "none", "direct (resolved)"]),
+    ],
+)
+def test_figures_say_what_the_records_say(tmp_path: Path, name: str, words: list[str]) -> None:
+    write_figures(content(), tmp_path, [name])
+    drawn = texts(tmp_path / f"{name}.svg")
+    for word in words:
+        assert f"<!-- {word}" in drawn, word
+
+
+def widths(panel: Axes) -> dict[str, list[float]]:
+    """The lengths of a panel's bars by colour, from the top down."""
+    from matplotlib.colors import to_hex
+
+    found: dict[str, list[float]] = {}
+    for bar in panel.patches:
+        assert isinstance(bar, Rectangle)
+        found.setdefault(to_hex(bar.get_facecolor()).lower(), []).append(bar.get_width())
+    return found
+
+
+def test_the_forms_bars_are_the_overlap() -> None:
+    drawn = draw_forms(content(planned=PLAN.jobs()))
+    assert drawn is not None
+    listener, forgetful = (widths(panel) for panel in drawn.axes)
+    both, resolved, implicit, neither = (colour.lower() for _, colour, _ in PARTS)
+    assert set(listener[both]) == set(forgetful[resolved]) == {100.0}
+    assert {*listener[resolved], *forgetful[both], *forgetful[implicit], *forgetful[neither]} == {0}
+
+
+def test_the_failures_bars_are_shares_of_what_was_played() -> None:
+    found = content(planned=PLAN.jobs())
+    drawn = draw_failures(found)
+    assert drawn is not None
+    listener, forgetful = (widths(panel) for panel in drawn.axes)
+    assert listener == {}
+    # Everything failed in the four implicit tellings, nothing in the rest.
+    assert sum(map(sum, forgetful.values())) == pytest.approx(400)
+    miscounted = sum(
+        one.attribution is not None and one.attribution.failure == "wrong_count"
+        for one in results()
+    )
+    assert sum(forgetful[COLOURS["wrong_count"]]) == pytest.approx(100 * miscounted / 6)
+
+
+def test_published_values_are_ghosts_on_request(
+    tmp_path: Path, published_like: Callable[..., list[Result]]
+) -> None:
+    found = content(published_like("context"))
+    write_figures(found, tmp_path / "with", ["context"], published=True)
+    write_figures(found, tmp_path / "without", ["context"])
+    drawn = texts(tmp_path / "with" / "context.svg")
+    for row in published_rows("context"):
+        assert f"<!-- {row.model} (published)" in drawn
+        summary = found.summaries[
+            next(who for who in found.names if who.policy == row.model), ALL, row.variant
+        ]
+        assert float(summary.rate) == pytest.approx(float(row.average) / 100, abs=1e-4)
+    assert "(published)" not in texts(tmp_path / "without" / "context.svg")
+    assert "1,2,3,4,5" in drawn
+
+
+def test_the_context_is_compared_on_the_same_tasks(
+    tmp_path: Path, published_like: Callable[..., list[Result]]
+) -> None:
+    found = published_like("context")
+    short = [one for one in found if not (one.task == "BinFill" and one.stages == (1, 5))]
+    write_figures(content(short), tmp_path, ["context"])
+    drawn = texts(tmp_path / "context.svg")
+    assert "PickXtimes" in drawn
+    assert "BinFill" not in drawn
+    only = content([one for one in found if one.stages == (1, 5)])
+    with pytest.raises(InvalidValueError, match="nothing to draw for context"):
+        write_figures(only, tmp_path, ["context"])
+
+
+def test_what_is_incomplete_is_called_so(tmp_path: Path) -> None:
+    write_figures(content(results()[:-2], planned=PLAN.jobs()), tmp_path, ["averages"])
+    drawn = texts(tmp_path / "averages.svg")
+    assert "<!-- forgetful (incomplete)" in drawn
+    assert "<!-- listener -->" in drawn
+
+
+def test_every_failure_has_a_colour_of_its_own() -> None:
+    assert set(COLOURS) == {*GROUNDING, *EXECUTION, UNKNOWN}
+    assert len(set(COLOURS.values())) == len(COLOURS)
+
+
+def test_runs_that_hold_the_same_episodes_stand_apart(tmp_path: Path) -> None:
+    both = Content.of([("one", results()), ("two", results())])
+    assert set(both.names.values()) == {
+        "listener, one", "listener, two", "forgetful, one", "forgetful, two",
+    }  # fmt: skip
+    assert {who.run for who, _ in both.results} == {"one", "two"}
+    write_figures(both, tmp_path, ["failures"])
+    assert "<!-- forgetful, two" in texts(tmp_path / "failures.svg")
+
+
+def test_wrong_names_and_places_are_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(UnknownNameError, match="Did you mean 'averages'"):
+        write_figures(content(), tmp_path, ["average"])
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InvalidValueError, match="Cannot write to"):
+        write_figures(content(), tmp_path / "file", ["averages"])
+    happy = [one for one in results() if one.outcome == "success"]
+    with pytest.raises(InvalidValueError, match="nothing to draw for failures"):
+        write_figures(content(happy), tmp_path, ["failures"])
+
+
+def test_the_command_draws_what_it_is_asked_for(tmp_path: Path) -> None:
+    app = typer.Typer()
+    app.command()(figures)
+    with RecordStore(tmp_path / "run") as store:
+        for one in results():
+            store.append(one)  # type: ignore[arg-type]
+    out = tmp_path / "figures"
+    asked = [str(tmp_path / "run"), "--out", str(out), "--which", "averages, failures"]
+    done = CliRunner().invoke(app, asked, catch_exceptions=False)
+    assert done.exit_code == 0
+    assert sorted(path.stem for path in out.iterdir()) == ["averages"] * 3 + ["failures"] * 3
+    assert str(out / "averages.pdf") in done.output
+    assert set(FIGURES) >= {"averages", "failures"}
+    assert Variant("explicit") in {variant for _, _, variant in content().samples}

@@ -1,0 +1,527 @@
+"""The page in a browser: everything that can be chosen is chosen."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+import shutil
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from roboirg.analysis.page.entries import Run
+from roboirg.analysis.page.serving import PageServer
+from roboirg.analysis.report import make_view, render, render_runs
+from roboirg.evaluation.course import Course, describe
+from roboirg.evaluation.plan import Plan
+from roboirg.evaluation.record import Attribution, EventRecord, Record
+from roboirg.evaluation.store import RecordStore
+from roboirg.evaluation.video import Film
+
+pytest.importorskip("jinja2")
+pytestmark = pytest.mark.browser
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+PAGE_SIZE = 40
+MOST_ELEMENTS = 4000
+PLAN = Plan(
+    policies=("listener", "forgetful"),
+    tasks=("PickXtimes", "VideoUnmask", "StopCube"),
+    episodes=(0, 1, 2),
+    forms=("implicit", "resolved"),
+)
+FILMED = "PickXtimes"
+TRACEBACK = "Traceback <script>alert(1)</script>"
+
+
+def records() -> list[Record]:
+    """The listener succeeds, the forgetful fails where it has to remember; one error."""
+    found = []
+    for index, job in enumerate(PLAN.jobs()):
+        told = describe(job, Course("success", cause=None), started_at="now")
+        subject = f"cube_{told.goal.get('colour', 'red')}"
+        events = [
+            EventRecord(step=-20, kind="still", subject="robot"),
+            EventRecord(step=-10, kind="over", subject=subject, place="target"),
+            EventRecord(step=40, kind="picked", subject=subject),
+            EventRecord(step=60, kind="picked", subject=subject, holds=False),
+        ]
+        course = Course("success", cause=None, steps=80, demonstration_steps=20, events=events)
+        if job.policy == "forgetful" and job.form == "implicit" and job.setting != "explicit":
+            course.outcome, course.cause = "failure", "picked up the wrong cube"
+        if index == len(PLAN.jobs()) - 1:
+            course = Course("error", error="policy", cause="policy: broke", details=TRACEBACK)
+        record = describe(job, course, started_at="2026-01-02T03:04:05+00:00")
+        wrong = Attribution(
+            kind="execution" if index % 4 == 0 else "grounding",
+            failure="dropped" if index % 4 == 0 else "wrong_object",
+            subject=subject, step=60, sentence="Picked up the wrong cube.",
+        )  # fmt: skip
+        update = {"attribution": wrong if record.outcome == "failure" else None}
+        if job.task == FILMED and job.episode == 0:
+            update["video"] = "videos/x.mp4"
+        found.append(record.model_copy(update=update))
+    return found
+
+
+class Blank:
+    """A world that gets brighter."""
+
+    def __init__(self) -> None:
+        self.taken = 0
+
+    def picture(self, camera: str) -> np.ndarray:
+        self.taken += 1
+        return np.full((256, 256, 3), self.taken % 256, np.uint8)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with records and one real film: 100 steps, every 8th of them, and the end."""
+    folder = tmp_path_factory.mktemp("run")
+    film = Film(folder / "videos" / "x.mp4")
+    film.caption = "Do it."
+    world = Blank()
+    for step in range(0, 101, 8):
+        film.shoot(world, is_demonstration=step < 20)  # type: ignore[arg-type]
+    assert film.finish()
+    with RecordStore(folder) as store:
+        for record in records():
+            store.append(record)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def page_file(run: Path) -> Path:
+    path = run / "report.html"
+    path.write_text(render(records(), run, PLAN.jobs(), name="a run"))
+    return path
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    reason = "no browser: pip install playwright, and a Chromium (Debian's package chromium)"
+    playwright = pytest.importorskip("playwright.sync_api", reason=reason)
+    path = next(filter(None, map(shutil.which, BROWSERS)), None)
+    with playwright.sync_playwright() as driver:
+        if path is None and not Path(driver.chromium.executable_path).exists():
+            pytest.skip(reason)
+        # Chromium refuses its sandbox to root, as whom containers run.
+        arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
+        chromium = driver.chromium.launch(executable_path=path, args=arguments)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def page(browser: Any, page_file: Path) -> Iterator[Any]:
+    yield from opened(browser, page_file.as_uri())
+
+
+def opened(browser: Any, address: str, **options: Any) -> Iterator[Any]:
+    """A page of which nothing may go wrong unnoticed, and which may ask nobody for anything."""
+    context = browser.new_context(viewport={"width": 1280, "height": 900}, **options)
+    page = context.new_page()
+    page.set_default_timeout(10_000)
+    wrong: list[str] = []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("console", lambda said: said.type in ("error", "warning") and wrong.append(said.text))
+    page.on("request", lambda asked: asked.url.startswith(("file:", "data:", "http://127.0.0.1"))
+            or wrong.append(asked.url))  # fmt: skip
+    page.goto(address)
+    yield page
+    context.close()
+    assert wrong == []
+
+
+def shown(page: Any) -> int:
+    return int(page.locator("#shown").inner_text().split(" of ")[0].replace(",", ""))
+
+
+def expected(**fields: object) -> int:
+    return sum(all(getattr(one, k) == v for k, v in fields.items()) for one in records())
+
+
+def first_row(page: Any, **filters: str) -> Any:
+    for name, value in filters.items():
+        page.select_option(f"#filters [name={name}]", value)
+    row = page.locator("#rows > li").first
+    row.locator("h3 button").click()
+    return row
+
+
+def focused(page: Any, what: str = "innerText") -> str:
+    return str(page.evaluate(f"document.activeElement.{what}"))
+
+
+def test_every_filter_filters(page: Any) -> None:
+    everything = len(records())
+    assert shown(page) == everything
+    for name, value, count in [
+        ("policy", "forgetful (privileged)", expected(policy="forgetful")),
+        ("task", "StopCube", expected(task="StopCube")),
+        ("task", "any counting", expected(task="StopCube") + expected(task="PickXtimes")),
+        ("setting", "direct", expected(setting="direct")),
+        ("form", "resolved", expected(form="resolved")),
+        ("difficulty", "medium", expected(difficulty="medium")),
+        ("outcome", "error", 1),
+        ("failure", "dropped", sum(
+            one.attribution is not None and one.attribution.failure == "dropped"
+            for one in records())),
+        ("failure", "policy", 1),
+    ]:  # fmt: skip
+        page.select_option(f"#filters [name={name}]", value)
+        assert shown(page) == count, (name, value)
+        assert 0 < count < everything
+        page.click("#filters button[type=reset]")
+        assert shown(page) == everything
+    page.select_option("#filters [name=policy]", "forgetful (privileged)")
+    page.select_option("#filters [name=form]", "resolved")
+    assert shown(page) == expected(policy="forgetful", form="resolved")
+
+
+def test_words_are_searched_in_utterances_and_causes(page: Any) -> None:
+    search = page.locator("[name=words]")
+    search.fill("WRONG  cube")
+    assert shown(page) == expected(outcome="failure")
+    search.fill("pick")
+    some = sum(
+        any("pick" in turn.text.lower() for turn in one.instruction)
+        or "pick" in f"{one.cause} {one.attribution and one.attribution.sentence}".lower()
+        for one in records()
+    )
+    assert shown(page) == some
+    search.fill("nobody says this")
+    assert shown(page) == 0
+    assert page.locator("#nothing").is_visible()
+
+
+def test_the_address_keeps_filters_pages_and_episodes(page: Any, page_file: Path) -> None:
+    page.select_option("#filters [name=task]", "VideoUnmask")
+    page.get_by_label("Next page").click()
+    assert "page=2" in page.url
+    address = page.url
+    page.goto("about:blank")
+    page.goto(address)
+    assert shown(page) == expected(task="VideoUnmask")
+    assert "page 2 of" in page.locator("#pager").inner_text()
+
+    row = first_row(page)
+    key = row.get_attribute("id").removeprefix("e-")
+    page.goto("about:blank")
+    page.goto(f"{page_file.as_uri()}#?task=StopCube&at={key}")
+    # Filters that would hide it are cleared.
+    assert shown(page) == len(records())
+    assert page.locator(f"#e-{key} .inside").is_visible()
+    assert focused(page, "closest('li').id") == f"e-{key}"
+
+
+def test_a_cell_tells_its_numbers_to_mouse_and_keyboard_and_shows_its_episodes(page: Any) -> None:
+    tip = page.locator("#tip")
+    cell = page.locator(".map").nth(1).locator("tr.all .cell").nth(1)
+    cell.hover()
+    assert "forgetful (privileged), all tasks, direct" in tip.inner_text()
+    assert "95 % interval" in tip.inner_text()
+    page.mouse.move(2, 2)
+    tip.wait_for(state="hidden")
+
+    first = page.locator(".cell").first
+    first.focus()
+    page.keyboard.press("ArrowRight")
+    tip.wait_for()
+    assert "listener (privileged), all tasks, direct" in tip.inner_text()
+    assert "points to explicit" in focused(page, "getAttribute('aria-label')")
+    page.keyboard.press("Escape")
+    assert tip.is_hidden()
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("ArrowDown")
+    assert "PickXtimes, direct" in tip.inner_text()
+    # One stop of the tab key for all cells of a map.
+    assert page.locator(".map").first.locator(".cell[tabindex='0']").count() == 1
+    page.keyboard.press("Enter")
+    assert shown(page) == 3
+    assert page.input_value("#filters [name=task]") == "PickXtimes"
+    assert page.input_value("#filters [name=form]") == "implicit"
+    assert focused(page, "id") == "episodes"
+
+
+def test_a_row_of_a_suite_shows_its_tasks(page: Any) -> None:
+    page.locator("tr.suite .cell").first.click()
+    assert page.input_value("#filters [name=task]") == "any counting"
+    assert shown(page) == 6
+
+
+def test_the_maps_follow_difficulty_and_measure(page: Any) -> None:
+    cell = page.locator(".map").nth(1).locator("tr.all .cell").nth(1)
+    assert cell.locator("b").inner_text() == "0"
+    assert cell.locator("small").inner_text() == "−100"
+    page.get_by_text("gap to explicit", exact=True).click()
+    assert cell.locator("b").inner_text() == "−100"
+    page.select_option("#level", label="easy")
+    easy = sum(
+        one.setting == "direct" and one.form == "implicit" and one.difficulty == "easy"
+        for one in records()
+        if one.policy == "forgetful"
+    )
+    cell.hover()
+    assert f"0 of {easy} trials" in page.locator("#tip").inner_text()
+    cell.click()
+    assert page.input_value("#filters [name=difficulty]") == "easy"
+
+
+def test_errors_are_marked_in_every_average_they_belong_to(page: Any) -> None:
+    marked = page.locator(".cell:has(i)")
+    rows = {text.split(";")[0] for text in marked.evaluate_all(
+        "all => all.map(one => one.getAttribute('aria-label'))")}  # fmt: skip
+    assert len(rows) >= 2
+    assert any("all tasks" in row for row in rows)
+    assert "ended in an error" in page.locator(".notices .warning").inner_text()
+
+
+def test_bars_show_their_episodes(page: Any) -> None:
+    bars = page.locator("#bars .map").nth(1)
+    bars.locator(".end.grounding").first.click()
+    assert page.input_value("#filters [name=failure]") in ("any grounding", "wrong_object")
+    assert page.input_value("#filters [name=policy]") == "forgetful (privileged)"
+    assert shown(page) > 0
+
+
+def test_an_expression_and_its_antecedent_light_up_together(page: Any) -> None:
+    row = first_row(page, task="PickXtimes", setting="contextual", form="implicit")
+    anaphor = row.locator("mark.anaphor").last
+    keys = anaphor.get_attribute("data-keys")
+    antecedent = row.locator(f"mark.antecedent[data-keys='{keys}']")
+    assert antecedent.get_attribute("data-number") == anaphor.get_attribute("data-number")
+    for act in (anaphor.hover, antecedent.focus, antecedent.hover, anaphor.focus):
+        act()
+        assert row.locator("mark.lit").count() == row.locator(f"mark[data-keys='{keys}']").count()
+        assert set(row.locator("mark.lit").evaluate_all("a => a.map(o => o.dataset.keys)")) == {
+            keys
+        }
+    assert "first named" in antecedent.get_attribute("aria-description")
+    page.locator("h1").hover()
+    page.locator("h1").evaluate("one => document.activeElement.blur()")
+    assert row.locator("mark.lit").count() == 0
+
+
+def test_an_episode_shows_its_forms_failure_and_company(page: Any) -> None:
+    row = first_row(page, policy="forgetful (privileged)", task="StopCube", setting="direct",
+                    form="implicit")  # fmt: skip
+    text = row.locator(".inside").inner_text()
+    for label in ("explicit", "resolved", "meant", "why it failed", "played", "under"):
+        assert re.search(rf"^{label}$", text, re.MULTILINE), label
+    assert "Picked up the wrong cube." in text
+    assert "stage never completed" in text or "stages never completed" in text
+    row.locator(".company .chip", has_text="explicit").first.click()
+    # It is hidden by the filters, so they are cleared.
+    assert shown(page) == len(records())
+    assert "explicit" in focused(page)
+
+
+def test_an_error_shows_its_traceback_as_text(page: Any) -> None:
+    row = first_row(page, outcome="error")
+    row.locator("summary").click()
+    assert row.locator("pre").inner_text() == TRACEBACK
+
+
+def test_rows_open_close_and_follow_the_arrow_keys(page: Any) -> None:
+    buttons = page.locator("#rows h3 button")
+    buttons.nth(0).focus()
+    page.keyboard.press("Enter")
+    assert buttons.nth(0).get_attribute("aria-expanded") == "true"
+    page.keyboard.press("Enter")
+    assert buttons.nth(0).get_attribute("aria-expanded") == "false"
+    assert page.locator("#rows .detail").count() == 0
+    page.keyboard.press("ArrowDown")
+    assert focused(page, "closest('li').id") == page.locator("#rows > li").nth(1).get_attribute(
+        "id"
+    )
+
+
+def check_seeking(page: Any) -> None:
+    row = first_row(page, policy="listener (privileged)", task=FILMED, setting="explicit")
+    row.locator(".moments button", has_text=": no longer").click()
+    page.wait_for_function("document.querySelector('video').currentTime > 0")
+    film = row.locator("video")
+    page.wait_for_function("!document.querySelector('video').seeking")
+    time, length = film.evaluate("one => [one.currentTime, one.duration]")
+    # The turn ends where the last picture begins to be repeated; step 60 is 20 steps before.
+    assert time == pytest.approx(length - 0.8 - 20 / 80, abs=0.06)
+    row.locator(".track button.done, .track button.event").first.click()
+    page.wait_for_function(f"document.querySelector('video').currentTime < {time} - 0.1")
+    assert row.locator(".head").is_visible()
+
+
+def test_choosing_an_event_seeks_in_the_film_inside(page: Any) -> None:
+    check_seeking(page)
+
+
+def test_choosing_an_event_seeks_in_the_film_that_is_served(browser: Any, run: Path) -> None:
+    with PageServer(run, lambda: make_view(run)) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        for page in opened(browser, server.address):
+            check_seeking(page)
+            assert page.locator("video").first.get_attribute("src") == "videos/x.mp4"
+        server.shutdown()
+        thread.join()
+
+
+def test_a_film_beside_the_page_plays_from_a_file(browser: Any, run: Path) -> None:
+    path = run / "linked.html"
+    path.write_text(render_runs([Run("a", records(), run)], embed=False))
+    for page in opened(browser, path.as_uri()):
+        check_seeking(page)
+
+
+def test_two_policies_are_compared_episode_by_episode(page: Any) -> None:
+    page.get_by_text("two policies", exact=True).click()
+    lost = expected(policy="forgetful", outcome="failure")
+    assert shown(page) == lost
+    assert page.locator("#filters [name=outcome]").is_hidden()
+    for change, count in [("left", lost), ("right", 0), ("neither", 0), ("error", 1)]:
+        page.select_option("#filters [name=change]", change)
+        assert shown(page) == count, change
+    page.select_option("#filters [name=left]", "forgetful (privileged)")
+    page.select_option("#filters [name=right]", "listener (privileged)")
+    page.select_option("#filters [name=change]", "right")
+    assert shown(page) == lost
+    page.locator(".counts tr", has_text="direct").first.locator(".count").first.click()
+    assert page.input_value("#filters [name=setting]") == "direct"
+    page.locator("#rows h3 button").first.click()
+    assert page.locator("#rows .inside section").count() == 2
+    page.locator("#pair-summary summary").click()
+    assert "listener (privileged) is better" in page.locator("#pair-summary").inner_text()
+    # And back.
+    page.goto(page.url.replace("view=pairs", "view="))
+    page.reload()
+    assert page.locator("#filters [name=outcome]").is_visible()
+
+
+def test_two_runs_are_compared(browser: Any, tmp_path: Path) -> None:
+    before = [one for one in records() if one.policy == "forgetful"]
+    after = [
+        one.model_copy(update={"outcome": "success", "cause": None, "attribution": None})
+        if one.outcome == "failure" and one.task == "StopCube"
+        else one
+        for one in before[:-4]
+    ]
+    path = tmp_path / "page.html"
+    path.write_text(render_runs([Run("before", before), Run("after", after)]))
+    gained = sum(one.outcome == "failure" and one.task == "StopCube" for one in before[:-4])
+    for page in opened(browser, f"{path.as_uri()}#?view=pairs"):
+        assert shown(page) == gained > 0
+        assert f"of {len(after)} pairs" in page.locator("#shown").inner_text()
+        page.select_option("#filters [name=change]", "right")
+        assert shown(page) == gained
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_it_fits_a_telephone_and_its_texts_can_be_read(
+    browser: Any, page_file: Path, scheme: str
+) -> None:
+    for page in opened(browser, page_file.as_uri(), color_scheme=scheme):
+        first_row(page, policy="forgetful (privileged)", setting="contextual", form="implicit")
+        assert page.evaluate(CONTRASTS) == []
+        page.set_viewport_size({"width": 400, "height": 800})
+        assert page.evaluate("document.documentElement.scrollWidth") == 400
+        page.get_by_text("two policies", exact=True).click()
+        page.locator("#rows h3 button").first.click()
+        assert page.evaluate("document.documentElement.scrollWidth") == 400
+        assert page.evaluate(CONTRASTS) == []
+
+
+def test_the_whole_page_is_reached_by_the_tab_key_and_shows_where_one_is(page: Any) -> None:
+    seen = set()
+    for _ in range(60):
+        page.keyboard.press("Tab")
+        seen.add(focused(page, "closest('section,header,form,body').id"))
+        outline = page.evaluate(
+            "(() => { const one = document.activeElement; const at = one.type === 'radio' "
+            "? one.nextElementSibling : one; return getComputedStyle(at).outlineWidth; })()"
+        )
+        assert outline == "3px", focused(page, "outerHTML")
+    assert {"overview", "failures", "episodes", "filters", "map-controls"} <= seen
+
+
+def test_landmarks_headings_and_names(page: Any) -> None:
+    assert page.locator("main").count() == page.locator("h1").count() == 1
+    levels = page.locator("h1,h2,h3,h4").evaluate_all("all => all.map(one => +one.tagName[1])")
+    assert all(after <= before + 1 for before, after in itertools.pairwise(levels))
+    unnamed = page.evaluate(
+        "[...document.querySelectorAll('button,select,input')].filter(one => !(one.innerText || "
+        "one.ariaLabel || one.labels?.length)).map(one => one.outerHTML)"
+    )
+    assert unnamed == []
+    identities = page.evaluate("[...document.querySelectorAll('[id]')].map(one => one.id)")
+    assert len(set(identities)) == len(identities)
+
+
+def test_ten_thousand_episodes_cost_no_more_than_a_page_of_them(
+    browser: Any, tmp_path: Path
+) -> None:
+    # By the page's own counters: how much is drawn, not how long it takes on this machine.
+    some = [one.model_copy(update={"video": None}) for one in records()]
+    many = [
+        one.model_copy(update={"policy_seed": seed})
+        for seed in range(-(-10_000 // len(some)))
+        for one in some
+    ][:10_000]
+    path = tmp_path / "many.html"
+    path.write_text(render(many))
+    for page in opened(browser, path.as_uri()):
+        assert shown(page) == 10_000
+        elements = "document.querySelectorAll('*').length"
+        assert page.evaluate(elements) < MOST_ELEMENTS
+        for words in ("cube", "nobody says this", ""):
+            page.fill("[name=words]", words)
+            counters = page.evaluate("roboirg.counters")
+            assert counters["scanned"] == 10_000
+            assert counters["drawn"] <= PAGE_SIZE
+            assert page.evaluate(elements) < MOST_ELEMENTS
+        page.get_by_label("Last page").click()
+        assert "page 250 of 250" in page.locator("#pager").inner_text()
+        page.get_by_text("two policies", exact=True).click()
+        assert page.evaluate("roboirg.counters.drawn") <= PAGE_SIZE
+
+
+CONTRASTS = """(() => {
+  const canvas = document.createElement("canvas").getContext("2d", { willReadFrequently: true });
+  const rgba = (colour) => {
+    canvas.clearRect(0, 0, 1, 1);
+    canvas.fillStyle = colour;
+    canvas.fillRect(0, 0, 1, 1);
+    const [r, g, b, a] = canvas.getImageData(0, 0, 1, 1).data;
+    return [r, g, b, a / 255];
+  };
+  const over = ([r, g, b, a], below) => [r, g, b].map((one, at) => one * a + below[at] * (1 - a));
+  const ground = (one) => {
+    if (!one) return rgba(getComputedStyle(document.body).backgroundColor).slice(0, 3);
+    const own = rgba(getComputedStyle(one).backgroundColor);
+    return own[3] === 1 ? own.slice(0, 3) : over(own, ground(one.parentElement));
+  };
+  const light = (rgb) => {
+    const [r, g, b] = rgb.map((one) => one / 255)
+      .map((one) => (one <= 0.04045 ? one / 12.92 : ((one + 0.055) / 1.055) ** 2.4));
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  };
+  const poor = new Set();
+  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (walker.nextNode()) {
+    const one = walker.currentNode.parentElement;
+    const isSeen = walker.currentNode.data.trim() && one.checkVisibility()
+      && !one.closest("script,style,option,.unseen,.skip,[aria-disabled]");
+    if (!isSeen) continue;
+    const below = ground(one);
+    const [a, b] = [over(rgba(getComputedStyle(one).color), below), below].map(light);
+    const ratio = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+    if (ratio < 4.5) poor.add(`${one.tagName}.${one.className} ${ratio.toFixed(2)}`);
+  }
+  return [...poor];
+})()"""
+"""Texts whose contrast is below what WCAG's level AA asks of small ones."""

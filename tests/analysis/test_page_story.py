@@ -1,0 +1,96 @@
+"""A run of the listener and the forgetful policy tells the story it should, all the way."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from roboirg.analysis.chance import chance_of
+from roboirg.analysis.comparison import compare
+from roboirg.analysis.figures import Content, write_figures
+from roboirg.analysis.report import write_report
+from roboirg.analysis.statistics import Variant
+from roboirg.analysis.summary import ALL
+from roboirg.evaluation.executors import choose_executor
+from roboirg.evaluation.plan import make_plan
+from roboirg.evaluation.record import Record
+from roboirg.evaluation.rollout import Player
+from roboirg.evaluation.runner import run_plan
+from roboirg.evaluation.store import read_records
+
+pytestmark = pytest.mark.sim
+
+PLAN = make_plan(
+    ("listener", "forgetful"),
+    tasks="SwingXtimes,ButtonUnmask,VideoRepick",
+    forms="implicit,resolved",
+    episodes="3",
+)
+"""A task of each suite, told in all its ways."""
+MOST_DEVIATIONS = 4
+"""Standard deviations between what came of guessing and what is expected."""
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("story")
+    summary = run_plan(PLAN, folder, Player(folder), choose_executor(None))
+    assert not summary.errors
+    assert not summary.missing
+    return folder
+
+
+def of(run: Path, policy: str) -> list[Record]:
+    return [record for record in read_records(run) if record.policy == policy]
+
+
+def test_the_listener_always_succeeds(run: Path) -> None:
+    assert {record.outcome for record in of(run, "listener")} == {"success"}
+
+
+def test_the_forgetful_policy_succeeds_where_nothing_has_to_be_remembered(run: Path) -> None:
+    spelled = [
+        record
+        for record in of(run, "forgetful")
+        if record.setting == "explicit" or record.form == "resolved"
+    ]
+    assert {record.outcome for record in spelled} == {"success"}
+
+
+def test_elsewhere_it_guesses_and_every_miss_is_one_of_grounding(run: Path) -> None:
+    guessed = [
+        record
+        for record in of(run, "forgetful")
+        if record.setting != "explicit" and record.form == "implicit"
+    ]
+    chances = [float(chance_of(record.identity)) for record in guessed]
+    won = sum(record.outcome == "success" for record in guessed)
+    deviation = math.sqrt(sum(chance * (1 - chance) for chance in chances))
+    assert abs(won - sum(chances)) < MOST_DEVIATIONS * deviation
+    assert 0 < won < len(guessed)
+    kinds = {record.attribution and record.attribution.kind for record in guessed}
+    assert kinds == {None, "grounding"}
+
+
+def test_the_whole_report_follows(run: Path, tmp_path: Path) -> None:
+    content = Content.of([("story", read_records(run))], PLAN.jobs())
+    listener, forgetful = content.names
+    assert (listener.policy, forgetful.policy) == ("listener", "forgetful")
+    told = content.summaries[forgetful, ALL, Variant("direct")]
+    assert told.form_gap is not None
+    assert told.form_gap.value < -0.3
+    assert told.form_gap.overlap.only_first == told.form_gap.overlap.neither == 0
+    found = compare(
+        *({key: one for key, one in content.samples.items() if key[0] == who}
+          for who in (listener, forgetful)),
+        np.random.default_rng(0),
+    )  # fmt: skip
+    verdicts = {finding.where.variant: finding.gap.value for finding in found.averages}
+    assert verdicts[Variant("explicit")] == verdicts[Variant("direct", "resolved")] == 0
+    assert verdicts[Variant("direct")] > 0
+    paths = write_figures(content, tmp_path)
+    assert {path.stem for path in paths} == {"averages", "forms", "expressions", "failures"}
+    assert "ended in an error (" not in write_report(run, planned=PLAN.jobs()).read_text()
