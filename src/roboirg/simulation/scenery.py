@@ -26,6 +26,8 @@ QUARTER_TURN = (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
 FLOOR_WIDTH = 100.0
 FLOOR_CELLS = 100
 """Squares per side; with fewer, single wrist pixels would differ by one level."""
+LIGHT_FLOOR_STEP = 20
+"""So many squares are one in length and width where pictures may differ a little."""
 FLOOR_PIECES = (
     ((40, 60), (40, 60)),
     ((40, 60), (0, 40)),
@@ -45,7 +47,8 @@ def add_scenery(scene: sapien.Scene, *, visible: bool, rendering: Rendering = FA
     """Add the table, whose top is at z = 0, and the floor under it."""
     _add_table(scene, visible=visible, rendering=rendering)
     pieces = WHOLE_FLOOR if rendering.meshes == "stock" else FLOOR_PIECES
-    _add_floor(scene, pieces if visible else ())
+    step = LIGHT_FLOOR_STEP if rendering.meshes == "light" else 1
+    _add_floor(scene, pieces if visible else (), step)
 
 
 def _add_table(scene: sapien.Scene, *, visible: bool, rendering: Rendering) -> None:
@@ -67,7 +70,7 @@ def _add_table(scene: sapien.Scene, *, visible: bool, rendering: Rendering) -> N
         table.add_component(component)
 
 
-def _add_floor(scene: sapien.Scene, pieces: Sequence[tuple[Range, Range]]) -> None:
+def _add_floor(scene: sapien.Scene, pieces: Sequence[tuple[Range, Range]], step: int) -> None:
     builder = ActorBuilder()
     builder.set_scene(scene)
     builder.add_plane_collision(sapien.Pose([0.0, 0.0, -TABLE_HEIGHT], PLANE_UP))
@@ -75,19 +78,23 @@ def _add_floor(scene: sapien.Scene, pieces: Sequence[tuple[Range, Range]]) -> No
     floor = builder.build(name="floor")
     for along_x, along_y in pieces:
         component = sapien.render.RenderBodyComponent()
-        component.attach(_floor_piece(along_x, along_y).clone())
+        component.attach(_floor_piece(along_x, along_y, step).clone())
         floor.add_component(component)
 
 
 @functools.cache
-def _floor_piece(along_x: Range, along_y: Range) -> sapien.render.RenderShapeTriangleMesh:
+def _floor_piece(
+    along_x: Range, along_y: Range, step: int
+) -> sapien.render.RenderShapeTriangleMesh:
     """Squares of the floor, from and to along x and y, as triangles with the grid texture."""
     ticks = np.linspace(-FLOOR_WIDTH / 2, FLOOR_WIDTH / 2, FLOOR_CELLS + 1)
-    columns, rows = along_x[1] - along_x[0], along_y[1] - along_y[0]
+    columns, rows = ((along[1] - along[0]) // step for along in (along_x, along_y))
     x, y = (
         axis.ravel()
         for axis in np.meshgrid(
-            ticks[along_x[0] : along_x[1] + 1], ticks[along_y[0] : along_y[1] + 1], indexing="ij"
+            ticks[along_x[0] : along_x[1] + 1 : step],
+            ticks[along_y[0] : along_y[1] + 1 : step],
+            indexing="ij",
         )
     )
     vertices = np.stack([x, y, np.full_like(x, -TABLE_HEIGHT)], axis=1)
