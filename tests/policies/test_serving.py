@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from contextlib import contextmanager
 from typing import ClassVar
 
@@ -252,27 +251,3 @@ def test_the_command_serves_until_it_is_stopped(number, code):
         process.kill()
         process.wait()
         process.stdout.close()
-
-
-STEP_COST = 0.022
-"""Seconds of a control step in which both cameras draw a moving robot, measured on two cores."""
-
-
-def test_a_remote_policy_costs_a_tenth_of_the_steps_at_most():
-    episode = [moment(n, size=256) for n in range(17)]
-    demonstration = video(0, size=256)
-
-    def steps_per_second(policy, chunks=6):
-        policy.reset(INSTRUCTION, demonstration)
-        start = time.perf_counter()
-        for number in range(chunks):
-            history = tuple(episode[1:]) if number else ()
-            policy.act({**episode[-1 if number else 0], "history": history})
-            time.sleep(16 * STEP_COST)
-        return 16 * chunks / (time.perf_counter() - start)
-
-    with served(HERE, "mme-vla") as url:
-        client = make_policy(url, 0)
-        remote = steps_per_second(client)
-        client.close()
-    assert remote >= 0.9 * steps_per_second(Recorder())

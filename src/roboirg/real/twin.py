@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-import roboirg
-from roboirg.actions import ARM_JOINTS
+from roboirg.actions import ARM_JOINTS, JOINT_ANGLE
 from roboirg.evaluation.course import Course
 from roboirg.evaluation.record import Job
+from roboirg.evaluation.rollout import Needs, make_env
 from roboirg.real.clock import Clock, VirtualClock
 from roboirg.real.robot import CAMERA_RATE, COMMAND_RATE, Command, Sensed
 
@@ -55,20 +55,7 @@ class Twin:
     def prepare(self, job: Job, cameras: Sequence[str]) -> None:
         """Build the scene of the trial."""
         self.cameras = tuple(cameras)
-        env = roboirg.make(
-            job.task,
-            setting=job.setting,
-            form=job.form,
-            split=job.split,
-            episode=job.episode,
-            stages=job.stages,
-            distractor=job.distractor,
-            distractors=job.distractors,
-            frame=job.frame,
-            cameras=(),
-            meshes=job.meshes,
-            max_steps=job.max_steps,
-        )
+        env = make_env(job, Needs((), JOINT_ANGLE))
         if cameras:
             # Pictures are to be had, but only those that are read are drawn.
             env.set_frame_hook(_look_away, every=_NEVER)

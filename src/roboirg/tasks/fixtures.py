@@ -68,7 +68,7 @@ def draw_cube(
         yaw = 2.0 * math.pi * rng.random()
         return SceneObject(name, "cube", Point(x, y, geometry.CUBE_HALF), yaw, colour)
 
-    return _placed(name, draw, lambda cube: cube_footprint(cube).grown(gap), obstacles)
+    return placed(name, draw, lambda cube: cube_footprint(cube).grown(gap), obstacles)
 
 
 def draw_coloured_cubes(
@@ -116,7 +116,7 @@ def draw_target(
     def clearance(target: SceneObject) -> Circle:
         return Circle(target.position.x, target.position.y, radius + gap)
 
-    return _placed(name, draw, clearance, obstacles)
+    return placed(name, draw, clearance, obstacles)
 
 
 def marker_over(target: SceneObject, name: str) -> SceneObject:
@@ -140,7 +140,7 @@ def draw_bin(
         yaw = (2.0 * rng.random() - 1.0) * BIN_YAW
         return SceneObject(name, "bin", Point(x, y, geometry.BIN_HEIGHT / 2), yaw)
 
-    return _placed(name, draw, bin_footprint, obstacles)
+    return placed(name, draw, bin_footprint, obstacles)
 
 
 def bin_footprint(item: SceneObject) -> Rectangle:
@@ -149,12 +149,17 @@ def bin_footprint(item: SceneObject) -> Rectangle:
     return Rectangle(item.position.x, item.position.y, half, half, item.yaw)
 
 
-def _placed(
+def placed(
     name: str,
     draw: Callable[[], SceneObject],
     clearance: Callable[[SceneObject], Footprint],
     obstacles: Sequence[Footprint],
 ) -> SceneObject:
+    """An object where its clearance is free of obstacles.
+
+    Raises:
+        SceneRejectedError: no free place was found.
+    """
     item = place(draw, clearance, obstacles)
     if item is None:
         raise SceneRejectedError(f"no place for {name}")

@@ -14,10 +14,10 @@ from typing import Literal
 import numpy as np
 
 from roboirg.episode import Colour, ObjectKind, Scene, SceneObject
-from roboirg.errors import SceneRejectedError
 from roboirg.motions import Point
 from roboirg.tasks import geometry
-from roboirg.tasks.placement import Circle, Footprint, Rectangle, Region, place
+from roboirg.tasks.fixtures import placed
+from roboirg.tasks.placement import Circle, Footprint, Rectangle, Region
 
 BOX_YAW = math.radians(15.0)
 """A box is turned by at most so much to either side."""
@@ -84,7 +84,4 @@ def draw_tape(
     def clearance(tape: SceneObject) -> Circle:
         return Circle(tape.position.x, tape.position.y, geometry.TAPE_RADIUS + gap)
 
-    tape = place(draw, clearance, obstacles)
-    if tape is None:
-        raise SceneRejectedError(f"no place for {name}")
-    return tape
+    return placed(name, draw, clearance, obstacles)
