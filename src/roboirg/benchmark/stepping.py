@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import gc
+import statistics
 import time
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
 
 from roboirg.benchmark.workloads import STEPS, Workload
 from roboirg.observations import CAMERAS
 from roboirg.simulation.rendering import FAITHFUL, STOCK, Rendering
+
+Action = NDArray[np.float64]
 
 CHUNK = 16
 """Control steps per picture pair of a policy that acts in chunks."""
@@ -27,51 +35,61 @@ def stock(workload: Workload) -> float:
     session = workload.begun(rendering=STOCK)
     cameras = session.world.cameras
     cameras.pictures(CAMERAS)
-    start = time.perf_counter()
-    for action in workload.actions:
+
+    def step(action: Action) -> None:
         session.step(action)
         cameras.pictures(CAMERAS)
         for camera in CAMERAS:
             cameras.segmentation(camera)
-    return (time.perf_counter() - start) / STEPS
+
+    return _median(workload, step)
 
 
 def floor(workload: Workload) -> float:
     """Physics and the pictures of what is visible, without rules, words or observations."""
     world = workload.begun().world
     world.cameras.pictures(CAMERAS)
-    start = time.perf_counter()
-    for action in workload.actions:
+
+    def step(action: Action) -> None:
         world.advance(action)
         world.cameras.pictures(CAMERAS)
-    return (time.perf_counter() - start) / STEPS
+
+    return _median(workload, step)
 
 
 def without_pictures(workload: Workload) -> float:
     """Physics and rules."""
-    session = workload.begun(visible=False)
-    start = time.perf_counter()
-    for action in workload.actions:
-        session.step(action)
-    return (time.perf_counter() - start) / STEPS
+    return _median(workload, workload.begun(visible=False).step, CHUNK)
 
 
 def physics(workload: Workload) -> float:
     """Physics alone."""
-    world = workload.begun(visible=False).world
-    start = time.perf_counter()
-    for action in workload.actions:
-        world.advance(action)
-    return (time.perf_counter() - start) / STEPS
+    return _median(workload, workload.begun(visible=False).world.advance, CHUNK)
 
 
 def _with_pictures(workload: Workload, rendering: Rendering, every: int) -> float:
     session = workload.begun(rendering=rendering)
     cameras = session.world.cameras
     cameras.pictures(CAMERAS)
-    start = time.perf_counter()
-    for number, action in enumerate(workload.actions, start=1):
+    count = 0
+
+    def step(action: Action) -> None:
+        nonlocal count
         session.step(action)
-        if number % every == 0:
+        count += 1
+        if count % every == 0:
             cameras.pictures(CAMERAS)
-    return (time.perf_counter() - start) / STEPS
+
+    return _median(workload, step, every)
+
+
+def _median(workload: Workload, step: Callable[[Action], object], together: int = 1) -> float:
+    """Seconds per step: the median over so many steps together, which a hiccup does not move."""
+    gc.collect()  # what an earlier measurement left behind
+    durations = []
+    for first in range(0, STEPS, together):
+        start = time.perf_counter()
+        for action in workload.actions[first : first + together]:
+            step(action)
+        durations.append((time.perf_counter() - start) / together)
+    return statistics.median(durations)

@@ -26,10 +26,12 @@ QUARTER_TURN = (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
 FLOOR_WIDTH = 100.0
 FLOOR_CELLS = 100
 """Squares per side; with fewer, single wrist pixels would differ by one level."""
-LIGHT_FLOOR_STEP = 20
-"""So many squares are one in length and width where pictures may differ a little."""
+FAR_FLOOR_STEP = 20
+"""So many squares are one in length and width far from the table, where no pixel differs, and where
+pictures may differ a little."""
+NEAR_FLOOR = ((40, 60), (40, 60))
 FLOOR_PIECES = (
-    ((40, 60), (40, 60)),
+    NEAR_FLOOR,
     ((40, 60), (0, 40)),
     ((40, 60), (60, 100)),
     ((0, 40), (0, 100)),
@@ -47,8 +49,7 @@ def add_scenery(scene: sapien.Scene, *, visible: bool, rendering: Rendering = FA
     """Add the table, whose top is at z = 0, and the floor under it."""
     _add_table(scene, visible=visible, rendering=rendering)
     pieces = WHOLE_FLOOR if rendering.meshes == "stock" else FLOOR_PIECES
-    step = LIGHT_FLOOR_STEP if rendering.meshes == "light" else 1
-    _add_floor(scene, pieces if visible else (), step)
+    _add_floor(scene, pieces if visible else (), rendering)
 
 
 def _add_table(scene: sapien.Scene, *, visible: bool, rendering: Rendering) -> None:
@@ -70,13 +71,17 @@ def _add_table(scene: sapien.Scene, *, visible: bool, rendering: Rendering) -> N
         table.add_component(component)
 
 
-def _add_floor(scene: sapien.Scene, pieces: Sequence[tuple[Range, Range]], step: int) -> None:
+def _add_floor(
+    scene: sapien.Scene, pieces: Sequence[tuple[Range, Range]], rendering: Rendering
+) -> None:
     builder = ActorBuilder()
     builder.set_scene(scene)
     builder.add_plane_collision(sapien.Pose([0.0, 0.0, -TABLE_HEIGHT], PLANE_UP))
     builder.set_physx_body_type("static")
     floor = builder.build(name="floor")
     for along_x, along_y in pieces:
+        near = (along_x, along_y) == NEAR_FLOOR and rendering.meshes != "light"
+        step = 1 if near or rendering.meshes == "stock" else FAR_FLOOR_STEP
         component = sapien.render.RenderBodyComponent()
         component.attach(_floor_piece(along_x, along_y, step).clone())
         floor.add_component(component)
