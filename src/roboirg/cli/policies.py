@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from pathlib import Path
 from types import FrameType
 from typing import Annotated
 
 import typer
 
+from roboirg.cli.imports import see_working_directory
 from roboirg.errors import InvalidValueError
 
 FAILED = 2
@@ -36,7 +36,7 @@ def serve(
     """Serve a policy to this benchmark and to any other client of the protocol."""
     from roboirg.policies.serving import open_server
 
-    _see_working_directory()
+    see_working_directory()
     key = None if api_key_env is None else os.environ.get(api_key_env)
     if api_key_env is not None and not key:
         raise InvalidValueError(f"The environment variable {api_key_env} holds no key.")
@@ -59,16 +59,11 @@ def check_policy(
     from roboirg.policies.checking import FAIL, print_findings
     from roboirg.policies.checking import check_policy as check
 
-    _see_working_directory()
+    see_working_directory()
     findings = check(policy, seed=seed)
     print_findings(findings, Console())
     if any(finding.verdict == FAIL for finding in findings):
         raise typer.Exit(FAILED)
-
-
-def _see_working_directory() -> None:
-    """As `python -m` has it: policies in the working directory can be named."""
-    sys.path.insert(0, str(Path.cwd()))
 
 
 def _stop(number: int, frame: FrameType | None) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from roboirg.cli import plan_options as options
+from roboirg.cli.imports import see_working_directory
 from roboirg.cli.options import Workers
 from roboirg.errors import InvalidValueError, UnknownNameError
 
@@ -97,8 +98,7 @@ def run(
         retry_on=retry_on,
     )
     folder = folder_of(out)
-    # As `python -m` has it: policies in the working directory can be named.
-    sys.path.insert(0, str(Path.cwd()))
+    see_working_directory()
     made = _plan(plan, typed)
     if dry_run:
         _print_estimate(made, folder, workers)
