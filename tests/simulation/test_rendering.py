@@ -16,7 +16,7 @@ from roboirg.simulation import bodies, culling, meshes, settings, shaders
 from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.device import render_system
 from roboirg.simulation.rendering import FAITHFUL, LIGHT, STOCK, Rendering
-from roboirg.simulation.robot import CAMERA_LINK, Robot
+from roboirg.simulation.robot import BASE_LINK, CAMERA_LINK, FINGERS, Robot
 from roboirg.simulation.scenery import add_scenery
 from roboirg.splits import get_episode
 from roboirg.tasks import all_tasks
@@ -46,8 +46,7 @@ class Stage:
         add_scenery(self.scene, visible=True, rendering=rendering)
         self.bodies = [bodies.build(self.scene, item, visible=True) for item in scene.objects]
         settings.add_lights(self.scene)
-        mount = self.robot.links[CAMERA_LINK].entity
-        self.cameras = Cameras(self.scene, mount, rendering)
+        self.cameras = Cameras(self.scene, self.robot, rendering)
 
     def show(self, moment):
         """Pictures and segmentations, (2, 256, 256, 3) and (2, 256, 256), of a moment."""
@@ -138,6 +137,27 @@ def test_each_camera_keeps_its_record_of_what_it_draws(monkeypatch):
             patch.setattr(culling, "keeps_records", lambda: False)
             for ours, theirs in zip(slow.show(moment), wanted, strict=True):
                 assert np.array_equal(ours, theirs)
+
+
+def test_cameras_leave_out_what_they_cannot_see(monkeypatch):
+    triangles = {camera: {} for camera in CAMERAS}
+    take = culling.Bodies.take
+
+    def noted(self, camera, visible):
+        for body, seen in zip(self._bodies, visible, strict=True):
+            if seen and body.entity.name in meshed:
+                count = sum(len(part.triangles) for it in body.render_shapes for part in it.parts)
+                triangles[camera.name][body.entity.name] = count
+        take(self, camera, visible)
+
+    monkeypatch.setattr(culling.Bodies, "take", noted)
+    stage = Stage(get_episode("PickXtimes", "test", 2).scene, FAITHFUL)
+    meshed = {body.entity.name for body in stage.robot.skins}
+    for moment in moments("PickXtimes", 2):
+        stage.show(moment)
+    assert {BASE_LINK, *FINGERS} <= set(triangles["wrist"])
+    assert not {"panda_hand", CAMERA_LINK} & set(triangles["wrist"])
+    assert triangles["front"][BASE_LINK] < 0.1 * triangles["wrist"][BASE_LINK]
 
 
 def test_an_unknown_shader_is_used_as_it_is(monkeypatch, caplog):

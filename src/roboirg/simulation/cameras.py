@@ -6,7 +6,6 @@ Drawing is most of the cost of a step on a CPU, so only what a camera can see is
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -18,16 +17,20 @@ import sapien
 import sapien.render
 from numpy.typing import NDArray
 
-from roboirg.simulation.culling import FAR, NEAR, Bodies
+from roboirg.observations import CAMERAS
+from roboirg.simulation.culling import Bodies
 from roboirg.simulation.rendering import FAITHFUL, Rendering
+from roboirg.simulation.robot import CAMERA_LINK, Robot
 from roboirg.simulation.shaders import COLOUR, STOCK_COLOUR, slim_shader, stand_in_table
-
-SIZE = 256
-"""Width and height of a picture, pixels."""
-FIELD_OF_VIEW = math.pi / 2
-
-FRONT_EYE = (0.3, 0.0, 0.4)
-FRONT_TARGET = (0.0, 0.0, -0.2)
+from roboirg.simulation.viewpoint import (
+    FAR,
+    FIELD_OF_VIEW,
+    FRONT_EYE,
+    FRONT_TARGET,
+    NEAR,
+    SIZE,
+    look_at,
+)
 
 GEOMETRY = "PositionSegmentation"
 """What the shaders write besides the colours: x, y, z in mm in the camera's frame (x right, y up,
@@ -49,26 +52,24 @@ class Cameras:
 
     Args:
         scene: with all its bodies built.
-        mount: the link that carries the wrist camera.
+        robot: carries the wrist camera.
         rendering: how pictures are made.
     """
 
-    def __init__(
-        self, scene: sapien.Scene, mount: sapien.Entity, rendering: Rendering = FAITHFUL
-    ) -> None:
+    def __init__(self, scene: sapien.Scene, robot: Robot, rendering: Rendering = FAITHFUL) -> None:
         self._scene = scene
         shader = slim_shader() if rendering.slim_shader else None
         fixed = sapien.Entity()
         fixed.name = "front_camera"
         self._colour = STOCK_COLOUR if shader is None else COLOUR
-        self._components = {name: _component(name, shader or "") for name in ("front", "wrist")}
+        self._components = {name: _component(name, shader or "") for name in CAMERAS}
         fixed.add_component(self._components["front"])
         fixed.set_pose(look_at(FRONT_EYE, FRONT_TARGET))
         scene.add_entity(fixed)
-        mount.add_component(self._components["wrist"])
+        robot.links[CAMERA_LINK].entity.add_component(self._components["wrist"])
         for component in self._components.values() if rendering.quick_start else ():
             component.set_texture("BRDFLUT", stand_in_table())
-        self._bodies = Bodies(scene)
+        self._bodies = Bodies(scene, robot.skins)
         self._culling = rendering.culling
         self._last: dict[str, _Drawn] = {}
         self._looks_back = False
@@ -118,11 +119,11 @@ class Cameras:
             known = self._last.get(camera)
             if known is None or known.state != state:
                 self._last[camera] = _Drawn(state)
-                due.append((self._components[camera], view))
+                due.append((camera, view))
         if due:
             self._scene.update_render()
-        for component, view in due:
-            self._draw(component, poses, view)
+        for camera, view in due:
+            self._draw(camera, poses, view)
 
     @contextmanager
     def looking_back(self) -> Iterator[None]:
@@ -133,14 +134,10 @@ class Cameras:
         finally:
             self._looks_back = False
 
-    def _draw(
-        self,
-        component: sapien.render.RenderCameraComponent,
-        poses: NDArray[np.float64],
-        view: NDArray[np.float64],
-    ) -> None:
+    def _draw(self, camera: str, poses: NDArray[np.float64], view: NDArray[np.float64]) -> None:
+        component = self._components[camera]
         if self._culling:
-            self._bodies.take(component, self._bodies.visible(poses, view))
+            self._bodies.take(component, self._bodies.visible(camera, poses, view))
         else:
             component.take_picture()
 
@@ -154,18 +151,6 @@ class Cameras:
         if what not in fetched:
             fetched[what] = np.asarray(self._components[camera].get_picture(what))
         return fetched[what]
-
-
-def look_at(eye: tuple[float, float, float], target: tuple[float, float, float]) -> sapien.Pose:
-    """Pose of a camera (x forward, z up, as SAPIEN has it) that looks at a target."""
-    forward = np.subtract(target, eye)
-    forward /= np.linalg.norm(forward)
-    left = np.cross([0.0, 0.0, 1.0], forward)
-    left /= np.linalg.norm(left)
-    matrix = np.eye(4)
-    matrix[:3, :3] = np.stack([forward, left, np.cross(forward, left)], axis=1)
-    matrix[:3, 3] = eye
-    return sapien.Pose(matrix)
 
 
 def _component(name: str, shader: str) -> sapien.render.RenderCameraComponent:

@@ -1,4 +1,4 @@
-"""Which bodies a camera draws: only those whose boxes reach into its view.
+"""Which bodies a camera draws: only those whose outlines reach into its view.
 
 Without shadows that cannot change a pixel. SAPIEN records what a camera draws once, and again only
 when the scene has changed since; bodies whose shading mode it does not know are left out of the
@@ -10,21 +10,41 @@ record of its own bodies until they become others. Where SAPIEN does not behave 
 from __future__ import annotations
 
 import functools
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import sapien
 import sapien.render
 from numpy.typing import NDArray
 
+from roboirg.observations import CAMERAS
 from roboirg.simulation.device import render_system
 from roboirg.simulation.shaders import COLOUR, STOCK_COLOUR, slim_shader, stand_in_table
+from roboirg.simulation.viewpoint import NEAR
 
 MARGIN = 0.002
 """Metres by which boxes are grown before the test."""
-NEAR, FAR = 0.01, 100.0
+OUTLINE_MARGIN = 1e-4
+"""Metres by which outlines are; the renderer's numbers are good for 1/100 of that. The hand is ten
+times as far outside the wrist camera's view."""
 
 _DRAWN, _LEFT_OUT = 0, 99
 """Shading modes; the latter is unknown to SAPIEN."""
+
+
+@dataclass(frozen=True)
+class Skin:
+    """What is known of a body that can be drawn.
+
+    Attributes:
+        outline: points (n, 3) in the frame of its entity, m, between which all of it lies.
+        cameras: that draw it if they see it.
+    """
+
+    outline: NDArray[np.float64]
+    cameras: Collection[str] = CAMERAS
 
 
 class Bodies:
@@ -32,16 +52,30 @@ class Bodies:
 
     Args:
         scene: with all its bodies built.
+        skins: of some of them; of the others the boxes are enough.
     """
 
-    def __init__(self, scene: sapien.Scene) -> None:
+    def __init__(
+        self, scene: sapien.Scene, skins: Mapping[sapien.render.RenderBodyComponent, Skin]
+    ) -> None:
         self._bodies = [
             component
             for entity in scene.entities
             for component in entity.components
             if isinstance(component, sapien.render.RenderBodyComponent)
         ]
-        self._boxes = np.stack([_local_corners(body) for body in self._bodies])
+        known = [skins.get(body) for body in self._bodies]
+        self._outlines = [None if skin is None else skin.outline for skin in known]
+        self._boxes = np.stack(
+            [
+                _box(_points(body) if outline is None else outline)
+                for body, outline in zip(self._bodies, self._outlines, strict=True)
+            ]
+        )
+        self._drawn_by = {
+            camera: np.array([skin is None or camera in skin.cameras for skin in known])
+            for camera in CAMERAS
+        }
         self._set = np.ones(len(self._bodies), dtype=bool)
         self._recorded: dict[sapien.render.RenderCameraComponent, NDArray[np.bool_]] = {}
 
@@ -49,25 +83,25 @@ class Bodies:
         """Where the bodies are now, (n, 4, 4)."""
         return np.stack([body.entity.pose.to_transformation_matrix() for body in self._bodies])
 
-    def visible(self, poses: NDArray[np.float64], view: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """For each body whether its box reaches into a camera's view.
+    def visible(
+        self, camera: str, poses: NDArray[np.float64], view: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
+        """For each body whether a camera is to draw it.
 
         Args:
+            camera: its name.
             poses: of the bodies.
             view: extrinsic matrix of the camera (3, 4).
         """
-        world = np.einsum("bij,bkj->bki", poses, self._boxes)
-        # OpenCV axes: x right, y down, z forward; the half view is 45 degrees, so the sides of
-        # the view are the planes |x| = z and |y| = z.
-        x, y, z = np.moveaxis(world @ view.T, -1, 0)[:3]
-        outside = (
-            (z < NEAR).all(axis=1)
-            | (x > z).all(axis=1)
-            | (-x > z).all(axis=1)
-            | (y > z).all(axis=1)
-            | (-y > z).all(axis=1)
-        )
-        return np.asarray(~outside)
+        beyond = _beyond(np.einsum("bij,bkj->bki", poses, self._boxes) @ view.T)
+        seen = self._drawn_by[camera] & ~beyond.all(axis=-1).any(axis=0)
+        for number in np.flatnonzero(seen & beyond.any(axis=(0, -1))):
+            outline = self._outlines[number]
+            if outline is not None:
+                to_camera = view[:3] @ poses[number]
+                points = outline @ to_camera[:, :3].T + to_camera[:, 3]
+                seen[number] = not _beyond(points, OUTLINE_MARGIN).all(axis=-1).any()
+        return np.asarray(seen)
 
     def take(self, camera: sapien.render.RenderCameraComponent, visible: NDArray[np.bool_]) -> None:
         """Have a camera draw these bodies; the picture is fetched later."""
@@ -94,6 +128,17 @@ class Bodies:
         camera.get_picture("PositionSegmentation")  # waits until it is drawn
         for body in hidden:
             body.visibility = 1.0
+
+
+def _beyond(points: NDArray[np.float64], margin: float = 0.0) -> NDArray[np.bool_]:
+    """For each side of a view, (5, ...), which points (..., 3) in its camera's frame are beyond it.
+
+    The frame is OpenCV's: x right, y down, z forward; the half view is 45 degrees, so the sides
+    are the planes z = NEAR, |x| = z and |y| = z.
+    """
+    x, y, z = np.moveaxis(points, -1, 0)[:3]
+    slack = math.sqrt(2.0) * margin
+    return np.stack([z < NEAR - margin, *(side > z + slack for side in (x, -x, y, -y))])
 
 
 def outdate_records(body: sapien.render.RenderBodyComponent) -> None:
@@ -140,13 +185,17 @@ def keeps_records() -> bool:
 _boxes_of_files: dict[tuple[object, ...], NDArray[np.float64]] = {}
 
 
-def _local_corners(body: sapien.render.RenderBodyComponent) -> NDArray[np.float64]:
-    """Homogeneous corners (8, 4) of the body's box in its entity's frame, with the margin."""
-    corners: list[NDArray[np.float64]] = [_shape_corners(shape) for shape in body.render_shapes]
-    points = np.concatenate(corners)
+def _box(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Homogeneous corners (8, 4) of the box around points (n, 3), with the margin."""
     low, high = points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
     grid = np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1)
     return np.column_stack([grid.reshape(-1, 3), np.ones(8)])
+
+
+def _points(body: sapien.render.RenderBodyComponent) -> NDArray[np.float64]:
+    """Corners (n, 3) of the boxes of a body's shapes in its entity's frame."""
+    corners: list[NDArray[np.float64]] = [_shape_corners(shape) for shape in body.render_shapes]
+    return np.concatenate(corners)
 
 
 def _shape_corners(shape: sapien.render.RenderShape) -> NDArray[np.float64]:

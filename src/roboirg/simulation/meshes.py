@@ -20,8 +20,10 @@ from numpy.typing import NDArray
 
 from roboirg.simulation import camera_mesh, shaders
 from roboirg.simulation.derived import Arrays, code_of, kept_arrays
+from roboirg.simulation.fixed_view import shown_triangles
 from roboirg.simulation.light_meshes import CAMERA_SHARE, LINK_SHARE, SMALL, lighten
 from roboirg.simulation.rendering import Rendering
+from roboirg.simulation.viewpoint import seen_by_front_camera
 
 FINGER = "finger.glb"
 """Seen from so near by the wrist camera that it is never lightened."""
@@ -51,6 +53,13 @@ class Shared(NamedTuple):
     vertices: NDArray[np.float32]
     normals: NDArray[np.float32]
     triangles: NDArray[np.uint32]
+
+
+class _Place(NamedTuple):
+    """A pose in the world, by which shapes can be remembered."""
+
+    position: tuple[float, ...]
+    quaternion: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -93,7 +102,10 @@ class _Look:
 
 
 def link_shapes(
-    path: Path, material: sapien.render.RenderMaterial | None, rendering: Rendering
+    path: Path,
+    material: sapien.render.RenderMaterial | None,
+    rendering: Rendering,
+    seen_at: sapien.Pose | None = None,
 ) -> list[sapien.render.RenderShapeTriangleMesh]:
     """A link's shapes, to be attached to a body and placed.
 
@@ -101,9 +113,18 @@ def link_shapes(
         path: the installed mesh.
         material: for files that have none.
         rendering: faithful or light.
+        seen_at: where the mesh is for ever, world frame, if only what the front camera can see
+            of it there is wanted.
     """
     look = None if material is None else _Look.of(material)
-    return [shape.clone() for shape in _shapes(path, look, rendering)]
+    place = None if seen_at is None else _Place(tuple(seen_at.p), tuple(seen_at.q))
+    return [shape.clone() for shape in _shapes(path, look, rendering, place)]
+
+
+@functools.cache
+def link_outline(path: Path, rendering: Rendering) -> NDArray[np.float64]:
+    """Points (n, 3), metres in the mesh's frame, between which all of it lies."""
+    return np.asarray(_derived(path, rendering)["outline"], np.float64)
 
 
 def finish(body: sapien.render.RenderBodyComponent, rendering: Rendering) -> None:
@@ -163,18 +184,16 @@ def _flat(rendering: Rendering) -> bool:
 
 @functools.cache
 def _shapes(
-    path: Path, look: _Look | None, rendering: Rendering
+    path: Path, look: _Look | None, rendering: Rendering, place: _Place | None
 ) -> Sequence[sapien.render.RenderShapeTriangleMesh]:
-    arrays = _derived(path, light=rendering.meshes == "light" and path.name != FINGER)
+    arrays = _derived(path, rendering)
+    parts = _parts(arrays)
+    if place is not None:
+        parts = _seen(parts, place)
     shapes = []
-    for part in range(len(arrays) // 4):
-        vertices, normals, triangles, numbers = (
-            arrays[f"{field}{part}"] for field in (*Shared._fields, "look")
-        )
-        if not _flat(rendering):  # three vertices of its own for each triangle
-            vertices = vertices[triangles].reshape(-1, 3)
-            normals = np.repeat(normals[triangles[:, 0]], 3, axis=0)
-            triangles = np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3)
+    for number, part in enumerate(parts):
+        numbers = arrays[f"look{number}"]
+        vertices, normals, triangles = part if _flat(rendering) else _unshared(part)
         own = _Look.unpacked(np.asarray(numbers, np.float32)) if len(numbers) else look
         shapes.append(
             sapien.render.RenderShapeTriangleMesh(
@@ -188,8 +207,47 @@ def _shapes(
     return shapes
 
 
-def _derived(path: Path, *, light: bool) -> Arrays:
-    """For each part of a mesh the fields of `Shared` and the look, each with the part's number."""
+def _unshared(part: Shared) -> Shared:
+    """Three vertices of its own for each triangle."""
+    corners, normals = _flattened(part)
+    count = 3 * len(corners)
+    return Shared(
+        corners.reshape(-1, 3),
+        np.repeat(normals, 3, axis=0),
+        np.arange(count, dtype=np.uint32).reshape(-1, 3),
+    )
+
+
+def _seen(parts: Sequence[Shared], place: _Place) -> list[Shared]:
+    """What the front camera can see of parts of a mesh that is in one place for ever."""
+    to_camera = seen_by_front_camera(sapien.Pose(place.position, place.quaternion))
+    flat = [_flattened(part) for part in parts]
+    corners = np.concatenate([part.corners for part in flat])
+    shown = shown_triangles(corners @ to_camera[:3, :3].T + to_camera[:3, 3])
+    ends = np.cumsum([len(part.corners) for part in flat])[:-1]
+    return [
+        share_corners(Triangles(part.corners[mask], part.normals[mask]))
+        for part, mask in zip(flat, np.split(shown, ends), strict=True)
+    ]
+
+
+def _flattened(part: Shared) -> Triangles:
+    return Triangles(part.vertices[part.triangles], part.normals[part.triangles[:, 0]])
+
+
+def _parts(arrays: Arrays) -> list[Shared]:
+    """What `_derived` holds of triangles."""
+    fields = Shared._fields
+    count = sum(name.startswith(fields[0]) for name in arrays)
+    return [Shared._make(arrays[f"{field}{part}"] for field in fields) for part in range(count)]
+
+
+def _derived(path: Path, rendering: Rendering) -> Arrays:
+    """For each part of a mesh the fields of `Shared` and the look, each with the part's number.
+
+    Besides them the outline of all parts together.
+    """
+    light = rendering.meshes == "light" and path.name != FINGER
     # The contents of the installed files are known: they have been checked.
     sources = code_of("meshes", "camera_mesh", "light_meshes") + camera_mesh.packed_mask()
 
@@ -203,6 +261,11 @@ def _derived(path: Path, *, light: bool) -> Arrays:
             for field, array in zip(Shared._fields, shared, strict=True):
                 arrays[f"{field}{part}"] = array
             arrays[f"look{part}"] = np.zeros(0) if look is None else look.packed()
+        points = np.concatenate([part.vertices for part in _parts(arrays)])
+        # SciPy takes a quarter of a second to import, and this is needed once.
+        from scipy.spatial import ConvexHull
+
+        arrays["outline"] = points[ConvexHull(points).vertices]
         return arrays
 
     return kept_arrays(f"{path.stem}-{'light' if light else 'faithful'}", sources, derive)

@@ -17,9 +17,11 @@ from sapien.wrapper.urdf_loader import URDFLoader
 
 from roboirg.actions import ARM_JOINTS
 from roboirg.episode import ROBOT_BASE
+from roboirg.observations import CAMERAS
 from roboirg.simulation import settings
 from roboirg.simulation.assets import find_model_files
-from roboirg.simulation.meshes import finish, link_shapes
+from roboirg.simulation.culling import Skin
+from roboirg.simulation.meshes import finish, link_outline, link_shapes
 from roboirg.simulation.rendering import FAITHFUL, Rendering
 
 if TYPE_CHECKING:
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
 FINGERS = ("panda_leftfinger", "panda_rightfinger")
 TOOL_LINK = "panda_hand_tcp"
 CAMERA_LINK = "camera_link"
+BASE_LINK = "panda_link0"
 
 GRASP_FORCE = 0.5
 """Newtons on each finger at which an object counts as grasped (ManiSkill)."""
@@ -44,6 +47,9 @@ class Robot:
         scene: where to build it; it has to be the first thing that is built.
         visible: whether to load its pictures' meshes too.
         rendering: which meshes.
+
+    Attributes:
+        skins: what is known of the bodies that cameras draw.
     """
 
     def __init__(
@@ -62,6 +68,7 @@ class Robot:
             )
             joint.set_friction(0.0)
         self.links = {link.name: link for link in self.articulation.links}
+        self.skins: dict[sapien.render.RenderBodyComponent, Skin] = {}
         self._add_meshes(loader.visuals, rendering)
         self.tool = self.links[TOOL_LINK]
         self._joints = list(self.articulation.active_joints)
@@ -70,13 +77,14 @@ class Robot:
 
     def _add_meshes(self, visuals: Mapping[str, Sequence[Any]], rendering: Rendering) -> None:
         for name, records in visuals.items():
-            component = sapien.render.RenderBodyComponent()
-            for record in records:
-                for shape in link_shapes(Path(record.filename), record.material, rendering):
-                    shape.local_pose = record.pose
-                    component.attach(shape)
-            self.links[name].entity.add_component(component)
-            finish(component, rendering)
+            # Of the base, which never moves, the front camera draws only what it can see of it.
+            apart = name == BASE_LINK and rendering.culling
+            for cameras in (("front",), ("wrist",)) if apart else (CAMERAS,):
+                component = sapien.render.RenderBodyComponent()
+                outline = [_dress(component, it, cameras, rendering) for it in records]
+                self.links[name].entity.add_component(component)
+                finish(component, rendering)
+                self.skins[component] = Skin(np.concatenate(outline), cameras)
 
     def reset(self) -> None:
         """Put the robot at home, at rest."""
@@ -144,6 +152,22 @@ def rotation_of(pose: sapien.Pose) -> Rotation:
 
     w, x, y, z = np.asarray(pose.q, dtype=np.float64)
     return Rotation.from_quat([x, y, z, w])
+
+
+def _dress(
+    component: sapien.render.RenderBodyComponent,
+    record: Any,  # noqa: ANN401 - SAPIEN's
+    cameras: Sequence[str],
+    rendering: Rendering,
+) -> NDArray[np.float64]:
+    """Give a body the shapes of a mesh for the cameras that draw it; its outline (n, 3), m."""
+    path, pose = Path(record.filename), record.pose
+    fixed = sapien.Pose(ROBOT_BASE) * pose if cameras == ("front",) else None
+    for shape in link_shapes(path, record.material, rendering, fixed):
+        shape.local_pose = pose
+        component.attach(shape)
+    matrix = pose.to_transformation_matrix()
+    return np.asarray(link_outline(path, rendering) @ matrix[:3, :3].T + matrix[:3, 3])
 
 
 def _force_on(

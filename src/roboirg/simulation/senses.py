@@ -17,9 +17,9 @@ from roboirg.observations import (
     check_demonstration_frames,
     check_observe_every,
 )
-from roboirg.simulation.cameras import SIZE
 from roboirg.simulation.proprioception import Proprioception
 from roboirg.simulation.rendering import FAITHFUL, Rendering
+from roboirg.simulation.viewpoint import SIZE
 from roboirg.simulation.world import World
 
 _SLACK = 0.1

@@ -19,7 +19,7 @@ from roboirg.simulation.detection import Detector
 from roboirg.simulation.device import render_system
 from roboirg.simulation.motions import Moment, MotionPlayer
 from roboirg.simulation.rendering import FAITHFUL, Rendering
-from roboirg.simulation.robot import CAMERA_LINK, Robot
+from roboirg.simulation.robot import Robot
 from roboirg.simulation.scenery import add_scenery
 
 
@@ -59,8 +59,7 @@ class World:
         self._cameras: Cameras | None = None
         if visible:
             settings.add_lights(self._scene)
-            mount = self.robot.links[CAMERA_LINK].entity
-            self._cameras = Cameras(self._scene, mount, rendering)
+            self._cameras = Cameras(self._scene, self.robot, rendering)
         self.elapsed = 0
         self.facts: frozenset[Fact] = self._detector.detect([], self._motions.absent())
 

@@ -1,0 +1,40 @@
+"""What the cameras' pictures are like, and where the front camera stands."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import sapien
+from numpy.typing import NDArray
+
+SIZE = 256
+"""Width and height of a picture, pixels."""
+FIELD_OF_VIEW = math.pi / 2
+FOCAL_LENGTH = SIZE / 2 / math.tan(FIELD_OF_VIEW / 2)
+"""Pixels."""
+NEAR, FAR = 0.01, 100.0
+"""Metres from the eye between which things are drawn."""
+
+FRONT_EYE = (0.3, 0.0, 0.4)
+FRONT_TARGET = (0.0, 0.0, -0.2)
+
+
+def look_at(eye: tuple[float, float, float], target: tuple[float, float, float]) -> sapien.Pose:
+    """Pose of a camera (x forward, z up, as SAPIEN has it) that looks at a target."""
+    forward = np.subtract(target, eye)
+    forward /= np.linalg.norm(forward)
+    left = np.cross([0.0, 0.0, 1.0], forward)
+    left /= np.linalg.norm(left)
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.stack([forward, left, np.cross(forward, left)], axis=1)
+    matrix[:3, 3] = eye
+    return sapien.Pose(matrix)
+
+
+def seen_by_front_camera(pose: sapien.Pose) -> NDArray[np.float64]:
+    """(4, 4): from the frame with this pose in the world to the front camera's, OpenCV."""
+    frame = look_at(FRONT_EYE, FRONT_TARGET).inv() * pose
+    # x right, y down, z forward of x forward, y left, z up
+    axes = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]], dtype=np.float64)
+    return np.asarray(axes @ frame.to_transformation_matrix(), dtype=np.float64)
