@@ -62,8 +62,8 @@ class Stage:
         return np.stack([pictures[camera] for camera in CAMERAS]).astype(int), np.stack(segments)
 
 
-def moments(task, index):
-    """So many moments of an oracle's run."""
+def moments(task, index, pick=lambda count: np.linspace(0, count - 1, FRAMES).astype(int)):
+    """Moments of an oracle's run, by default so many from all of it."""
     taken = []
 
     def note(env, _demonstration):
@@ -80,7 +80,7 @@ def moments(task, index):
     env = roboirg.make(task, episode=index, cameras=())
     env.set_frame_hook(note)
     assert play(env, make_policy("oracle", 0))["status"] == "success"
-    return [taken[number] for number in np.linspace(0, len(taken) - 1, FRAMES).astype(int)]
+    return [taken[number] for number in pick(len(taken))]
 
 
 class Differences:
@@ -158,6 +158,25 @@ def test_cameras_leave_out_what_they_cannot_see(monkeypatch):
     assert {BASE_LINK, *FINGERS} <= set(triangles["wrist"])
     assert not {"panda_hand", CAMERA_LINK} & set(triangles["wrist"])
     assert triangles["front"][BASE_LINK] < 0.1 * triangles["wrist"][BASE_LINK]
+
+
+def test_a_camera_draws_again_only_when_something_in_its_view_has_moved(monkeypatch):
+    drawn, take = [], culling.Bodies.take
+
+    def noted(self, camera, visible):
+        drawn.append(camera.name)
+        take(self, camera, visible)
+
+    monkeypatch.setattr(culling.Bodies, "take", noted)
+    scene = get_episode("PickXtimes", "test", 2).scene
+    ours, always = Stage(scene, FAITHFUL), Stage(scene, Rendering(culling=False))
+    some = moments("PickXtimes", 2, pick=lambda _: range(10, 30))
+    for moment in some:
+        for mine, wanted in zip(ours.show(moment), always.show(moment), strict=True):
+            assert np.array_equal(mine, wanted)
+    # The cubes have come to rest, and the arm, which carries the other camera, is still far away.
+    assert drawn.count("front") == 1
+    assert drawn.count("wrist") > 0.9 * len(some)
 
 
 def test_an_unknown_shader_is_used_as_it_is(monkeypatch, caplog):

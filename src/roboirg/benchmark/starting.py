@@ -45,9 +45,11 @@ def throughput(workers: int) -> float:
         worker.start()
     barrier.wait()
     start = time.perf_counter()
+    barrier.wait()
+    seconds = time.perf_counter() - start
     for worker in team:
         worker.join()
-    return workers * _ROUNDS * STEPS / (time.perf_counter() - start)
+    return workers * _ROUNDS * STEPS / seconds
 
 
 _ROUNDS = 3
@@ -60,6 +62,7 @@ def _work(barrier: Barrier) -> None:
     barrier.wait()
     for _ in range(_ROUNDS):
         stepping.eager(workload)
+    barrier.wait()
 
 
 def _in_process(path: Path, what: str) -> dict[str, float]:

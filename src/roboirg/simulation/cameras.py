@@ -39,16 +39,23 @@ z backward) with the id of the entity, int16."""
 
 @dataclass
 class _Drawn:
-    """The poses of everything when a camera last drew, and what has been fetched of it."""
+    """What a camera drew last.
+
+    Attributes:
+        state: all that determines the picture.
+        bodies: for each whether it is drawn; None for all of them.
+        fetched: what has been fetched of what the shader wrote.
+    """
 
     state: bytes
+    bodies: NDArray[np.bool_] | None
     fetched: dict[str, NDArray[np.integer[Any]]] = field(default_factory=dict)
 
 
 class Cameras:
     """The two cameras of a scene.
 
-    While nothing has moved, a picture is not drawn again.
+    While nothing in its view has moved, a picture is not drawn again.
 
     Args:
         scene: with all its bodies built.
@@ -104,7 +111,7 @@ class Cameras:
         return np.array(self._components[camera].get_intrinsic_matrix(), dtype=np.float32)
 
     def draw(self, cameras: Sequence[str]) -> None:
-        """Have cameras begin to draw what they see now, as far as something has moved.
+        """Have cameras begin to draw what they see now, as far as something in view has moved.
 
         It is drawn in the background. What is read later is of now if nothing has moved by then,
         or within `looking_back`.
@@ -112,18 +119,28 @@ class Cameras:
         if self._looks_back:
             return
         poses = self._bodies.poses()
-        due = []
-        for camera in cameras:
-            view = np.asarray(self._components[camera].get_extrinsic_matrix(), dtype=np.float64)
-            state = poses.tobytes() + view.tobytes()
-            known = self._last.get(camera)
-            if known is None or known.state != state:
-                self._last[camera] = _Drawn(state)
-                due.append((camera, view))
+        due = [camera for camera in cameras if self._is_due(camera, poses)]
         if due:
             self._scene.update_render()
-        for camera, view in due:
-            self._draw(camera, poses, view)
+        for camera in due:
+            bodies = self._last[camera].bodies
+            if bodies is None:
+                self._components[camera].take_picture()
+            else:
+                self._bodies.take(self._components[camera], bodies)
+
+    def _is_due(self, camera: str, poses: NDArray[np.float64]) -> bool:
+        """Whether a camera has something new to draw; what it is, is noted then."""
+        view = np.asarray(self._components[camera].get_extrinsic_matrix(), dtype=np.float64)
+        bodies = self._bodies.visible(camera, poses, view) if self._culling else None
+        state = view.tobytes() + poses.tobytes()
+        if bodies is not None:
+            state = view.tobytes() + bodies.tobytes() + poses[bodies].tobytes()
+        known = self._last.get(camera)
+        if known is not None and known.state == state:
+            return False
+        self._last[camera] = _Drawn(state, bodies)
+        return True
 
     @contextmanager
     def looking_back(self) -> Iterator[None]:
@@ -133,13 +150,6 @@ class Cameras:
             yield
         finally:
             self._looks_back = False
-
-    def _draw(self, camera: str, poses: NDArray[np.float64], view: NDArray[np.float64]) -> None:
-        component = self._components[camera]
-        if self._culling:
-            self._bodies.take(component, self._bodies.visible(camera, poses, view))
-        else:
-            component.take_picture()
 
     def _look(self, camera: str, what: str) -> NDArray[np.integer[Any]]:
         self.draw((camera,))
