@@ -20,7 +20,6 @@ from roboirg.evaluation.store import (
     TORN_FILE,
     RecordStore,
     StoreError,
-    latest,
     read_contents,
     read_records,
     write_atomically,
@@ -149,10 +148,14 @@ def test_a_line_that_is_no_record_is_told_with_its_number(
         read_records(tmp_path)
 
 
-def test_the_newest_record_of_a_job_wins() -> None:
-    first = some_records()[0]
+def test_the_newest_record_of_a_job_wins(tmp_path: Path) -> None:
+    first, *others = some_records()
     newer = first.model_copy(update={"steps": 1234})
-    assert next(iter(latest([first, *some_records()[1:], newer]).values())) == newer
+    fill(tmp_path, (first, *others, newer))
+    found = read_records(tmp_path)
+    assert newer in found
+    assert first not in found
+    assert len(found) == len(some_records())
 
 
 def test_no_records_is_one_sentence(tmp_path: Path) -> None:

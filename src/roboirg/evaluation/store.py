@@ -20,7 +20,7 @@ import contextlib
 import fcntl
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple, Self, TypeVar
@@ -34,7 +34,7 @@ from roboirg.evaluation.lines import (
     read_line,
     read_stored,
 )
-from roboirg.evaluation.record import Job, Record, Result
+from roboirg.evaluation.record import Record, Result
 
 __all__ = ["Contents", "RecordStore", "StoreError", "read_contents", "read_records", "read_results"]
 
@@ -194,14 +194,6 @@ def read_index(folder: Path) -> dict[Key, Stored]:
         StoreError: the file cannot be read, or a line is no record of a version that can be read.
     """
     return {key_of(one): one for one in _Lines(folder / RECORDS_FILE).parsed(read_stored)}
-
-
-def latest(records: Iterable[Kind]) -> Mapping[Job, Kind]:
-    """The newest record of each job."""
-    newest: dict[Job, Kind] = {}
-    for record in records:
-        newest[record.identity] = record
-    return newest
 
 
 def write_atomically(path: Path, text: str) -> None:

@@ -6,14 +6,11 @@ from typing import TYPE_CHECKING
 
 from roboirg.analysis.figures.content import Content
 from roboirg.analysis.figures.drawing import (
-    COLUMN_INCHES,
     GHOST,
-    clear_axes,
     draw_ghost,
     draw_point,
     legend_below,
-    new_figure,
-    percent_axis,
+    rates_figure,
 )
 from roboirg.analysis.published import published_rows
 from roboirg.analysis.statistics import SETTING_ORDER, Variant
@@ -24,11 +21,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 HEIGHT_INCHES = 2.5
-LEGEND_LINE_INCHES = 0.16
 SPREAD = 0.62
 """The width over which the points of one setting lie, in distances between settings."""
 GHOST_PLACE = 0.42
-LEGEND_COLUMNS = 2
 
 
 def draw_averages(content: Content, *, published: bool = False) -> Figure | None:
@@ -42,9 +37,7 @@ def draw_averages(content: Content, *, published: bool = False) -> Figure | None
         return None
     ghosts = published_rows("main") if published else ()
     models = list(dict.fromkeys(row.model for row in ghosts))
-    lines = -(-(len(content.names) + len(models)) // LEGEND_COLUMNS)
-    figure = new_figure(COLUMN_INCHES, HEIGHT_INCHES + LEGEND_LINE_INCHES * lines)
-    axes = figure.subplots()
+    figure, axes = rates_figure(HEIGHT_INCHES, len(content.names) + len(models))
     for number, who in enumerate(content.names):
         for place, setting in enumerate(settings):
             one = content.summaries.get((who, ALL, Variant(setting)))
@@ -57,13 +50,11 @@ def draw_averages(content: Content, *, published: bool = False) -> Figure | None
             number = models.index(row.model)
             draw_ghost(axes, at, float(row.average), number, f"{row.model} (published)")
     _set_axes(axes, content, settings, room=GHOST_PLACE if ghosts else 0.0)
-    legend_below(figure, axes, LEGEND_COLUMNS)
+    legend_below(figure, axes)
     return figure
 
 
 def _set_axes(axes: Axes, content: Content, settings: list[str], room: float) -> None:
-    percent_axis(axes)
-    clear_axes(axes, grid="y")
     axes.set_xticks(range(len(settings)), [_label(content, setting) for setting in settings])
     axes.set_xlim(-0.5, len(settings) - 0.5 + (0.1 if room else 0))
     for edge in range(1, len(settings)):

@@ -7,14 +7,11 @@ from typing import TYPE_CHECKING
 from roboirg.analysis.figures.content import Content, by_key
 from roboirg.analysis.figures.drawing import (
     COLOURS,
-    COLUMN_INCHES,
     GHOST,
-    clear_axes,
     draw_ghost,
     draw_point,
     legend_below,
-    new_figure,
-    percent_axis,
+    rates_figure,
 )
 from roboirg.analysis.published import published_rows
 from roboirg.analysis.samples import Contestant, Samples
@@ -27,9 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 HEIGHT_INCHES = 2.4
-LEGEND_LINE_INCHES = 0.16
 SHIFT = 0.08
-LEGEND_COLUMNS = 2
 
 
 def draw_context(content: Content, *, published: bool = False) -> Figure | None:
@@ -46,9 +41,7 @@ def draw_context(content: Content, *, published: bool = False) -> Figure | None:
     ghosts = published_rows("context") if published else ()
     models = list(dict.fromkeys(row.model for row in ghosts))
     names = [who for who in content.names if any(own == who for own, _, _ in found)]
-    lines = -(-(len(names) + len(models)) // LEGEND_COLUMNS)
-    figure = new_figure(COLUMN_INCHES, HEIGHT_INCHES + LEGEND_LINE_INCHES * lines)
-    axes = figure.subplots()
+    figure, axes = rates_figure(HEIGHT_INCHES, len(names) + len(models))
     for number, who in enumerate(names):
         course = []
         for place, stages in enumerate(sets):
@@ -65,13 +58,11 @@ def draw_context(content: Content, *, published: bool = False) -> Figure | None:
             draw_ghost(axes, at, value, models.index(model), f"{model} (published)")
         axes.plot(*zip(*known, strict=True), color=GHOST, linewidth=0.6, linestyle=":", zorder=1)
     _set_axes(axes, sets, tasks)
-    legend_below(figure, axes, LEGEND_COLUMNS)
+    legend_below(figure, axes)
     return figure
 
 
 def _set_axes(axes: Axes, sets: list[tuple[int, ...]], tasks: list[str]) -> None:
-    percent_axis(axes)
-    clear_axes(axes, grid="y")
     axes.set_xticks(range(len(sets)), [",".join(map(str, stages)) for stages in sets])
     axes.set_xlim(-0.4, len(sets) - 0.6)
     axes.set_xlabel(f"stages that are spoken; mean over {', '.join(tasks)}", wrap=True)

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 FORMATS = ("png", "svg", "pdf")
 COLUMN_INCHES, PAGE_INCHES = 3.4, 7.0
 """Widths of a column and of a page; figures are drawn at their true size."""
+LEGEND_COLUMNS, LEGEND_LINE_INCHES = 2, 0.16
+"""Of a figure of one column."""
 DOTS_PER_INCH = 300
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
 """Of Okabe and Ito, told apart by colour-blind people too; signs differ as well."""
@@ -95,11 +97,21 @@ def clear_axes(axes: Axes, *, grid: str) -> None:
         spine.set_color("#999999")
 
 
-def percent_axis(axes: Axes) -> None:
-    """Success from 0 to 100 percent, upwards."""
+def rates_figure(height: float, entries: int) -> tuple[Figure, Axes]:
+    """An empty figure of one column with success in percent upwards and room for a legend below.
+
+    Args:
+        height: inches without the legend.
+        entries: of the legend.
+    """
+    lines = -(-entries // LEGEND_COLUMNS)
+    figure = new_figure(COLUMN_INCHES, height + LEGEND_LINE_INCHES * lines)
+    axes = figure.subplots()
+    clear_axes(axes, grid="y")
     axes.set_ylim(-3, 103)
     axes.set_yticks(range(0, 101, 25))
     axes.set_ylabel("success, %")
+    return figure, axes
 
 
 def draw_point(
@@ -136,11 +148,11 @@ def draw_ghost(axes: Axes, place: float, percent: float, number: int, label: str
     )
 
 
-def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
+def legend_below(figure: Figure, axes: Axes) -> None:
     """Every label once, below the axes."""
     handles, names = axes.get_legend_handles_labels()
     found = dict(zip(names, handles, strict=True))
     figure.legend(
-        found.values(), found.keys(), loc="outside lower center", ncols=columns,
+        found.values(), found.keys(), loc="outside lower center", ncols=LEGEND_COLUMNS,
         columnspacing=1.2, handletextpad=0.3,
     )  # fmt: skip

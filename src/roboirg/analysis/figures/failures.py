@@ -7,7 +7,13 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from roboirg.analysis.figures.content import Content
-from roboirg.analysis.figures.drawing import COLUMN_INCHES, PAGE_INCHES, clear_axes, new_figure
+from roboirg.analysis.figures.drawing import (
+    COLUMN_INCHES,
+    LEGEND_LINE_INCHES,
+    PAGE_INCHES,
+    clear_axes,
+    new_figure,
+)
 from roboirg.analysis.samples import Contestant
 from roboirg.analysis.statistics import Variant
 from roboirg.evaluation.record import Result
@@ -17,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-ROW_INCHES, MARGIN_INCHES, LEGEND_LINE_INCHES = 0.2, 0.55, 0.16
+ROW_INCHES, MARGIN_INCHES = 0.2, 0.55
 UNKNOWN = "not attributed"
 COLOURS: Mapping[str, str] = {
     **dict(zip(GROUNDING, ("#7f2704", "#c0510a", "#ee8130", "#fbb477", "#fddfbf"), strict=True)),
