@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from roboirg.errors import InvalidValueError, UnknownNameError
 
-CAMERAS = ("front", "wrist")
+FRONT, WRIST = "front", "wrist"
+CAMERAS = (FRONT, WRIST)
 
 DemonstrationFrames = Literal["all", "none"] | int
 """Which pictures of the video there are: all, none, or every n-th, the first included."""

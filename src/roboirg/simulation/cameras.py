@@ -17,7 +17,7 @@ import sapien
 import sapien.render
 from numpy.typing import NDArray
 
-from roboirg.observations import CAMERAS
+from roboirg.observations import CAMERAS, FRONT, WRIST
 from roboirg.simulation.culling import Bodies
 from roboirg.simulation.rendering import FAITHFUL, Rendering
 from roboirg.simulation.robot import CAMERA_LINK, Robot
@@ -39,23 +39,23 @@ z backward) with the id of the entity, int16."""
 
 @dataclass
 class _Drawn:
-    """What a camera drew last.
+    """What a camera draws.
 
     Attributes:
         state: all that determines the picture.
-        bodies: for each whether it is drawn; None for all of them.
+        bodies: for each of the scene's whether it is drawn.
         fetched: what has been fetched of what the shader wrote.
     """
 
     state: bytes
-    bodies: NDArray[np.bool_] | None
+    bodies: NDArray[np.bool_]
     fetched: dict[str, NDArray[np.integer[Any]]] = field(default_factory=dict)
 
 
 class Cameras:
     """The two cameras of a scene.
 
-    While nothing in its view has moved, a picture is not drawn again.
+    A camera's picture is not drawn again while nothing in its view has moved.
 
     Args:
         scene: with all its bodies built.
@@ -70,15 +70,17 @@ class Cameras:
         fixed.name = "front_camera"
         self._colour = STOCK_COLOUR if shader is None else COLOUR
         self._components = {name: _component(name, shader or "") for name in CAMERAS}
-        fixed.add_component(self._components["front"])
+        fixed.add_component(self._components[FRONT])
         fixed.set_pose(look_at(FRONT_EYE, FRONT_TARGET))
         scene.add_entity(fixed)
-        robot.links[CAMERA_LINK].entity.add_component(self._components["wrist"])
+        robot.links[CAMERA_LINK].entity.add_component(self._components[WRIST])
         for component in self._components.values() if rendering.quick_start else ():
             component.set_texture("BRDFLUT", stand_in_table())
-        self._bodies = Bodies(scene, robot.skins)
+        self._bodies = Bodies(scene, robot.drawables)
         self._culling = rendering.culling
         self._last: dict[str, _Drawn] = {}
+        # The poses of everything, the wrist camera too, when a camera's last picture was right.
+        self._moments: dict[str, bytes] = {}
         self._looks_back = False
 
     def picture(self, camera: str) -> NDArray[np.uint8]:
@@ -119,28 +121,34 @@ class Cameras:
         if self._looks_back:
             return
         poses = self._bodies.poses()
-        due = [camera for camera in cameras if self._is_due(camera, poses)]
+        moment = poses.tobytes()
+        unsure = [camera for camera in cameras if self._moments.get(camera) != moment]
+        now = {camera: self._seen_by(camera, poses) for camera in unsure}
+        due = [camera for camera in unsure if self._is_new(camera, now[camera])]
         if due:
             self._scene.update_render()
         for camera in due:
-            bodies = self._last[camera].bodies
-            if bodies is None:
-                self._components[camera].take_picture()
+            if self._culling:
+                self._bodies.take(self._components[camera], now[camera].bodies)
             else:
-                self._bodies.take(self._components[camera], bodies)
+                self._components[camera].take_picture()
+            self._last[camera] = now[camera]
+        self._moments.update(dict.fromkeys(unsure, moment))
 
-    def _is_due(self, camera: str, poses: NDArray[np.float64]) -> bool:
-        """Whether a camera has something new to draw; what it is, is noted then."""
-        view = np.asarray(self._components[camera].get_extrinsic_matrix(), dtype=np.float64)
-        bodies = self._bodies.visible(camera, poses, view) if self._culling else None
-        state = view.tobytes() + poses.tobytes()
-        if bodies is not None:
-            state = view.tobytes() + bodies.tobytes() + poses[bodies].tobytes()
-        known = self._last.get(camera)
-        if known is not None and known.state == state:
-            return False
-        self._last[camera] = _Drawn(state, bodies)
-        return True
+    def _seen_by(self, camera: str, poses: NDArray[np.float64]) -> _Drawn:
+        """What a camera would draw now."""
+        component = self._components[camera]
+        view = np.asarray(component.get_extrinsic_matrix(), dtype=np.float64)[:3]
+        bodies = np.ones(len(poses), dtype=bool)
+        if self._culling:
+            bodies = self._bodies.visible(camera, poses, view)
+        eye = component.entity.pose
+        state = b"".join(it.tobytes() for it in (eye.p, eye.q, bodies, poses[bodies]))
+        return _Drawn(state, bodies)
+
+    def _is_new(self, camera: str, drawn: _Drawn) -> bool:
+        last = self._last.get(camera)
+        return last is None or last.state != drawn.state
 
     @contextmanager
     def looking_back(self) -> Iterator[None]:

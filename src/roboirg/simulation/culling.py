@@ -1,4 +1,6 @@
-"""Which bodies a camera draws: only those whose outlines reach into its view.
+"""View-frustum culling: a camera draws only the bodies that reach into its view.
+
+They are tested by their bounding boxes, and those of the robot by their convex hulls.
 
 Without shadows that cannot change a pixel. SAPIEN records what a camera draws once, and again only
 when the scene has changed since; bodies whose shading mode it does not know are left out of the
@@ -26,24 +28,24 @@ from roboirg.simulation.viewpoint import NEAR
 
 MARGIN = 0.002
 """Metres by which boxes are grown before the test."""
-OUTLINE_MARGIN = 1e-4
-"""Metres by which outlines are; the renderer's numbers are good for 1/100 of that. The hand is ten
-times as far outside the wrist camera's view."""
+HULL_MARGIN = 1e-4
+"""Metres by which convex hulls are; the renderer's numbers are good for 1/100 of that. The hand
+stays 1 mm outside the wrist camera's view, so that a larger margin would have it drawn."""
 
 _DRAWN, _LEFT_OUT = 0, 99
 """Shading modes; the latter is unknown to SAPIEN."""
 
 
 @dataclass(frozen=True)
-class Skin:
+class Drawable:
     """What is known of a body that can be drawn.
 
     Attributes:
-        outline: points (n, 3) in the frame of its entity, m, between which all of it lies.
-        cameras: that draw it if they see it.
+        hull: vertices (n, 3) of its convex hull in the frame of its entity, m.
+        cameras: that draw it if it reaches into their views.
     """
 
-    outline: NDArray[np.float64]
+    hull: NDArray[np.float64]
     cameras: Collection[str] = CAMERAS
 
 
@@ -52,11 +54,11 @@ class Bodies:
 
     Args:
         scene: with all its bodies built.
-        skins: of some of them; of the others the boxes are enough.
+        drawables: what is known of some of them; for the others boxes do.
     """
 
     def __init__(
-        self, scene: sapien.Scene, skins: Mapping[sapien.render.RenderBodyComponent, Skin]
+        self, scene: sapien.Scene, drawables: Mapping[sapien.render.RenderBodyComponent, Drawable]
     ) -> None:
         self._bodies = [
             component
@@ -64,16 +66,16 @@ class Bodies:
             for component in entity.components
             if isinstance(component, sapien.render.RenderBodyComponent)
         ]
-        known = [skins.get(body) for body in self._bodies]
-        self._outlines = [None if skin is None else skin.outline for skin in known]
+        known = [drawables.get(body) for body in self._bodies]
+        self._hulls = [None if one is None else one.hull for one in known]
         self._boxes = np.stack(
             [
-                _box(_points(body) if outline is None else outline)
-                for body, outline in zip(self._bodies, self._outlines, strict=True)
+                _box(_points(body) if hull is None else hull)
+                for body, hull in zip(self._bodies, self._hulls, strict=True)
             ]
         )
         self._drawn_by = {
-            camera: np.array([skin is None or camera in skin.cameras for skin in known])
+            camera: np.array([one is None or camera in one.cameras for one in known])
             for camera in CAMERAS
         }
         self._set = np.ones(len(self._bodies), dtype=bool)
@@ -90,17 +92,17 @@ class Bodies:
 
         Args:
             camera: its name.
-            poses: of the bodies.
+            poses: of the bodies, (n, 4, 4).
             view: extrinsic matrix of the camera (3, 4).
         """
-        beyond = _beyond(np.einsum("bij,bkj->bki", poses, self._boxes) @ view.T)
-        seen = self._drawn_by[camera] & ~beyond.all(axis=-1).any(axis=0)
-        for number in np.flatnonzero(seen & beyond.any(axis=(0, -1))):
-            outline = self._outlines[number]
-            if outline is not None:
-                to_camera = view[:3] @ poses[number]
-                points = outline @ to_camera[:, :3].T + to_camera[:, 3]
-                seen[number] = not _beyond(points, OUTLINE_MARGIN).all(axis=-1).any()
+        outside = _outside(np.einsum("bij,bkj->bki", poses, self._boxes) @ view.T)
+        seen = self._drawn_by[camera] & ~outside.all(axis=-1).any(axis=0)
+        for number in np.flatnonzero(seen & outside.any(axis=(0, -1))):
+            hull = self._hulls[number]
+            if hull is not None:
+                to_camera = view @ poses[number]
+                points = hull @ to_camera[:, :3].T + to_camera[:, 3]
+                seen[number] = not _outside(points, HULL_MARGIN).all(axis=-1).any()
         return np.asarray(seen)
 
     def take(self, camera: sapien.render.RenderCameraComponent, visible: NDArray[np.bool_]) -> None:
@@ -130,13 +132,16 @@ class Bodies:
             body.visibility = 1.0
 
 
-def _beyond(points: NDArray[np.float64], margin: float = 0.0) -> NDArray[np.bool_]:
-    """For each side of a view, (5, ...), which points (..., 3) in its camera's frame are beyond it.
+def _outside(points: NDArray[np.float64], margin: float = 0.0) -> NDArray[np.bool_]:
+    """For each plane of a view's frustum, (5, ...), which points are outside of it.
 
-    The frame is OpenCV's: x right, y down, z forward; the half view is 45 degrees, so the sides
-    are the planes z = NEAR, |x| = z and |y| = z.
+    The half view is 45 degrees, so the planes are z = NEAR, |x| = z and |y| = z.
+
+    Args:
+        points: (..., 3), m, in the camera's frame: x right, y down, z forward (OpenCV).
+        margin: metres by which they have to be.
     """
-    x, y, z = np.moveaxis(points, -1, 0)[:3]
+    x, y, z = np.moveaxis(points, -1, 0)
     slack = math.sqrt(2.0) * margin
     return np.stack([z < NEAR - margin, *(side > z + slack for side in (x, -x, y, -y))])
 

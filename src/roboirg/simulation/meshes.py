@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 
 from roboirg.simulation import camera_mesh, shaders
 from roboirg.simulation.derived import Arrays, code_of, kept_arrays
-from roboirg.simulation.fixed_view import shown_triangles
 from roboirg.simulation.light_meshes import CAMERA_SHARE, LINK_SHARE, SMALL, lighten
+from roboirg.simulation.occlusion import shown_triangles
 from roboirg.simulation.rendering import Rendering
-from roboirg.simulation.viewpoint import seen_by_front_camera
+from roboirg.simulation.viewpoint import to_front_camera
 
 FINGER = "finger.glb"
 """Seen from so near by the wrist camera that it is never lightened."""
@@ -122,9 +122,9 @@ def link_shapes(
 
 
 @functools.cache
-def link_outline(path: Path, rendering: Rendering) -> NDArray[np.float64]:
-    """Points (n, 3), metres in the mesh's frame, between which all of it lies."""
-    return np.asarray(_derived(path, rendering)["outline"], np.float64)
+def link_hull(path: Path, rendering: Rendering) -> NDArray[np.float64]:
+    """Vertices (n, 3) of a link's convex hull, metres in the mesh's frame."""
+    return np.asarray(_derived(path, rendering)["hull"], np.float64)
 
 
 def finish(body: sapien.render.RenderBodyComponent, rendering: Rendering) -> None:
@@ -165,11 +165,11 @@ def share_corners(flat: Triangles) -> Shared:
             min(at[three[(first + k) % 3]], key=lambda vertex: abs(vertex - here)) for k in (1, 2)
         ]
         triangles.append([here, *others])
-    owners, corners = np.array(sources).T
+    owners, corners = np.array(sources, dtype=np.intp).reshape(-1, 2).T
     return Shared(
         flat.corners[owners, corners],
         flat.normals[owners],
-        np.array(triangles, dtype=np.uint32),
+        np.array(triangles, dtype=np.uint32).reshape(-1, 3),
     )
 
 
@@ -192,6 +192,8 @@ def _shapes(
         parts = _seen(parts, place)
     shapes = []
     for number, part in enumerate(parts):
+        if not len(part.triangles):
+            continue
         numbers = arrays[f"look{number}"]
         vertices, normals, triangles = part if _flat(rendering) else _unshared(part)
         own = _Look.unpacked(np.asarray(numbers, np.float32)) if len(numbers) else look
@@ -219,8 +221,8 @@ def _unshared(part: Shared) -> Shared:
 
 
 def _seen(parts: Sequence[Shared], place: _Place) -> list[Shared]:
-    """What the front camera can see of parts of a mesh that is in one place for ever."""
-    to_camera = seen_by_front_camera(sapien.Pose(place.position, place.quaternion))
+    """What the front camera can see of parts of an opaque mesh that is in one place for ever."""
+    to_camera = to_front_camera(sapien.Pose(place.position, place.quaternion))
     flat = [_flattened(part) for part in parts]
     corners = np.concatenate([part.corners for part in flat])
     shown = shown_triangles(corners @ to_camera[:3, :3].T + to_camera[:3, 3])
@@ -236,16 +238,17 @@ def _flattened(part: Shared) -> Triangles:
 
 
 def _parts(arrays: Arrays) -> list[Shared]:
-    """What `_derived` holds of triangles."""
-    fields = Shared._fields
-    count = sum(name.startswith(fields[0]) for name in arrays)
-    return [Shared._make(arrays[f"{field}{part}"] for field in fields) for part in range(count)]
+    """The triangles in what `_derived` gives, of each part of the mesh."""
+    count = sum(name.startswith("triangles") for name in arrays)
+    return [
+        Shared._make(arrays[f"{field}{part}"] for field in Shared._fields) for part in range(count)
+    ]
 
 
 def _derived(path: Path, rendering: Rendering) -> Arrays:
     """For each part of a mesh the fields of `Shared` and the look, each with the part's number.
 
-    Besides them the outline of all parts together.
+    Besides them the convex hull of all parts together.
     """
     light = rendering.meshes == "light" and path.name != FINGER
     # The contents of the installed files are known: they have been checked.
@@ -265,7 +268,7 @@ def _derived(path: Path, rendering: Rendering) -> Arrays:
         # SciPy takes a quarter of a second to import, and this is needed once.
         from scipy.spatial import ConvexHull
 
-        arrays["outline"] = points[ConvexHull(points).vertices]
+        arrays["hull"] = points[ConvexHull(points).vertices]
         return arrays
 
     return kept_arrays(f"{path.stem}-{'light' if light else 'faithful'}", sources, derive)

@@ -16,7 +16,8 @@ class Rendering:
     """What is drawn, and by which shader.
 
     Attributes:
-        culling: each camera draws only the bodies that reach into its view; changes no pixel.
+        culling: each camera draws only the bodies that reach into its view, of the robot's base
+            only what it can see, and only when one of them has moved; changes no pixel.
         slim_shader: what adds nothing to a picture is left out of SAPIEN's shader; some pixels
             change by one level.
         meshes: ``stock`` as installed; ``faithful`` without what nobody ever sees; ``light`` with

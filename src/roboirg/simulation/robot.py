@@ -17,11 +17,11 @@ from sapien.wrapper.urdf_loader import URDFLoader
 
 from roboirg.actions import ARM_JOINTS
 from roboirg.episode import ROBOT_BASE
-from roboirg.observations import CAMERAS
+from roboirg.observations import CAMERAS, FRONT
 from roboirg.simulation import settings
 from roboirg.simulation.assets import find_model_files
-from roboirg.simulation.culling import Skin
-from roboirg.simulation.meshes import finish, link_outline, link_shapes
+from roboirg.simulation.culling import Drawable
+from roboirg.simulation.meshes import finish, link_hull, link_shapes
 from roboirg.simulation.rendering import FAITHFUL, Rendering
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class Robot:
         rendering: which meshes.
 
     Attributes:
-        skins: what is known of the bodies that cameras draw.
+        drawables: what is known of its bodies that cameras draw.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class Robot:
             )
             joint.set_friction(0.0)
         self.links = {link.name: link for link in self.articulation.links}
-        self.skins: dict[sapien.render.RenderBodyComponent, Skin] = {}
+        self.drawables: dict[sapien.render.RenderBodyComponent, Drawable] = {}
         self._add_meshes(loader.visuals, rendering)
         self.tool = self.links[TOOL_LINK]
         self._joints = list(self.articulation.active_joints)
@@ -77,14 +77,44 @@ class Robot:
 
     def _add_meshes(self, visuals: Mapping[str, Sequence[Any]], rendering: Rendering) -> None:
         for name, records in visuals.items():
-            # Of the base, which never moves, the front camera draws only what it can see of it.
-            apart = name == BASE_LINK and rendering.culling
-            for cameras in (("front",), ("wrist",)) if apart else (CAMERAS,):
-                component = sapien.render.RenderBodyComponent()
-                outline = [_dress(component, it, cameras, rendering) for it in records]
-                self.links[name].entity.add_component(component)
-                finish(component, rendering)
-                self.skins[component] = Skin(np.concatenate(outline), cameras)
+            if name == BASE_LINK and rendering.culling:
+                # It never moves, and the front camera draws only what it can see of it.
+                others = [camera for camera in CAMERAS if camera != FRONT]
+                self._add_body(name, records, rendering, (FRONT,), sapien.Pose(ROBOT_BASE))
+                self._add_body(name, records, rendering, others)
+            else:
+                self._add_body(name, records, rendering, CAMERAS)
+
+    def _add_body(
+        self,
+        link: str,
+        records: Sequence[Any],
+        rendering: Rendering,
+        cameras: Sequence[str],
+        fixed_at: sapien.Pose | None = None,
+    ) -> None:
+        """Give a link what some cameras draw of it.
+
+        Args:
+            link: its name.
+            records: SAPIEN's, of its meshes.
+            rendering: which meshes.
+            cameras: that draw it.
+            fixed_at: where the link is for ever, world frame, if only what the front camera can
+                see of it there is wanted.
+        """
+        component, hulls = sapien.render.RenderBodyComponent(), []
+        for record in records:
+            path, pose = Path(record.filename), record.pose
+            place = None if fixed_at is None else fixed_at * pose
+            for shape in link_shapes(path, record.material, rendering, place):
+                shape.local_pose = pose
+                component.attach(shape)
+            matrix = pose.to_transformation_matrix()
+            hulls.append(link_hull(path, rendering) @ matrix[:3, :3].T + matrix[:3, 3])
+        self.links[link].entity.add_component(component)
+        finish(component, rendering)
+        self.drawables[component] = Drawable(np.concatenate(hulls), cameras)
 
     def reset(self) -> None:
         """Put the robot at home, at rest."""
@@ -152,22 +182,6 @@ def rotation_of(pose: sapien.Pose) -> Rotation:
 
     w, x, y, z = np.asarray(pose.q, dtype=np.float64)
     return Rotation.from_quat([x, y, z, w])
-
-
-def _dress(
-    component: sapien.render.RenderBodyComponent,
-    record: Any,  # noqa: ANN401 - SAPIEN's
-    cameras: Sequence[str],
-    rendering: Rendering,
-) -> NDArray[np.float64]:
-    """Give a body the shapes of a mesh for the cameras that draw it; its outline (n, 3), m."""
-    path, pose = Path(record.filename), record.pose
-    fixed = sapien.Pose(ROBOT_BASE) * pose if cameras == ("front",) else None
-    for shape in link_shapes(path, record.material, rendering, fixed):
-        shape.local_pose = pose
-        component.attach(shape)
-    matrix = pose.to_transformation_matrix()
-    return np.asarray(link_outline(path, rendering) @ matrix[:3, :3].T + matrix[:3, 3])
 
 
 def _force_on(

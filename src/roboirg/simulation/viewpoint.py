@@ -32,7 +32,7 @@ def look_at(eye: tuple[float, float, float], target: tuple[float, float, float])
     return sapien.Pose(matrix)
 
 
-def seen_by_front_camera(pose: sapien.Pose) -> NDArray[np.float64]:
+def to_front_camera(pose: sapien.Pose) -> NDArray[np.float64]:
     """(4, 4): from the frame with this pose in the world to the front camera's, OpenCV."""
     frame = look_at(FRONT_EYE, FRONT_TARGET).inv() * pose
     # x right, y down, z forward of x forward, y left, z up

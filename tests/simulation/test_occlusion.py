@@ -6,13 +6,13 @@ import sapien
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboirg.simulation.fixed_view import shown_triangles
+from roboirg.simulation.occlusion import shown_triangles
 from roboirg.simulation.viewpoint import (
     FOCAL_LENGTH,
     FRONT_EYE,
     FRONT_TARGET,
     SIZE,
-    seen_by_front_camera,
+    to_front_camera,
 )
 
 GRID = 256
@@ -21,8 +21,15 @@ WINDOW = 12
 """Pixels around the picture's middle in which everything happens."""
 
 
-def painted(corners, shift, *, both_sides):
-    """The triangle that a renderer would show at each pixel of the window; -1 for none."""
+DEPTH_NOISE = 1e-5
+"""Metres."""
+
+
+def painted(corners, shift, noise, *, both_sides):
+    """The triangle that a renderer would show at each pixel of the window; -1 for none.
+
+    Each triangle's corners are shifted by so many pixels, and its depth by so many metres.
+    """
     places = FOCAL_LENGTH * corners[..., :2] / corners[..., 2:] + SIZE / 2
     places = np.round((places + shift) * GRID) / GRID
     ticks = np.arange(SIZE // 2 - WINDOW, SIZE // 2 + WINDOW) + 0.5
@@ -41,7 +48,7 @@ def painted(corners, shift, *, both_sides):
         inside &= total != 0
         weights = areas / np.where(total == 0, 1, total)
         with np.errstate(divide="ignore"):  # where there is nothing to divide
-            depth = 1 / np.einsum("kij,k->ij", weights[[1, 2, 0]], 1 / depths)
+            depth = 1 / np.einsum("kij,k->ij", weights[[1, 2, 0]], 1 / depths) + noise[number]
         ahead = inside & (depth < nearest)
         nearest[ahead], winner[ahead] = depth[ahead], number
     return winner
@@ -49,12 +56,15 @@ def painted(corners, shift, *, both_sides):
 
 @st.composite
 def soups(draw):
-    """Triangles (n, 3, 3) in the window, from specks to ones that fill it."""
+    """Triangles (n, 3, 3) in the window, from specks to ones that fill it; some have no area."""
     random = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     count = draw(st.integers(1, 60))
     size = 10.0 ** random.uniform(-2, 1, (count, 1, 1))
     middle = random.uniform(-WINDOW, WINDOW, (count, 1, 2))
     pixels = np.clip(middle + size * random.standard_normal((count, 3, 2)), -WINDOW, WINDOW)
+    for corners in pixels:
+        if random.random() < 0.2:
+            corners[2] = corners[0] + random.choice([0.0, 0.5, 1.0]) * (corners[1] - corners[0])
     depths = 1 + random.uniform(0, 0.3, (count, 1)) + random.uniform(0, 0.02, (count, 3))
     return np.concatenate([pixels / FOCAL_LENGTH * depths[..., None], depths[..., None]], axis=2)
 
@@ -62,9 +72,11 @@ def soups(draw):
 @given(soups(), st.booleans(), st.integers(0, 99))
 def test_whatever_a_renderer_shows_is_kept(corners, both_sides, seed):
     shown = shown_triangles(corners)
-    shifts = np.random.default_rng(seed).uniform(-0.01, 0.01, (3, *corners.shape[:2], 2))
-    for shift in (0.0, *shifts):
-        winner = painted(corners, shift, both_sides=both_sides)
+    random = np.random.default_rng(seed)
+    for size in (0.0, 1.0, 1.0, 1.0):
+        shift = size * random.uniform(-0.01, 0.01, (*corners.shape[:2], 2))
+        noise = size * random.uniform(-DEPTH_NOISE, DEPTH_NOISE, len(corners))
+        winner = painted(corners, shift, noise, both_sides=both_sides)
         assert shown[winner[winner >= 0]].all()
 
 
@@ -106,7 +118,7 @@ def test_what_is_out_of_the_picture_is_left_out_and_what_is_at_the_eye_is_kept()
 
 
 def test_the_front_camera_s_frame():
-    matrix = seen_by_front_camera(sapien.Pose())
+    matrix = to_front_camera(sapien.Pose())
     far = np.linalg.norm(np.subtract(FRONT_TARGET, FRONT_EYE))
     assert matrix @ [*FRONT_TARGET, 1] == pytest.approx([0, 0, far, 1], abs=1e-6)
     # The camera looks back at the robot: the world's y is to its right, up is against its y.

@@ -1,0 +1,19 @@
+"""What tests of the simulator share."""
+
+import pytest
+
+from roboirg.simulation.culling import Bodies
+
+
+@pytest.fixture
+def takes(monkeypatch):
+    """All pictures that are taken: the camera's name and the bodies that it draws, as a list."""
+    taken, take = [], Bodies.take
+
+    def noted(self, camera, visible):
+        drawn = [body for body, seen in zip(self._bodies, visible, strict=True) if seen]
+        taken.append((camera.name, drawn))
+        take(self, camera, visible)
+
+    monkeypatch.setattr(Bodies, "take", noted)
+    return taken
