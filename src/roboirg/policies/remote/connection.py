@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import contextlib
 import socket
-import threading
 import time
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from roboirg.errors import (
@@ -22,6 +22,7 @@ from roboirg.errors import (
 )
 from roboirg.policies.remote.codec import pack
 from roboirg.policies.remote.links import Link, TryAgainError, keep_trying, read_reply, refusal
+from roboirg.policies.remote.send_limit import SendLimit
 
 try:
     from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
@@ -56,6 +57,10 @@ class WebsocketConnection:
         self._closing = contextlib.ExitStack()
         self._socket: ClientConnection | None = keep_trying(link, self._attempt)
         self._gave_up = False
+        # The library has no time limit for sending. The socket's own would also end the thread that
+        # receives, and begins anew with every piece that is taken in.
+        self._limit = SendLimit(link.options.timeout, partial(self._give_up, self._socket))
+        self._closing.callback(self._limit.close)
         self.metadata: Mapping[str, Any] = self._receive(
             "its metadata", link.options.connect, time.monotonic() + link.options.connect
         )
@@ -70,7 +75,7 @@ class WebsocketConnection:
         """
         seconds = self._link.options.timeout
         deadline = time.monotonic() + seconds
-        self._send(pack(message), seconds)
+        self._send(pack(message))
         return self._receive("a reply", seconds, deadline)
 
     def close(self) -> None:
@@ -108,20 +113,14 @@ class WebsocketConnection:
         except (OSError, EOFError, WebSocketException) as error:
             raise TryAgainError(_words(error)) from error
 
-    def _send(self, data: bytes, seconds: float) -> None:
+    def _send(self, data: bytes) -> None:
         connection = self._open()
-        # The library has no time limit for sending. The socket's own would also end the thread that
-        # receives, and begins anew with every piece that is taken in.
-        limit = threading.Timer(seconds, self._give_up, [connection])
-        limit.daemon = True
-        limit.start()
         try:
             self._refuse_surplus(connection)
-            connection.send(data)
+            with self._limit.watching():
+                connection.send(data)
         except ConnectionClosed as error:
             raise self._broken(error) from error
-        finally:
-            limit.cancel()
 
     def _give_up(self, connection: ClientConnection) -> None:
         """Wake the thread that sends, by another one."""
