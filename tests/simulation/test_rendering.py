@@ -206,19 +206,3 @@ def test_a_damaged_shader_in_the_cache_is_written_anew(monkeypatch, tmp_path):
     passing = Path(shaders.slim_shader.__wrapped__())
     assert (passing / "gbuffer.vert").read_text() == text
     shutil.rmtree(passing.parent)
-
-
-def test_triangles_keep_their_places_and_normals_when_they_share_corners():
-    ticks = np.arange(6.0)
-    x, y = np.meshgrid(ticks, ticks, indexing="ij")
-    heights = np.random.default_rng(0).random(x.shape).round(1)
-    points = np.stack([x, y, heights], axis=-1).astype(np.float32)
-    halves = [(points[:-1, :-1], points[1:, :-1], points[:-1, 1:])]
-    halves += [(points[1:, :-1], points[1:, 1:], points[:-1, 1:])]
-    corners = np.concatenate([np.stack(half, axis=2).reshape(-1, 3, 3) for half in halves])
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    shared = meshes.share_corners(meshes.Triangles(corners, normals))
-    assert np.array_equal(shared.normals[shared.triangles[:, 0]], normals)
-    for given, kept in zip(corners, shared.vertices[shared.triangles], strict=True):
-        assert any(np.array_equal(np.roll(given, turn, axis=0), kept) for turn in range(3))
-    assert len(shared.vertices) < 0.5 * 3 * len(corners)

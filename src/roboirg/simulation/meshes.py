@@ -1,8 +1,7 @@
 """The robot's meshes in a form that is quick to draw, derived from the installed files.
 
-The installed meshes are shaded flat, with three corners of its own for each triangle, and computing
-corners is most of what drawing them costs on a processor. Where a triangle's normal is that of its
-first corner (`roboirg.simulation.shaders`), the other two can be any corners at their places.
+The installed meshes are shaded flat, with three corners of its own for each triangle; ours share
+them. What is derived is kept between processes.
 """
 
 from __future__ import annotations
@@ -23,36 +22,11 @@ from roboirg.simulation.derived import Arrays, code_of, kept_arrays
 from roboirg.simulation.light_meshes import CAMERA_SHARE, LINK_SHARE, SMALL, lighten
 from roboirg.simulation.occlusion import shown_triangles
 from roboirg.simulation.rendering import Rendering
+from roboirg.simulation.triangles import Shared, Triangles, share_corners, unshare_corners
 from roboirg.simulation.viewpoint import to_front_camera
 
 FINGER = "finger.glb"
 """Seen from so near by the wrist camera that it is never lightened."""
-
-
-class Triangles(NamedTuple):
-    """Triangles that are shaded flat.
-
-    Attributes:
-        corners: (n, 3, 3), metres.
-        normals: (n, 3).
-    """
-
-    corners: NDArray[np.float32]
-    normals: NDArray[np.float32]
-
-
-class Shared(NamedTuple):
-    """Triangles that share corners; the normal of each is that of its first corner.
-
-    Attributes:
-        vertices: (m, 3), metres.
-        normals: (m, 3).
-        triangles: (n, 3), indices of vertices.
-    """
-
-    vertices: NDArray[np.float32]
-    normals: NDArray[np.float32]
-    triangles: NDArray[np.uint32]
 
 
 class _Place(NamedTuple):
@@ -117,7 +91,9 @@ def link_shapes(
             of it there is wanted.
     """
     look = None if material is None else _Look.of(material)
-    place = None if seen_at is None else _Place(tuple(seen_at.p), tuple(seen_at.q))
+    place = None
+    if seen_at is not None:
+        place = _Place(*(tuple(map(float, numbers)) for numbers in (seen_at.p, seen_at.q)))
     return [shape.clone() for shape in _shapes(path, look, rendering, place)]
 
 
@@ -133,51 +109,6 @@ def finish(body: sapien.render.RenderBodyComponent, rendering: Rendering) -> Non
         shaders.mark(body)
 
 
-def share_corners(flat: Triangles) -> Shared:
-    """Few vertices for all triangles, in the triangles' order."""
-    places = _numbers_of(flat.corners.reshape(-1, 3)).reshape(-1, 3).tolist()
-    ways = _numbers_of(flat.normals).tolist()
-    at: dict[int, list[int]] = {}
-    vertex_of: dict[tuple[int, int], int] = {}
-    sources: list[tuple[int, int]] = []
-    firsts = []
-    for number, (three, way) in enumerate(zip(places, ways, strict=True)):
-        # A vertex with this normal, or one more where there are the fewest.
-        first = min(
-            range(3),
-            key=lambda k: -1 if (three[k], way) in vertex_of else len(at.get(three[k], ())),
-        )
-        if (three[first], way) not in vertex_of:
-            vertex_of[three[first], way] = len(sources)
-            at.setdefault(three[first], []).append(len(sources))
-            sources.append((number, first))
-        firsts.append(first)
-    for number, three in enumerate(places):
-        for corner, place in enumerate(three):
-            if place not in at:
-                at[place] = [len(sources)]
-                sources.append((number, corner))
-    triangles = []
-    for three, way, first in zip(places, ways, firsts, strict=True):
-        here = vertex_of[three[first], way]
-        # What has been computed lately need not be computed again.
-        others = [
-            min(at[three[(first + k) % 3]], key=lambda vertex: abs(vertex - here)) for k in (1, 2)
-        ]
-        triangles.append([here, *others])
-    owners, corners = np.array(sources, dtype=np.intp).reshape(-1, 2).T
-    return Shared(
-        flat.corners[owners, corners],
-        flat.normals[owners],
-        np.array(triangles, dtype=np.uint32).reshape(-1, 3),
-    )
-
-
-def _numbers_of(rows: NDArray[np.float32]) -> NDArray[np.intp]:
-    """A number for each row, equal for equal rows."""
-    return np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1)
-
-
 def _flat(rendering: Rendering) -> bool:
     return rendering.slim_shader and shaders.slim_shader() is not None
 
@@ -187,15 +118,13 @@ def _shapes(
     path: Path, look: _Look | None, rendering: Rendering, place: _Place | None
 ) -> Sequence[sapien.render.RenderShapeTriangleMesh]:
     arrays = _derived(path, rendering)
-    parts = _parts(arrays)
-    if place is not None:
-        parts = _seen(parts, place)
+    drawn = arrays if place is None else _derived_for_front(path, rendering, place)
     shapes = []
-    for number, part in enumerate(parts):
+    for number, part in enumerate(_parts(drawn)):
         if not len(part.triangles):
             continue
         numbers = arrays[f"look{number}"]
-        vertices, normals, triangles = part if _flat(rendering) else _unshared(part)
+        vertices, normals, triangles = part if _flat(rendering) else unshare_corners(part)
         own = _Look.unpacked(np.asarray(numbers, np.float32)) if len(numbers) else look
         shapes.append(
             sapien.render.RenderShapeTriangleMesh(
@@ -209,36 +138,8 @@ def _shapes(
     return shapes
 
 
-def _unshared(part: Shared) -> Shared:
-    """Three vertices of its own for each triangle."""
-    corners, normals = _flattened(part)
-    count = 3 * len(corners)
-    return Shared(
-        corners.reshape(-1, 3),
-        np.repeat(normals, 3, axis=0),
-        np.arange(count, dtype=np.uint32).reshape(-1, 3),
-    )
-
-
-def _seen(parts: Sequence[Shared], place: _Place) -> list[Shared]:
-    """What the front camera can see of parts of an opaque mesh that is in one place for ever."""
-    to_camera = to_front_camera(sapien.Pose(place.position, place.quaternion))
-    flat = [_flattened(part) for part in parts]
-    corners = np.concatenate([part.corners for part in flat])
-    shown = shown_triangles(corners @ to_camera[:3, :3].T + to_camera[:3, 3])
-    ends = np.cumsum([len(part.corners) for part in flat])[:-1]
-    return [
-        share_corners(Triangles(part.corners[mask], part.normals[mask]))
-        for part, mask in zip(flat, np.split(shown, ends), strict=True)
-    ]
-
-
-def _flattened(part: Shared) -> Triangles:
-    return Triangles(part.vertices[part.triangles], part.normals[part.triangles[:, 0]])
-
-
 def _parts(arrays: Arrays) -> list[Shared]:
-    """The triangles in what `_derived` gives, of each part of the mesh."""
+    """The triangles of each part of a mesh, of what has been derived."""
     count = sum(name.startswith("triangles") for name in arrays)
     return [
         Shared._make(arrays[f"{field}{part}"] for field in Shared._fields) for part in range(count)
@@ -250,9 +151,7 @@ def _derived(path: Path, rendering: Rendering) -> Arrays:
 
     Besides them the convex hull of all parts together.
     """
-    light = rendering.meshes == "light" and path.name != FINGER
-    # The contents of the installed files are known: they have been checked.
-    sources = code_of("meshes", "camera_mesh", "light_meshes") + camera_mesh.packed_mask()
+    light = _is_light(path, rendering)
 
     def derive() -> Arrays:
         arrays: Arrays = {}
@@ -260,9 +159,7 @@ def _derived(path: Path, rendering: Rendering) -> Arrays:
             share = CAMERA_SHARE if path.suffix == ".stl" else LINK_SHARE
             lighter = light and len(flat.corners) > SMALL
             drawn = Triangles(*lighten(flat.corners, share=share)) if lighter else flat
-            shared = share_corners(drawn)
-            for field, array in zip(Shared._fields, shared, strict=True):
-                arrays[f"{field}{part}"] = array
+            arrays |= _numbered(share_corners(drawn), part)
             arrays[f"look{part}"] = np.zeros(0) if look is None else look.packed()
         points = np.concatenate([part.vertices for part in _parts(arrays)])
         # SciPy takes a quarter of a second to import, and this is needed once.
@@ -271,7 +168,43 @@ def _derived(path: Path, rendering: Rendering) -> Arrays:
         arrays["hull"] = points[ConvexHull(points).vertices]
         return arrays
 
-    return kept_arrays(f"{path.stem}-{'light' if light else 'faithful'}", sources, derive)
+    return kept_arrays(f"{path.stem}-{'light' if light else 'faithful'}", _sources(), derive)
+
+
+def _derived_for_front(path: Path, rendering: Rendering, place: _Place) -> Arrays:
+    """The fields of `Shared` with the numbers of the parts, of what the front camera can see.
+
+    The mesh is opaque and in one place for ever.
+    """
+    light = _is_light(path, rendering)
+
+    def derive() -> Arrays:
+        to_camera = to_front_camera(sapien.Pose(place.position, place.quaternion))
+        parts = [part.flattened() for part in _parts(_derived(path, rendering))]
+        corners = np.concatenate([part.corners for part in parts])
+        shown = shown_triangles(corners @ to_camera[:3, :3].T + to_camera[:3, 3])
+        ends = np.cumsum([len(part.corners) for part in parts])[:-1]
+        arrays: Arrays = {}
+        for number, (part, mask) in enumerate(zip(parts, np.split(shown, ends), strict=True)):
+            seen = Triangles(part.corners[mask], part.normals[mask])
+            arrays |= _numbered(share_corners(seen), number)
+        return arrays
+
+    sources = _sources() + code_of("occlusion", "viewpoint") + repr(place).encode()
+    return kept_arrays(f"{path.stem}-{'light' if light else 'faithful'}-front", sources, derive)
+
+
+def _is_light(path: Path, rendering: Rendering) -> bool:
+    return rendering.meshes == "light" and path.name != FINGER
+
+
+def _sources() -> bytes:
+    """What determines derived meshes; the installed files' contents are known and checked."""
+    return code_of("meshes", "triangles", "camera_mesh", "light_meshes") + camera_mesh.packed_mask()
+
+
+def _numbered(part: Shared, number: int) -> Arrays:
+    return {f"{field}{number}": array for field, array in part._asdict().items()}
 
 
 def _installed(path: Path) -> list[tuple[Triangles, _Look | None]]:

@@ -1,0 +1,42 @@
+"""Triangles that share corners are the same triangles."""
+
+import numpy as np
+
+from roboirg.simulation.triangles import Triangles, share_corners, unshare_corners
+
+
+def hills():
+    """Triangles over a grid of points with uneven heights."""
+    ticks = np.arange(6.0)
+    x, y = np.meshgrid(ticks, ticks, indexing="ij")
+    heights = np.random.default_rng(0).random(x.shape).round(1)
+    points = np.stack([x, y, heights], axis=-1).astype(np.float32)
+    halves = [(points[:-1, :-1], points[1:, :-1], points[:-1, 1:])]
+    halves += [(points[1:, :-1], points[1:, 1:], points[:-1, 1:])]
+    corners = np.concatenate([np.stack(half, axis=2).reshape(-1, 3, 3) for half in halves])
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return Triangles(corners, normals)
+
+
+def test_triangles_keep_their_places_and_normals_when_they_share_corners():
+    corners, normals = hills()
+    shared = share_corners(hills())
+    assert np.array_equal(shared.normals[shared.triangles[:, 0]], normals)
+    for given, kept in zip(corners, shared.vertices[shared.triangles], strict=True):
+        assert any(np.array_equal(np.roll(given, turn, axis=0), kept) for turn in range(3))
+    assert len(shared.vertices) < 0.5 * 3 * len(corners)
+
+
+def test_they_can_have_their_own_corners_again():
+    shared = share_corners(hills())
+    own = unshare_corners(shared)
+    assert len(own.vertices) == 3 * len(own.triangles)
+    assert np.array_equal(own.flattened().corners, shared.flattened().corners)
+    assert np.array_equal(own.flattened().normals, hills().normals)
+
+
+def test_none_is_no_special_case():
+    nothing = Triangles(np.zeros((0, 3, 3), np.float32), np.zeros((0, 3), np.float32))
+    shared = share_corners(nothing)
+    assert [len(field) for field in shared] == [0, 0, 0]
+    assert len(unshare_corners(shared).flattened().corners) == 0
