@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import roboirg
-from roboirg.observations import Demonstration, Observation
+from roboirg.observations import CAMERAS, Demonstration, Observation
 from roboirg.policies import Policy, make_policy, play
 from roboirg.policies.wishes import wanted_cameras
 
@@ -28,7 +28,7 @@ SWING = 0.2
 class Waving:
     """Swings the arm to and fro, so that every picture has to be drawn; decides nothing."""
 
-    cameras: ClassVar[tuple[str, ...]] = ("front", "wrist")
+    cameras: ClassVar[tuple[str, ...]] = CAMERAS
     version = "1"
 
     def __init__(self) -> None:

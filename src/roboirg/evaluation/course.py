@@ -72,6 +72,19 @@ class Course:
         """Nobody knows what the policy would have done."""
         self.outcome, self.error, self.cause, self.details = "error", kind, cause, details
 
+    def settle(self, status: str, cause: str | None, steps: int) -> bool:
+        """Take down how an episode ended after so many steps; whether the status is an end."""
+        if status == "success":
+            self.outcome, self.cause = "success", None
+        elif status == "timeout":
+            self.outcome, self.timed_out = "failure", True
+            self.cause = cause or f"not done after {steps} steps"
+        elif status == "failure":
+            self.outcome, self.cause = "failure", cause or "the judge gave no cause"
+        else:
+            return False
+        return True
+
     def note(self, info: Mapping[str, Any]) -> None:
         """Keep the events that the environment reports, and how far the world is."""
         self.elapsed = int(info.get("elapsed_steps", self.elapsed))

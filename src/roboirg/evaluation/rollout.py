@@ -287,18 +287,7 @@ def _play(
         course.steps = int(info["steps"])
         course.note(info)
         status, cause = info["status"], info.get("cause")
-    _judge(job, status, cause, course)
-
-
-def _judge(job: Job, status: str, cause: str | None, course: Course) -> None:
-    if status == "success":
-        course.outcome, course.cause = "success", None
-    elif status == "timeout":
-        course.outcome, course.timed_out = "failure", True
-        course.cause = cause or f"not done after {job.max_steps} steps"
-    elif status == "failure":
-        course.outcome, course.cause = "failure", cause or "the judge gave no cause"
-    else:
+    if not course.settle(status, cause, job.max_steps):
         course.cause = f"environment: the episode ended with status {status!r}"
 
 

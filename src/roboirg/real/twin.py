@@ -113,14 +113,8 @@ class Twin:
         course.turn = int(first["elapsed_steps"])
         for info in (first, *later):
             course.note(info)
-        status, cause = self._infos[-1]["status"], self._infos[-1].get("cause")
-        if status == "success":
-            course.outcome, course.cause = "success", None
-        elif status == "timeout":
-            course.outcome, course.timed_out = "failure", True
-            course.cause = cause or f"not done after {self._infos[-1]['steps']} steps"
-        elif status == "failure":
-            course.outcome, course.cause = "failure", cause or "the judge gave no cause"
+        last = self._infos[-1]
+        course.settle(last["status"], last.get("cause"), last["steps"])
 
     def _step(self, command: Command) -> None:
         self._feeling, *_, info = self._playing().step(command)

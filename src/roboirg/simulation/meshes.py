@@ -168,7 +168,7 @@ def _derived(path: Path, rendering: Rendering) -> Arrays:
         arrays["hull"] = points[ConvexHull(points).vertices]
         return arrays
 
-    return kept_arrays(f"{path.stem}-{'light' if light else 'faithful'}", _sources(), derive)
+    return kept_arrays(_name(path, rendering), _sources(), derive)
 
 
 def _derived_for_front(path: Path, rendering: Rendering, place: _Place) -> Arrays:
@@ -176,7 +176,6 @@ def _derived_for_front(path: Path, rendering: Rendering, place: _Place) -> Array
 
     The mesh is opaque and in one place for ever.
     """
-    light = _is_light(path, rendering)
 
     def derive() -> Arrays:
         to_camera = to_front_camera(sapien.Pose(place.position, place.quaternion))
@@ -191,11 +190,16 @@ def _derived_for_front(path: Path, rendering: Rendering, place: _Place) -> Array
         return arrays
 
     sources = _sources() + code_of("occlusion", "viewpoint") + repr(place).encode()
-    return kept_arrays(f"{path.stem}-{'light' if light else 'faithful'}-front", sources, derive)
+    return kept_arrays(f"{_name(path, rendering)}-front", sources, derive)
 
 
 def _is_light(path: Path, rendering: Rendering) -> bool:
     return rendering.meshes == "light" and path.name != FINGER
+
+
+def _name(path: Path, rendering: Rendering) -> str:
+    """Of what is kept of a mesh."""
+    return f"{path.stem}-{'light' if _is_light(path, rendering) else 'faithful'}"
 
 
 def _sources() -> bytes:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from roboirg.actions import JOINT_ANGLE, ActionSpace, check_chunk
 from roboirg.errors import InvalidActionError, PolicyReplyError
-from roboirg.observations import Demonstration, Observation
+from roboirg.observations import CAMERAS, Demonstration, Observation
 from roboirg.policies.remote.address import RemoteOptions, read_endpoints
 from roboirg.policies.remote.connection import WebsocketConnection
 from roboirg.policies.remote.session import Connect, Session
@@ -41,7 +41,7 @@ class RemotePolicy(ABC):
 
     options_type: ClassVar[type[RemoteOptions]] = RemoteOptions
     connect: ClassVar[Connect] = WebsocketConnection
-    cameras: tuple[str, ...] = ("front", "wrist")
+    cameras: tuple[str, ...] = CAMERAS
     actions: str = JOINT_ANGLE.name
 
     def __init__(self, url: str, seed: int = 0) -> None:
