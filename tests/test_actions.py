@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from roboirg.actions import (
+from roboirg.core.actions import (
     ACTION_SPACES,
     EE_POSE,
     JOINT_ANGLE,
@@ -15,7 +15,7 @@ from roboirg.actions import (
     check_chunk,
     find_action_space,
 )
-from roboirg.errors import InvalidActionError, UnknownNameError
+from roboirg.core.errors import InvalidActionError, UnknownNameError
 
 finite = st.floats(-10, 10)
 

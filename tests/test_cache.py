@@ -9,9 +9,9 @@ import time
 
 import pytest
 
-from roboirg import cache as cache_module
-from roboirg.cache import Cache, open_cache
-from roboirg.errors import InvalidValueError
+from roboirg.core.errors import InvalidValueError
+from roboirg.util import cache as cache_module
+from roboirg.util.cache import Cache, open_cache
 
 KEYS = ("a1", "b2", "c3")
 
@@ -87,7 +87,7 @@ def test_damage_is_noticed_told_once_and_repaired(tmp_path, caplog, harm):
 WRITER = """
 import sys
 from pathlib import Path
-from roboirg.cache import Cache
+from roboirg.util.cache import Cache
 cache = Cache(Path(sys.argv[1]), 40_000_000)
 print("ready", flush=True)
 for number in range(int(sys.argv[2])):

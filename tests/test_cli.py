@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from roboirg.cli import app as cli
-from roboirg.evaluation.course import Course, describe
 from roboirg.evaluation.plan import read_plan
-from roboirg.evaluation.record import Job
-from roboirg.evaluation.store import RecordStore
+from roboirg.evaluation.rollout_result import Course, describe
+from roboirg.records.record import Job
+from roboirg.records.store import RecordStore
 
 RUN = ("run", "--policy", "random", "--tasks", "PickXtimes")
 
@@ -207,7 +207,7 @@ def test_errors_are_told_and_are_exit_code_2(
 def test_missing_graphics_are_one_sentence(
     roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from roboirg.errors import RenderDeviceError
+    from roboirg.core.errors import RenderDeviceError
 
     def fail(_self: CannedPlayer, _job: Job) -> None:
         raise RenderDeviceError("No Vulkan device can render; install Mesa.")
@@ -255,15 +255,17 @@ def test_failures_are_named_below_the_table(
 def test_splits_are_built_anew_for_what_is_named(
     roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from roboirg.evaluation import acceptance
-    from roboirg.splits import shipped, splits_text
+    from roboirg.episodes.splits import shipped, splits_text
+    from roboirg.evaluation import seed_selection
 
     def find(slots, workers):
         assert workers == 0
         # Backwards: no order of ending may matter.
-        return (acceptance.find_seed(slot, acceptance.judge_words) for slot in reversed(slots))
+        return (
+            seed_selection.find_seed(slot, seed_selection.judge_words) for slot in reversed(slots)
+        )
 
-    monkeypatch.setattr(acceptance, "find_seeds", find)
+    monkeypatch.setattr(seed_selection, "find_seeds", find)
     words = ("build-splits", "--tasks", "VideoUnmask,PickXtimes", "--split", "val", "--workers", 0)
     said = roboirg(*words)
     assert (said.code, said.out) == (0, splits_text(shipped()))
@@ -296,7 +298,7 @@ def test_wrong_wishes_are_one_sentence(roboirg, words: tuple[str, ...], sentence
 def test_an_episode_is_shown(roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(
-        "roboirg.showing.playthrough.draw_sheet", lambda _episode, path: f"success, in {path}"
+        "roboirg.visualization.playthrough.draw_sheet", lambda _episode, path: f"success, in {path}"
     )
     said = roboirg("show", "VideoPlaceButton", "3", "--split", "val")
     assert (said.code, said.err) == (0, "")

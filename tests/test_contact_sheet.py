@@ -4,15 +4,15 @@ import cv2
 import numpy as np
 import pytest
 
-from roboirg.conditions import Fact
-from roboirg.episode import Scene
-from roboirg.errors import InvalidValueError
-from roboirg.motions import Away, Glow, Point, Shuttle, Swap, Vanish
-from roboirg.showing.contact_sheet import Moment, compose_sheet, thinned, write_png
-from roboirg.showing.happenings import Happenings
-from roboirg.showing.playthrough import FEWEST, MOST, choose, play_through
-from roboirg.showing.words import fact_words, motion_lines, video_lines
-from roboirg.splits import get_episode
+from roboirg.core.conditions import Fact
+from roboirg.core.episode import Scene
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.motions import Away, Glow, Point, Shuttle, Swap, Vanish
+from roboirg.episodes.splits import get_episode
+from roboirg.visualization.contact_sheet import Moment, compose_sheet, thinned, write_png
+from roboirg.visualization.episode_text import fact_words, motion_lines, video_lines
+from roboirg.visualization.key_events import Happenings
+from roboirg.visualization.playthrough import FEWEST, MOST, choose, play_through
 
 
 def picture(value):

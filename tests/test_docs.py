@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import roboirg
-from roboirg.actions import check_chunk
+from roboirg.core.actions import check_chunk
 from roboirg.policies import Policy
 
 ROOT = Path(__file__).parent.parent

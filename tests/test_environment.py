@@ -13,16 +13,16 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import roboirg
-from roboirg.actions import ACTION_SPACES
-from roboirg.errors import InvalidActionError, InvalidValueError, UnknownNameError
-from roboirg.evaluation.record import Job
+from roboirg.core.actions import ACTION_SPACES
+from roboirg.core.errors import InvalidActionError, InvalidValueError, UnknownNameError
+from roboirg.envs.registration import environment_id
+from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.rollout import Needs, make_env
-from roboirg.gym import environment_id
 from roboirg.policies import make_policy, play
-from roboirg.policies.handed import HandedPolicy
-from roboirg.simulation.cameras import Cameras
-from roboirg.simulation.settings import HOME_ACTION
-from roboirg.splits import get_episode
+from roboirg.policies.builtin.scripted import HandedPolicy
+from roboirg.records.record import Job
+from roboirg.simulation.physics_settings import HOME_ACTION
+from roboirg.simulation.rendering.cameras import Cameras
 from roboirg.tasks import every_task, get_task
 
 pytestmark = pytest.mark.sim
@@ -44,7 +44,9 @@ class Wrong(HandedPolicy):
 @pytest.mark.parametrize("task", TASKS)
 def test_gymnasium_s_checker_is_content(task):
     # Drawing is tested elsewhere; the checker resets a dozen times.
-    env = gymnasium.make(f"roboirg.gym:{environment_id(task)}", cameras=(), setting="direct")
+    env = gymnasium.make(
+        f"roboirg.envs.registration:{environment_id(task)}", cameras=(), setting="direct"
+    )
     with warnings.catch_warnings():
         # Joint targets are in radians and positions in metres, not in [-1, 1].
         warnings.filterwarnings("ignore", message=".*(Box action|Box observation).*")
@@ -445,7 +447,7 @@ def test_without_vulkan_episodes_play_undrawn_and_drawing_says_what_to_install()
 def test_without_the_simulator_the_extra_is_named():
     code = (
         "import sys; sys.modules['gymnasium'] = None\n"
-        "import roboirg, roboirg.language, roboirg.judging, roboirg.splits\n"
+        "import roboirg, roboirg.language, roboirg.judging, roboirg.episodes.splits\n"
         "roboirg.make('PickXtimes')"
     )
     result = run_python(code)

@@ -7,10 +7,10 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from roboirg.episode import SPLITS, Episode
-from roboirg.errors import InvalidValueError, UnknownNameError
-from roboirg.fingerprint import fingerprint, plain
-from roboirg.splits import (
+from roboirg.core.episode import SPLITS, Episode
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.episodes.fingerprint import fingerprint, plain
+from roboirg.episodes.splits import (
     MAX_REJECTED,
     SEED_STRIDE,
     SIZES,

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from roboirg.errors import MissingDependencyError
+from roboirg.core.errors import MissingDependencyError
 
 if TYPE_CHECKING:
-    from roboirg.environment import RoboIRGEnv
-    from roboirg.episode import Episode
+    from roboirg.core.episode import Episode
+    from roboirg.envs.environment import RoboIRGEnv
 
 __version__ = "0.1.0"
 __all__ = ["__version__", "make"]
@@ -20,7 +20,7 @@ def make(task: str | Episode, **options: Any) -> RoboIRGEnv:  # noqa: ANN401 - R
     Args:
         task: name of the task, for example ``"PickXtimes"``, or an episode made by hand.
         **options: setting, form, split, episode and more, see
-            `roboirg.environment.RoboIRGEnv`.
+            `roboirg.envs.environment.RoboIRGEnv`.
 
     Raises:
         MissingDependencyError: the simulator is not installed.
@@ -28,7 +28,7 @@ def make(task: str | Episode, **options: Any) -> RoboIRGEnv:  # noqa: ANN401 - R
         InvalidValueError: the split has no such episode, or the combination is not defined.
     """
     try:
-        from roboirg.environment import RoboIRGEnv
+        from roboirg.envs.environment import RoboIRGEnv
     except ModuleNotFoundError as error:
         raise MissingDependencyError(
             f"Playing episodes needs the package {error.name!r}; "

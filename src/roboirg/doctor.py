@@ -21,9 +21,9 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
-from roboirg.errors import MissingDependencyError, RenderDeviceError, RoboIRGError
-from roboirg.simulation.assets import look_for_model_files
-from roboirg.simulation.device import DEVICE_VARIABLE
+from roboirg.core.errors import MissingDependencyError, RenderDeviceError, RoboIRGError
+from roboirg.simulation.model_files import look_for_model_files
+from roboirg.simulation.rendering.render_device import DEVICE_VARIABLE
 
 DISTRIBUTION = "roboirgbench"
 FRAME_TIMEOUT = 120.0
@@ -255,7 +255,7 @@ def _render_test_frame() -> str:
         RenderDeviceError: no device can render, or the picture is wrong.
     """
     # Named here and not at the top: only the child process may load them.
-    devices = importlib.import_module("roboirg.simulation.device")
+    devices = importlib.import_module("roboirg.simulation.rendering.render_device")
     device = devices.describe(devices.find_render_device())
     kind = "drawn by the processor" if device.is_software else "GPU"
     # Flushed at once: the next lines may crash this process.

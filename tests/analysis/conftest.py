@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from roboirg.analysis.published import TRIALS, published_rows
-from roboirg.analysis.statistics import Variant
-from roboirg.evaluation.record import Result
+from roboirg.analysis.stats.success_rates import Variant
+from roboirg.records.record import Result
 
 MakeResult = Callable[..., Result]
 

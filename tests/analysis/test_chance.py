@@ -8,12 +8,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from roboirg.analysis.chance import chance_level, chance_of
+from roboirg.analysis.stats.chance import chance_level, chance_of
+from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.plan import say
-from roboirg.evaluation.record import Job
 from roboirg.language.variants import all_variants
-from roboirg.policies.listeners import ForgetfulPolicy
-from roboirg.splits import get_episode
+from roboirg.policies.builtin.listeners import ForgetfulPolicy
+from roboirg.records.record import Job
 from roboirg.tasks import all_tasks, get_task
 
 

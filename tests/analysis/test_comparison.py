@@ -7,10 +7,10 @@ import re
 import numpy as np
 import pytest
 
-from roboirg.analysis.comparison import compare
-from roboirg.analysis.comparison_words import sentences
-from roboirg.analysis.samples import gather
-from roboirg.errors import InvalidValueError
+from roboirg.analysis.stats.comparison import compare
+from roboirg.analysis.stats.comparison_text import sentences
+from roboirg.analysis.stats.samples import gather
+from roboirg.core.errors import InvalidValueError
 
 GOOD, POOR = "listener", "forgetful"
 

@@ -13,15 +13,15 @@ from roboirg.analysis.figures import FIGURES, Content, write_figures
 from roboirg.analysis.figures.failures import COLOURS, UNKNOWN, draw_failures
 from roboirg.analysis.figures.forms import PARTS, draw_forms
 from roboirg.analysis.published import published_rows
-from roboirg.analysis.statistics import Variant
-from roboirg.analysis.summary import ALL
-from roboirg.cli.telling import figures
-from roboirg.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.course import Course, describe
+from roboirg.analysis.stats.run_summary import ALL
+from roboirg.analysis.stats.success_rates import Variant
+from roboirg.cli.report_commands import figures
+from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.plan import Plan
-from roboirg.evaluation.record import Attribution, Result
-from roboirg.evaluation.store import RecordStore
-from roboirg.judging.finding import EXECUTION, GROUNDING
+from roboirg.evaluation.rollout_result import Course, describe
+from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
+from roboirg.records.record import Attribution, Result
+from roboirg.records.store import RecordStore
 
 pytest.importorskip("matplotlib")
 

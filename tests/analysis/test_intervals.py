@@ -9,15 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboirg.analysis.intervals import (
+from roboirg.analysis.stats.intervals import (
     percentile_interval,
     resampled_rates,
     unseen_share,
     wilson_interval,
     without_spread,
 )
-from roboirg.analysis.paired import Pairs, measure_gap, sign_flip_test
-from roboirg.analysis.samples import Sample, Trial, clustered_interval, shown_interval, wilson
+from roboirg.analysis.stats.paired_tests import Pairs, measure_gap, sign_flip_test
+from roboirg.analysis.stats.samples import Sample, Trial, clustered_interval, shown_interval, wilson
 
 LONG = "ROBOIRG_LONG_TESTS" in os.environ
 """Ten times as many simulated runs."""
@@ -192,7 +192,7 @@ def test_the_test_raises_few_false_alarms(seeds: int) -> None:
 
     McNemar's test over single trials raises far too many with several seeds.
     """
-    from roboirg.analysis.paired import mcnemar_test
+    from roboirg.analysis.stats.paired_tests import mcnemar_test
 
     rng = np.random.default_rng(14)
     alarms = np.zeros(2)

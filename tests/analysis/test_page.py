@@ -15,13 +15,13 @@ import numpy as np
 import pytest
 
 from roboirg.analysis.page.entries import Run
-from roboirg.analysis.page.serving import PageServer
-from roboirg.analysis.report import make_view, render, render_runs
-from roboirg.evaluation.course import Course, describe
+from roboirg.analysis.page.page_server import PageServer
+from roboirg.analysis.page.report import make_view, render, render_runs
 from roboirg.evaluation.plan import Plan
-from roboirg.evaluation.record import Attribution, EventRecord, Record
-from roboirg.evaluation.store import RecordStore
-from roboirg.evaluation.video import Film
+from roboirg.evaluation.rollout_result import Course, describe
+from roboirg.evaluation.video_writer import Film
+from roboirg.records.record import Attribution, EventRecord, Record
+from roboirg.records.store import RecordStore
 
 pytest.importorskip("jinja2")
 pytestmark = pytest.mark.browser

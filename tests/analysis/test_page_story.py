@@ -8,18 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from roboirg.analysis.chance import chance_of
-from roboirg.analysis.comparison import compare
 from roboirg.analysis.figures import Content, write_figures
-from roboirg.analysis.report import write_report
-from roboirg.analysis.statistics import Variant
-from roboirg.analysis.summary import ALL
-from roboirg.evaluation.executors import choose_executor
+from roboirg.analysis.page.report import write_report
+from roboirg.analysis.stats.chance import chance_of
+from roboirg.analysis.stats.comparison import compare
+from roboirg.analysis.stats.run_summary import ALL
+from roboirg.analysis.stats.success_rates import Variant
+from roboirg.evaluation.executors.executor import choose_executor
 from roboirg.evaluation.plan import make_plan
-from roboirg.evaluation.record import Record
 from roboirg.evaluation.rollout import Player
 from roboirg.evaluation.runner import run_plan
-from roboirg.evaluation.store import read_records
+from roboirg.records.record import Record
+from roboirg.records.store import read_records
 
 pytestmark = pytest.mark.sim
 

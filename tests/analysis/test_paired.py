@@ -10,9 +10,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboirg.analysis.correction import holm
-from roboirg.analysis.paired import Overlap, Pairs, mcnemar_test, measure_gap, sign_flip_test
-from roboirg.analysis.samples import Sample, Trial
+from roboirg.analysis.stats.multiple_testing import holm
+from roboirg.analysis.stats.paired_tests import (
+    Overlap,
+    Pairs,
+    mcnemar_test,
+    measure_gap,
+    sign_flip_test,
+)
+from roboirg.analysis.stats.samples import Sample, Trial
 
 
 def sample(*won: str) -> Sample:

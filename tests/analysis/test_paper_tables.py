@@ -12,13 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from roboirg.analysis.paper_tables import has_something_to_say, make_table
-from roboirg.analysis.rates import change, mean_percent, percent
-from roboirg.analysis.rendering import FORMATS, get_format
-from roboirg.analysis.rendering.terminal import renderable
-from roboirg.analysis.samples import gather
-from roboirg.analysis.table import Entry
-from roboirg.errors import UnknownNameError
+from roboirg.analysis.stats.rates import change, mean_percent, percent
+from roboirg.analysis.stats.samples import gather
+from roboirg.analysis.tables.paper_tables import has_something_to_say, make_table
+from roboirg.analysis.tables.rendering import FORMATS, get_format
+from roboirg.analysis.tables.rendering.terminal import renderable
+from roboirg.analysis.tables.table import Entry
+from roboirg.core.errors import UnknownNameError
 from roboirg.tasks import all_tasks
 
 

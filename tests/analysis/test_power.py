@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roboirg.analysis.paired import mcnemar_test
-from roboirg.analysis.power import MOST_EPISODES, episodes_needed, mcnemar_power, smallest_gap
-from roboirg.errors import InvalidValueError
+from roboirg.analysis.stats.paired_tests import mcnemar_test
+from roboirg.analysis.stats.power import MOST_EPISODES, episodes_needed, mcnemar_power, smallest_gap
+from roboirg.core.errors import InvalidValueError
 
 
 def test_power_by_hand() -> None:

@@ -9,7 +9,6 @@ from importlib import resources
 
 import pytest
 
-from roboirg.analysis.paper_tables import WHICH, make_table
 from roboirg.analysis.published import (
     RATE_TABLES,
     TRIALS,
@@ -17,11 +16,12 @@ from roboirg.analysis.published import (
     published_rows,
     published_tasks,
 )
-from roboirg.analysis.rates import mean_percent, percent
-from roboirg.analysis.rendering import FORMATS
-from roboirg.analysis.samples import gather
-from roboirg.analysis.table import Row, Table
-from roboirg.errors import UnknownNameError
+from roboirg.analysis.stats.rates import mean_percent, percent
+from roboirg.analysis.stats.samples import gather
+from roboirg.analysis.tables.paper_tables import WHICH, make_table
+from roboirg.analysis.tables.rendering import FORMATS
+from roboirg.analysis.tables.table import Row, Table
+from roboirg.core.errors import UnknownNameError
 from roboirg.language import STAGE_SETS
 from roboirg.tasks import all_tasks
 
@@ -30,7 +30,7 @@ FILES = {"main": "main", "planner": "planner", "context": "context", "real": "re
 
 def printed(table: str) -> list[dict[str, str]]:
     """The file as it is, without the loader."""
-    path = resources.files("roboirg.analysis") / "published" / f"{FILES[table]}.csv"
+    path = resources.files("roboirg.analysis") / "published_results" / f"{FILES[table]}.csv"
     return list(csv.DictReader(path.read_text().splitlines()))
 
 

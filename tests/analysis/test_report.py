@@ -16,12 +16,12 @@ from typer.testing import CliRunner
 from roboirg.analysis.page import films
 from roboirg.analysis.page.columns import UNATTRIBUTED
 from roboirg.analysis.page.entries import Run
-from roboirg.analysis.report import make_view, render, render_runs, write_report
-from roboirg.cli.telling import report
-from roboirg.evaluation.course import Course, describe
+from roboirg.analysis.page.report import make_view, render, render_runs, write_report
+from roboirg.cli.report_commands import report
 from roboirg.evaluation.plan import Plan, write_plan
-from roboirg.evaluation.record import Attribution, EventRecord, MentionSpan, Record, Turn
-from roboirg.evaluation.store import RecordStore, StoreError
+from roboirg.evaluation.rollout_result import Course, describe
+from roboirg.records.record import Attribution, EventRecord, MentionSpan, Record, Turn
+from roboirg.records.store import RecordStore, StoreError
 
 pytest.importorskip("jinja2")
 

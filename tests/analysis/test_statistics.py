@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import pytest
 
-from roboirg.analysis.statistics import (
+from roboirg.analysis.stats.success_rates import (
     EXPLICIT,
     Cell,
     Variant,
     make_panels,
     wilson_interval,
 )
-from roboirg.evaluation.course import Course, describe
-from roboirg.evaluation.record import Job, Record
+from roboirg.evaluation.rollout_result import Course, describe
+from roboirg.records.record import Job, Record
 
 DIRECT = Variant("direct")
 

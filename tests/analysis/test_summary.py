@@ -7,9 +7,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from roboirg.analysis.samples import Sample, Trial, gather, labels, wilson
-from roboirg.analysis.statistics import EXPLICIT, Variant
-from roboirg.analysis.summary import ALL, Scope, summarise
+from roboirg.analysis.stats.run_summary import ALL, Scope, summarise
+from roboirg.analysis.stats.samples import Sample, Trial, gather, labels, wilson
+from roboirg.analysis.stats.success_rates import EXPLICIT, Variant
 
 DIRECT = Variant("direct")
 

@@ -4,10 +4,16 @@ import io
 
 from rich.console import Console
 
-from roboirg.analysis.statistics import EXPLICIT, Cell, Condition, Panel, Variant
-from roboirg.analysis.tables import NO_GAP, gap_text, points, print_failures, print_tables
-from roboirg.evaluation.course import Course, describe
-from roboirg.evaluation.record import Job, Record
+from roboirg.analysis.stats.success_rates import EXPLICIT, Cell, Condition, Panel, Variant
+from roboirg.analysis.tables.run_tables import (
+    NO_GAP,
+    gap_text,
+    points,
+    print_failures,
+    print_tables,
+)
+from roboirg.evaluation.rollout_result import Course, describe
+from roboirg.records.record import Job, Record
 
 
 def record(

@@ -8,11 +8,11 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from roboirg.cli.telling import compare, tables
-from roboirg.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.course import Course, describe
+from roboirg.cli.report_commands import compare, tables
+from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.plan import make_plan, write_plan
-from roboirg.evaluation.store import RecordStore, StoreError
+from roboirg.evaluation.rollout_result import Course, describe
+from roboirg.records.store import RecordStore, StoreError
 
 app = typer.Typer()
 app.command()(tables)

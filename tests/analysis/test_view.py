@@ -17,12 +17,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboirg.analysis.page.serving import PageServer, Range, parse_range
-from roboirg.errors import InvalidValueError
-from roboirg.evaluation.course import Course, describe
+from roboirg.analysis.page.page_server import PageServer, Range, parse_range
+from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.plan import make_plan
-from roboirg.evaluation.record import Record
-from roboirg.evaluation.store import RecordStore
+from roboirg.evaluation.rollout_result import Course, describe
+from roboirg.records.record import Record
+from roboirg.records.store import RecordStore
 
 FILM = bytes(range(256)) * 1000
 
@@ -178,7 +178,7 @@ def test_a_port_that_is_taken_or_is_none_is_one_sentence(server: PageServer, run
 
 def test_the_command_says_where_and_ends_with_ctrl_c(run: Path) -> None:
     pytest.importorskip("jinja2")
-    code = "import typer; from roboirg.cli.telling import view; typer.run(view)"
+    code = "import typer; from roboirg.cli.report_commands import view; typer.run(view)"
     with subprocess.Popen(
         [sys.executable, "-c", code, str(run)], stdout=subprocess.PIPE, text=True,
         env={**os.environ, "PYTHONUNBUFFERED": "1"},

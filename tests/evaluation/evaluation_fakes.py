@@ -10,12 +10,12 @@ import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from roboirg.errors import RenderDeviceError
-from roboirg.evaluation.course import Course, describe
-from roboirg.evaluation.executors import LocalProcesses
+from roboirg.core.errors import RenderDeviceError
+from roboirg.evaluation.executors.executor import LocalProcesses
 from roboirg.evaluation.plan import Plan
-from roboirg.evaluation.record import EventRecord, Job, Record
+from roboirg.evaluation.rollout_result import Course, describe
 from roboirg.evaluation.runner import run_plan
+from roboirg.records.record import EventRecord, Job, Record
 
 
 @dataclass(frozen=True)

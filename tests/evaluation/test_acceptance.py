@@ -7,9 +7,10 @@ import pytest
 from acceptance_fakes import die, refuse, take_the_third
 from rich.console import Console
 
-from roboirg.episode import SPLITS
-from roboirg.errors import InvalidValueError, RoboIRGError, SceneRejectedError
-from roboirg.evaluation.acceptance import (
+from roboirg.core.episode import SPLITS
+from roboirg.core.errors import InvalidValueError, RoboIRGError, SceneRejectedError
+from roboirg.episodes.splits import SIZES, TaskSplits, get_episode, shipped, slot_seed
+from roboirg.evaluation.seed_selection import (
     Found,
     Rejection,
     Slot,
@@ -21,9 +22,8 @@ from roboirg.evaluation.acceptance import (
     merged,
     slots_of,
 )
-from roboirg.evaluation.split_summary import cause_lines, followed, print_summary
+from roboirg.evaluation.seed_summary import cause_lines, followed, print_summary
 from roboirg.language import expressible
-from roboirg.splits import SIZES, TaskSplits, get_episode, shipped, slot_seed
 from roboirg.tasks import every_task, get_task
 
 TASKS = tuple(every_task())

@@ -12,11 +12,11 @@ from typing import Any
 import pytest
 from evaluation_fakes import FakePlayer, small_plan
 
-from roboirg.errors import InvalidValueError, RenderDeviceError, RoboIRGError
-from roboirg.evaluation.cluster import RayCluster
-from roboirg.evaluation.executors import InProcess, LocalProcesses
+from roboirg.core.errors import InvalidValueError, RenderDeviceError, RoboIRGError
+from roboirg.evaluation.executors.executor import InProcess, LocalProcesses
+from roboirg.evaluation.executors.ray_cluster import RayCluster
 from roboirg.evaluation.runner import run_plan
-from roboirg.evaluation.store import RECORDS_FILE, read_records
+from roboirg.records.store import RECORDS_FILE, read_records
 
 ray = pytest.importorskip("ray")
 

@@ -6,7 +6,7 @@ from evaluation_fakes import FakePlay, small_plan
 
 from roboirg.evaluation.estimate import cell_sizes, estimate, in_words
 from roboirg.evaluation.plan import make_plan
-from roboirg.evaluation.store import RecordStore, read_index
+from roboirg.records.store import RecordStore, read_index
 
 
 def test_cells_are_counted_by_policy_task_setting_and_form() -> None:

@@ -14,15 +14,15 @@ import chaos
 import pytest
 from evaluation_fakes import FakePlay, small_plan
 
-from roboirg.errors import RoboIRGError
-from roboirg.evaluation.executors import LocalProcesses
-from roboirg.evaluation.faults import Fault, blame
+from roboirg.core.errors import RoboIRGError
+from roboirg.evaluation.episode_errors import Fault, blame
+from roboirg.evaluation.executors.executor import LocalProcesses
+from roboirg.evaluation.executors.workers import Worker
 from roboirg.evaluation.plan import Plan
-from roboirg.evaluation.record import Job, Record
 from roboirg.evaluation.rollout import Player, load_policy
 from roboirg.evaluation.runner import UNREACHABLE_AFTER, Summary, run_plan
-from roboirg.evaluation.store import read_records
-from roboirg.evaluation.workers import Worker
+from roboirg.records.record import Job, Record
+from roboirg.records.store import read_records
 
 TIMEOUT_S = 3.0
 

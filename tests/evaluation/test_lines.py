@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 from evaluation_fakes import FakePlay, small_plan
 
-from roboirg.evaluation.executors import InProcess
-from roboirg.evaluation.lines import key_of
-from roboirg.evaluation.record import ERROR_KINDS, Job, Record, Result
+from roboirg.evaluation.executors.executor import InProcess
 from roboirg.evaluation.runner import run_plan
-from roboirg.evaluation.store import (
+from roboirg.records.record import ERROR_KINDS, Job, Record, Result
+from roboirg.records.record_codec import key_of
+from roboirg.records.store import (
     RECORDS_FILE,
     RecordStore,
     read_contents,
@@ -124,7 +124,7 @@ def test_very_many_records_need_little_memory(tmp_path: Path) -> None:
             file.write(line.replace(seed, b'"policy_seed":%d' % number) + b"\n")
     code = (
         "import pathlib, sys\n"
-        "from roboirg.evaluation.store import RecordStore\n"
+        "from roboirg.records.store import RecordStore\n"
         "with RecordStore(pathlib.Path(sys.argv[1])) as store:\n"
         "    count = len(store.stored)\n"
         # Not what `resource` tells, which may be the parent's from before the fork.

@@ -5,12 +5,12 @@ from pathlib import Path
 import pytest
 from evaluation_fakes import FakePlay, small_plan
 
-from roboirg.errors import InvalidValueError
-from roboirg.evaluation.executors import InProcess
-from roboirg.evaluation.merging import merge_runs
-from roboirg.evaluation.record import Record
+from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.executors.executor import InProcess
 from roboirg.evaluation.runner import run_plan
-from roboirg.evaluation.store import RecordStore, StoreError, read_records
+from roboirg.records.merging import merge_runs
+from roboirg.records.record import Record
+from roboirg.records.store import RecordStore, StoreError, read_records
 
 
 def fill(folder: Path, *records: Record) -> Path:

@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 from evaluation_fakes import FakePlay, small_plan
 
-from roboirg.errors import InvalidValueError
-from roboirg.evaluation.parquet import write_parquet
-from roboirg.evaluation.record import Attribution, Record
+from roboirg.core.errors import InvalidValueError
+from roboirg.records.parquet import write_parquet
+from roboirg.records.record import Attribution, Record
 
 
 def test_a_table_holds_every_field_of_every_record(tmp_path: Path) -> None:

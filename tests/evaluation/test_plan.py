@@ -4,13 +4,18 @@ from pathlib import Path
 
 import pytest
 
-from roboirg.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.lines import key_of
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.plan import Plan, make_plan, read_plan, write_plan
-from roboirg.evaluation.record import Job
-from roboirg.evaluation.words import parse_episodes, parse_numbers, parse_policies, parse_stages
+from roboirg.evaluation.plan_parsing import (
+    parse_episodes,
+    parse_numbers,
+    parse_policies,
+    parse_stages,
+)
 from roboirg.language import expressible
-from roboirg.splits import get_episode
+from roboirg.records.record import Job
+from roboirg.records.record_codec import key_of
 from roboirg.tasks import all_tasks
 
 
@@ -112,7 +117,7 @@ def test_what_cannot_be_played_is_told_up_front(options: dict[str, str], sentenc
         make_plan(["random"], **options)
 
 
-@pytest.mark.parametrize("spec", ["orakel", "nowhere.at.all:Policy", "roboirg.errors:Policy"])
+@pytest.mark.parametrize("spec", ["orakel", "nowhere.at.all:Policy", "roboirg.core.errors:Policy"])
 def test_an_unknown_policy_is_told_up_front(spec: str) -> None:
     with pytest.raises(InvalidValueError, match=spec.partition(":")[0]):
         make_plan([spec])

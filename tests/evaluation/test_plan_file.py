@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from roboirg.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.plan import make_plan
 from roboirg.evaluation.plan_file import named_plans, read_plan_file
 from roboirg.language import STAGE_SETS

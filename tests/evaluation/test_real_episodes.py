@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from roboirg.evaluation.plan import read_plan
-from roboirg.evaluation.store import RECORDS_FILE, read_records
+from roboirg.records.store import RECORDS_FILE, read_records
 
 pytestmark = pytest.mark.sim
 

@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from roboirg.errors import (
+from roboirg.core.errors import (
     InvalidActionError,
     MissingDependencyError,
     MotionPlanningError,
     RenderDeviceError,
 )
 from roboirg.evaluation import rollout
-from roboirg.evaluation.course import Course
-from roboirg.evaluation.faults import one_line
-from roboirg.evaluation.record import Job
+from roboirg.evaluation.episode_errors import one_line
 from roboirg.evaluation.rollout import Player, load_policy, play_episode
-from roboirg.evaluation.video import Film, VideoOptions
+from roboirg.evaluation.rollout_result import Course
+from roboirg.evaluation.video_writer import Film, VideoOptions
+from roboirg.records.record import Job
 
 JOB = Job(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
 

@@ -13,13 +13,13 @@ import evaluation_fakes
 import pytest
 from evaluation_fakes import FakePlay, is_alive, small_plan, starts, worker_pids
 
-from roboirg.errors import InvalidValueError, RenderDeviceError
-from roboirg.evaluation.executors import InProcess, LocalProcesses, choose_executor
+from roboirg.core.errors import InvalidValueError, RenderDeviceError
+from roboirg.evaluation.executors.executor import InProcess, LocalProcesses, choose_executor
 from roboirg.evaluation.plan import read_plan
 from roboirg.evaluation.progress import Silent
-from roboirg.evaluation.record import Job, Record
 from roboirg.evaluation.runner import Summary, run_plan
-from roboirg.evaluation.store import RECORDS_FILE, RecordStore, StoreError, read_records
+from roboirg.records.record import Job, Record
+from roboirg.records.store import RECORDS_FILE, RecordStore, StoreError, read_records
 
 WAIT_S = 20.0
 

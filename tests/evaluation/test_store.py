@@ -12,10 +12,10 @@ from evaluation_fakes import fake_course, small_plan
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roboirg.evaluation.course import describe
-from roboirg.evaluation.lines import key_of
-from roboirg.evaluation.record import EventRecord, Record
-from roboirg.evaluation.store import (
+from roboirg.evaluation.rollout_result import describe
+from roboirg.records.record import EventRecord, Record
+from roboirg.records.record_codec import key_of
+from roboirg.records.store import (
     RECORDS_FILE,
     TORN_FILE,
     RecordStore,
@@ -115,7 +115,7 @@ def test_a_second_writer_is_told_who_writes(tmp_path: Path) -> None:
 
 def test_a_killed_writer_leaves_no_lock(tmp_path: Path) -> None:
     code = (
-        "import os, pathlib, signal, sys; from roboirg.evaluation.store import RecordStore;"
+        "import os, pathlib, signal, sys; from roboirg.records.store import RecordStore;"
         "s = RecordStore(pathlib.Path(sys.argv[1])); os.kill(os.getpid(), signal.SIGKILL)"
     )
     assert subprocess.run([sys.executable, "-c", code, tmp_path], check=False).returncode == -9
@@ -183,9 +183,9 @@ def test_a_full_disk_is_one_sentence_and_costs_no_record(tmp_path: Path) -> None
     code = (
         "import pathlib, resource, sys\n"
         "from evaluation_fakes import FakePlay, small_plan\n"
-        "from roboirg.evaluation.executors import InProcess\n"
+        "from roboirg.evaluation.executors.executor import InProcess\n"
         "from roboirg.evaluation.runner import run_plan\n"
-        "from roboirg.evaluation.store import StoreError\n"
+        "from roboirg.records.store import StoreError\n"
         "def play(job):\n"
         "    return FakePlay()(job).model_copy(update={'started_at': 'now'})\n"
         f"resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))\n"

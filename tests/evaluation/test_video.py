@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from roboirg.evaluation.video import DEMONSTRATION_COLOUR, GAP, Film, VideoOptions, compose
+from roboirg.evaluation.video_writer import DEMONSTRATION_COLOUR, GAP, Film, VideoOptions, compose
 
 av = pytest.importorskip("av")
 

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 from staged import Staged
 
-from roboirg.conditions import Fact
-from roboirg.motions import Shuttle
+from roboirg.core.conditions import Fact
+from roboirg.core.motions import Shuttle
 
 Play = Callable[[Staged], bool | None]
 

@@ -6,10 +6,10 @@ more happens after its verdict.
 
 from __future__ import annotations
 
-from roboirg.conditions import Fact
-from roboirg.episode import Episode, Stage
+from roboirg.core.conditions import Fact
+from roboirg.core.episode import Episode, Stage
+from roboirg.core.motions import Shuttle
 from roboirg.judging import Event, Finding, Judge, Status, attribute, changes
-from roboirg.motions import Shuttle
 
 NEAR_SHARE = 0.07
 """Of a pass, before and after its middle, in which the shuttle is near its target."""

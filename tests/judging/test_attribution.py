@@ -12,11 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from staged import Staged
 
-from roboirg.conditions import ExecutionFailure, Fact, GroundingFailure, Rule, facts_of
-from roboirg.episode import Episode
-from roboirg.fingerprint import NOT_COUNTED, fingerprint, plain
+from roboirg.core.conditions import ExecutionFailure, Fact, GroundingFailure, Rule, facts_of
+from roboirg.core.episode import Episode
+from roboirg.episodes.fingerprint import NOT_COUNTED, fingerprint, plain
+from roboirg.episodes.splits import get_episode
 from roboirg.judging import EXECUTION, GROUNDING, Finding, Status, attribute
-from roboirg.splits import get_episode
 from roboirg.tasks import every_task
 
 DOCUMENT = (Path(__file__).parents[2] / "docs" / "attribution.md").read_text()

@@ -10,14 +10,14 @@ import pytest
 from numpy.typing import NDArray
 
 import roboirg
-from roboirg.conditions import Fact
-from roboirg.environment import RoboIRGEnv
-from roboirg.episode import Goal, Primitive
+from roboirg.core.conditions import Fact
+from roboirg.core.episode import Goal, Primitive
+from roboirg.envs.environment import RoboIRGEnv
+from roboirg.episodes.splits import get_episode
 from roboirg.judging import Finding, attribute
 from roboirg.policies import make_policy, play
-from roboirg.policies.handed import HandedPolicy
-from roboirg.simulation.hands import Hands
-from roboirg.splits import get_episode
+from roboirg.policies.builtin.scripted import HandedPolicy
+from roboirg.simulation.expert.primitives import Hands
 from roboirg.tasks import all_tasks, get_task
 
 pytestmark = pytest.mark.sim

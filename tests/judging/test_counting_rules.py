@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from roboirg.conditions import Fact
-from roboirg.episode import Goal
+from roboirg.core.conditions import Fact
+from roboirg.core.episode import Goal
+from roboirg.core.motions import Shuttle
 from roboirg.judging import Judge, Status
-from roboirg.motions import Shuttle
 from roboirg.tasks import bin_fill, stop_cube, swing_x_times
 
 PRESSED = Fact("pressed", "button")

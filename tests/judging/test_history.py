@@ -5,8 +5,8 @@ import itertools
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboirg.conditions import All, Began, Count, Elapsed, Fact, absent
-from roboirg.judging.history import History
+from roboirg.core.conditions import All, Began, Count, Elapsed, Fact, absent
+from roboirg.judging.fact_history import History
 
 A, B, C = Fact("picked", "a"), Fact("picked", "b"), Fact("pressed", "button")
 courses = st.lists(st.frozensets(st.sampled_from([A, B, C])), min_size=1, max_size=15)

@@ -4,11 +4,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboirg.conditions import Fact, Rule, facts_of
-from roboirg.episode import Primitive, Stage
+from roboirg.core.conditions import Fact, Rule, facts_of
+from roboirg.core.episode import Primitive, Stage
+from roboirg.episodes.splits import get_episode
 from roboirg.judging import Judge, Status, changes, plain_subgoal
 from roboirg.judging.judge import describe_object
-from roboirg.splits import get_episode
 from roboirg.tasks import every_task
 
 A, B, BAD = Fact("picked", "a"), Fact("placed", "a", "target"), Fact("pressed", "button")

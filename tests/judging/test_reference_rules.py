@@ -6,9 +6,9 @@ import itertools
 import numpy as np
 import pytest
 
-from roboirg.conditions import Fact
-from roboirg.episode import DIFFICULTIES, Episode, Goal
-from roboirg.errors import SceneRejectedError
+from roboirg.core.conditions import Fact
+from roboirg.core.episode import DIFFICULTIES, Episode, Goal
+from roboirg.core.errors import SceneRejectedError
 from roboirg.judging import Judge, Status
 from roboirg.tasks.video_place_button import TASK as VIDEO_PLACE_BUTTON
 from roboirg.tasks.video_place_order import TASK as VIDEO_PLACE_ORDER

@@ -3,10 +3,10 @@
 import itertools
 from collections.abc import Iterator
 
-from roboirg.episode import SPLITS, Episode
-from roboirg.errors import SceneRejectedError
+from roboirg.core.episode import SPLITS, Episode
+from roboirg.core.errors import SceneRejectedError
+from roboirg.episodes.splits import CYCLE, get_episode, make_episode
 from roboirg.language import variants
-from roboirg.splits import CYCLE, get_episode, make_episode
 from roboirg.tasks import every_task
 
 TASKS = tuple(every_task())

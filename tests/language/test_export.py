@@ -7,10 +7,10 @@ import json
 import pytest
 from language_variants import TASKS
 
-from roboirg.errors import InvalidValueError, MissingDependencyError
+from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.episodes.splits import get_episode
 from roboirg.language import FORMS, SETTINGS, export
 from roboirg.language.variants import instructions, split_episodes
-from roboirg.splits import get_episode
 
 LISTS = {
     "patterns": str,

@@ -7,10 +7,10 @@ import sys
 import pytest
 from language_variants import PAIRS, random_episodes
 
-from roboirg.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.episodes.splits import get_episode
 from roboirg.language import SETTINGS, expressible, instruct
 from roboirg.language.settings import all_settings
-from roboirg.splits import get_episode
 from roboirg.tasks import every_task
 
 EPISODE = get_episode("PickXtimes", "test", 2)
@@ -86,7 +86,7 @@ def test_an_episode_without_landmark_is_refused_in_the_spatial_setting():
 
 def test_the_same_words_in_another_process():
     program = (
-        "from roboirg.splits import get_episode; from roboirg.language import instruct;"
+        "from roboirg.episodes.splits import get_episode; from roboirg.language import instruct;"
         "print(instruct(get_episode('PickXtimes', 'test', 2), 'contextual').text, end='')"
     )
     command = [sys.executable, "-c", program]

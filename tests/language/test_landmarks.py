@@ -7,12 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from language_variants import SPATIAL_TASKS, random_episodes
 
-from roboirg.episode import COLOURS, Point, Scene, SceneObject
+from roboirg.core.episode import COLOURS, Point, Scene, SceneObject
+from roboirg.core.motions import Away
 from roboirg.language import FORMS, expressible, instruct, resolve
+from roboirg.language.interpreter.places import find, read_places
+from roboirg.language.interpreter.tokens import split_sentences
 from roboirg.language.landmarks import MARGIN, landmarks, selectors
-from roboirg.language.resolver.places import find, read_places
-from roboirg.language.resolver.tokens import split_sentences
-from roboirg.motions import Away
 
 GRID = st.integers(-17, 17).map(lambda step: step / 100)
 PLACES = st.lists(st.tuples(GRID, GRID), min_size=1, max_size=8, unique=True)

@@ -7,14 +7,18 @@ import pytest
 from language_variants import SPATIAL_TASKS, random_episodes
 from rich.console import Console
 
-from roboirg.errors import InvalidValueError
+from roboirg.core.errors import InvalidValueError
+from roboirg.episodes.splits import get_episode, slot_seed
 from roboirg.language import Utterance, expressible, instruct, resolve
-from roboirg.language.proof import Evidence, Failure, batches, examine, pairing, prove
-from roboirg.language.proof import examine as examine_episode
-from roboirg.language.proof.examine import leaking, not_needed, not_read_back, not_self_contained
-from roboirg.language.proof.run import RANDOM_BASE, random_episode
-from roboirg.language.proof.tables import proof_tables
-from roboirg.splits import get_episode, slot_seed
+from roboirg.language.validation import Evidence, Failure, batches, examine, pairing, prove
+from roboirg.language.validation.episode_checks import (
+    leaking,
+    not_needed,
+    not_read_back,
+    not_self_contained,
+)
+from roboirg.language.validation.validation_run import RANDOM_BASE, random_episode
+from roboirg.language.validation.validation_tables import proof_tables
 from roboirg.tasks import every_task, get_task
 
 EPISODE = get_episode("PickXtimes", "test", 3)
@@ -122,10 +126,10 @@ def test_scenes_without_landmark_are_counted_and_fail_only_in_splits():
         for episode in random_episodes("VideoUnmask", 1000)
         if "spatial" not in expressible(episode)
     )
-    found = examine_episode(lacking)
+    found = examine(lacking)
     assert not found.failures
     assert found.unplaced["VideoUnmask", lacking.difficulty, "robot"] == 1
-    strict = examine_episode(lacking, must_be_expressible=True)
+    strict = examine(lacking, must_be_expressible=True)
     assert [failure.rule for failure in strict.failures] == ["expressible"]
 
 

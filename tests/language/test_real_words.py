@@ -7,11 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from language_variants import random_episodes
 
-from roboirg.episode import ALL_COLOURS, Goal, Point, Scene, SceneObject
+from roboirg.core.episode import ALL_COLOURS, Goal, Point, Scene, SceneObject
 from roboirg.language import expressible, instruct, resolve
+from roboirg.language.interpreter.places import Towards, read_places
+from roboirg.language.interpreter.tokens import split_sentences
 from roboirg.language.landmarks import MARGIN, landmarks
-from roboirg.language.resolver.places import Towards, read_places
-from roboirg.language.resolver.tokens import split_sentences
 
 GREEN = SceneObject("box_green", "box", Point(0.05, 0.15, 0.03), colour="green")
 PURPLE = SceneObject("box_purple", "box", Point(0.05, -0.15, 0.03), colour="purple")

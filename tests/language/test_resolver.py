@@ -9,26 +9,26 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from language_variants import first_episodes
 
-from roboirg.episode import COLOURS, Goal, Point, Scene, SceneObject
-from roboirg.errors import UnknownNameError
-from roboirg.language import expressible, instruct, resolve, resolver
-from roboirg.language.resolver.places import Beside, Towards, read_places
-from roboirg.language.resolver.tokens import split_sentences
-from roboirg.splits import get_episode
+from roboirg.core.episode import COLOURS, Goal, Point, Scene, SceneObject
+from roboirg.core.errors import UnknownNameError
+from roboirg.episodes.splits import get_episode
+from roboirg.language import expressible, instruct, interpreter, resolve
+from roboirg.language.interpreter.places import Beside, Towards, read_places
+from roboirg.language.interpreter.tokens import split_sentences
 from roboirg.tasks import every_task, get_task
 
-FOLDER = Path(resolver.__file__).parent
+FOLDER = Path(interpreter.__file__).parent
 EPISODES = {task: tuple(first_episodes(task, "train", 8)) for task in every_task()}
 PICK = get_episode("PickXtimes", "test", 2).scene
 UNMASK = get_episode("VideoUnmask", "test", 0).scene
 
 
 ALLOWED = (
-    "roboirg.episode",
-    "roboirg.conditions",
-    "roboirg.motions",
+    "roboirg.core.episode",
+    "roboirg.core.conditions",
+    "roboirg.core.motions",
     "roboirg.tasks",
-    "roboirg.language.resolver",
+    "roboirg.language.interpreter",
 )
 """The scene as data, and the goals that a task can have."""
 

@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from language_variants import first_episodes
 
-from roboirg.conditions import Fact
-from roboirg.episode import COLOURS, Goal, Point, Scene, SceneObject
+from roboirg.core.conditions import Fact
+from roboirg.core.episode import COLOURS, Goal, Point, Scene, SceneObject
+from roboirg.core.motions import Away, Swap
 from roboirg.language import resolve
-from roboirg.motions import Away, Swap
 
 
 def cube(name, x, y):

@@ -9,12 +9,12 @@ from collections import Counter
 import pytest
 from language_variants import SPATIAL_TASKS, TASKS, split_episodes
 
-from roboirg.episode import ALL_COLOURS
+from roboirg.core.episode import ALL_COLOURS
+from roboirg.episodes.splits import get_episode
 from roboirg.language import FORMS, STAGE_SETS, instruct, templates
+from roboirg.language.number_words import CARDINALS, ORDINALS
 from roboirg.language.patterns import deduction, sequence
 from roboirg.language.variants import tellings
-from roboirg.language.words import CARDINALS, ORDINALS
-from roboirg.splits import get_episode
 from roboirg.tasks import every_task, get_task
 
 COLOUR_NAMES = frozenset(ALL_COLOURS)

@@ -7,8 +7,8 @@ import pytest
 from language_variants import TASKS
 from rich.console import Console
 
-from roboirg.errors import InvalidValueError, MissingDependencyError
-from roboirg.language import SETTINGS, figure, overview, statistics
+from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.language import SETTINGS, corpus_statistics, expression_figure, statistics_tables
 from roboirg.language.variants import instructions, split_episodes
 from roboirg.tasks import every_task
 
@@ -21,9 +21,9 @@ def said():
 
 
 def test_expressions_are_counted_once_per_scene():
-    counts = statistics.expression_counts(said())
-    assert statistics.expression_counts(said() * 2) == counts
-    scenes = statistics.scene_counts(said() * 2)
+    counts = corpus_statistics.expression_counts(said())
+    assert corpus_statistics.expression_counts(said() * 2) == counts
+    scenes = corpus_statistics.scene_counts(said() * 2)
     assert scenes["direct"] == 50 * len(TASKS)
     assert scenes["spatial"] == 50 * sum("spatial" in one.settings for one in every_task().values())
     assert "explicit" not in counts
@@ -33,42 +33,47 @@ def test_expressions_are_counted_once_per_scene():
     assert set(counts["direct"]) == {"it", "them", "that", "then", *ranks}
     assert {"pair", "that", "other"} == set(counts["reasoning"])
     assert {"there", *ranks} == set(counts["spatial"])
-    order = statistics.expression_order(counts)
+    order = corpus_statistics.expression_order(counts)
     assert set(order) == {name for by_class in counts.values() for name in by_class}
     assert order.index("it") < order.index("former") < order.index("there")
 
 
 def test_lengths_patterns_relations_and_landmarks():
-    lengths = statistics.word_counts(said())
+    lengths = corpus_statistics.word_counts(said())
     assert lengths["explicit"].mean < lengths["direct"].mean < lengths["contextual"].mean
     assert all(one.shortest <= one.mean <= one.longest for one in lengths.values())
-    patterns = statistics.pattern_counts(said())
+    patterns = corpus_statistics.pattern_counts(said())
     assert patterns["PickXtimes"] == {"colour exclusion": 25, "number deduction": 25}
-    assert sum(statistics.relation_counts(said())["PickXtimes"].values()) == 25
-    assert set(statistics.relation_counts(said())["VideoPlaceOrder"]) >= {"right after", "neighbor"}
-    assert set(statistics.landmark_counts(said())["VideoUnmask"]) >= {"1", "2", "3"}
+    assert sum(corpus_statistics.relation_counts(said())["PickXtimes"].values()) == 25
+    assert set(corpus_statistics.relation_counts(said())["VideoPlaceOrder"]) >= {
+        "right after",
+        "neighbor",
+    }
+    assert set(corpus_statistics.landmark_counts(said())["VideoUnmask"]) >= {"1", "2", "3"}
 
 
 def test_the_tables_hold_the_counts():
     console = Console(width=160, file=io.StringIO())
-    for table in overview.overview_tables(said()):
+    for table in statistics_tables.overview_tables(said()):
         console.print(table)
     text = console.file.getvalue()
-    counts = statistics.expression_counts(said())
+    counts = corpus_statistics.expression_counts(said())
     row = next(
         line for line in text.splitlines() if line.startswith("│ spatial") and "." not in line
     )
     assert str(counts["spatial"]["there"]) in row
-    relations = statistics.relation_counts(said())
+    relations = corpus_statistics.relation_counts(said())
     for name in {name for by_task in relations.values() for name in by_task}:
         assert name in text
-    assert list(overview.overview_tables(said()[:1]))  # a single explicit command has no patterns
+    assert list(
+        statistics_tables.overview_tables(said()[:1])
+    )  # a single explicit command has no patterns
 
 
 def test_the_figure_is_drawn_the_same_every_time(tmp_path):
     pytest.importorskip("matplotlib")
-    first = figure.write_figure(said(), tmp_path / "one", "expressions", "A title")
-    second = figure.write_figure(said(), tmp_path / "two", "expressions", "A title")
+    first = expression_figure.write_figure(said(), tmp_path / "one", "expressions", "A title")
+    second = expression_figure.write_figure(said(), tmp_path / "two", "expressions", "A title")
     assert [path.name for path in first] == ["expressions.png", "expressions.svg"]
     for one, two in zip(first, second, strict=True):
         assert one.read_bytes() == two.read_bytes()
@@ -77,17 +82,17 @@ def test_the_figure_is_drawn_the_same_every_time(tmp_path):
 
 def test_no_words_give_an_empty_figure(tmp_path):
     pytest.importorskip("matplotlib")
-    assert figure.write_figure((), tmp_path, "none", "Nothing")[0].exists()
+    assert expression_figure.write_figure((), tmp_path, "none", "Nothing")[0].exists()
 
 
 def test_a_folder_that_cannot_be_is_one_sentence(tmp_path):
     pytest.importorskip("matplotlib")
     (tmp_path / "file").touch()
     with pytest.raises(InvalidValueError, match="Cannot write"):
-        figure.write_figure(said()[:5], tmp_path / "file" / "folder", "name", "title")
+        expression_figure.write_figure(said()[:5], tmp_path / "file" / "folder", "name", "title")
 
 
 def test_without_matplotlib_one_sentence_says_what_to_install(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "matplotlib", None)
     with pytest.raises(MissingDependencyError, match=r"roboirgbench\[report\]"):
-        figure.check_figure_support()
+        expression_figure.check_figure_support()

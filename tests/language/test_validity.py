@@ -8,9 +8,9 @@ import functools
 import pytest
 from language_variants import SPATIAL_TASKS, TASKS, random_episodes
 
+from roboirg.episodes.splits import SIZES
 from roboirg.language import expressible, instruct, resolve
-from roboirg.language.proof import Batch, Evidence, random_episode, work_on
-from roboirg.splits import SIZES
+from roboirg.language.validation import Batch, Evidence, random_episode, work_on
 from roboirg.tasks import get_task
 
 RANDOM_SCENES = 24

@@ -2,8 +2,8 @@
 
 from collections import Counter
 
+from roboirg.episodes.splits import get_episode
 from roboirg.language import SETTINGS, variants
-from roboirg.splits import get_episode
 from roboirg.tasks import all_tasks, every_task
 
 

@@ -7,10 +7,10 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from roboirg.cli.policies import check_policy as command
-from roboirg.observations import CAMERAS
-from roboirg.policies.checking import FAIL, NOTE, PASS, check_policy
-from roboirg.policies.synthetic import Studio
+from roboirg.cli.policy_commands import check_policy as command
+from roboirg.core.observations import CAMERAS
+from roboirg.policies.policy_check import FAIL, NOTE, PASS, check_policy
+from roboirg.policies.synthetic_episodes import Studio
 
 
 class Sound:

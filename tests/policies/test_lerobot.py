@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from wire_episode import INSTRUCTION, moment, video
 
-from roboirg.errors import InvalidValueError, MissingDependencyError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.policies import Policy, load_policy_class, make_policy
-from roboirg.policies.lerobot import load
+from roboirg.policies.lerobot_policy import load
 from roboirg.policies.loading import policy_version
 
 

@@ -28,19 +28,19 @@ from planning_fakes import (
 )
 
 import roboirg
-from roboirg.errors import (
+from roboirg.core.errors import (
     MissingDependencyError,
     PolicyConnectionError,
     PolicyReplyError,
     PolicyTimeoutError,
 )
+from roboirg.episodes.splits import SIZES, get_episode
 from roboirg.language import instruct, resolve
 from roboirg.policies import play
-from roboirg.policies.planning.asking import UnparsableReply
-from roboirg.policies.planning.listener import NotUnderstood
+from roboirg.policies.planning.goal_schema import full_answer, slots_of
 from roboirg.policies.planning.models import ModelOptions
-from roboirg.policies.planning.slots import full_answer, slots_of
-from roboirg.splits import SIZES, get_episode
+from roboirg.policies.planning.vlm_listener import NotUnderstood
+from roboirg.policies.planning.vlm_query import UnparsableReply
 from roboirg.tasks import every_task
 
 SPLITS = tuple(SIZES)

@@ -10,11 +10,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from planning_fakes import decoded
 
-from roboirg.errors import InvalidValueError
-from roboirg.observations import DemonstrationFrames
-from roboirg.policies.planning.asking import UnparsableReply, json_object, text_of
-from roboirg.policies.planning.content import Clip, Picture, evenly, mp4, png, summary
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.observations import DemonstrationFrames
+from roboirg.episodes.splits import get_episode
 from roboirg.policies.planning.keyframes import NEAR, merged
+from roboirg.policies.planning.model_content import Clip, Picture, evenly, mp4, png, summary
+from roboirg.policies.planning.observation_merging import (
+    Excerpt,
+    both_cameras,
+    both_frames,
+    both_histories,
+    cut_history,
+)
 from roboirg.policies.planning.points import (
     LONGEST_SUBGOAL,
     from_boxes,
@@ -24,14 +31,7 @@ from roboirg.policies.planning.points import (
     without_places,
 )
 from roboirg.policies.planning.prompts import load_prompts
-from roboirg.policies.planning.sharing import (
-    Excerpt,
-    both_cameras,
-    both_frames,
-    both_histories,
-    cut_history,
-)
-from roboirg.splits import get_episode
+from roboirg.policies.planning.vlm_query import UnparsableReply, json_object, text_of
 from roboirg.tasks import every_task
 
 thousandths = st.integers(0, 1000)

@@ -10,13 +10,13 @@ import pytest
 from planning_fakes import KEY, KEY_VARIABLE, TOKENS, decoded, fake_vlm, golden, model_options
 
 import roboirg
-from roboirg.errors import InvalidValueError
+from roboirg.core.errors import InvalidValueError
 from roboirg.policies import Policy, PrivilegedPolicy, play
-from roboirg.policies.oracle import OraclePolicy
-from roboirg.policies.planning.planned import PlannedPolicy, put_in_front
+from roboirg.policies.builtin.oracle_policy import OraclePolicy
+from roboirg.policies.planning.hierarchical_policy import PlannedPolicy, put_in_front
 from roboirg.policies.planning.planners.gemini import GeminiOptions, GeminiPlanner
 from roboirg.policies.planning.planners.memer import MemerOptions, MemerPlanner
-from roboirg.policies.planning.planners.oracle import OracleOptions, OraclePlanner
+from roboirg.policies.planning.planners.oracle_planner import OracleOptions, OraclePlanner
 from roboirg.policies.planning.planners.qwen import QwenOptions, QwenPlanner
 
 CHUNK = 16

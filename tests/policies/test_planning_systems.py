@@ -10,20 +10,20 @@ from planning_fakes import KEY, fake_vlm, stand_in
 from wire_servers import MmeVlaServer, unpack
 
 import roboirg
-from roboirg.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.episodes.splits import get_episode
 from roboirg.policies import Policy, PrivilegedPolicy, load_policy_class, make_policy, play
 from roboirg.policies.loading import is_privileged, policy_version
-from roboirg.policies.planning import specs
-from roboirg.policies.planning.listener import VLMListener
-from roboirg.policies.planning.planned import PlannedPolicy
+from roboirg.policies.planning import policy_specs
+from roboirg.policies.planning.hierarchical_policy import PlannedPolicy
 from roboirg.policies.planning.systems import all_systems, find_system, load_system
-from roboirg.policies.wishes import (
+from roboirg.policies.planning.vlm_listener import VLMListener
+from roboirg.policies.requirements import (
     wanted_cameras,
     wanted_demonstration_frames,
     wanted_history,
     wanted_history_cameras,
 )
-from roboirg.splits import get_episode
 
 PAPER = ("FrameS-Modul", "GroundSG-Gemini", "GroundSG-QwenVL", "GroundSG-oracle", "MemER",
          "TTT-Expert", "pi0.5")  # fmt: skip
@@ -156,7 +156,7 @@ def test_wrong_specs_are_explained(spec, error, words):
 
 def test_other_specs_are_not_ours():
     for spec in ("oracle", "package.module:Class", "mme-vla://localhost:8001", "x"):
-        assert specs.find(spec) is None
+        assert policy_specs.find(spec) is None
 
 
 def test_own_systems_are_files(tmp_path):
@@ -190,7 +190,7 @@ def test_nothing_is_asked_of_libraries_before_the_first_question():
         "specs += [f'system:{name}' for name in all_systems()]\n"
         "made = [load_policy_class(spec)(seed=1) for spec in specs]\n"
         "from types import SimpleNamespace\n"
-        "from roboirg.errors import MissingDependencyError\n"
+        "from roboirg.core.errors import MissingDependencyError\n"
         "from roboirg.policies.planning.models import make_model, ModelOptions\n"
         "for provider in ('openai', 'google'):\n"
         "    try:\n"

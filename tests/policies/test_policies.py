@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import roboirg
-from roboirg.actions import JOINT_ANGLE, WAYPOINT, check_chunk
-from roboirg.errors import InvalidValueError, UnknownNameError
+from roboirg.core.actions import JOINT_ANGLE, WAYPOINT, check_chunk
+from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.policies import Policy, PrivilegedPolicy, load_policy_class, make_policy
-from roboirg.policies.classes import BUILTIN
-from roboirg.policies.listeners import ForgetfulPolicy, ListenerPolicy
+from roboirg.policies.builtin.listeners import ForgetfulPolicy, ListenerPolicy
 from roboirg.policies.loading import is_privileged, policy_version
-from roboirg.policies.wishes import (
+from roboirg.policies.policy_classes import BUILTIN
+from roboirg.policies.requirements import (
     wanted_actions,
     wanted_cameras,
     wanted_demonstration_frames,
@@ -96,9 +96,9 @@ def test_own_policies_are_named_by_import_path():
     [
         ("orcale", UnknownNameError, "Did you mean 'oracle'"),
         ("no_such_package.policy:It", InvalidValueError, "cannot be imported"),
-        ("roboirg.policies.random:Missing", InvalidValueError, "no class 'Missing'"),
+        ("roboirg.policies.builtin.random_policy:Missing", InvalidValueError, "no class 'Missing'"),
         (f"{__name__}:Deaf", InvalidValueError, r"no method act\(\)"),
-        ("roboirg.policies.random:", InvalidValueError, "no class ''"),
+        ("roboirg.policies.builtin.random_policy:", InvalidValueError, "no class ''"),
         (
             "json:loads",
             InvalidValueError,
@@ -111,7 +111,11 @@ def test_own_policies_are_named_by_import_path():
             r"Needy\(\) .* needs 'weights'; give it a default",
         ),
         (f"{__name__}:Numb", InvalidValueError, "act of class Numb is no method"),
-        ("roboirg.policies.handed:HandedPolicy", InvalidValueError, "is abstract; it lacks decide"),
+        (
+            "roboirg.policies.builtin.scripted:HandedPolicy",
+            InvalidValueError,
+            "is abstract; it lacks decide",
+        ),
     ],
 )
 def test_wrong_specs_are_explained(spec, error, words):

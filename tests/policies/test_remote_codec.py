@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from roboirg.policies.remote.codec import CodecError, pack, unpack
+from roboirg.policies.remote.message_codec import CodecError, pack, unpack
 
 ARRAYS = hnp.arrays(
     st.sampled_from(["|u1", "<f4", "<f8", ">i2", "|b1", "<i8", "<U3"]),

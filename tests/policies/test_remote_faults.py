@@ -15,7 +15,7 @@ from wire_servers import (
     pack,
 )
 
-from roboirg.errors import (
+from roboirg.core.errors import (
     InvalidValueError,
     PolicyConnectionError,
     PolicyReplyError,

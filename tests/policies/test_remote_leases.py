@@ -10,10 +10,10 @@ import pytest
 from wire_episode import INSTRUCTION, moment, video
 from wire_servers import MmeVlaServer, WireServer
 
-from roboirg.errors import PolicyConnectionError, PolicyTimeoutError
+from roboirg.core.errors import PolicyConnectionError, PolicyTimeoutError
 from roboirg.policies import make_policy
-from roboirg.policies.remote.address import Endpoint
-from roboirg.policies.remote.leases import take
+from roboirg.policies.remote.endpoints import Endpoint
+from roboirg.policies.remote.server_lock import take
 
 SPAWN = multiprocessing.get_context("spawn")
 ONE, TWO = Endpoint("h", 8001), Endpoint("h", 8002)

@@ -10,7 +10,7 @@ import pytest
 from wire_episode import INSTRUCTION, moment, video
 from wire_servers import ChallengeHttpServer, ChallengeServer, MmeVlaServer, WireServer, unpack
 
-from roboirg.errors import InvalidValueError
+from roboirg.core.errors import InvalidValueError
 from roboirg.policies import Policy, make_policy
 from roboirg.policies.base import SubgoalFollower
 

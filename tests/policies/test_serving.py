@@ -16,7 +16,7 @@ from websockets.sync.client import connect
 from wire_episode import INSTRUCTION, moment, video
 from wire_servers import pack, unpack
 
-from roboirg.errors import InvalidValueError, PolicyReplyError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, PolicyReplyError, UnknownNameError
 from roboirg.policies import make_policy
 from roboirg.policies.serving import PROTOCOLS, open_server
 
@@ -229,7 +229,7 @@ def test_what_cannot_be_served_is_told(options, error, words):
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_the_command_serves_until_it_is_stopped(number, code):
     program = (
-        "import typer; from roboirg.cli.policies import serve; app = typer.Typer(); "
+        "import typer; from roboirg.cli.policy_commands import serve; app = typer.Typer(); "
         "app.command()(serve); app()"
     )
     process = subprocess.Popen(

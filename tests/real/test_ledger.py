@@ -2,15 +2,15 @@
 
 import pytest
 
-from roboirg.analysis.paper_tables import make_table
-from roboirg.analysis.report import render
-from roboirg.analysis.samples import gather
-from roboirg.errors import InvalidValueError
-from roboirg.evaluation.course import Course, describe
-from roboirg.evaluation.record import Record
-from roboirg.evaluation.store import RecordStore, read_records, read_results
-from roboirg.real.failures import failure_choices
-from roboirg.real.ledger import UNSCORED, VOID, WITHDRAWN, Ledger, said_of
+from roboirg.analysis.page.report import render
+from roboirg.analysis.stats.samples import gather
+from roboirg.analysis.tables.paper_tables import make_table
+from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.rollout_result import Course, describe
+from roboirg.real.study.failure_choices import failure_choices
+from roboirg.real.study.trial_log import UNSCORED, VOID, WITHDRAWN, Ledger, said_of
+from roboirg.records.record import Record
+from roboirg.records.store import RecordStore, read_records, read_results
 
 
 def fresh(plan, folder):

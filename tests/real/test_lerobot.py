@@ -4,14 +4,14 @@ import lab_arm
 import numpy as np
 import pytest
 
-from roboirg.errors import InvalidValueError, UnknownNameError
-from roboirg.real.ledger import Ledger
-from roboirg.real.lerobot import LeRobotArm, LeRobotOptions, make_arm, squared
-from roboirg.real.limits import Limits
-from roboirg.real.robot import JudgingRobot
-from roboirg.real.robots import check_scorer, make_robot
-from roboirg.real.running import Study
-from roboirg.real.study import make_study
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.real.control.lerobot_arm import LeRobotArm, LeRobotOptions, make_arm, squared
+from roboirg.real.control.limits import Limits
+from roboirg.real.control.robot import JudgingRobot
+from roboirg.real.control.robot_specs import check_scorer, make_robot
+from roboirg.real.study.study_plan import make_study
+from roboirg.real.study.study_run import Study
+from roboirg.real.study.trial_log import Ledger
 
 WATCHING, STILL = "faulty_policies:Watcher", "faulty_policies:Still"
 # A busy machine is slow: what is tested here is not how quick it is.

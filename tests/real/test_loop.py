@@ -10,17 +10,17 @@ import time
 import numpy as np
 import pytest
 
-from roboirg.errors import InvalidValueError
-from roboirg.evaluation.record import Job
-from roboirg.real.clock import RealClock
-from roboirg.real.host import ProcessHost, ThreadHost
-from roboirg.real.ledger import Ledger
-from roboirg.real.limits import Limits
-from roboirg.real.loop import ControlLoop
-from roboirg.real.robot import COMMAND_RATE
-from roboirg.real.running import Study
-from roboirg.real.study import make_study
-from roboirg.real.twin import Twin
+from roboirg.core.errors import InvalidValueError
+from roboirg.real.control.clock import RealClock
+from roboirg.real.control.control_loop import ControlLoop
+from roboirg.real.control.limits import Limits
+from roboirg.real.control.policy_process import ProcessHost, ThreadHost
+from roboirg.real.control.robot import COMMAND_RATE
+from roboirg.real.control.twin import Twin
+from roboirg.real.study.study_plan import make_study
+from roboirg.real.study.study_run import Study
+from roboirg.real.study.trial_log import Ledger
+from roboirg.records.record import Job
 
 pytestmark = pytest.mark.sim
 

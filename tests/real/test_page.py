@@ -12,11 +12,11 @@ import urllib.request
 import pytest
 from real_start import start
 
-from roboirg.evaluation.store import read_records
-from roboirg.real.failures import failure_choices
-from roboirg.real.ledger import Ledger, said_of
-from roboirg.real.server import ScoreServer
-from roboirg.real.study import make_study, write_study
+from roboirg.real.pages.score_server import ScoreServer
+from roboirg.real.study.failure_choices import failure_choices
+from roboirg.real.study.study_plan import make_study, write_study
+from roboirg.real.study.trial_log import Ledger, said_of
+from roboirg.records.store import read_records
 
 CHROMIUM = shutil.which("chromium") or ""
 NARROW = {"width": 400, "height": 800}

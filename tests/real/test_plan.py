@@ -11,14 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from roboirg import language
-from roboirg.errors import InvalidValueError, UnknownNameError
-from roboirg.real.balance import Arrangement, balanced_order, tallies
-from roboirg.real.drawing import Shape, corners, shapes_of
-from roboirg.real.failures import failure_choices
-from roboirg.real.listing import demonstrations_csv, trials_csv
-from roboirg.real.sheet import _pages, write_sheet
-from roboirg.real.study import StudyPlan, make_study, read_study, write_study
-from roboirg.real.svg import draw_svg
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.real.pages.arrangement_drawing import Shape, corners, shapes_of
+from roboirg.real.pages.arrangement_svg import draw_svg
+from roboirg.real.pages.trial_sheet import _pages, write_sheet
+from roboirg.real.study.counterbalancing import Arrangement, balanced_order, tallies
+from roboirg.real.study.failure_choices import failure_choices
+from roboirg.real.study.plan_csv import demonstrations_csv, trials_csv
+from roboirg.real.study.study_plan import StudyPlan, make_study, read_study, write_study
 
 TASKS = ("PutInBox", "PickByCount")
 SETTINGS = ("explicit", "direct", "reasoning", "contextual", "spatial")

@@ -9,13 +9,13 @@ import time
 import pytest
 from real_start import start
 
-from roboirg.analysis.paper_tables import make_table
-from roboirg.analysis.samples import gather
-from roboirg.evaluation.store import read_records, read_results
-from roboirg.real.failures import failure_choices
-from roboirg.real.figure import series_of, write_figure
-from roboirg.real.ledger import Ledger, said_of
-from roboirg.real.study import read_study
+from roboirg.analysis.stats.samples import gather
+from roboirg.analysis.tables.paper_tables import make_table
+from roboirg.real.pages.study_figure import series_of, write_figure
+from roboirg.real.study.failure_choices import failure_choices
+from roboirg.real.study.study_plan import read_study
+from roboirg.real.study.trial_log import Ledger, said_of
+from roboirg.records.store import read_records, read_results
 
 pytestmark = pytest.mark.sim
 
@@ -127,7 +127,7 @@ def test_scored_in_a_browser_it_is_the_table_that_the_judge_would_have_given(stu
 
 
 def test_two_loops_do_not_share_a_robot(study):
-    from roboirg.real.running import alone_with_robot
+    from roboirg.real.study.study_run import alone_with_robot
 
     with alone_with_robot(study):
         process = start("run", study)

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from roboirg.evaluation.record import INCIDENTALS
 from roboirg.evaluation.rollout import Player
-from roboirg.real.clock import VirtualClock
-from roboirg.real.kinematics import end_effector, tool_in_base
-from roboirg.real.limits import Limits
-from roboirg.real.robot import CAMERA_RATE, JudgingRobot
-from roboirg.real.running import Study
-from roboirg.real.study import make_study
-from roboirg.real.twin import Twin
+from roboirg.real.control.clock import VirtualClock
+from roboirg.real.control.kinematics import end_effector, tool_in_base
+from roboirg.real.control.limits import Limits
+from roboirg.real.control.robot import CAMERA_RATE, JudgingRobot
+from roboirg.real.control.twin import Twin
+from roboirg.real.study.study_plan import make_study
+from roboirg.real.study.study_run import Study
+from roboirg.records.record import INCIDENTALS
 
 pytestmark = pytest.mark.sim
 

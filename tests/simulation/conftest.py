@@ -2,7 +2,7 @@
 
 import pytest
 
-from roboirg.simulation.culling import Bodies
+from roboirg.simulation.rendering.culling import Bodies
 
 
 @pytest.fixture

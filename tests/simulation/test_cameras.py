@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from roboirg.observations import CAMERAS
-from roboirg.simulation.cameras import Cameras
-from roboirg.simulation.settings import HOME_ACTION
+from roboirg.core.observations import CAMERAS
+from roboirg.episodes.splits import get_episode
+from roboirg.simulation.physics_settings import HOME_ACTION
+from roboirg.simulation.rendering.cameras import Cameras
 from roboirg.simulation.world import World
-from roboirg.splits import get_episode
 
 pytestmark = pytest.mark.sim
 

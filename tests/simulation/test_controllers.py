@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import roboirg
-from roboirg.conditions import Fact
-from roboirg.simulation.settings import HOME_ACTION
+from roboirg.core.conditions import Fact
+from roboirg.simulation.physics_settings import HOME_ACTION
 
 pytestmark = pytest.mark.sim
 

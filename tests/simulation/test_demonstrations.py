@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 
 import roboirg
-from roboirg.evaluation.record import Job
+from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.rollout import Player
-from roboirg.simulation.cameras import Cameras
-from roboirg.simulation.demonstration import frames as frames_module
-from roboirg.simulation.demonstration import library
+from roboirg.records.record import Job
+from roboirg.simulation.demonstration import demonstration_cache
+from roboirg.simulation.demonstration import demonstration_frames as frames_module
 from roboirg.simulation.demonstration.recording import Move, Recording
-from roboirg.simulation.hands import Hands
-from roboirg.simulation.rendering import FAITHFUL
-from roboirg.simulation.session import Session
-from roboirg.simulation.settings import HOME_ACTION
-from roboirg.splits import get_episode
+from roboirg.simulation.episode_session import Session
+from roboirg.simulation.expert.primitives import Hands
+from roboirg.simulation.physics_settings import HOME_ACTION
+from roboirg.simulation.rendering.cameras import Cameras
+from roboirg.simulation.rendering.render_mode import FAITHFUL
 from roboirg.tasks import all_tasks
 
 pytestmark = pytest.mark.sim
@@ -257,7 +257,7 @@ def tampered(recording, **changes):
 def test_a_replay_that_ends_differently_is_replaced_and_told(cache, caplog, fault):
     _, observation, info = reset()
     (entry,) = cache.glob("actions/*")
-    store = library.open_cache("actions")
+    store = demonstration_cache.open_cache("actions")
     good = store.read(entry.name)
     right = Recording.decoded(good)
     changes = {
@@ -283,7 +283,7 @@ def test_a_replay_that_ends_differently_is_replaced_and_told(cache, caplog, faul
 def test_who_looks_on_sees_the_right_demonstration_once(cache):
     _, _, _ = reset()
     (entry,) = cache.glob("actions/*")
-    store = library.open_cache("actions")
+    store = demonstration_cache.open_cache("actions")
     right = Recording.decoded(store.read(entry.name))
     store.write(entry.name, tampered(right, actions=right.actions + 0.2))
     seen = []
@@ -345,17 +345,17 @@ def test_two_processes_may_fill_the_cache_at_once(cache):
 
 def test_keys_change_with_what_determines_a_demonstration(monkeypatch):
     episode = get_episode(SHORT, "test", 1)
-    key = library.recording_key(episode)
-    assert library.recording_key(get_episode(SHORT, "test", 1)) == key
-    assert library.recording_key(get_episode(SHORT, "test", 2)) != key
+    key = demonstration_cache.recording_key(episode)
+    assert demonstration_cache.recording_key(get_episode(SHORT, "test", 1)) == key
+    assert demonstration_cache.recording_key(get_episode(SHORT, "test", 2)) != key
     for name, other in (("_SOURCE_HASH", "another"), ("_processor", lambda: "another")):
         with monkeypatch.context() as patch:
-            patch.setattr(library, name, other)
-            library._ground.cache_clear()
-            assert library.recording_key(episode) != key
-        library._ground.cache_clear()
-    assert library.recording_key(episode) == key
-    ground = library._ground()
+            patch.setattr(demonstration_cache, name, other)
+            demonstration_cache._ground.cache_clear()
+            assert demonstration_cache.recording_key(episode) != key
+        demonstration_cache._ground.cache_clear()
+    assert demonstration_cache.recording_key(episode) == key
+    ground = demonstration_cache._ground()
     for part in ("sapien 3", "numpy ", "scipy ", "toppra ", "python 3"):
         assert part in ground
 

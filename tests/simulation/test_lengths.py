@@ -6,10 +6,10 @@ from statistics import median
 
 import pytest
 
-from roboirg.errors import SceneRejectedError
-from roboirg.simulation.hands import Hands
-from roboirg.simulation.session import Session
-from roboirg.splits import make_episode
+from roboirg.core.errors import SceneRejectedError
+from roboirg.episodes.splits import make_episode
+from roboirg.simulation.episode_session import Session
+from roboirg.simulation.expert.primitives import Hands
 
 pytestmark = pytest.mark.sim
 

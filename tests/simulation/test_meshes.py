@@ -13,10 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays, scalar_dtypes
 
-from roboirg.cache import open_cache
-from roboirg.simulation import derived, meshes, table_mesh
-from roboirg.simulation.assets import find_model_files
-from roboirg.simulation.derived import kept_arrays, packed, unpacked
+from roboirg.simulation.model_files import find_model_files
+from roboirg.simulation.rendering import mesh_cache, robot_meshes, table_mesh
+from roboirg.simulation.rendering.mesh_cache import kept_arrays, packed, unpacked
+from roboirg.util.cache import open_cache
 
 DERIVED = 13
 """Ten links of the robot, what the front camera sees of one, the wrist camera and the table."""
@@ -181,7 +181,7 @@ def test_the_table_is_the_installed_one():
 
 def test_code_that_derives_is_part_of_the_key(cache, monkeypatch):
     kept_arrays("thing", b"", dict)
-    monkeypatch.setattr(derived, "code_of", lambda *_: b"other code")
+    monkeypatch.setattr(mesh_cache, "code_of", lambda *_: b"other code")
     kept_arrays("thing", b"", dict)
     assert len(complete(cache)) == 2
-    assert meshes.code_of("meshes") != derived.code_of("meshes")
+    assert robot_meshes.code_of("meshes") != mesh_cache.code_of("meshes")

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from roboirg.conditions import Fact
-from roboirg.episode import Scene, SceneObject
-from roboirg.motions import Away, Glow, Point, Shuttle, Swap, Vanish
-from roboirg.simulation import settings
-from roboirg.simulation.motions import shuttle_position
+from roboirg.core.conditions import Fact
+from roboirg.core.episode import Scene, SceneObject
+from roboirg.core.motions import Away, Glow, Point, Shuttle, Swap, Vanish
+from roboirg.simulation import physics_settings
+from roboirg.simulation.motion_player import shuttle_position
 from roboirg.simulation.world import World
 
 pytestmark = pytest.mark.sim
@@ -21,7 +21,7 @@ def cube(name: str, x: float, y: float, z: float = 0.02, yaw: float = 0.0) -> Sc
 
 def rest(world: World, steps: int) -> World:
     for _ in range(steps):
-        world.step(settings.HOME_ACTION)
+        world.step(physics_settings.HOME_ACTION)
     return world
 
 
@@ -110,7 +110,7 @@ def test_a_shuttle_runs_to_and_fro_and_stops_for_good_when_pressed():
     near, stopped = Fact("near", "s", "target"), Fact("stopped", "s", "target")
     seen = []
     for _ in range(33):
-        seen.append(near in world.step(settings.HOME_ACTION))
+        seen.append(near in world.step(physics_settings.HOME_ACTION))
         # The step that ends at t shows position t - 1.
         assert world.bodies["s"].position.y == pytest.approx(
             shuttle_position(run, world.elapsed - 1).y, abs=1e-6
@@ -120,7 +120,7 @@ def test_a_shuttle_runs_to_and_fro_and_stops_for_good_when_pressed():
     cap = world.bodies["button"].button
     cap.set_qpos(np.array([-0.012]))
     joint.set_drive_target(-0.012)
-    world.step(settings.HOME_ACTION)
+    world.step(physics_settings.HOME_ACTION)
     assert pressed in world.facts
     assert stopped not in world.facts
     rest(world, 1)

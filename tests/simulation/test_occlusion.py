@@ -6,8 +6,8 @@ import sapien
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboirg.simulation.occlusion import shown_triangles
-from roboirg.simulation.viewpoint import (
+from roboirg.simulation.rendering.occlusion import shown_triangles
+from roboirg.simulation.rendering.viewpoint import (
     FOCAL_LENGTH,
     FRONT_EYE,
     FRONT_TARGET,

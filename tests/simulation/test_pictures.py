@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import roboirg
-from roboirg.observations import CAMERAS
+from roboirg.core.observations import CAMERAS
+from roboirg.episodes.splits import get_episode
 from roboirg.policies import make_policy, play
-from roboirg.simulation.settings import HOME_ACTION
+from roboirg.simulation.physics_settings import HOME_ACTION
 from roboirg.simulation.world import World
-from roboirg.splits import get_episode
 
 pytestmark = pytest.mark.sim
 

@@ -4,15 +4,19 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from roboirg.actions import JOINT_HIGH, JOINT_LOW
-from roboirg.errors import MotionPlanningError
-from roboirg.simulation.hands import Hands
-from roboirg.simulation.planning import Planner, ToolPose
-from roboirg.simulation.settings import CONTROL_PERIOD, HOME, HOME_ACTION
-from roboirg.simulation.timing import JOINT_ACCELERATION_LIMIT, JOINT_SPEED_LIMIT, timed
+from roboirg.core.actions import JOINT_HIGH, JOINT_LOW
+from roboirg.core.errors import MotionPlanningError
+from roboirg.episodes.splits import get_episode
+from roboirg.simulation.expert.motion_planning import Planner, ToolPose
+from roboirg.simulation.expert.primitives import Hands
+from roboirg.simulation.expert.trajectory_timing import (
+    JOINT_ACCELERATION_LIMIT,
+    JOINT_SPEED_LIMIT,
+    timed,
+)
+from roboirg.simulation.physics_settings import CONTROL_PERIOD, HOME, HOME_ACTION
 from roboirg.simulation.world import World
-from roboirg.splits import get_episode
-from roboirg.tasks.unmask import APPEAR_STEP
+from roboirg.tasks.shared.unmask import APPEAR_STEP
 
 pytestmark = pytest.mark.sim
 

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 import roboirg
-from roboirg.episode import DIFFICULTIES, Goal
-from roboirg.errors import SceneRejectedError
-from roboirg.motions import Away, Glow, subjects_of
-from roboirg.observations import CAMERAS
+from roboirg.core.episode import DIFFICULTIES, Goal
+from roboirg.core.errors import SceneRejectedError
+from roboirg.core.motions import Away, Glow, subjects_of
+from roboirg.core.observations import CAMERAS
+from roboirg.episodes.splits import get_episode, make_episode
 from roboirg.policies import make_policy, play
-from roboirg.policies.handed import HandedPolicy
-from roboirg.simulation import settings
+from roboirg.policies.builtin.scripted import HandedPolicy
+from roboirg.simulation import physics_settings
 from roboirg.simulation.world import World
-from roboirg.splits import get_episode, make_episode
 from roboirg.tasks import every_task, get_task
 
 pytestmark = pytest.mark.sim
@@ -89,7 +89,7 @@ def test_another_goal_is_a_failure_with_a_cause(task):
 def test_whoever_does_nothing_runs_out_of_time(task):
     env = roboirg.make(task, episode=0, cameras=(), max_steps=2)
     env.reset()
-    outcomes = [env.step(settings.HOME_ACTION) for _ in range(2)]
+    outcomes = [env.step(physics_settings.HOME_ACTION) for _ in range(2)]
     assert [(outcome[2], outcome[3]) for outcome in outcomes] == [(False, False), (False, True)]
     assert [outcome[4]["status"] for outcome in outcomes] == ["ongoing", "timeout"]
 
@@ -100,7 +100,7 @@ def test_the_same_seed_gives_the_same_pictures_to_the_bit(task):
 
     def pictures():
         world = World(episode.scene)
-        reach = settings.HOME_ACTION + np.append(np.full(7, 0.05), 0.0)
+        reach = physics_settings.HOME_ACTION + np.append(np.full(7, 0.05), 0.0)
         for _ in range(36):
             world.step(reach)
         return [world.picture(camera) for camera in CAMERAS]
@@ -115,7 +115,7 @@ def test_nothing_falls_or_drifts_while_the_robot_rests(task):
         world = World(episode.scene, visible=False)
         moved = {name for motion in episode.scene.motions for name in subjects_of(motion)}
         for _ in range(60):
-            world.step(settings.HOME_ACTION)
+            world.step(physics_settings.HOME_ACTION)
         for name, body in world.bodies.items():
             if name not in moved and body.item.kind != "hidden_cube":
                 assert np.allclose(body.position, body.item.position, atol=2e-3), (episode, name)
@@ -131,7 +131,7 @@ def test_the_front_camera_sees_every_object_that_is_there(task):
         if isinstance(motion, Glow) or (isinstance(motion, Away) and motion.end > 33)
     }
     for _ in range(34):
-        world.step(settings.HOME_ACTION)
+        world.step(physics_settings.HOME_ACTION)
     seen, counts = np.unique(world.cameras.segmentation("front"), return_counts=True)
     pixels = dict(zip(seen.tolist(), counts.tolist(), strict=True))
     for name, body in world.bodies.items():

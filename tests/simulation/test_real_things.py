@@ -6,21 +6,21 @@ import numpy as np
 import pytest
 
 import roboirg
-from roboirg.conditions import Fact
-from roboirg.episode import Goal, Primitive, Scene, SceneObject
-from roboirg.motions import Point
+from roboirg.core import object_sizes
+from roboirg.core.conditions import Fact
+from roboirg.core.episode import Goal, Primitive, Scene, SceneObject
+from roboirg.core.motions import Point
+from roboirg.episodes.splits import get_episode
 from roboirg.policies import play
-from roboirg.policies.handed import HandedPolicy
-from roboirg.simulation import settings
-from roboirg.simulation.hands import Hands
+from roboirg.policies.builtin.scripted import HandedPolicy
+from roboirg.simulation import physics_settings
+from roboirg.simulation.expert.primitives import Hands
 from roboirg.simulation.world import World
-from roboirg.splits import get_episode
-from roboirg.tasks import geometry
 
 pytestmark = pytest.mark.sim
 
-TAPE = SceneObject("tape", "tape", Point(0.0, 0.0, geometry.TAPE_HALF), 0.0, "yellow")
-BOX = SceneObject("box_green", "box", Point(0.0, 0.0, geometry.BOX_HEIGHT / 2), 0.2, "green")
+TAPE = SceneObject("tape", "tape", Point(0.0, 0.0, object_sizes.TAPE_HALF), 0.0, "yellow")
+BOX = SceneObject("box_green", "box", Point(0.0, 0.0, object_sizes.BOX_HEIGHT / 2), 0.2, "green")
 HALF_OPEN = -0.1
 """A gripper action at which each finger is 0.0125 from the middle: one fits into the hole."""
 
@@ -38,7 +38,7 @@ class Mistaken(HandedPolicy):
 
 def rest(world, steps):
     for _ in range(steps):
-        world.step(settings.HOME_ACTION)
+        world.step(physics_settings.HOME_ACTION)
     return world
 
 
@@ -75,14 +75,14 @@ def test_a_roll_is_picked_by_its_wall():
     world = World(Scene((TAPE,)), visible=False)
     hands = Hands(world)
     rotation = hands._rotation()  # closes along y
-    middle = (geometry.TAPE_RADIUS + geometry.TAPE_HOLE_RADIUS) / 2
-    above, at = (Point(0.0, middle, z) for z in (0.15, geometry.TAPE_HALF))
+    middle = (object_sizes.TAPE_RADIUS + object_sizes.TAPE_HOLE_RADIUS) / 2
+    above, at = (Point(0.0, middle, z) for z in (0.15, object_sizes.TAPE_HALF))
     execute(world, [hands._move(above, rotation)], HALF_OPEN)
-    execute(world, [hands._grip(settings.OPEN)], HALF_OPEN)
+    execute(world, [hands._grip(physics_settings.OPEN)], HALF_OPEN)
     execute(world, [hands._move(at, rotation)], HALF_OPEN)
     assert world.bodies["tape"].position == pytest.approx(TAPE.position, abs=2e-3)
-    execute(world, [hands._grip(settings.CLOSED)])
-    wall = geometry.TAPE_RADIUS - geometry.TAPE_HOLE_RADIUS
+    execute(world, [hands._grip(physics_settings.CLOSED)])
+    wall = object_sizes.TAPE_RADIUS - object_sizes.TAPE_HOLE_RADIUS
     assert world.robot.finger_positions.sum() == pytest.approx(wall, abs=3e-3)
     execute(world, [hands._move(above, rotation)])
     assert Fact("picked", "tape") in world.facts
@@ -92,7 +92,9 @@ def test_a_roll_is_picked_by_its_wall():
 def test_a_box_takes_in_what_falls_between_its_walls(x, y):
     world = dropped(x, y, 0.12)
     # One that has touched a wall may stand on its edge.
-    low, high = (geometry.BOX_FLOOR + size for size in (geometry.TAPE_HALF, geometry.TAPE_RADIUS))
+    low, high = (
+        object_sizes.BOX_FLOOR + size for size in (object_sizes.TAPE_HALF, object_sizes.TAPE_RADIUS)
+    )
     assert low - 1e-3 <= world.bodies["tape"].position.z <= high + 1e-3
     assert Fact("binned", "tape", "box_green") in world.facts
     assert world.bodies["box_green"].position == pytest.approx(BOX.position)

@@ -11,15 +11,16 @@ import sapien
 import sapien.physx
 
 import roboirg
-from roboirg.observations import CAMERAS
+from roboirg.core.observations import CAMERAS
+from roboirg.episodes.splits import get_episode
 from roboirg.policies import make_policy, play
-from roboirg.simulation import bodies, culling, meshes, settings, shaders
-from roboirg.simulation.cameras import Cameras
-from roboirg.simulation.device import render_system
-from roboirg.simulation.rendering import FAITHFUL, LIGHT, STOCK, Rendering
-from roboirg.simulation.robot import BASE_LINK, CAMERA_LINK, FINGERS, Robot
+from roboirg.simulation import bodies, physics_settings
+from roboirg.simulation.panda import BASE_LINK, CAMERA_LINK, FINGERS, Robot
+from roboirg.simulation.rendering import culling, robot_meshes, shaders
+from roboirg.simulation.rendering.cameras import Cameras
+from roboirg.simulation.rendering.render_device import render_system
+from roboirg.simulation.rendering.render_mode import FAITHFUL, LIGHT, STOCK, Rendering
 from roboirg.simulation.scenery import add_scenery
-from roboirg.splits import get_episode
 from roboirg.tasks import all_tasks
 
 pytestmark = pytest.mark.sim
@@ -40,13 +41,13 @@ class Stage:
     """A scene that is only looked at."""
 
     def __init__(self, scene, rendering):
-        settings.apply_physics_settings()
-        settings.apply_render_settings()
+        physics_settings.apply_physics_settings()
+        physics_settings.apply_render_settings()
         self.scene = sapien.Scene([sapien.physx.PhysxCpuSystem(), render_system()])
         self.robot = Robot(self.scene, visible=True, rendering=rendering)
         add_scenery(self.scene, visible=True, rendering=rendering)
         self.bodies = [bodies.build(self.scene, item, visible=True) for item in scene.objects]
-        settings.add_lights(self.scene)
+        physics_settings.add_lights(self.scene)
         self.cameras = Cameras(self.scene, self.robot, rendering)
 
     def show(self, moment):
@@ -134,7 +135,7 @@ def test_pictures_are_those_of_the_stock_path():
 
 def test_each_camera_keeps_its_record_of_what_it_draws(monkeypatch):
     scene = get_episode("PickXtimes", "test", 2).scene
-    settings.apply_render_settings()
+    physics_settings.apply_render_settings()
     assert culling.keeps_records(), "SAPIEN records differently now: `Bodies.take` became slow"
     quick, slow = Stage(scene, FAITHFUL), Stage(scene, FAITHFUL)
     for moment in moments("PickXtimes", 2):
@@ -181,14 +182,14 @@ def test_an_unknown_shader_is_used_as_it_is(monkeypatch, caplog):
     usual = Stage(scene, Rendering(slim_shader=False))
     with monkeypatch.context() as patch:
         patch.setattr(shaders, "_STOCK_SHA256", "of another version")
-        for function in (shaders.slim_shader, meshes._shapes):
+        for function in (shaders.slim_shader, robot_meshes._shapes):
             function.cache_clear()
         unknown = Stage(scene, FAITHFUL)
         assert "it is used as it is" in caplog.text
         for moment in moments("PickXtimes", 2)[::4]:
             for ours, theirs in zip(unknown.show(moment), usual.show(moment), strict=True):
                 assert np.array_equal(ours, theirs)
-    for function in (shaders.slim_shader, meshes._shapes):
+    for function in (shaders.slim_shader, robot_meshes._shapes):
         function.cache_clear()
 
 

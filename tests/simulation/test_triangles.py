@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from roboirg.simulation.triangles import Triangles, share_corners, unshare_corners
+from roboirg.simulation.rendering.triangles import Triangles, share_corners, unshare_corners
 
 
 def hills():

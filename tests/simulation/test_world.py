@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from roboirg.conditions import Fact
-from roboirg.episode import Scene
-from roboirg.errors import InvalidValueError
-from roboirg.motions import Away
-from roboirg.simulation import settings
+from roboirg.core.conditions import Fact
+from roboirg.core.episode import Scene
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.motions import Away
+from roboirg.episodes.splits import get_episode
+from roboirg.simulation import physics_settings
 from roboirg.simulation.world import World
-from roboirg.splits import get_episode
 from roboirg.tasks import every_task
 
 pytestmark = pytest.mark.sim
@@ -24,7 +24,7 @@ def world_of(task: str, index: int = 3, *, visible: bool = False) -> World:
 
 def rest(world: World, steps: int) -> World:
     for _ in range(steps):
-        world.step(settings.HOME_ACTION)
+        world.step(physics_settings.HOME_ACTION)
     return world
 
 
@@ -81,7 +81,9 @@ def test_a_released_motion_leaves_the_object_alone():
 @pytest.mark.parametrize("task", TASKS)
 def test_worlds_repeat_themselves_bit_for_bit(task):
     rng = np.random.default_rng(0)
-    actions = settings.HOME_ACTION + np.append(rng.normal(0, 0.2, (60, 7)), np.zeros((60, 1)), 1)
+    actions = physics_settings.HOME_ACTION + np.append(
+        rng.normal(0, 0.2, (60, 7)), np.zeros((60, 1)), 1
+    )
 
     def trace():
         world = world_of(task)
@@ -101,7 +103,7 @@ def test_worlds_repeat_themselves_bit_for_bit(task):
 
 def test_the_gripper_opens_and_closes():
     world = world_of("PickXtimes")
-    closing = np.append(settings.HOME, -1.0)
+    closing = np.append(physics_settings.HOME, -1.0)
     for _ in range(10):
         world.step(closing)
     assert world.robot.finger_positions == pytest.approx([0, 0], abs=1e-3)
@@ -111,7 +113,7 @@ def test_the_gripper_opens_and_closes():
 
 def test_a_moving_arm_is_not_still():
     world = world_of("PickXtimes")
-    action = settings.HOME_ACTION.copy()
+    action = physics_settings.HOME_ACTION.copy()
     action[0] += 0.3
     world.step(action)
     assert Fact("still", "robot") not in world.facts

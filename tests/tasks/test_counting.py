@@ -8,19 +8,20 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from roboirg.conditions import Elapsed, Fact
-from roboirg.episode import DIFFICULTIES
-from roboirg.errors import SceneRejectedError
-from roboirg.motions import Away, Glow, Shuttle, Vanish
-from roboirg.tasks import bin_fill, geometry, stop_cube, swing_x_times
-from roboirg.tasks.fixtures import (
+from roboirg.core import object_sizes
+from roboirg.core.conditions import Elapsed, Fact
+from roboirg.core.episode import DIFFICULTIES
+from roboirg.core.errors import SceneRejectedError
+from roboirg.core.motions import Away, Glow, Shuttle, Vanish
+from roboirg.tasks import bin_fill, stop_cube, swing_x_times
+from roboirg.tasks.shared.fixtures import (
     bin_footprint,
     button_footprint,
     button_keep_out,
     cube_footprint,
     draw_bin,
 )
-from roboirg.tasks.placement import Circle, Rectangle, Region, overlap
+from roboirg.tasks.shared.placement import Circle, Rectangle, Region, overlap
 
 SEEDS = 300
 TASKS = {module.TASK.name: module for module in (bin_fill, swing_x_times, stop_cube)}
@@ -157,7 +158,7 @@ def test_bin_fill_places_are_free(difficulty):
         for cube in scene.of_kind("cube"):
             assert -0.28 <= cube.position.x <= 0.08
             assert -0.23 <= cube.position.y <= 0.23
-            assert cube.position.z == geometry.CUBE_HALF
+            assert cube.position.z == object_sizes.CUBE_HALF
             clear = cube_footprint(cube).grown(0.02)
             assert not any(overlap(clear, other) for other in taken)
             taken.append(cube_footprint(cube))
@@ -277,8 +278,8 @@ def test_swing_markers_cover_their_targets_and_glow_for_the_target_cube(difficul
             assert marker.radius == pytest.approx(0.04 * 1.003)
             assert marker.position[:2] == target.position[:2]
             assert marker.position.z == pytest.approx(target.position.z - 0.01)
-            top = marker.position.z + geometry.MARKER_HALF_THICKNESS
-            assert top > target.position.z + geometry.TARGET_THICKNESS / 2
+            top = marker.position.z + object_sizes.MARKER_HALF_THICKNESS
+            assert top > target.position.z + object_sizes.TARGET_THICKNESS / 2
         assert set(scene.motions) == {
             Glow(f"marker_{side}", Fact("over", cube, f"target_{side}"), 20)
             for side in ("right", "left")

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboirg.tasks.placement import (
+from roboirg.tasks.shared.placement import (
     MAX_DRAWS,
     Circle,
     Rectangle,

@@ -9,13 +9,13 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from roboirg.conditions import Fact
-from roboirg.episode import DIFFICULTIES, Goal
-from roboirg.errors import SceneRejectedError
-from roboirg.motions import Swap
-from roboirg.tasks.fixtures import button_keep_out, cube_footprint
-from roboirg.tasks.placement import Circle, overlap
-from roboirg.tasks.swapping import nearest
+from roboirg.core.conditions import Fact
+from roboirg.core.episode import DIFFICULTIES, Goal
+from roboirg.core.errors import SceneRejectedError
+from roboirg.core.motions import Swap
+from roboirg.tasks.shared.fixtures import button_keep_out, cube_footprint
+from roboirg.tasks.shared.placement import Circle, overlap
+from roboirg.tasks.shared.swapping import nearest
 from roboirg.tasks.video_place_button import TASK as VIDEO_PLACE_BUTTON
 from roboirg.tasks.video_place_order import TASK as VIDEO_PLACE_ORDER
 from roboirg.tasks.video_repick import TASK as VIDEO_REPICK

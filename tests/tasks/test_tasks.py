@@ -7,17 +7,18 @@ import itertools
 import numpy as np
 import pytest
 
-from roboirg.conditions import facts_of
-from roboirg.episode import DIFFICULTIES, ROBOT_BASE, SPLITS, Goal
-from roboirg.errors import SceneRejectedError
-from roboirg.fingerprint import plain
-from roboirg.motions import Away, Glow, Shuttle, Vanish, subjects_of
-from roboirg.splits import SIZES, get_episode, make_episode
-from roboirg.tasks import every_task, geometry, get_task
-from roboirg.tasks.fixtures import bin_footprint, button_footprint, cube_footprint
-from roboirg.tasks.placement import Circle, overlap
-from roboirg.tasks.real_table import box_footprint, tape_footprint
-from roboirg.tasks.unmask import container_footprint
+from roboirg.core import object_sizes
+from roboirg.core.conditions import facts_of
+from roboirg.core.episode import DIFFICULTIES, ROBOT_BASE, SPLITS, Goal
+from roboirg.core.errors import SceneRejectedError
+from roboirg.core.motions import Away, Glow, Shuttle, Vanish, subjects_of
+from roboirg.episodes.fingerprint import plain
+from roboirg.episodes.splits import SIZES, get_episode, make_episode
+from roboirg.tasks import every_task, get_task
+from roboirg.tasks.shared.fixtures import bin_footprint, button_footprint, cube_footprint
+from roboirg.tasks.shared.placement import Circle, overlap
+from roboirg.tasks.shared.real_table import box_footprint, tape_footprint
+from roboirg.tasks.shared.unmask import container_footprint
 
 TASKS = tuple(every_task())
 SETTINGS = {"explicit", "direct", "reasoning", "contextual", "spatial"}
@@ -241,7 +242,7 @@ def test_pick_x_times_scenes_are_as_in_the_facts():
             away = np.hypot(
                 cube.position.x - target.position.x, cube.position.y - target.position.y
             )
-            assert away >= 0.04 + 0.04 + geometry.CUBE_HALF
+            assert away >= 0.04 + 0.04 + object_sizes.CUBE_HALF
         assert len(episode.stages) == 2 * episode.goal.number("repeats") + 1
         assert not episode.demonstration
         assert not episode.scene.motions

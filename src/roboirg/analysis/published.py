@@ -9,9 +9,9 @@ from decimal import Decimal
 from importlib import resources
 from typing import Literal, NamedTuple, get_args
 
-from roboirg.analysis.rates import DIGITS
-from roboirg.analysis.statistics import EXPLICIT, Variant
-from roboirg.errors import UnknownNameError
+from roboirg.analysis.stats.rates import DIGITS
+from roboirg.analysis.stats.success_rates import EXPLICIT, Variant
+from roboirg.core.errors import UnknownNameError
 
 RateTable = Literal["main", "planner", "context", "real"]
 RATE_TABLES: tuple[RateTable, ...] = get_args(RateTable)
@@ -116,5 +116,5 @@ def _covers(word: str) -> Covers:
 
 
 def _lines(name: str) -> list[dict[str, str]]:
-    path = resources.files("roboirg.analysis") / "published" / f"{name}.csv"
+    path = resources.files("roboirg.analysis") / "published_results" / f"{name}.csv"
     return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))

@@ -13,12 +13,12 @@ from typing import Annotated
 import typer
 
 import roboirg
-from roboirg.cli import language, policies, running, telling
-from roboirg.cli.bench import bench
+from roboirg.cli import language_commands, policy_commands, report_commands, run_commands
+from roboirg.cli.bench_commands import bench
 from roboirg.cli.options import Distractor, Frame, Split, Stages, Tasks, Video, Workers
-from roboirg.cli.real import real_app
-from roboirg.cli.running import INTERRUPTED, USAGE_ERROR, Out
-from roboirg.errors import InvalidValueError, RoboIRGError
+from roboirg.cli.real_commands import real_app
+from roboirg.cli.run_commands import INTERRUPTED, USAGE_ERROR, Out
+from roboirg.core.errors import InvalidValueError, RoboIRGError
 
 # Everything heavy is imported inside the commands, so that --help answers at once.
 
@@ -41,8 +41,8 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-app.add_typer(language.language_app, name="language")
-app.add_typer(language.export_app, name="export")
+app.add_typer(language_commands.language_app, name="language")
+app.add_typer(language_commands.export_app, name="export")
 app.add_typer(real_app, name="real")
 app.command()(bench)
 
@@ -65,16 +65,16 @@ def _options(*, version: _Version = False) -> None:
     del version
 
 
-app.command()(running.run)
-app.command()(running.merge)
-app.command()(telling.report)
-app.command()(telling.view)
-app.command()(telling.tables)
-app.command()(telling.figures)
-app.command()(telling.compare)
-app.command()(policies.serve)
-app.command("check-policy")(policies.check_policy)
-language.export_app.command("records")(running.export_records)
+app.command()(run_commands.run)
+app.command()(run_commands.merge)
+app.command()(report_commands.report)
+app.command()(report_commands.view)
+app.command()(report_commands.tables)
+app.command()(report_commands.figures)
+app.command()(report_commands.compare)
+app.command()(policy_commands.serve)
+app.command("check-policy")(policy_commands.check_policy)
+language_commands.export_app.command("records")(run_commands.export_records)
 
 
 @app.command()
@@ -85,17 +85,17 @@ def demo(
     workers: Workers = None,
 ) -> None:
     """Oracle, listener and forgetful on every task and setting, filmed; ends with a page."""
-    from roboirg.analysis.report import check_report_support
-    from roboirg.evaluation.executors import choose_executor
+    from roboirg.analysis.page.report import check_report_support
+    from roboirg.evaluation.executors.executor import choose_executor
     from roboirg.evaluation.plan import make_plan
 
-    folder = running.folder_of(out)
+    folder = run_commands.folder_of(out)
     plan = make_plan(DEMO_POLICIES, episodes=episodes, video=video)
     check_report_support()
-    summary = running.play(plan, folder, choose_executor(workers), retry=True)
-    running.print_tables_of(folder)
+    summary = run_commands.play(plan, folder, choose_executor(workers), retry=True)
+    run_commands.print_tables_of(folder)
     typer.echo(_write_page(folder, videos=True))
-    running.complain(summary, folder)
+    run_commands.complain(summary, folder)
 
 
 @app.command()
@@ -125,13 +125,13 @@ def build_splits(
     """Find anew which seeds the splits pass over; what is not named stays as it is shipped."""
     from rich.console import Console
 
-    from roboirg import splits
-    from roboirg.episode import SPLITS
-    from roboirg.evaluation.acceptance import check_kept, find_seeds, merged, slots_of
-    from roboirg.evaluation.executors import core_count
-    from roboirg.evaluation.split_summary import followed, print_summary
-    from roboirg.evaluation.store import write_atomically
-    from roboirg.evaluation.words import parse_names, says_all
+    from roboirg.core.episode import SPLITS
+    from roboirg.episodes import splits
+    from roboirg.evaluation.executors.executor import core_count
+    from roboirg.evaluation.plan_parsing import parse_names, says_all
+    from roboirg.evaluation.seed_selection import check_kept, find_seeds, merged, slots_of
+    from roboirg.evaluation.seed_summary import followed, print_summary
+    from roboirg.records.store import write_atomically
     from roboirg.tasks import find_tasks
 
     names = find_tasks(parse_names("task", tasks))
@@ -163,9 +163,9 @@ def show(
     """Print an episode's scene and words, and draw how the oracle plays it."""
     from rich.console import Console
 
-    from roboirg.showing.playthrough import draw_sheet
-    from roboirg.showing.words import print_episode
-    from roboirg.splits import get_episode
+    from roboirg.episodes.splits import get_episode
+    from roboirg.visualization.episode_text import print_episode
+    from roboirg.visualization.playthrough import draw_sheet
 
     found = get_episode(task, split, episode)
     path = Path(f"{task}-{split}-{episode}.png" if out is None else out)
@@ -190,9 +190,9 @@ def instruct(
     frame: Frame = "robot",
 ) -> None:
     """Print what is said to the robot, turn by turn."""
-    from roboirg.evaluation.words import parse_stages, says_all
+    from roboirg.episodes.splits import get_episode
+    from roboirg.evaluation.plan_parsing import parse_stages, says_all
     from roboirg.language import instruct as make_instruction
-    from roboirg.splits import get_episode
     from roboirg.tasks import get_task
 
     spoken = parse_stages(stages)
@@ -238,6 +238,6 @@ def _explain(error: Exception) -> int:
 
 
 def _write_page(folder: Path, *, videos: bool) -> Path:
-    from roboirg.analysis.report import write_report
+    from roboirg.analysis.page.report import write_report
 
-    return write_report(folder, planned=running.planned_jobs(folder), videos=videos)
+    return write_report(folder, planned=run_commands.planned_jobs(folder), videos=videos)

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from statistics import fmean
 from typing import NamedTuple
 
-from roboirg.evaluation.lines import Stored
-from roboirg.evaluation.record import Job
+from roboirg.records.record import Job
+from roboirg.records.record_codec import Stored
 
 ASSUMED_STEPS = 450
 """Control steps of an episode if nothing is known: the oracle's mean over the test split, 236,

@@ -9,22 +9,16 @@ from typing import Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from roboirg import language, policies, splits, tasks
-from roboirg.actions import find_action_space
-from roboirg.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.record import (
-    ALL_STAGES,
-    DEFAULT_DISTRACTOR,
-    DEFAULT_DISTRACTORS,
-    DEFAULT_FRAME,
-    DEFAULT_MAX_STEPS,
-    DEFAULT_MESHES,
-    ERROR_KINDS,
-    ErrorKind,
-    Job,
+from roboirg import language, policies, tasks
+from roboirg.core.actions import find_action_space
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.observations import (
+    DemonstrationFrames,
+    check_demonstration_frames,
+    check_observe_every,
 )
-from roboirg.evaluation.store import write_atomically
-from roboirg.evaluation.words import (
+from roboirg.episodes import splits
+from roboirg.evaluation.plan_parsing import (
     WHOLE,
     parse_episodes,
     parse_names,
@@ -35,11 +29,18 @@ from roboirg.evaluation.words import (
     split_name,
 )
 from roboirg.language.instruction import FORMS, SETTINGS, Instruction
-from roboirg.observations import (
-    DemonstrationFrames,
-    check_demonstration_frames,
-    check_observe_every,
+from roboirg.records.record import (
+    ALL_STAGES,
+    DEFAULT_DISTRACTOR,
+    DEFAULT_DISTRACTORS,
+    DEFAULT_FRAME,
+    DEFAULT_MAX_STEPS,
+    DEFAULT_MESHES,
+    ERROR_KINDS,
+    ErrorKind,
+    Job,
 )
+from roboirg.records.store import write_atomically
 
 PLAN_FILE = "plan.json"
 

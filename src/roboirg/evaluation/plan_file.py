@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from roboirg.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.plan import Plan
 
 _PACKAGE = "roboirg.evaluation"

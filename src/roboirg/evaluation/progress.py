@@ -13,7 +13,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
-from roboirg.evaluation.record import Record
+from roboirg.records.record import Record
 
 _MINUTE = 60
 

@@ -27,27 +27,27 @@ from numpy.typing import NDArray
 from pydantic import JsonValue
 
 from roboirg import policies
-from roboirg.actions import ActionSpace, check_chunk
-from roboirg.errors import InvalidActionError, InvalidValueError
-from roboirg.evaluation.course import Course, describe, utc_now
-from roboirg.evaluation.faults import Fault, blame, one_line
+from roboirg.core.actions import ActionSpace, check_chunk
+from roboirg.core.errors import InvalidActionError, InvalidValueError
+from roboirg.core.observations import DemonstrationFrames, Observation
+from roboirg.episodes.splits import get_episode
+from roboirg.evaluation.episode_errors import Fault, blame, one_line
+from roboirg.evaluation.executors.watchdog import Phase, watched
 from roboirg.evaluation.plan import VideoMode
-from roboirg.evaluation.record import Job, Record
-from roboirg.evaluation.video import Film, VideoOptions
-from roboirg.evaluation.watching import Phase, watched
-from roboirg.observations import DemonstrationFrames, Observation
+from roboirg.evaluation.rollout_result import Course, describe, utc_now
+from roboirg.evaluation.video_writer import Film, VideoOptions
 from roboirg.policies.base import Policy, PrivilegedPolicy
-from roboirg.policies.wishes import (
+from roboirg.policies.requirements import (
     wanted_actions,
     wanted_cameras,
     wanted_demonstration_frames,
     wanted_history,
     wanted_history_cameras,
 )
-from roboirg.splits import get_episode
+from roboirg.records.record import Job, Record
 
 if TYPE_CHECKING:
-    from roboirg.environment import RoboIRGEnv
+    from roboirg.envs.environment import RoboIRGEnv
 
 Play = Callable[[Job], Record]
 """Plays one job. Executors send it to other processes, so it must pickle."""

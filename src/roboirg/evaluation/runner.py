@@ -11,18 +11,18 @@ from pathlib import Path
 from types import FrameType
 from typing import NamedTuple
 
-from roboirg.episode import ENVIRONMENT_VERSION
-from roboirg.errors import InvalidValueError
-from roboirg.evaluation.executors import Executor
-from roboirg.evaluation.lines import Stored, key_of
+from roboirg.core.episode import ENVIRONMENT_VERSION
+from roboirg.core.errors import InvalidValueError
+from roboirg.episodes.splits import get_episode
+from roboirg.evaluation.executors.executor import Executor
 from roboirg.evaluation.plan import Plan, write_plan
 from roboirg.evaluation.progress import Reporter, Silent
-from roboirg.evaluation.record import Job, Record
 from roboirg.evaluation.rollout import Play
-from roboirg.evaluation.store import TORN_FILE, RecordStore, StoreError
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.policies.loading import policy_version
-from roboirg.splits import get_episode
+from roboirg.records.record import Job, Record
+from roboirg.records.record_codec import Stored, key_of
+from roboirg.records.store import TORN_FILE, RecordStore, StoreError
 
 UNREACHABLE_AFTER = 20
 """So many episodes of a policy in a row without a connection, and its others are left for later."""

@@ -2,7 +2,7 @@
 
 from roboirg.judging.attribution import attribute
 from roboirg.judging.events import Event, changes
-from roboirg.judging.finding import EXECUTION, GROUNDING, Finding
+from roboirg.judging.failure_attribution import EXECUTION, GROUNDING, Finding
 from roboirg.judging.judge import Judge, Status, plain_subgoal
 
 __all__ = [

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from roboirg.conditions import (
+from roboirg.core.conditions import (
     LASTING_KINDS,
     All,
     Began,
@@ -21,15 +21,15 @@ from roboirg.conditions import (
     Rule,
     facts_of,
 )
-from roboirg.episode import Episode
-from roboirg.judging.ending import ending
+from roboirg.core.episode import Episode
+from roboirg.judging.end_state import ending
+from roboirg.judging.episode_replay import Spell, Trace, retrace
 from roboirg.judging.events import Event
-from roboirg.judging.finding import FailureName, Finding
-from roboirg.judging.grounding import mistake
-from roboirg.judging.history import History
+from roboirg.judging.fact_history import History
+from roboirg.judging.failure_attribution import FailureName, Finding
+from roboirg.judging.grounding_errors import mistake
 from roboirg.judging.judge import Status, describe_violation
-from roboirg.judging.slips import excuse
-from roboirg.judging.trace import Spell, Trace, retrace
+from roboirg.judging.release_errors import excuse
 
 
 class _Deviation(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Set as AbstractSet
 from typing import NamedTuple
 
-from roboirg.conditions import Fact
+from roboirg.core.conditions import Fact
 
 
 class Event(NamedTuple):

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from enum import StrEnum
 
-from roboirg.conditions import Fact, Rule
-from roboirg.episode import Scene, Stage
-from roboirg.judging.history import History
+from roboirg.core.conditions import Fact, Rule
+from roboirg.core.episode import Scene, Stage
+from roboirg.judging.fact_history import History
 
 
 class Status(StrEnum):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from roboirg.language.compose import STAGE_SETS, expressible, instruct
+from roboirg.language.generator import STAGE_SETS, expressible, instruct
 from roboirg.language.instruction import FORMS, SETTINGS, Instruction, Mention, Utterance
-from roboirg.language.resolver import Resolution, resolve
+from roboirg.language.interpreter import Resolution, resolve
 from roboirg.language.templates import LANGUAGE_VERSION
 
 __all__ = [

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from roboirg.episode import Episode
-from roboirg.language.compose import instruct
+from roboirg.core.episode import Episode
+from roboirg.episodes.splits import get_episode
+from roboirg.language.generator import instruct
 from roboirg.language.instruction import Instruction, Mention
 from roboirg.language.templates import LANGUAGE_VERSION
 from roboirg.language.variants import all_variants
-from roboirg.splits import get_episode
 from roboirg.tasks import all_tasks, get_task
 
 SPLIT = "test"

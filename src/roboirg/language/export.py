@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from roboirg.episode import Episode
-from roboirg.errors import InvalidValueError, MissingDependencyError
+from roboirg.core.episode import Episode
+from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.language.instruction import Instruction
 from roboirg.tasks import get_task
 

@@ -12,8 +12,8 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Literal, NamedTuple
 
-from roboirg.episode import Scene, SceneObject
-from roboirg.motions import Away
+from roboirg.core.episode import Scene, SceneObject
+from roboirg.core.motions import Away
 from roboirg.tasks.task import Thing
 
 MARGIN = 0.03

@@ -7,12 +7,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
-from roboirg.episode import Colour, Episode, Goal, Scene, SceneObject
-from roboirg.errors import InvalidValueError
-from roboirg.language.choice import Chooser
+from roboirg.core.episode import Colour, Episode, Goal, Scene, SceneObject
+from roboirg.core.errors import InvalidValueError
 from roboirg.language.instruction import Form, Setting, UtteranceStage
 from roboirg.language.landmarks import Frame
 from roboirg.language.phrases import Phrase, fill
+from roboirg.language.template_sampler import Chooser
 from roboirg.tasks import Task, get_task
 
 Distractor = Literal["neutral", "competing"]

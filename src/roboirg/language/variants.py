@@ -6,13 +6,13 @@ import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from roboirg.episode import Episode, Split
-from roboirg.language.compose import STAGE_SETS, expressible, instruct
+from roboirg.core.episode import Episode, Split
+from roboirg.episodes.splits import SIZES, get_episode
+from roboirg.language.generator import STAGE_SETS, expressible, instruct
 from roboirg.language.instruction import FORMS, Form, Instruction, Setting
 from roboirg.language.landmarks import FRAMES
 from roboirg.language.request import DISTRACTORS
 from roboirg.language.settings import all_settings
-from roboirg.splits import SIZES, get_episode
 from roboirg.tasks import all_tasks
 
 EXPLICIT: Setting = "explicit"

@@ -1,9 +1,9 @@
 """Policies: the contract, the built-in ones, and how a name becomes one."""
 
-from roboirg.observations import Demonstration, Observation
+from roboirg.core.observations import Demonstration, Observation
 from roboirg.policies.base import Policy, PrivilegedPolicy
 from roboirg.policies.loading import load_policy_class, make_policy
-from roboirg.policies.playing import play
+from roboirg.policies.play import play
 
 __all__ = [
     "Demonstration",

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.observations import Demonstration, Observation
+from roboirg.core.observations import Demonstration, Observation
 
 if TYPE_CHECKING:
-    from roboirg.environment import RoboIRGEnv
+    from roboirg.envs.environment import RoboIRGEnv
 
 
 @runtime_checkable

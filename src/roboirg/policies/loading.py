@@ -7,11 +7,11 @@ import inspect
 from pathlib import Path
 from typing import Any, cast
 
-from roboirg.errors import InvalidValueError
+from roboirg.core.errors import InvalidValueError
 from roboirg.policies.base import Policy
-from roboirg.policies.classes import BUILTIN, find_class, make_from_class
-from roboirg.policies.planning import specs
-from roboirg.policies.urls import is_url
+from roboirg.policies.planning import policy_specs
+from roboirg.policies.policy_classes import BUILTIN, find_class, make_from_class
+from roboirg.policies.policy_urls import is_url
 
 FINGERPRINT_LENGTH = 12
 """Hexadecimal digits."""
@@ -20,15 +20,15 @@ FINGERPRINT_LENGTH = 12
 def load_policy_class(spec: str) -> type[Any]:
     """The class that a spec names: a built-in name, ``package.module:Class``, or a URL.
 
-    Of ``system:NAME`` and ``vlm-listener:PROVIDER`` (`roboirg.policies.planning.specs`) something
-    that makes policies and has a class's attributes.
+    Of ``system:NAME`` and ``vlm-listener:PROVIDER`` (`roboirg.policies.planning.policy_specs`)
+    something that makes policies and has a class's attributes.
 
     Raises:
         UnknownNameError: it is none of them, or the URL gives an option that there is not.
         InvalidValueError: the module or the class cannot be imported, or is not a policy; or
             the URL is malformed.
     """
-    factory = specs.find(spec) if ":" in spec else None
+    factory = policy_specs.find(spec) if ":" in spec else None
     # A factory has all that is asked of a class here.
     return find_class(spec) if factory is None else cast("type[Any]", factory)
 

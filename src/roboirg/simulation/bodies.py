@@ -16,10 +16,10 @@ import sapien.render
 from sapien.wrapper.actor_builder import ActorBuilder
 from sapien.wrapper.articulation_builder import ArticulationBuilder
 
-from roboirg.episode import SceneObject
-from roboirg.motions import Point
-from roboirg.simulation.ring import Rgba, ring
-from roboirg.tasks import geometry
+from roboirg.core import object_sizes
+from roboirg.core.episode import SceneObject
+from roboirg.core.motions import Point
+from roboirg.simulation.rendering.tube_mesh import Rgba, ring
 
 Triple = tuple[float, float, float]
 Cuboid = tuple[Triple, Triple]
@@ -118,7 +118,7 @@ def _finish(builder: ActorBuilder, scene: sapien.Scene, item: SceneObject, kind:
 
 
 def _build_cube(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
-    half = geometry.HIDDEN_CUBE_HALF if item.kind == "hidden_cube" else geometry.CUBE_HALF
+    half = object_sizes.HIDDEN_CUBE_HALF if item.kind == "hidden_cube" else object_sizes.CUBE_HALF
     builder = ActorBuilder()
     builder.add_box_collision(half_size=[half] * 3)
     if visible:
@@ -129,17 +129,17 @@ def _build_cube(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
 
 def _build_container(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
     """Six boxes, built opening up and turned over; the knob is what the gripper grasps."""
-    wall, side = geometry.CONTAINER_WALL / 2, geometry.CONTAINER_HALF
-    roof, height = geometry.CONTAINER_ROOF / 2, geometry.CONTAINER_WALL_HEIGHT / 2
+    wall, side = object_sizes.CONTAINER_WALL / 2, object_sizes.CONTAINER_HALF
+    roof, height = object_sizes.CONTAINER_ROOF / 2, object_sizes.CONTAINER_WALL_HEIGHT / 2
     # Upside down, z is measured from the origin (the roof's top) towards the opening.
-    roof_z, wall_z = roof, geometry.CONTAINER_HEIGHT - height
+    roof_z, wall_z = roof, object_sizes.CONTAINER_HEIGHT - height
     boxes = [
         ((0.0, 0.0, roof_z), (side, side, roof)),
         ((-side, 0.0, wall_z), (wall, side, height)),
         ((side, 0.0, wall_z), (wall, side, height)),
         ((0.0, -side, wall_z), (side, wall, height)),
         ((0.0, side, wall_z), (side, wall, height)),
-        ((0.0, 0.0, 0.0), (geometry.CUBE_HALF,) * 3),
+        ((0.0, 0.0, 0.0), (object_sizes.CUBE_HALF,) * 3),
     ]
     builder = ActorBuilder()
     for centre, half in boxes:
@@ -151,7 +151,7 @@ def _build_container(scene: sapien.Scene, item: SceneObject, visible: bool) -> B
 
 def _build_target(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
     """A ringed disc, purple or as the scene wants it."""
-    half = (item.thickness or geometry.TARGET_THICKNESS) / 2
+    half = (item.thickness or object_sizes.TARGET_THICKNESS) / 2
     return _ringed_disc(
         scene, item, PURPLE if item.rgb is None else (*item.rgb, 1.0), half, visible
     )
@@ -159,7 +159,7 @@ def _build_target(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body
 
 def _build_marker(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
     """A ringed disc, red and thick enough to cover a target."""
-    return _ringed_disc(scene, item, RED, geometry.MARKER_HALF_THICKNESS, visible)
+    return _ringed_disc(scene, item, RED, object_sizes.MARKER_HALF_THICKNESS, visible)
 
 
 def _ringed_disc(
@@ -189,21 +189,21 @@ def _build_shuttle(scene: sapien.Scene, item: SceneObject, visible: bool) -> Bod
     builder = ActorBuilder()
     if visible:
         material = _material(_rgba(item, WHITE))
-        builder.add_box_visual(half_size=[geometry.CUBE_HALF] * 3, material=material)
+        builder.add_box_visual(half_size=[object_sizes.CUBE_HALF] * 3, material=material)
     return _finish(builder, scene, item, "kinematic")
 
 
 def _build_bin(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
     """Four walls; the black floor is only seen, things fall to the table."""
-    height = geometry.BIN_HEIGHT / 2
+    height = object_sizes.BIN_HEIGHT / 2
     builder = ActorBuilder()
-    walls = _walls(geometry.BIN_HALF, geometry.BIN_WALL / 2, height)
+    walls = _walls(object_sizes.BIN_HALF, object_sizes.BIN_WALL / 2, height)
     _add_boxes(builder, walls, WOOD if visible else None)
     if visible:
-        floor = geometry.BIN_FLOOR_HEIGHT / 2
+        floor = object_sizes.BIN_FLOOR_HEIGHT / 2
         builder.add_box_visual(
             sapien.Pose([0.0, 0.0, floor - height]),
-            half_size=(geometry.BIN_HOLE_HALF, geometry.BIN_HOLE_HALF, floor),
+            half_size=(object_sizes.BIN_HOLE_HALF, object_sizes.BIN_HOLE_HALF, floor),
             material=_material(BLACK),
         )
     return _finish(builder, scene, item, "kinematic")
@@ -214,11 +214,15 @@ def _build_box(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
     rgba = COLOUR_RGBA[str(item.colour)]
     red, green, blue, _ = rgba
     dark = (FLOOR_SHADE * red, FLOOR_SHADE * green, FLOOR_SHADE * blue, 1.0)
-    wall, height, floor = geometry.BOX_WALL / 2, geometry.BOX_HEIGHT / 2, geometry.BOX_FLOOR / 2
-    inner = geometry.BOX_HALF - geometry.BOX_WALL
+    wall, height, floor = (
+        object_sizes.BOX_WALL / 2,
+        object_sizes.BOX_HEIGHT / 2,
+        object_sizes.BOX_FLOOR / 2,
+    )
+    inner = object_sizes.BOX_HALF - object_sizes.BOX_WALL
     bottom = ((0.0, 0.0, floor - height), (inner, inner, floor))
     builder = ActorBuilder()
-    _add_boxes(builder, _walls(geometry.BOX_HALF, wall, height), rgba if visible else None)
+    _add_boxes(builder, _walls(object_sizes.BOX_HALF, wall, height), rgba if visible else None)
     _add_boxes(builder, [bottom], dark if visible else None)
     return _finish(builder, scene, item, "kinematic")
 
@@ -247,19 +251,19 @@ def _add_boxes(builder: ActorBuilder, cuboids: Sequence[Cuboid], rgba: Rgba | No
 
 def _build_tape(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
     """A ring of boxes, which fingers can take from outside or by its wall; round to the eye."""
-    outer, inner = geometry.TAPE_RADIUS, geometry.TAPE_HOLE_RADIUS
+    outer, inner = object_sizes.TAPE_RADIUS, object_sizes.TAPE_HOLE_RADIUS
     wall = (outer - inner) / 2
-    half = (wall, outer * math.tan(math.pi / geometry.TAPE_SIDES), geometry.TAPE_HALF)
+    half = (wall, outer * math.tan(math.pi / object_sizes.TAPE_SIDES), object_sizes.TAPE_HALF)
     builder = ActorBuilder()
-    for number in range(geometry.TAPE_SIDES):
-        angle = 2 * math.pi * number / geometry.TAPE_SIDES
+    for number in range(object_sizes.TAPE_SIDES):
+        angle = 2 * math.pi * number / object_sizes.TAPE_SIDES
         centre = (math.cos(angle) * (inner + wall), math.sin(angle) * (inner + wall), 0.0)
         turned = [math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2)]
         builder.add_box_collision(sapien.Pose(centre, turned), half_size=half)
     body = _finish(builder, scene, item, "dynamic")
     if visible:
         component = sapien.render.RenderBodyComponent()
-        component.attach(ring(outer, inner, geometry.TAPE_HALF, COLOUR_RGBA[str(item.colour)]))
+        component.attach(ring(outer, inner, object_sizes.TAPE_HALF, COLOUR_RGBA[str(item.colour)]))
         body.entity.add_component(component)
     return body
 
@@ -271,26 +275,26 @@ def _build_button(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body
     builder.set_initial_pose(_pose(item, item.position))
     base = builder.create_link_builder()
     base.set_name("button_base")
-    base.add_box_collision(half_size=geometry.BUTTON_BASE_HALF)
+    base.add_box_collision(half_size=object_sizes.BUTTON_BASE_HALF)
     cap = builder.create_link_builder(base)
     cap.set_name("button_cap")
     cap.set_joint_name("button_joint")
     # SAPIEN's prismatic joints slide along x: both joint frames are turned so that x points up.
-    rest = geometry.BUTTON_BASE_HALF[2] + geometry.BUTTON_CAP_HALF_LENGTH
+    rest = object_sizes.BUTTON_BASE_HALF[2] + object_sizes.BUTTON_CAP_HALF_LENGTH
     up = (math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0)
     cap.set_joint_properties(
         "prismatic",
-        [[-geometry.BUTTON_TRAVEL, 0.0]],
+        [[-object_sizes.BUTTON_TRAVEL, 0.0]],
         sapien.Pose([0.0, 0.0, rest], up),
         sapien.Pose([0.0, 0.0, 0.0], up),
     )
     shape = {
-        "radius": geometry.BUTTON_CAP_RADIUS,
-        "half_length": geometry.BUTTON_CAP_HALF_LENGTH,
+        "radius": object_sizes.BUTTON_CAP_RADIUS,
+        "half_length": object_sizes.BUTTON_CAP_HALF_LENGTH,
     }
     cap.add_cylinder_collision(sapien.Pose(q=UPRIGHT), density=CAP_DENSITY, **shape)
     if visible:
-        base.add_box_visual(half_size=geometry.BUTTON_BASE_HALF, material=_material(WHITE))
+        base.add_box_visual(half_size=object_sizes.BUTTON_BASE_HALF, material=_material(WHITE))
         cap.add_cylinder_visual(sapien.Pose(q=UPRIGHT), material=_material(GRAY), **shape)
     articulation = builder.build(fix_root_link=True)
     articulation.set_name(item.name)

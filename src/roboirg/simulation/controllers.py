@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.actions import EE_POSE, JOINT_ANGLE, POSE_SIZE, WAYPOINT, ActionSpace
-from roboirg.errors import MotionPlanningError
-from roboirg.simulation.robot import Robot
-from roboirg.simulation.settings import CLOSED, GRIPPER_STEPS, OPEN
+from roboirg.core.actions import EE_POSE, JOINT_ANGLE, POSE_SIZE, WAYPOINT, ActionSpace
+from roboirg.core.errors import MotionPlanningError
+from roboirg.simulation.panda import Robot
+from roboirg.simulation.physics_settings import CLOSED, GRIPPER_STEPS, OPEN
 
 if TYPE_CHECKING:
-    from roboirg.simulation.planning import Planner, ToolPose
+    from roboirg.simulation.expert.motion_planning import Planner, ToolPose
 
 Piece = NDArray[np.float64]
 """Joint actions (n, 8), n >= 1: joint targets and the gripper."""
@@ -107,7 +107,7 @@ def tool_pose(action: NDArray[np.float64]) -> ToolPose:
     """The pose in an action that begins with x, y, z, roll, pitch, yaw (extrinsic x-y-z)."""
     from scipy.spatial.transform import Rotation
 
-    from roboirg.simulation.planning import ToolPose
+    from roboirg.simulation.expert.motion_planning import ToolPose
 
     return ToolPose(action[:3], Rotation.from_euler("xyz", action[3:POSE_SIZE]))
 
@@ -120,7 +120,7 @@ def in_words(action: NDArray[np.float64]) -> str:
 
 def _make_planner(robot: Robot) -> Planner:
     # It takes a third of a second to import, and who commands joints does not need it.
-    from roboirg.simulation.planning import Planner
+    from roboirg.simulation.expert.motion_planning import Planner
 
     return Planner(robot)
 

@@ -9,7 +9,7 @@ import numpy as np
 import sapien
 from numpy.typing import NDArray
 
-from roboirg.simulation.robot import Robot
+from roboirg.simulation.panda import Robot
 
 LOCKED = 1e-7
 """Radians from straight up or down at which roll and yaw turn about one axis; yaw is 0 there."""

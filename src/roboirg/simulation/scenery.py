@@ -11,9 +11,9 @@ import sapien
 import sapien.render
 from sapien.wrapper.actor_builder import ActorBuilder
 
-from roboirg.simulation.assets import find_model_files
-from roboirg.simulation.rendering import FAITHFUL, Rendering
-from roboirg.simulation.table_mesh import table_shape
+from roboirg.simulation.model_files import find_model_files
+from roboirg.simulation.rendering.render_mode import FAITHFUL, Rendering
+from roboirg.simulation.rendering.table_mesh import table_shape
 
 Range = tuple[int, int]
 

@@ -9,17 +9,17 @@ import sapien
 import sapien.physx
 from numpy.typing import NDArray
 
-from roboirg.conditions import Fact
-from roboirg.episode import Scene
-from roboirg.errors import InvalidValueError, UnknownNameError
-from roboirg.observations import CAMERAS
-from roboirg.simulation import bodies, settings
-from roboirg.simulation.cameras import Cameras
-from roboirg.simulation.detection import Detector
-from roboirg.simulation.device import render_system
-from roboirg.simulation.motions import Moment, MotionPlayer
-from roboirg.simulation.rendering import FAITHFUL, Rendering
-from roboirg.simulation.robot import Robot
+from roboirg.core.conditions import Fact
+from roboirg.core.episode import Scene
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.observations import CAMERAS
+from roboirg.simulation import bodies, physics_settings
+from roboirg.simulation.fact_detection import Detector
+from roboirg.simulation.motion_player import Moment, MotionPlayer
+from roboirg.simulation.panda import Robot
+from roboirg.simulation.rendering.cameras import Cameras
+from roboirg.simulation.rendering.render_device import render_system
+from roboirg.simulation.rendering.render_mode import FAITHFUL, Rendering
 from roboirg.simulation.scenery import add_scenery
 
 
@@ -40,14 +40,14 @@ class World:
     def __init__(
         self, scene: Scene, *, visible: bool = True, rendering: Rendering = FAITHFUL
     ) -> None:
-        settings.apply_physics_settings()
+        physics_settings.apply_physics_settings()
         systems: list[Any] = [sapien.physx.PhysxCpuSystem()]
         if visible:
             systems.append(render_system(keep_engine=rendering.quick_start))
-            settings.apply_render_settings()
+            physics_settings.apply_render_settings()
         self._scene = sapien.Scene(systems)
         self._physics = systems[0]
-        self._physics.timestep = 1.0 / settings.PHYSICS_RATE
+        self._physics.timestep = 1.0 / physics_settings.PHYSICS_RATE
         self.robot = Robot(self._scene, visible=visible, rendering=rendering)
         add_scenery(self._scene, visible=visible, rendering=rendering)
         self.bodies = {
@@ -58,7 +58,7 @@ class World:
         self._stages: dict[int, int] = {}
         self._cameras: Cameras | None = None
         if visible:
-            settings.add_lights(self._scene)
+            physics_settings.add_lights(self._scene)
             self._cameras = Cameras(self._scene, self.robot, rendering)
         self.elapsed = 0
         self.facts: frozenset[Fact] = self._detector.detect([], self._motions.absent())
@@ -84,7 +84,7 @@ class World:
     def advance(self, action: NDArray[np.floating[Any]]) -> None:
         """The physics of one control step and nothing else: no motions, no facts, no time."""
         self.robot.set_targets(action)
-        for _ in range(settings.PHYSICS_STEPS):
+        for _ in range(physics_settings.PHYSICS_STEPS):
             self._physics.step()
 
     def note_stage(self, index: int) -> None:

@@ -11,10 +11,10 @@ import functools
 import sys
 from collections.abc import Iterable, Mapping
 
-from roboirg.discovery import offered
-from roboirg.episode import BENCHMARK_SUITES, SUITES, Suite
-from roboirg.errors import UnknownNameError
+from roboirg.core.episode import BENCHMARK_SUITES, SUITES, Suite
+from roboirg.core.errors import UnknownNameError
 from roboirg.tasks.task import Task
+from roboirg.util.discovery import offered
 
 __all__ = ["Task", "all_tasks", "every_task", "find_tasks", "get_task"]
 

@@ -13,10 +13,19 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from roboirg.conditions import Count, Fact, Rule
-from roboirg.episode import COLOURS, Colour, Difficulty, Goal, Primitive, Scene, SceneObject, Stage
-from roboirg.motions import Away, Motion, Vanish
-from roboirg.tasks.fixtures import (
+from roboirg.core.conditions import Count, Fact, Rule
+from roboirg.core.episode import (
+    COLOURS,
+    Colour,
+    Difficulty,
+    Goal,
+    Primitive,
+    Scene,
+    SceneObject,
+    Stage,
+)
+from roboirg.core.motions import Away, Motion, Vanish
+from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     bin_footprint,
     button_footprint,
@@ -27,7 +36,7 @@ from roboirg.tasks.fixtures import (
     draw_cube,
     draw_number,
 )
-from roboirg.tasks.placement import Footprint, Region
+from roboirg.tasks.shared.placement import Footprint, Region
 from roboirg.tasks.task import Commands, Task, Wording
 
 COLOURS_PRESENT: dict[Difficulty, int] = {"easy": 1, "medium": 2, "hard": 3}

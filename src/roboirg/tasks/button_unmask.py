@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboirg.conditions import Fact
-from roboirg.episode import Difficulty, Goal, Scene, Stage
-from roboirg.tasks import unmask
-from roboirg.tasks.fixtures import button_keep_out, draw_button
-from roboirg.tasks.placement import Region
+from roboirg.core.conditions import Fact
+from roboirg.core.episode import Difficulty, Goal, Scene, Stage
+from roboirg.tasks.shared import unmask
+from roboirg.tasks.shared.fixtures import button_keep_out, draw_button
+from roboirg.tasks.shared.placement import Region
 from roboirg.tasks.task import Task, Wording
 from roboirg.tasks.video_unmask import CONTAINERS, GAP, PICKS, REGION
 

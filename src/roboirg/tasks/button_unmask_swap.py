@@ -10,12 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from roboirg.conditions import All, Began, Count, Fact
-from roboirg.episode import Difficulty, Goal, Scene, Stage
-from roboirg.tasks import unmask, unmask_swap
-from roboirg.tasks.fixtures import button_keep_out, draw_button
-from roboirg.tasks.layouts import PlanePoint
-from roboirg.tasks.placement import Region
+from roboirg.core.conditions import All, Began, Count, Fact
+from roboirg.core.episode import Difficulty, Goal, Scene, Stage
+from roboirg.tasks.shared import unmask, unmask_swap
+from roboirg.tasks.shared.fixtures import button_keep_out, draw_button
+from roboirg.tasks.shared.layouts import PlanePoint
+from roboirg.tasks.shared.placement import Region
 from roboirg.tasks.task import Task, Wording
 
 RIGHT, LEFT = "button_right", "button_left"

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboirg.conditions import Elapsed, Fact, Rule
-from roboirg.episode import Colour, Difficulty, Goal, Primitive, Scene, Stage
-from roboirg.tasks.fixtures import ORDINALS, draw_number, draw_target
-from roboirg.tasks.placement import Circle, Footprint, Region
-from roboirg.tasks.real_table import Side, draw_sides, draw_tape, on_side
+from roboirg.core.conditions import Elapsed, Fact, Rule
+from roboirg.core.episode import Colour, Difficulty, Goal, Primitive, Scene, Stage
+from roboirg.tasks.shared.fixtures import ORDINALS, draw_number, draw_target
+from roboirg.tasks.shared.placement import Circle, Footprint, Region
+from roboirg.tasks.shared.real_table import Side, draw_sides, draw_tape, on_side
 from roboirg.tasks.task import Commands, Task, Wording
 
 TAPES: tuple[Colour, ...] = ("yellow", "gray")

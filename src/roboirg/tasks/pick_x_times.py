@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboirg.conditions import Fact
-from roboirg.episode import Difficulty, Goal, Primitive, Scene, Stage
-from roboirg.tasks.fixtures import (
+from roboirg.core.conditions import Fact
+from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, Stage
+from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     button_keep_out,
     cube_footprint,
@@ -19,7 +19,7 @@ from roboirg.tasks.fixtures import (
     draw_number,
     draw_target,
 )
-from roboirg.tasks.placement import Footprint, Region
+from roboirg.tasks.shared.placement import Footprint, Region
 from roboirg.tasks.task import Commands, Task, Wording
 
 CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}

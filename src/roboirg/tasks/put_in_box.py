@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboirg.conditions import Fact, Rule
-from roboirg.episode import Colour, Difficulty, Goal, Primitive, Scene, Stage
-from roboirg.tasks.placement import Footprint, Region
-from roboirg.tasks.real_table import (
+from roboirg.core.conditions import Fact, Rule
+from roboirg.core.episode import Colour, Difficulty, Goal, Primitive, Scene, Stage
+from roboirg.tasks.shared.placement import Footprint, Region
+from roboirg.tasks.shared.real_table import (
     Side,
     box_footprint,
     draw_box,

@@ -12,11 +12,11 @@ from typing import Literal
 
 import numpy as np
 
-from roboirg.conditions import All, Began, Elapsed, Fact, Rule, absent
-from roboirg.episode import Difficulty, Goal, Primitive, Scene, SceneObject, Stage
-from roboirg.motions import Point, Shuttle
-from roboirg.tasks.fixtures import ORDINALS, draw_button
-from roboirg.tasks.placement import Region
+from roboirg.core.conditions import All, Began, Elapsed, Fact, Rule, absent
+from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, SceneObject, Stage
+from roboirg.core.motions import Point, Shuttle
+from roboirg.tasks.shared.fixtures import ORDINALS, draw_button
+from roboirg.tasks.shared.placement import Region
 from roboirg.tasks.task import Commands, Task, Wording
 
 BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.2)

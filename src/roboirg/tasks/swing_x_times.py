@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboirg.conditions import Began, Fact, Rule
-from roboirg.episode import Difficulty, Goal, Primitive, Scene, SceneObject, Stage
-from roboirg.motions import Glow
-from roboirg.tasks.fixtures import (
+from roboirg.core.conditions import Began, Fact, Rule
+from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, SceneObject, Stage
+from roboirg.core.motions import Glow
+from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     button_keep_out,
     cube_footprint,
@@ -21,7 +21,7 @@ from roboirg.tasks.fixtures import (
     draw_target,
     marker_over,
 )
-from roboirg.tasks.placement import Circle, Footprint, Region
+from roboirg.tasks.shared.placement import Circle, Footprint, Region
 from roboirg.tasks.task import Commands, Task, Wording
 
 CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}

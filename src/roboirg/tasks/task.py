@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from roboirg.episode import COLOURS, Colour, Difficulty, Goal, Scene, Stage, Suite
+from roboirg.core.episode import COLOURS, Colour, Difficulty, Goal, Scene, Stage, Suite
 
 Thing = Literal["cube", "container", "box", "tape"]
 """What can be told by a place: its kind and its name in words."""

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboirg.conditions import Fact
-from roboirg.episode import Difficulty, Goal, Scene, Stage
-from roboirg.tasks import video_place
+from roboirg.core.conditions import Fact
+from roboirg.core.episode import Difficulty, Goal, Scene, Stage
+from roboirg.tasks.shared import video_place
 from roboirg.tasks.task import Commands, Task, Wording
 
 DISCS: dict[Difficulty, int] = {"easy": 3, "medium": 4, "hard": 4}

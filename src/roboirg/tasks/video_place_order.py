@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboirg.conditions import Fact
-from roboirg.episode import Difficulty, Goal, Scene, Stage
-from roboirg.tasks import video_place
-from roboirg.tasks.fixtures import draw_number
+from roboirg.core.conditions import Fact
+from roboirg.core.episode import Difficulty, Goal, Scene, Stage
+from roboirg.tasks.shared import video_place
+from roboirg.tasks.shared.fixtures import draw_number
 from roboirg.tasks.task import Commands, Task, Wording
 
 DISCS = 4

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboirg.conditions import All, Elapsed, Fact, Rule
-from roboirg.episode import COLOURS, Difficulty, Goal, Primitive, Scene, SceneObject, Stage
-from roboirg.motions import Swap
-from roboirg.tasks import video
-from roboirg.tasks.fixtures import (
+from roboirg.core.conditions import All, Elapsed, Fact, Rule
+from roboirg.core.episode import COLOURS, Difficulty, Goal, Primitive, Scene, SceneObject, Stage
+from roboirg.core.motions import Swap
+from roboirg.tasks.shared import video_stages
+from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     button_keep_out,
     cube_footprint,
@@ -21,9 +21,9 @@ from roboirg.tasks.fixtures import (
     draw_cube,
     draw_number,
 )
-from roboirg.tasks.layouts import layout_points
-from roboirg.tasks.placement import Footprint, Region
-from roboirg.tasks.swapping import SWAP_STEPS, plan_swaps
+from roboirg.tasks.shared.layouts import layout_points
+from roboirg.tasks.shared.placement import Footprint, Region
+from roboirg.tasks.shared.swapping import SWAP_STEPS, plan_swaps
 from roboirg.tasks.task import Commands, Task, Wording
 
 REPEATS = (1, 3)
@@ -102,9 +102,9 @@ def demonstration(scene: Scene) -> tuple[Stage, ...]:
         subgoal="drop the cube on the table",
     )
     swaps = [motion for motion in scene.motions if isinstance(motion, Swap)]
-    waiting = [video.retreat()] if swaps else []
-    waiting += [video.hold_still(SWAP_STEPS) for _ in swaps]
-    return (video.show_pick(target), put_down, *waiting, video.go_home())
+    waiting = [video_stages.retreat()] if swaps else []
+    waiting += [video_stages.hold_still(SWAP_STEPS) for _ in swaps]
+    return (video_stages.show_pick(target), put_down, *waiting, video_stages.go_home())
 
 
 def goals(_scene: Scene) -> tuple[Goal, ...]:

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboirg.episode import Difficulty, Goal, Scene, Stage
-from roboirg.tasks import unmask, video
-from roboirg.tasks.placement import Region
+from roboirg.core.episode import Difficulty, Goal, Scene, Stage
+from roboirg.tasks.shared import unmask, video_stages
+from roboirg.tasks.shared.placement import Region
 from roboirg.tasks.task import Task, Wording
 
 CONTAINERS: dict[Difficulty, int] = {"easy": 3, "medium": 5, "hard": 15}
@@ -34,7 +34,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
 
 def demonstration(_scene: Scene) -> tuple[Stage, ...]:
     """The robot watches for 64 steps."""
-    return (video.hold_still(HOLD_STEPS),)
+    return (video_stages.hold_still(HOLD_STEPS),)
 
 
 COMMANDS = unmask.commands(

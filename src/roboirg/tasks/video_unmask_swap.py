@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from roboirg.episode import Difficulty, Goal, Scene, Stage
-from roboirg.tasks import unmask, unmask_swap, video
-from roboirg.tasks.layouts import layout_points
-from roboirg.tasks.swapping import last_step
+from roboirg.core.episode import Difficulty, Goal, Scene, Stage
+from roboirg.tasks.shared import unmask, unmask_swap, video_stages
+from roboirg.tasks.shared.layouts import layout_points
+from roboirg.tasks.shared.swapping import last_step
 from roboirg.tasks.task import Task, Wording
 
 
@@ -25,7 +25,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
 
 def demonstration(scene: Scene) -> tuple[Stage, ...]:
     """The robot watches until the last exchange: 114, 164 or 214 steps."""
-    return (video.hold_still(last_step(scene.motions)),)
+    return (video_stages.hold_still(last_step(scene.motions)),)
 
 
 COMMANDS = replace(

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from roboirg.analysis.figures.content import Content
-from roboirg.analysis.figures.drawing import save
-from roboirg.errors import InvalidValueError, UnknownNameError
+from roboirg.analysis.figures.figure_data import Content
+from roboirg.analysis.figures.figure_style import save
+from roboirg.core.errors import InvalidValueError, UnknownNameError
 
 __all__ = ["FIGURES", "Content", "write_figures"]
 

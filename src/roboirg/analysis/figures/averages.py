@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from roboirg.analysis.figures.content import Content
-from roboirg.analysis.figures.drawing import (
+from roboirg.analysis.figures.figure_data import Content
+from roboirg.analysis.figures.figure_style import (
     GHOST,
     draw_ghost,
     draw_point,
@@ -13,8 +13,8 @@ from roboirg.analysis.figures.drawing import (
     rates_figure,
 )
 from roboirg.analysis.published import published_rows
-from roboirg.analysis.statistics import SETTING_ORDER, Variant
-from roboirg.analysis.summary import ALL
+from roboirg.analysis.stats.run_summary import ALL
+from roboirg.analysis.stats.success_rates import SETTING_ORDER, Variant
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

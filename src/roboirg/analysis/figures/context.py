@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from roboirg.analysis.figures.content import Content, by_key
-from roboirg.analysis.figures.drawing import (
+from roboirg.analysis.figures.figure_data import Content, by_key
+from roboirg.analysis.figures.figure_style import (
     COLOURS,
     GHOST,
     draw_ghost,
@@ -14,9 +14,9 @@ from roboirg.analysis.figures.drawing import (
     rates_figure,
 )
 from roboirg.analysis.published import published_rows
-from roboirg.analysis.samples import Contestant, Samples
-from roboirg.analysis.statistics import Variant
-from roboirg.analysis.summary import ALL
+from roboirg.analysis.stats.run_summary import ALL
+from roboirg.analysis.stats.samples import Contestant, Samples
+from roboirg.analysis.stats.success_rates import Variant
 from roboirg.language import STAGE_SETS
 
 if TYPE_CHECKING:

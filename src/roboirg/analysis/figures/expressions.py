@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from roboirg import language
-from roboirg.analysis.figures.content import Content
-from roboirg.errors import RoboIRGError
+from roboirg.analysis.figures.figure_data import Content
+from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.plan import say
-from roboirg.evaluation.record import Job
-from roboirg.language.figure import write_figure
+from roboirg.language.expression_figure import write_figure
 from roboirg.language.instruction import Instruction
+from roboirg.records.record import Job
 
 TITLE = "Referring expressions that were said"
 

@@ -6,18 +6,18 @@ from collections import Counter, defaultdict
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from roboirg.analysis.figures.content import Content
-from roboirg.analysis.figures.drawing import (
+from roboirg.analysis.figures.figure_data import Content
+from roboirg.analysis.figures.figure_style import (
     COLUMN_INCHES,
     LEGEND_LINE_INCHES,
     PAGE_INCHES,
     clear_axes,
     new_figure,
 )
-from roboirg.analysis.samples import Contestant
-from roboirg.analysis.statistics import Variant
-from roboirg.evaluation.record import Result
-from roboirg.judging.finding import EXECUTION, GROUNDING
+from roboirg.analysis.stats.samples import Contestant
+from roboirg.analysis.stats.success_rates import Variant
+from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
+from roboirg.records.record import Result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

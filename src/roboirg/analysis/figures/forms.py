@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from roboirg.analysis.figures.content import Content
-from roboirg.analysis.figures.drawing import COLUMN_INCHES, PAGE_INCHES, clear_axes, new_figure
-from roboirg.analysis.paired import Gap
-from roboirg.analysis.samples import Contestant
-from roboirg.analysis.statistics import SETTING_ORDER, Variant
-from roboirg.analysis.summary import ALL, Scope
-from roboirg.analysis.tables import ALL_TASKS, points
+from roboirg.analysis.figures.figure_data import Content
+from roboirg.analysis.figures.figure_style import COLUMN_INCHES, PAGE_INCHES, clear_axes, new_figure
+from roboirg.analysis.stats.paired_tests import Gap
+from roboirg.analysis.stats.run_summary import ALL, Scope
+from roboirg.analysis.stats.samples import Contestant
+from roboirg.analysis.stats.success_rates import SETTING_ORDER, Variant
+from roboirg.analysis.tables.run_tables import ALL_TASKS, points
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -15,10 +15,10 @@ from typing import NamedTuple, get_args
 from roboirg.analysis.page.details import Strings, details_of, words_of
 from roboirg.analysis.page.entries import Entries, Entry, task_order
 from roboirg.analysis.page.films import Film, Films
-from roboirg.analysis.statistics import Variant
-from roboirg.episode import DIFFICULTIES
-from roboirg.evaluation.record import ERROR_KINDS, FailureKind, Outcome
-from roboirg.judging.finding import EXECUTION, GROUNDING
+from roboirg.analysis.stats.success_rates import Variant
+from roboirg.core.episode import DIFFICULTIES
+from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
+from roboirg.records.record import ERROR_KINDS, FailureKind, Outcome
 from roboirg.tasks import all_tasks
 
 NO_FAILURE = -1

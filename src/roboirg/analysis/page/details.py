@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from roboirg.analysis.page.films import Film
-from roboirg.analysis.page.retelling import resolved_form, stages_of
-from roboirg.evaluation.record import EventRecord, Record
+from roboirg.analysis.page.reconstruction import resolved_form, stages_of
+from roboirg.records.record import EventRecord, Record
 
 SHORT_LIVED = frozenset({"home", "held", "lying", "still"})
 """Kinds of event that say how the world is rather than what is done."""

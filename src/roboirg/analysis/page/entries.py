@@ -6,9 +6,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from roboirg.analysis.samples import Contestant, Rules, Sample, Samples, Versions, gather, labels
-from roboirg.analysis.statistics import Variant
-from roboirg.evaluation.record import Job, Record
+from roboirg.analysis.stats.samples import (
+    Contestant,
+    Rules,
+    Sample,
+    Samples,
+    Versions,
+    gather,
+    labels,
+)
+from roboirg.analysis.stats.success_rates import Variant
+from roboirg.records.record import Job, Record
 from roboirg.tasks import all_tasks
 
 

@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from roboirg.analysis.intervals import Interval
 from roboirg.analysis.page.entries import Entries, in_order, task_order
-from roboirg.analysis.samples import Contestant, Samples, gather
-from roboirg.analysis.statistics import EXPLICIT, Variant
-from roboirg.analysis.summary import Scope, Summary, summarise
-from roboirg.analysis.tables import ALL_TASKS, percent, points
-from roboirg.episode import DIFFICULTIES
+from roboirg.analysis.stats.intervals import Interval
+from roboirg.analysis.stats.run_summary import Scope, Summary, summarise
+from roboirg.analysis.stats.samples import Contestant, Samples, gather
+from roboirg.analysis.stats.success_rates import EXPLICIT, Variant
+from roboirg.analysis.tables.run_tables import ALL_TASKS, percent, points
+from roboirg.core.episode import DIFFICULTIES
 from roboirg.tasks import all_tasks
 
 SEED = 20_240_607

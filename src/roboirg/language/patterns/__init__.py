@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from roboirg.language.patterns import deduction, exclusion, moments, sequence
+from roboirg.language.patterns import before_after, deduction, exclusion, sequence
 from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
 from roboirg.language.request import Request
 
@@ -13,8 +13,8 @@ __all__ = ["PATTERNS", "REFERENCE", "Derived", "Pattern", "way"]
 PATTERNS: Mapping[str, tuple[Pattern, ...]] = {
     "colour exclusion": (exclusion.ONE_COLOUR,),
     "number deduction": (deduction.TIMES, deduction.AMOUNTS, deduction.VISIT),
-    "sequential relation": (sequence.ORDINAL, moments.NEIGHBOR),
-    "contextual logic": (exclusion.TWO_AMOUNTS, moments.OTHER),
+    "sequential relation": (sequence.ORDINAL, before_after.NEIGHBOR),
+    "contextual logic": (exclusion.TWO_AMOUNTS, before_after.OTHER),
 }
 
 

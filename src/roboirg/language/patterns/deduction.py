@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from roboirg.language import templates
-from roboirg.language.kinds import amount, ordinal
-from roboirg.language.kinds.number import introduce_quantity
+from roboirg.language.number_words import cardinal
 from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed
 from roboirg.language.request import Part, PartKind, Request
-from roboirg.language.words import cardinal
+from roboirg.language.slot_types import amount, ordinal
+from roboirg.language.slot_types.number import introduce_quantity
 
 NUMBER_SLOTS = ("repeats", "visit", "counts")
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import itertools
 
 from roboirg.language import templates
-from roboirg.language.kinds import described
 from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, sentences
 from roboirg.language.request import Part, Request
+from roboirg.language.slot_types import described
 
 
 def _exclude(request: Request) -> Derived:

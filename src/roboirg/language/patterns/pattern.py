@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from roboirg.language.kinds import Fields
 from roboirg.language.phrases import Phrase
 from roboirg.language.request import Request
+from roboirg.language.slot_types import Fields
 
 REFERENCE = "reference"
 """Slot of the mentions that stand for what the goal is derived from, not for the goal."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from roboirg.language import templates
-from roboirg.language.kinds import ordinal
+from roboirg.language.number_words import ordinal as ordinal_word
 from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
 from roboirg.language.phrases import anaphor, antecedent, fill, plain
 from roboirg.language.request import Part, Request
-from roboirg.language.words import ordinal as ordinal_word
+from roboirg.language.slot_types import ordinal
 
 
 def steps(position: int, length: int, choices: Sequence[int]) -> list[templates.Step]:

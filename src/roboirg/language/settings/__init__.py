@@ -6,11 +6,11 @@ import functools
 import sys
 from collections.abc import Mapping
 
-from roboirg.discovery import offered
-from roboirg.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.language.instruction import SETTINGS
 from roboirg.language.request import SettingRule
 from roboirg.tasks import Task
+from roboirg.util.discovery import offered
 
 __all__ = ["all_settings", "get_setting"]
 

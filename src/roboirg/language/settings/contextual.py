@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from roboirg.language import templates
-from roboirg.language.kinds import kinds_in
 from roboirg.language.phrases import Phrase, fill, plain, sentences
 from roboirg.language.request import Draft, Request, Said, SettingRule
 from roboirg.language.settings import direct
+from roboirg.language.slot_types import kinds_in
 
 REINFORCE, DISTRACT, ANNOUNCE = 2, 3, 4
 """Numbers of the stages between introduction and command."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from roboirg.language.kinds import Fields, kinds_in
 from roboirg.language.phrases import sentences
 from roboirg.language.request import Draft, Request, Said, SettingRule
 from roboirg.language.settings.explicit import stated
+from roboirg.language.slot_types import Fields, kinds_in
 
 
 def introduction(request: Request) -> Said:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from roboirg.language.kinds import Fields, kinds_in
 from roboirg.language.request import Draft, Request, Said, SettingRule
+from roboirg.language.slot_types import Fields, kinds_in
 
 
 def stated(request: Request) -> Fields:

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from roboirg.core.motions import Swap
 from roboirg.language import templates
 from roboirg.language.instruction import Expression
-from roboirg.language.kinds import described
 from roboirg.language.landmarks import Landmark, landmarks
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain, sentences
 from roboirg.language.request import Draft, Part, Request, Said, SettingRule
 from roboirg.language.settings.explicit import stated
-from roboirg.motions import Swap
+from roboirg.language.slot_types import described
 
 POINTING: Mapping[int, tuple[tuple[str, Expression], ...]] = {
     1: (("there", "there"),),

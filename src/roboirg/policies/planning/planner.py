@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from roboirg.observations import Demonstration, Observation
+from roboirg.core.observations import Demonstration, Observation
 
 if TYPE_CHECKING:
-    from roboirg.environment import RoboIRGEnv
+    from roboirg.envs.environment import RoboIRGEnv
 
 
 @runtime_checkable

@@ -10,7 +10,7 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-from roboirg.errors import InvalidValueError
+from roboirg.core.errors import InvalidValueError
 
 FOLDER = "prompts"
 SHARED = "subgoals"

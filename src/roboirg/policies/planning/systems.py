@@ -11,13 +11,13 @@ from urllib.parse import urlencode
 
 from pydantic import BaseModel, ConfigDict
 
-from roboirg.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.policies.base import Policy
-from roboirg.policies.classes import find_class, make_from_class
-from roboirg.policies.planning.planned import put_in_front
+from roboirg.policies.planning.hierarchical_policy import put_in_front
+from roboirg.policies.planning.option_checking import checked
 from roboirg.policies.planning.planners import make_planner
-from roboirg.policies.planning.validation import checked
-from roboirg.policies.urls import is_url, split_url
+from roboirg.policies.policy_classes import find_class, make_from_class
+from roboirg.policies.policy_urls import is_url, split_url
 
 PACKAGE, FOLDER = "roboirg.policies", "systems"
 SUFFIX = ".toml"

@@ -6,14 +6,20 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
-from roboirg.errors import (
+from roboirg.core.errors import (
     MissingDependencyError,
     PolicyConnectionError,
     PolicyReplyError,
     PolicyTimeoutError,
 )
-from roboirg.policies.remote.codec import pack
-from roboirg.policies.remote.links import Link, TryAgainError, keep_trying, read_reply, refusal
+from roboirg.policies.remote.connections import (
+    Link,
+    TryAgainError,
+    keep_trying,
+    read_reply,
+    refusal,
+)
+from roboirg.policies.remote.message_codec import pack
 
 try:
     import httpx

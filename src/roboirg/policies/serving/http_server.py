@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
-from roboirg.policies.remote.codec import pack, unpack
 from roboirg.policies.remote.http_connection import MSGPACK
-from roboirg.policies.serving.services import Service
+from roboirg.policies.remote.message_codec import pack, unpack
+from roboirg.policies.serving.service import Service
 from roboirg.policies.serving.websocket_server import LARGEST_REQUEST, knows
 
 TEXT = "text/plain; charset=utf-8"

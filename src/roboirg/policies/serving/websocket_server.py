@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.server import ServerConnection, serve
 
-from roboirg.policies.remote.address import MIB
-from roboirg.policies.remote.codec import pack, unpack
-from roboirg.policies.serving.services import Service
+from roboirg.policies.remote.endpoints import MIB
+from roboirg.policies.remote.message_codec import pack, unpack
+from roboirg.policies.serving.service import Service
 
 if TYPE_CHECKING:
     from websockets.http11 import Request, Response

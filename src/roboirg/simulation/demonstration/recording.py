@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.episode import Episode
+from roboirg.core.episode import Episode
 
 
 class Move(NamedTuple):

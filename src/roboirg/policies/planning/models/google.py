@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from roboirg.errors import (
+from roboirg.core.errors import (
     MissingDependencyError,
     PolicyConnectionError,
     PolicyReplyError,
     RoboIRGError,
 )
-from roboirg.policies.planning.content import Part, Picture, png
+from roboirg.policies.planning.model_content import Part, Picture, png
+from roboirg.policies.planning.models.bounded_wait import timed_out, within
 from roboirg.policies.planning.models.model import ModelOptions, Query, Reply
-from roboirg.policies.planning.models.waiting import timed_out, within
 
 if TYPE_CHECKING:
     from google.genai import types

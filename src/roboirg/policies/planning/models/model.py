@@ -9,8 +9,8 @@ from urllib.parse import urlsplit
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from roboirg.errors import MissingDependencyError
-from roboirg.policies.planning.content import Turn
+from roboirg.core.errors import MissingDependencyError
+from roboirg.policies.planning.model_content import Turn
 
 Provider = Literal["openai", "google"]
 

@@ -6,15 +6,15 @@ import base64
 from collections.abc import Iterator
 from typing import Any
 
-from roboirg.errors import (
+from roboirg.core.errors import (
     MissingDependencyError,
     PolicyConnectionError,
     PolicyReplyError,
     RoboIRGError,
 )
-from roboirg.policies.planning.content import Clip, Part, Picture, Turn, evenly, png
+from roboirg.policies.planning.model_content import Clip, Part, Picture, Turn, evenly, png
+from roboirg.policies.planning.models.bounded_wait import timed_out, within
 from roboirg.policies.planning.models.model import ModelOptions, Query, Reply
-from roboirg.policies.planning.models.waiting import timed_out, within
 
 OPENAI = "https://api.openai.com/v1"
 BUSY = frozenset({408, 409, 429, 502, 503, 504})

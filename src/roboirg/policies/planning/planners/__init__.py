@@ -8,12 +8,12 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from roboirg.errors import UnknownNameError
+from roboirg.core.errors import UnknownNameError
+from roboirg.policies.planning.option_checking import checked
 from roboirg.policies.planning.planner import Planner
-from roboirg.policies.planning.validation import checked
 
 PLANNERS: Mapping[str, str] = {
-    "oracle": "roboirg.policies.planning.planners.oracle:OraclePlanner",
+    "oracle": "roboirg.policies.planning.planners.oracle_planner:OraclePlanner",
     "qwen": "roboirg.policies.planning.planners.qwen:QwenPlanner",
     "gemini": "roboirg.policies.planning.planners.gemini:GeminiPlanner",
     "memer": "roboirg.policies.planning.planners.memer:MemerPlanner",

@@ -9,17 +9,17 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import BaseModel, Field
 
-from roboirg.observations import Demonstration, Observation
-from roboirg.policies.planning.asking import UnparsableReply, json_object, text_of
-from roboirg.policies.planning.content import VIDEO_RATE, Clip, Part, Picture, Pixels, Turn
+from roboirg.core.observations import Demonstration, Observation
+from roboirg.policies.planning.model_content import VIDEO_RATE, Clip, Part, Picture, Pixels, Turn
 from roboirg.policies.planning.models import Query
-from roboirg.policies.planning.planners.vlm import (
+from roboirg.policies.planning.planners.vlm_planner import (
     VLMPlanner,
     VLMPlannerOptions,
     seen,
     shown,
 )
 from roboirg.policies.planning.points import from_points, says_finished
+from roboirg.policies.planning.vlm_query import UnparsableReply, json_object, text_of
 
 PERIOD = 48
 """Control steps between calls."""

@@ -7,19 +7,19 @@ from typing import Any, ClassVar, NamedTuple
 
 from pydantic import BaseModel, Field
 
-from roboirg.observations import Demonstration, Observation
-from roboirg.policies.planning.asking import UnparsableReply, json_object, text_of
-from roboirg.policies.planning.content import Clip, Part, Picture, Pixels, Turn, summary
+from roboirg.core.observations import Demonstration, Observation
 from roboirg.policies.planning.keyframes import NEAR, merged
+from roboirg.policies.planning.model_content import Clip, Part, Picture, Pixels, Turn, summary
 from roboirg.policies.planning.models import Query
 from roboirg.policies.planning.planners.qwen import VIDEO_FRAMES
-from roboirg.policies.planning.planners.vlm import (
+from roboirg.policies.planning.planners.vlm_planner import (
     VLMPlanner,
     VLMPlannerOptions,
     seen,
     shown,
 )
 from roboirg.policies.planning.points import from_boxes
+from roboirg.policies.planning.vlm_query import UnparsableReply, json_object, text_of
 
 RECENT = 8
 STRIDE = 2

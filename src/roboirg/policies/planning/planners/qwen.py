@@ -8,10 +8,10 @@ from typing import ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from roboirg.observations import Demonstration, Observation
-from roboirg.policies.planning.content import Clip, Part, Picture, Turn, summary
+from roboirg.core.observations import Demonstration, Observation
+from roboirg.policies.planning.model_content import Clip, Part, Picture, Turn, summary
 from roboirg.policies.planning.models import Query
-from roboirg.policies.planning.planners.vlm import (
+from roboirg.policies.planning.planners.vlm_planner import (
     VLMPlanner,
     VLMPlannerOptions,
     seen,

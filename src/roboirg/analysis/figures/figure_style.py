@@ -1,0 +1,158 @@
+"""What all figures share: sizes, colours, signs, and the files they become."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from roboirg.analysis.stats.intervals import Interval
+from roboirg.core.errors import InvalidValueError, MissingDependencyError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FORMATS = ("png", "svg", "pdf")
+COLUMN_INCHES, PAGE_INCHES = 3.4, 7.0
+"""Widths of a column and of a page; figures are drawn at their true size."""
+LEGEND_COLUMNS, LEGEND_LINE_INCHES = 2, 0.16
+"""Of a figure of one column."""
+DOTS_PER_INCH = 300
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
+"""Of Okabe and Ito, told apart by colour-blind people too; signs differ as well."""
+SIGNS = ("o", "s", "^", "D", "v", "P")
+GHOST, GHOST_SIGNS = "#8a8a8a", ("d", "X", "p", "<", ">", "h", "8", "*")
+
+
+def check_figure_support() -> None:
+    """See before the work starts that pictures can be drawn.
+
+    Raises:
+        MissingDependencyError: matplotlib is not installed.
+    """
+    try:
+        import matplotlib as mpl  # noqa: F401
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"Figures need matplotlib, which is not installed ({error}); run: "
+            "pip install 'roboirgbench[report]'"
+        ) from error
+
+
+def save(draw: Callable[[], Figure | None], folder: Path, name: str) -> tuple[Path, ...]:
+    """Draw a figure and write it in all formats; nothing if there is nothing to draw.
+
+    The same content gives the same bytes.
+
+    Raises:
+        MissingDependencyError: matplotlib is not installed.
+        InvalidValueError: the folder cannot be written to.
+    """
+    check_figure_support()
+    import matplotlib as mpl
+
+    with mpl.rc_context(
+        {
+            "font.family": "DejaVu Sans",
+            "font.size": 7.5,
+            "axes.linewidth": 0.6,
+            "legend.frameon": False,
+            "legend.fontsize": 7,
+            "pdf.fonttype": 42,  # letters, not outlines, which some venues refuse
+            "svg.hashsalt": "roboirg",  # the ids in an SVG file are random without it
+        }
+    ):
+        figure = draw()
+        if figure is None:
+            return ()
+        paths = tuple(folder / f"{name}.{ending}" for ending in FORMATS)
+        dates = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": None}
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            for path, ending in zip(paths, FORMATS, strict=True):
+                figure.savefig(path, dpi=DOTS_PER_INCH, metadata=dates[ending])
+        except OSError as error:
+            raise InvalidValueError(f"Cannot write to {folder}: {error.strerror}.") from error
+    return paths
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure of so many inches."""
+    # Not by pyplot: that would keep every figure and look for a display.
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    return Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.03, h_pad=0.03))
+
+
+def clear_axes(axes: Axes, *, grid: str) -> None:
+    """Leave of the frame only what helps to read, with lines across along one axis."""
+    axes.set_axisbelow(True)
+    axes.grid(axis="x" if grid == "x" else "y", color="#dddddd", linewidth=0.5)
+    axes.tick_params(axis="both", length=0)
+    for side in ("top", "right", "left" if grid == "x" else "bottom"):
+        axes.spines[side].set_visible(False)
+    for spine in axes.spines.values():
+        spine.set_color("#999999")
+
+
+def rates_figure(height: float, entries: int) -> tuple[Figure, Axes]:
+    """An empty figure of one column with success in percent upwards and room for a legend below.
+
+    Args:
+        height: inches without the legend.
+        entries: of the legend.
+    """
+    lines = -(-entries // LEGEND_COLUMNS)
+    figure = new_figure(COLUMN_INCHES, height + LEGEND_LINE_INCHES * lines)
+    axes = figure.subplots()
+    clear_axes(axes, grid="y")
+    axes.set_ylim(-3, 103)
+    axes.set_yticks(range(0, 101, 25))
+    axes.set_ylabel("success, %")
+    return figure, axes
+
+
+def draw_point(
+    axes: Axes, place: float, rate: float, interval: Interval | None, number: int, label: str
+) -> None:
+    """A rate with its interval, both from 0 to 1."""
+    colour = COLOURS[number % len(COLOURS)]
+    if interval is not None:
+        axes.plot([place] * 2, [100 * end for end in interval], color=colour, linewidth=1.1)
+    axes.plot(
+        [place],
+        [100 * rate],
+        linestyle="none",
+        marker=SIGNS[number % len(SIGNS)],
+        markersize=4.6,
+        color=colour,
+        label=label,
+    )
+
+
+def draw_ghost(axes: Axes, place: float, percent: float, number: int, label: str) -> None:
+    """A published value."""
+    axes.plot(
+        [place],
+        [percent],
+        linestyle="none",
+        marker=GHOST_SIGNS[number % len(GHOST_SIGNS)],
+        markersize=4.2,
+        markerfacecolor="none",
+        markeredgecolor=GHOST,
+        markeredgewidth=0.8,
+        label=label,
+        zorder=1,
+    )
+
+
+def legend_below(figure: Figure, axes: Axes) -> None:
+    """Every label once, below the axes."""
+    handles, names = axes.get_legend_handles_labels()
+    found = dict(zip(names, handles, strict=True))
+    figure.legend(
+        found.values(), found.keys(), loc="outside lower center", ncols=LEGEND_COLUMNS,
+        columnspacing=1.2, handletextpad=0.3,
+    )  # fmt: skip

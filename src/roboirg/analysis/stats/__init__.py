@@ -1,0 +1,1 @@
+"""Statistics of records: rates, intervals, paired tests, power."""

@@ -1,0 +1,46 @@
+"""One table, drawn for the terminal, Markdown, LaTeX or other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+from roboirg.analysis.tables.rendering.csv_lines import csv_text
+from roboirg.analysis.tables.rendering.latex import latex
+from roboirg.analysis.tables.rendering.markdown import markdown
+from roboirg.analysis.tables.rendering.terminal import plain
+from roboirg.analysis.tables.table import Table
+from roboirg.core.errors import UnknownNameError
+
+__all__ = ["FORMATS", "Format", "get_format"]
+
+
+class Format(NamedTuple):
+    """A way to draw a table.
+
+    Attributes:
+        suffix: of its files.
+        draw: the whole text, ending in a newline.
+    """
+
+    suffix: str
+    draw: Callable[[Table], str]
+
+
+FORMATS: Mapping[str, Format] = {
+    "terminal": Format(".txt", plain),
+    "markdown": Format(".md", markdown),
+    "latex": Format(".tex", latex),
+    "csv": Format(".csv", csv_text),
+}
+
+
+def get_format(name: str) -> Format:
+    """The format of that name.
+
+    Raises:
+        UnknownNameError: there is none.
+    """
+    if name not in FORMATS:
+        raise UnknownNameError("format", name, FORMATS)
+    return FORMATS[name]

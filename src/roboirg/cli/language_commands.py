@@ -1,0 +1,219 @@
+"""The commands about words: ``roboirg language`` and ``roboirg export``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, TypeVar
+
+import typer
+
+from roboirg.cli.options import (
+    AnySplit,
+    Distractor,
+    Forms,
+    Frame,
+    Settings,
+    Stages,
+    Tasks,
+    Workers,
+)
+from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from roboirg.core.episode import Split
+    from roboirg.language.validation import Batch, Evidence
+
+# Everything heavy is imported inside the commands, so that --help answers at once.
+
+MINIMUM_WIDTH = 150
+"""Columns to use where the output is not a terminal."""
+MOST_FAILURES = 10
+"""Broken rules that are spelled out."""
+_LINE_EVERY = 200
+"""Where there is no terminal, a line is printed after so many batches."""
+
+Name = TypeVar("Name", bound=str)
+
+language_app = typer.Typer(no_args_is_help=True, help="Count, prove and show the words.")
+export_app = typer.Typer(no_args_is_help=True, help="Write data for other programs.")
+
+
+@export_app.callback()
+def _export() -> None:
+    # With a callback, the only command keeps its name.
+    pass
+
+
+@export_app.command("instructions")
+def export_instructions(
+    out: Annotated[Path, typer.Option(help="The file to write.")],
+    format: Annotated[str, typer.Option(help="jsonl or parquet.")] = "jsonl",  # noqa: A002
+    split: AnySplit = "test",
+    tasks: Tasks = "all",
+    settings: Settings = "all",
+    forms: Forms = "implicit,resolved",
+    stages: Stages = "1-5",
+    distractor: Distractor = "neutral",
+    frame: Frame = "robot",
+) -> None:
+    """Write a row for each episode, setting and form; docs/language.md explains the columns."""
+    from roboirg.evaluation.plan_parsing import parse_names, parse_stages
+    from roboirg.language import FORMS
+    from roboirg.language.export import EXPORT_FORMATS, check_export_support, row, write_rows
+    from roboirg.language.variants import instructions, split_episodes
+
+    kind = _known("format", format, EXPORT_FORMATS)
+    check_export_support(kind)
+    if out.is_dir() or not out.parent.is_dir():
+        raise InvalidValueError(f"{str(out)!r} is no name for a file in a folder that exists.")
+    names, chosen = _tasks(tasks), _settings(settings)
+    spoken = [_known("form", one, FORMS) for one in parse_names("form", forms)]
+    episodes = [
+        episode for task in names for one in _splits(split) for episode in split_episodes(task, one)
+    ]
+    said = instructions(
+        episodes,
+        chosen,
+        spoken,
+        stages=parse_stages(stages),
+        distractor=distractor,
+        frame=frame,
+    )
+    rows = [row(episode, instruction) for episode, instruction in said]
+    if not rows:
+        raise InvalidValueError(f"None of these tasks has the setting {', '.join(chosen)}.")
+    write_rows(rows, out, kind)
+    typer.echo(f"{len(rows)} instructions of {len(episodes)} episodes: {out}")
+
+
+@language_app.command()
+def stats(
+    split: AnySplit = "test",
+    tasks: Tasks = "all",
+    out: Annotated[Path | None, typer.Option(help="Folder for the figure, as PNG and SVG.")] = None,
+) -> None:
+    """Count referring expressions, words, patterns, relations and landmarks; draw the first."""
+    from roboirg.language.expression_figure import check_figure_support, write_figure
+    from roboirg.language.statistics_tables import overview_tables
+    from roboirg.language.variants import instructions, split_episodes
+
+    if out is not None:
+        check_figure_support()
+    names, wanted = _tasks(tasks), _splits(split)
+    episodes = (
+        episode for task in names for one in wanted for episode in split_episodes(task, one)
+    )
+    said = [one for _, one in instructions(episodes, _settings("all"), ("implicit",))]
+    console = _console()
+    for table in overview_tables(said):
+        console.print(table)
+    if out is not None:
+        label = "all splits" if len(wanted) > 1 else f"{wanted[0]} split"
+        title = f"Referring expressions by setting, {label} (each counted once per scene)"
+        name = f"expressions-{wanted[0] if len(wanted) == 1 else 'all'}"
+        for path in write_figure(said, out, name, title):
+            typer.echo(path)
+
+
+@language_app.command()
+def prove(
+    seeds: Annotated[
+        int, typer.Option(help="Random scenes for each task, beyond the splits.")
+    ] = 100,
+    tasks: Tasks = "all",
+    split: Annotated[str, typer.Option(help="train, val, test, all or none.")] = "all",
+    workers: Workers = None,
+) -> None:
+    """Read all words back: one goal, none without context, no leak, paired; exit code 2 if not."""
+    from roboirg.evaluation.executors.executor import core_count
+    from roboirg.language.validation import Evidence, batches
+    from roboirg.language.validation import prove as examine_all
+    from roboirg.language.validation.validation_tables import proof_tables
+
+    names = _tasks(tasks)
+    work = batches(names, () if split.strip().lower() == "none" else _splits(split), seeds)
+    count = core_count() if workers is None else workers
+    found = Evidence()
+    for evidence in _followed(examine_all(work, count), work):
+        found.add(evidence)
+    console = _console()
+    for table in proof_tables(found):
+        console.print(table)
+    for failure in found.failures[:MOST_FAILURES]:
+        where = f"{failure.episode}, seed {failure.seed}, {failure.setting}"
+        console.print(f"{failure.rule}: {where}: {failure.words}", markup=False)
+    if found.failures:
+        texts = found.texts.total()
+        raise RoboIRGError(f"{len(found.failures)} rules were broken in {texts} texts.")
+
+
+@language_app.command()
+def card(
+    out: Annotated[Path | None, typer.Option(help="File to write instead of stdout.")] = None,
+) -> None:
+    """Write the language card: an example of each variant, in Markdown."""
+    from roboirg.language.card import language_card
+    from roboirg.records.store import write_atomically
+
+    if out is None:
+        typer.echo(language_card(), nl=False)
+    else:
+        write_atomically(out, language_card())
+
+
+def _followed(found: Iterable[tuple[Batch, Evidence]], work: Sequence[Batch]) -> Iterable[Evidence]:
+    """What is found; meanwhile a bar, or a line now and then, tells how far it is."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("episodes", total=sum(batch.size for batch in work))
+        for number, (batch, evidence) in enumerate(found, start=1):
+            bar.advance(task, batch.size)
+            if not console.is_terminal and number % _LINE_EVERY == 0:
+                console.print(f"{number} of {len(work)} batches", highlight=False)
+            yield evidence
+
+
+def _console() -> Console:
+    from rich.console import Console
+
+    console = Console()
+    if not console.is_terminal:
+        console.width = max(console.width, MINIMUM_WIDTH)
+    return console
+
+
+def _tasks(text: str) -> tuple[str, ...]:
+    from roboirg.evaluation.plan_parsing import parse_names
+    from roboirg.tasks import find_tasks
+
+    return find_tasks(parse_names("task", text))
+
+
+def _settings(text: str) -> tuple[str, ...]:
+    from roboirg.evaluation.plan_parsing import parse_names, says_all
+    from roboirg.language import SETTINGS
+
+    if says_all(text):
+        return SETTINGS
+    return tuple(_known("setting", name, SETTINGS) for name in parse_names("setting", text))
+
+
+def _splits(text: str) -> tuple[Split, ...]:
+    from roboirg.core.episode import SPLITS
+    from roboirg.episodes.splits import check_split
+    from roboirg.evaluation.plan_parsing import says_all
+
+    return SPLITS if says_all(text) else (check_split(text),)
+
+
+def _known(kind: str, name: str, known: Sequence[Name]) -> Name:
+    for one in known:
+        if name == one:
+            return one
+    raise UnknownNameError(kind, name, known)

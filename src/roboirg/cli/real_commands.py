@@ -1,0 +1,195 @@
+"""Studies with a real robot: ``roboirg real plan``, ``run``, ``score`` and ``figure``."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from roboirg.real.pages.operator_console import Console
+    from roboirg.real.study.study_plan import StudyPlan
+    from roboirg.real.study.study_run import Study
+
+# Everything heavy is imported inside the commands, so that --help answers at once.
+
+USAGE_ERROR, INTERRUPTED = 2, 130
+
+real_app = typer.Typer(
+    name="real",
+    help="A study with a real robot, or its twin: plan, run, score.",
+    no_args_is_help=True,
+)
+
+Folder = Annotated[str, typer.Argument(help="The --out folder of roboirg real plan.")]
+
+
+@real_app.command()
+def plan(
+    policy: Annotated[
+        list[str], typer.Option(help="A spec, NAME=SPEC, or a label; repeatable.", metavar="SPEC")
+    ],
+    out: Annotated[str, typer.Option(help="Folder of the study.")],
+    tasks: Annotated[str, typer.Option(help="Names separated by commas.")] = "real",
+    settings: Annotated[str, typer.Option(help="Names separated by commas, or all.")] = "all",
+    trials: Annotated[int, typer.Option(help="Arrangements per task.")] = 10,
+    demonstrations: Annotated[int, typer.Option(help="Per task, explicit only.")] = 50,
+    seed: Annotated[int, typer.Option(help="Of the orders; nothing else depends on it.")] = 0,
+    split: Annotated[str, typer.Option(help="Whose episodes the trials are.")] = "val",
+    max_steps: Annotated[int, typer.Option(help="Control periods of a trial.")] = 1300,
+    sheet: Annotated[bool, typer.Option(help="Draw the printable sheet.")] = True,
+) -> None:
+    """Write a study's plan: plan.json, CSV, and a sheet to print."""
+    from roboirg.evaluation.plan_parsing import parse_names, says_all
+    from roboirg.language.instruction import SETTINGS
+    from roboirg.real.pages.trial_sheet import check_sheet_support
+    from roboirg.real.study.study_plan import make_study
+    from roboirg.tasks import find_tasks
+
+    if sheet:
+        check_sheet_support()
+    made = make_study(
+        policy,
+        tasks=find_tasks(parse_names("task", tasks)),
+        settings=SETTINGS if says_all(settings) else parse_names("setting", settings),
+        trials=trials,
+        demonstrations=demonstrations,
+        seed=seed,
+        split=split,
+        max_steps=max_steps,
+    )
+    _write(made, Path(out), sheet=sheet)
+
+
+def _write(made: StudyPlan, folder: Path, *, sheet: bool) -> None:
+    """Write the files of a plan, and say which."""
+    from roboirg.real.pages.trial_sheet import SHEET_FILE, write_sheet
+    from roboirg.real.study import plan_csv
+    from roboirg.real.study.study_plan import write_study
+    from roboirg.records.store import write_atomically
+
+    typer.echo(write_study(made, folder))
+    for name, text in (
+        (plan_csv.TRIALS_FILE, plan_csv.trials_csv(made)),
+        (plan_csv.DEMONSTRATIONS_FILE, plan_csv.demonstrations_csv(made)),
+    ):
+        if text:
+            write_atomically(folder / name, text)
+            typer.echo(folder / name)
+    if sheet:
+        count = write_sheet(made, folder / SHEET_FILE)
+        typer.echo(f"{folder / SHEET_FILE} ({count} pages)")
+    typer.echo(_size(made))
+
+
+def _size(made: StudyPlan) -> str:
+    blocks = made.trials[-1].block
+    return (
+        f"{len(made.trials)} trials in {blocks} blocks, {len(made.demonstrations)} demonstrations, "
+        f"plan {made.fingerprint}"
+    )
+
+
+@real_app.command()
+def run(
+    folder: Folder,
+    policy: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Play this policy's trials only (NAME or NAME=SPEC); repeatable.", metavar="SPEC"
+        ),
+    ] = None,
+    robot: Annotated[
+        str, typer.Option(help="twin, or lerobot:package.module:function?options.")
+    ] = "twin",
+    real_time: Annotated[bool, typer.Option(help="Let the twin's time pass as it does.")] = False,
+    limits: Annotated[
+        Path | None, typer.Option(help="JSON file of limits other than the usual.")
+    ] = None,
+    score: Annotated[
+        str, typer.Option(help="Who says how trials ended: judge (the twin's) or operator.")
+    ] = "",
+    retry_errors: Annotated[
+        bool, typer.Option(help="Play again what ended in an error or was void.")
+    ] = True,
+) -> None:
+    """Play the trials of a plan on a robot or its twin, in order."""
+    from roboirg.real.control.limits import read_limits
+    from roboirg.real.control.robot_specs import check_scorer, make_robot
+    from roboirg.real.pages.operator_console import Console
+    from roboirg.real.study.study_plan import read_study
+    from roboirg.real.study.study_run import Study
+
+    path = Path(folder)
+    made = read_study(path)
+    console = Console(made)
+    device = make_robot(robot, real_time=real_time, arrange=console.arrange)
+    study = Study(
+        made,
+        path,
+        device,
+        read_limits(limits),
+        check_scorer(score, device),
+        console.ended if robot != "twin" else lambda: False,
+        console.tell,
+    )
+    _play(study, console, policy or [], retry=retry_errors)
+
+
+@real_app.command()
+def score(
+    folder: Folder,
+    operator: Annotated[str, typer.Option(help="Who judges, for the records.")] = "operator",
+    port: Annotated[int, typer.Option(help="Of this machine; 0 for any that is free.")] = 0,
+) -> None:
+    """Serve the operator's page: one trial at a time, by keyboard, every verdict stored at once."""
+    from roboirg.real.pages.score_server import ScoreServer
+    from roboirg.real.study.study_plan import read_study
+
+    path = Path(folder)
+    server = ScoreServer(read_study(path), path, operator, port)
+    server.ledger()  # complain now if the records cannot be read
+    typer.echo(f"Open {server.url}")
+    typer.echo("Ctrl-C ends it; everything is stored.")
+    sys.stdout.flush()
+    try:
+        server.serve_forever()
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)
+    finally:
+        server.server_close()
+
+
+@real_app.command()
+def figure(
+    runs: Annotated[list[str], typer.Argument(help="Folders of studies.", metavar="RUN")],
+    out: Annotated[str, typer.Option(help="Folder for real.png and real.svg.")],
+    published: Annotated[bool, typer.Option(help="Put the paper's own bars beside these.")] = True,
+) -> None:
+    """Draw success by setting, with 95 % intervals, as PNG and SVG."""
+    from roboirg.analysis.stats.samples import gather
+    from roboirg.real.pages.study_figure import write_figure
+    from roboirg.records.store import read_results
+
+    samples = gather([(name, read_results(Path(name))) for name in runs])
+    for path in write_figure(samples, Path(out), published=published):
+        typer.echo(path)
+
+
+def _play(study: Study, console: Console, policies: list[str], *, retry: bool) -> None:
+    """Play a study and say how it went; an error among the trials is an exit code."""
+    # Whoever ends the command ends it with the arm at rest.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        records = study.run(policies, retry_errors=retry)
+    except KeyboardInterrupt:
+        typer.echo(f"Stopped; {study.folder} keeps what ended. The same command goes on.", err=True)
+        sys.exit(INTERRUPTED)
+    faulty = console.faulty
+    typer.echo(f"{len(records)} trials were played, {len(faulty)} of them ended in an error.")
+    if faulty:
+        typer.echo(f"roboirg: the first error: {faulty[0]}", err=True)
+        sys.exit(USAGE_ERROR)

@@ -1,0 +1,243 @@
+"""The commands that tell results: ``report``, ``view``, ``tables``, ``figures`` and ``compare``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+
+if TYPE_CHECKING:
+    from roboirg.analysis.stats.samples import Samples
+    from roboirg.analysis.tables.table import Table
+    from roboirg.records.record import Job, Result
+
+# Everything heavy is imported inside the commands, so that --help answers at once.
+
+MINIMUM_WIDTH = 120
+"""Columns to use where the output is not a terminal."""
+SEED = 20_240_607
+"""Of the bootstrap; the same records give the same words."""
+_ALL = "all"
+
+
+def report(
+    folder: Annotated[str, typer.Argument(help="The --out folder of a run.", metavar="RUN")],
+    against: Annotated[
+        str | None, typer.Option(help="Another run, to compare with episode by episode.")
+    ] = None,
+    videos: Annotated[bool, typer.Option(help="Put the films into the page.")] = True,
+) -> None:
+    """Print the table of a run and write RUN/report.html, one self-contained page."""
+    from roboirg.analysis.page.report import check_report_support, write_report
+    from roboirg.cli import run_commands
+
+    path, other = run_commands.folder_of(folder), None if against is None else Path(against)
+    check_report_support()
+    run_commands.print_tables_of(path)
+    page = write_report(
+        path,
+        planned=run_commands.planned_jobs(path),
+        videos=videos,
+        against=other,
+        planned_against=() if other is None else run_commands.planned_jobs(other),
+    )
+    typer.echo(page)
+
+
+def view(
+    folder: Annotated[str, typer.Argument(help="The --out folder of a run.", metavar="RUN")],
+    port: Annotated[int, typer.Option(help="On loopback; 0 chooses a free one.")] = 0,
+) -> None:
+    """Serve the page of a run with its films on this machine, until Ctrl-C."""
+    from roboirg.analysis.page.page_server import PageServer
+    from roboirg.analysis.page.report import make_view
+    from roboirg.cli import run_commands
+
+    path = run_commands.folder_of(folder)
+
+    def make_page() -> str:
+        return make_view(path, run_commands.planned_jobs(path))
+
+    with PageServer(path, make_page, port) as server:
+        # What is wrong with the run is said here, not in the browser.
+        server.page()
+        typer.echo(f"{server.address}  Ctrl-C ends it.")
+        try:
+            server.serve_forever()
+        except KeyboardInterrupt:
+            typer.echo("", err=True)
+
+
+def figures(
+    runs: Annotated[list[str], typer.Argument(help="The --out folders of runs.", metavar="RUN...")],
+    out: Annotated[Path, typer.Option(help="Folder for the pictures; made if it is missing.")],
+    which: Annotated[
+        str,
+        typer.Option(
+            help="averages, forms, expressions, context, failures; several with commas, or all "
+            "that apply."
+        ),
+    ] = _ALL,
+    published: Annotated[bool, typer.Option(help="Put the paper's own values in.")] = False,
+) -> None:
+    """Draw the paper's figures of one or several runs, as PNG, SVG and PDF."""
+    from roboirg.analysis.figures import FIGURES, Content, write_figures
+    from roboirg.analysis.figures.figure_style import check_figure_support
+
+    check_figure_support()
+    names = FIGURES if which == _ALL else tuple(word.strip() for word in which.split(","))
+    content = Content.of(*_runs(runs))
+    for path in write_figures(content, out, names, published=published):
+        typer.echo(path)
+
+
+def tables(
+    runs: Annotated[
+        list[str] | None,
+        typer.Argument(help="The --out folders of runs; none with --published.", metavar="RUN"),
+    ] = None,
+    which: Annotated[
+        str, typer.Option(help="main, planner, context, real, coverage, or all that apply.")
+    ] = _ALL,
+    format: Annotated[  # noqa: A002
+        str, typer.Option(help="terminal, markdown, latex or csv.")
+    ] = "terminal",
+    published: Annotated[bool, typer.Option(help="Put the paper's own rows beside these.")] = False,
+    chance: Annotated[
+        bool, typer.Option(help="Add what the forgetful listener reaches on average.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for a file of each table, instead of printing.")
+    ] = None,
+) -> None:
+    """Print the paper's tables, made of the records of one or several runs."""
+    from roboirg.analysis.tables.rendering import get_format
+
+    drawing = get_format(format)
+    found = _tables(which, _samples(runs or []), published=published, chance=chance)
+    if out is not None:
+        _write(found, out, drawing.suffix, format)
+    elif format == "terminal":
+        _print(found)
+    else:
+        typer.echo("\n".join(drawing.draw(table) for table in found), nl=False)
+
+
+def compare(
+    first: Annotated[str, typer.Argument(help="A run's folder, or RUN:policy.", metavar="A")],
+    second: Annotated[str, typer.Argument(help="Another, or the same run.", metavar="B")],
+) -> None:
+    """Say which of two policies is better where, on the same episodes, or that nobody can tell."""
+    import numpy as np
+    from rich.console import Console
+    from rich.text import Text
+
+    from roboirg.analysis.stats.comparison import compare as compare_samples
+    from roboirg.analysis.stats.comparison_text import sentences
+
+    ours, theirs = _one_policy(first), _one_policy(second)
+    found = compare_samples(ours, theirs, np.random.default_rng(SEED))
+    names = [found.first.policy, found.second.policy]
+    if names[0] == names[1]:
+        names = [f"{names[0]} ({first})", f"{names[1]} ({second})"]
+    console = Console()
+    if not console.is_terminal:
+        console.width = max(console.width, MINIMUM_WIDTH)
+    for sentence in sentences(found, *names):
+        console.print(Text(sentence), highlight=False)
+
+
+def _tables(which: str, samples: Samples, *, published: bool, chance: bool) -> list[Table]:
+    from roboirg.analysis.tables.paper_tables import WHICH, has_something_to_say, make_table
+
+    if which == _ALL:
+        wanted: list[str] = [
+            one for one in WHICH if published or has_something_to_say(one, samples)
+        ]
+    elif which in WHICH:
+        wanted = [which]
+    else:
+        raise UnknownNameError("table", which, (*WHICH, _ALL))
+    if which not in (_ALL, "coverage") and not published and not samples:
+        raise InvalidValueError(
+            f"There is no run to make the table {which!r} of; give a folder, or --published."
+        )
+    found = [make_table(one, samples, published=published, chance=chance) for one in wanted]
+    if which not in (_ALL, "coverage") and not found[0].rows:
+        raise InvalidValueError(
+            f"The runs hold nothing that belongs into the table {which!r}; --which all shows what "
+            "they have."
+        )
+    return found
+
+
+def _print(found: list[Table]) -> None:
+    from rich.console import Console
+
+    from roboirg.analysis.tables.rendering.terminal import renderable
+
+    console = Console()
+    if not console.is_terminal:
+        console.width = max(console.width, MINIMUM_WIDTH)
+    for table in found:
+        console.print(renderable(table, console), highlight=False)
+
+
+def _write(found: list[Table], folder: Path, suffix: str, name: str) -> None:
+    from roboirg.analysis.tables.rendering import get_format
+    from roboirg.records.store import StoreError, write_atomically
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StoreError(f"Cannot write to {folder}: {error.strerror}.") from error
+    for table in found:
+        path = folder / f"{table.key}{suffix}"
+        write_atomically(path, get_format(name).draw(table))
+        typer.echo(path)
+
+
+def _samples(runs: list[str]) -> Samples:
+    from roboirg.analysis.stats.samples import gather
+
+    return gather(*_runs(runs))
+
+
+def _runs(runs: list[str]) -> tuple[list[tuple[str, Sequence[Result]]], list[Job]]:
+    """The results of runs, each with its folder, and the jobs of their plans."""
+    from roboirg.evaluation.plan import read_plan
+    from roboirg.records.store import read_results
+
+    folders = [Path(run) for run in runs]
+    planned = [
+        job for folder in folders if (plan := read_plan(folder)) is not None for job in plan.jobs()
+    ]
+    results: list[tuple[str, Sequence[Result]]] = [
+        (str(folder), read_results(folder)) for folder in folders
+    ]
+    return results, planned
+
+
+def _one_policy(text: str) -> Samples:
+    """The samples of a run's folder, or of RUN:policy; policies may have colons in their names."""
+    folder, policy = _split(text)
+    samples = _samples([folder])
+    if policy is None:
+        return samples
+    names = list(dict.fromkeys(who.policy for who, _, _ in samples))
+    if policy not in names:
+        raise UnknownNameError(f"policy in {folder}", policy, names)
+    return {key: sample for key, sample in samples.items() if key[0].policy == policy}
+
+
+def _split(text: str) -> tuple[str, str | None]:
+    if Path(text).is_dir():
+        return text, None
+    for place, sign in enumerate(text):
+        if sign == ":" and Path(text[:place]).is_dir():
+            return text[:place], text[place + 1 :]
+    return text, None

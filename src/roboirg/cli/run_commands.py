@@ -1,0 +1,291 @@
+"""The commands that play episodes and handle their records."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from roboirg.cli import plan_options as options
+from roboirg.cli.import_path import see_working_directory
+from roboirg.cli.options import Workers
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+
+if TYPE_CHECKING:
+    from roboirg.evaluation.executors.executor import Executor
+    from roboirg.evaluation.plan import Plan
+    from roboirg.evaluation.runner import Summary
+    from roboirg.records.record import Job
+
+# Everything heavy is imported inside the commands, so that --help answers at once.
+
+USAGE_ERROR, INTERRUPTED, TERMINATED = 2, 130, 143
+EXECUTORS = ("local", "ray")
+_MINIMUM_WIDTH = 100
+
+Policies = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--policy",
+        help="Built-in name, package.module:Class or address; or NAME=one of these; repeatable.",
+    ),
+]
+PlanName = Annotated[
+    str | None,
+    typer.Option("--plan", help="A YAML file, or paper, paper-context, paper-planners, quick."),
+]
+Out = Annotated[str, typer.Option(help="Folder of the run; give the same again to go on.")]
+Folder = Annotated[str, typer.Argument(help="The --out folder of a run.")]
+RetryErrors = Annotated[
+    bool, typer.Option(help="Play episodes again whose newest record is an error.")
+]
+
+
+def run(
+    out: Out,
+    policy: Policies = None,
+    plan: PlanName = None,
+    tasks: options.Tasks = None,
+    settings: options.Settings = None,
+    forms: options.Forms = None,
+    split: options.Split = None,
+    episodes: options.Episodes = None,
+    policy_seeds: options.PolicySeeds = None,
+    stages: options.Stages = None,
+    distractor: options.Distractor = None,
+    distractors: options.Distractors = None,
+    frame: options.Frame = None,
+    max_steps: options.MaxSteps = None,
+    actions: options.Actions = None,
+    demonstration_frames: options.DemonstrationFrames = None,
+    observe_every: options.ObserveEvery = None,
+    meshes: options.Meshes = None,
+    video: options.Video = None,
+    policy_timeout_s: options.PolicyTimeout = None,
+    episode_timeout_s: options.EpisodeTimeout = None,
+    tries: options.Tries = None,
+    retry_on: options.RetryOn = None,
+    workers: Workers = None,
+    executor: Annotated[str, typer.Option(help="local or ray.")] = "local",
+    address: Annotated[str | None, typer.Option(help="Of the Ray cluster.")] = None,
+    retry_errors: RetryErrors = True,
+    dry_run: Annotated[bool, typer.Option(help="Print the cells and how long they take.")] = False,
+) -> None:
+    """Play episodes and append one record for each to OUT/records.jsonl; resumes by itself."""
+    typed = _given(
+        policies=policy,
+        tasks=tasks,
+        settings=settings,
+        forms=forms,
+        split=split,
+        episodes=episodes,
+        policy_seeds=policy_seeds,
+        stages=stages,
+        distractor=distractor,
+        distractors=distractors,
+        frame=frame,
+        max_steps=max_steps,
+        actions=actions,
+        demonstration_frames=demonstration_frames,
+        observe_every=observe_every,
+        meshes=meshes,
+        video=video,
+        policy_timeout_s=policy_timeout_s,
+        episode_timeout_s=episode_timeout_s,
+        tries=tries,
+        retry_on=retry_on,
+    )
+    folder = folder_of(out)
+    see_working_directory()
+    made = _plan(plan, typed)
+    if dry_run:
+        _print_estimate(made, folder, workers)
+        return
+    summary = play(made, folder, _executor(made, executor, address, workers), retry=retry_errors)
+    print_tables_of(folder)
+    complain(summary, folder)
+
+
+def merge(
+    runs: Annotated[list[str], typer.Argument(help="The --out folders of runs.")],
+    out: Annotated[str, typer.Option(help="Folder that gets all their records and films.")],
+) -> None:
+    """Put the records of several runs into one folder."""
+    from roboirg.records.merging import merge_runs
+
+    merged = merge_runs([folder_of(run) for run in runs], folder_of(out))
+    typer.echo(f"{merged.added} records came to {out}; {merged.doubled} were there already.")
+    if merged.disputed:
+        first = merged.disputed[0]
+        typer.echo(
+            f"{len(merged.disputed)} episodes have another verdict in a later run, and the first "
+            f"one stays; for example {first.slug}: {first.outcome}.",
+            err=True,
+        )
+
+
+def export_records(
+    run: Folder,
+    out: Annotated[Path, typer.Option(help="The Parquet file to write.")],
+) -> None:
+    """Write a run's records as a Parquet table; docs/running.md explains the columns."""
+    from roboirg.records.parquet import check_parquet_support, write_parquet
+    from roboirg.records.store import read_records
+
+    check_parquet_support()
+    if out.is_dir() or not out.parent.is_dir():
+        raise InvalidValueError(f"{str(out)!r} is no name for a file in a folder that exists.")
+    count = write_parquet(read_records(folder_of(run)), out)
+    typer.echo(f"{count} records: {out}")
+
+
+def folder_of(text: str) -> Path:
+    """The folder that is meant.
+
+    Raises:
+        InvalidValueError: an empty text.
+    """
+    if not text.strip():
+        raise InvalidValueError("The folder of the run is an empty text; give it a name.")
+    return Path(text)
+
+
+def play(plan: Plan, out: Path, executor: Executor, *, retry: bool) -> Summary:
+    """Play a plan with a progress bar; ends the process when it is interrupted."""
+    from rich.console import Console
+
+    from roboirg.evaluation.progress import ConsoleReporter
+    from roboirg.evaluation.rollout import Player
+    from roboirg.evaluation.runner import Terminated, run_plan
+    from roboirg.evaluation.video_writer import check_video_support
+
+    if plan.video != "off":
+        check_video_support()
+    player = Player(out, plan.video, policy_timeout_s=plan.policy_timeout_s, plan=plan.fingerprint)
+    try:
+        with ConsoleReporter(Console()) as reporter:
+            return run_plan(plan, out, player, executor, retry_errors=retry, reporter=reporter)
+    except KeyboardInterrupt as interrupt:
+        typer.echo(
+            f"Stopped; {out} keeps what ended. The same command goes on from there.", err=True
+        )
+        sys.exit(TERMINATED if isinstance(interrupt, Terminated) else INTERRUPTED)
+
+
+def print_tables_of(folder: Path) -> None:
+    """Print the table of a run, and the episodes that did not succeed."""
+    from rich.console import Console
+
+    from roboirg.analysis.stats.success_rates import make_panels
+    from roboirg.analysis.tables.run_tables import print_failures, print_tables
+
+    results, console = _results(folder), Console()
+    print_tables(make_panels(results, planned_jobs(folder)), console)
+    print_failures(results, console)
+
+
+def planned_jobs(folder: Path) -> tuple[Job, ...]:
+    """The jobs of a run's newest plan; none if it has none that can be understood."""
+    from roboirg.evaluation.plan import read_plan
+
+    plan = read_plan(folder)
+    return plan.jobs() if plan else ()
+
+
+def complain(summary: Summary, folder: Path) -> None:
+    """Say on stderr what is lacking in a run; a run that lacks something exits with 2."""
+    if summary.unfilmed:
+        typer.echo(
+            f"{len(summary.unfilmed)} of {summary.played} films could not be written, the verdicts "
+            f"stand; the first: {summary.unfilmed[0]}",
+            err=True,
+        )
+    if summary.errors:
+        first = summary.errors[0]
+        typer.echo(
+            f"roboirg: {len(summary.errors)} of {summary.total} episodes ended in an error "
+            f"and are in no rate; the first ({first.task} {first.split}/{first.episode} "
+            f"{first.setting}): {first.cause}",
+            err=True,
+        )
+    if summary.missing:
+        typer.echo(
+            f"roboirg: {summary.missing} of {summary.total} episodes have not been played; the "
+            f"same command goes on with them in {folder}.",
+            err=True,
+        )
+    if summary.errors or summary.missing:
+        sys.exit(USAGE_ERROR)
+
+
+def _given(**options: object) -> dict[str, Any]:
+    """The options that were typed."""
+    return {name: value for name, value in options.items() if value not in (None, [])}
+
+
+def _results(folder: Path) -> Any:  # noqa: ANN401 - imported where it is needed
+    from roboirg.records.store import read_results
+
+    return read_results(folder)
+
+
+def _plan(name: str | None, typed: dict[str, Any]) -> Plan:
+    """The plan of a file, where nothing else is typed, and what is typed."""
+    from roboirg.evaluation.plan import make_plan
+    from roboirg.evaluation.plan_file import read_plan_file
+
+    chosen = {**({} if name is None else read_plan_file(name)), **typed}
+    policies = chosen.pop("policies", None)
+    if not policies:
+        raise InvalidValueError("No policy is given; name one with --policy, such as oracle.")
+    frames = chosen.get("demonstration_frames")
+    if isinstance(frames, str) and frames.isdigit():
+        chosen["demonstration_frames"] = int(frames)
+    return make_plan(policies, **chosen)
+
+
+def _executor(plan: Plan, name: str, address: str | None, workers: int | None) -> Executor:
+    if name not in EXECUTORS:
+        raise UnknownNameError("executor", name, EXECUTORS)
+    if name == "ray":
+        from roboirg.evaluation.executors.ray_cluster import RayCluster
+
+        return RayCluster(workers, address, plan.episode_timeout_s)
+    if address is not None:
+        raise InvalidValueError(f"address is {address!r}; only --executor ray has one.")
+    from roboirg.evaluation.executors.executor import choose_executor
+
+    return choose_executor(workers, plan.episode_timeout_s)
+
+
+def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from roboirg.evaluation.estimate import cell_sizes, estimate, in_words
+    from roboirg.evaluation.executors.executor import core_count
+    from roboirg.records.record_codec import key_of
+    from roboirg.records.store import read_index
+
+    jobs, console = plan.jobs(), Console()
+    if not console.is_terminal:
+        console.width = max(console.width, _MINIMUM_WIDTH)
+    table = Table(title=f"plan {plan.fingerprint}", title_justify="left")
+    sizes = cell_sizes(jobs)
+    settings = tuple(dict.fromkeys(setting for cells in sizes.values() for setting in cells))
+    table.add_column("policy")
+    table.add_column("task")
+    for setting in settings:
+        table.add_column(setting, justify="right")
+    for (policy, task), cells in sizes.items():
+        counts = (" + ".join(map(str, cells.get(one, {}).values())) or "–" for one in settings)
+        table.add_row(policy, task, *counts)
+    table.caption = "episodes: implicit" + (" + resolved" if "resolved" in plan.forms else "")
+    console.print(table)
+    played = read_index(folder)
+    todo = [job for job in jobs if key_of(job) not in played]
+    count = core_count() if workers is None else max(workers, 1)
+    for line in in_words(estimate(todo, played.values(), count), len(jobs), count):
+        console.print(line, highlight=False)

@@ -1,0 +1,133 @@
+"""The action spaces: what an action holds, how it is checked, and its limits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from roboirg.core.errors import InvalidActionError, UnknownNameError
+
+ARM_JOINTS = 7
+POSE_SIZE = 6
+"""x, y, z, roll, pitch, yaw."""
+
+JOINT_LOW = np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973])
+JOINT_HIGH = np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973])
+"""Joint limits of the Franka Panda, rad. Targets beyond them are accepted; the joints stop."""
+
+REACH_LOW = np.array([-1.7, -1.1, 0.0])
+REACH_HIGH = np.array([0.5, 1.1, 1.4])
+"""Box around all that the tool reaches above the table, world frame, m."""
+
+
+class ActionSpace(NamedTuple):
+    """One way to command the robot.
+
+    Attributes:
+        name: as policies and environments name it.
+        low: smallest sensible value of each number; smaller ones are not refused.
+        high: largest sensible value of each number.
+        describe: what the numbers are, in words.
+    """
+
+    name: str
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    describe: str
+
+    @property
+    def size(self) -> int:
+        """How many numbers an action has."""
+        return len(self.low)
+
+
+JOINT_ANGLE = ActionSpace(
+    "joint_angle",
+    np.append(JOINT_LOW, -1.0),
+    np.append(JOINT_HIGH, 1.0),
+    "seven joint targets in rad and the gripper in [-1, 1]",
+)
+"""Absolute joint targets, then the gripper: +1 open, -1 closed; one control step."""
+
+_POSE_LOW = np.concatenate([REACH_LOW, np.full(3, -math.pi), [-1.0]])
+_POSE_HIGH = np.concatenate([REACH_HIGH, np.full(3, math.pi), [1.0]])
+_POSE = "x, y, z in m, roll, pitch, yaw in rad and the gripper"
+
+EE_POSE = ActionSpace("ee_pose", _POSE_LOW, _POSE_HIGH, f"{_POSE} in [-1, 1]")
+"""Pose of the tool centre, world frame, extrinsic x-y-z angles; one control step."""
+
+WAYPOINT = ActionSpace("waypoint", _POSE_LOW, _POSE_HIGH, f"{_POSE}, -1 to close it, +1 to open it")
+"""The same pose, reached in a straight move of many steps; then the gripper closes or opens."""
+
+ACTION_SPACES: Mapping[str, ActionSpace] = {
+    space.name: space for space in (JOINT_ANGLE, EE_POSE, WAYPOINT)
+}
+
+
+def find_action_space(name: object) -> ActionSpace:
+    """The action space of that name.
+
+    Raises:
+        UnknownNameError: there is none.
+    """
+    if not isinstance(name, str) or name not in ACTION_SPACES:
+        raise UnknownNameError("action space", name, ACTION_SPACES)
+    return ACTION_SPACES[name]
+
+
+def check_action(action: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> NDArray[np.float64]:
+    """The action as finite numbers of the space's size.
+
+    Raises:
+        InvalidActionError: it is not numeric, of another shape, or not finite.
+    """
+    numbers = _numbers(action, space)
+    if numbers.shape != (space.size,):
+        raise InvalidActionError(
+            f"An action ({space.name}) has shape ({space.size},), {space.describe}; "
+            f"got shape {numbers.shape}."
+        )
+    return _finite(numbers)
+
+
+def check_chunk(actions: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> NDArray[np.float64]:
+    """A policy's answer as a chunk of shape (n, size), n >= 1; one action is a chunk of one.
+
+    Raises:
+        InvalidActionError: it is not numeric, of another shape, or not finite.
+    """
+    numbers = _numbers(actions, space)
+    chunk = numbers[None] if numbers.ndim == 1 else numbers
+    if chunk.ndim != 2 or chunk.shape[1] != space.size or len(chunk) == 0:  # noqa: PLR2004
+        raise InvalidActionError(
+            f"A chunk of actions ({space.name}) has shape (n, {space.size}), n >= 1; an action has "
+            f"{space.describe}; got shape {numbers.shape}."
+        )
+    return _finite(chunk)
+
+
+def _numbers(action: ArrayLike, space: ActionSpace) -> NDArray[np.float64]:
+    try:
+        numbers = np.asarray(action)
+    except ValueError:  # rows of different lengths
+        numbers = np.asarray(None)
+    if numbers.dtype.kind not in "biuf":
+        raise InvalidActionError(
+            f"An action ({space.name}) is an array of {space.size} real numbers; "
+            f"got {type(action).__name__}."
+        )
+    return numbers.astype(np.float64)
+
+
+def _finite(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+    bad = np.argwhere(~np.isfinite(numbers))
+    if len(bad):
+        raise InvalidActionError(
+            f"Action value {bad[0][-1]} is {numbers[tuple(bad[0])]}; "
+            "every value has to be a finite number."
+        )
+    return numbers

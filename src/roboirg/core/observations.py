@@ -1,0 +1,108 @@
+"""What a policy gets to see: which pictures, one moment, and what was shown before."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal, NotRequired, TypedDict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+
+FRONT, WRIST = "front", "wrist"
+CAMERAS = (FRONT, WRIST)
+
+DemonstrationFrames = Literal["all", "none"] | int
+"""Which pictures of the video there are: all, none, or every n-th, the first included."""
+
+
+def check_cameras(cameras: object) -> tuple[str, ...]:
+    """The names of cameras that somebody asks for.
+
+    Raises:
+        InvalidValueError: it is no tuple or list, or names a camera twice.
+        UnknownNameError: there is no such camera.
+    """
+    if isinstance(cameras, str):
+        raise InvalidValueError(f"cameras is the text {cameras!r}; write ({cameras!r},).")
+    if not isinstance(cameras, tuple | list):
+        raise InvalidValueError(
+            f"cameras is of type {type(cameras).__name__}; it has to be a tuple such as "
+            "('front',) or ()."
+        )
+    for camera in cameras:
+        if camera not in CAMERAS:
+            raise UnknownNameError("camera", camera, CAMERAS)
+        if cameras.count(camera) > 1:
+            raise InvalidValueError(f"cameras names {camera!r} twice.")
+    return tuple(cameras)
+
+
+def check_demonstration_frames(wish: object) -> DemonstrationFrames:
+    """Which pictures of the video somebody asks for.
+
+    Raises:
+        InvalidValueError: it is neither ``"all"`` nor ``"none"`` nor a whole number from 1 on.
+    """
+    if wish == "all":
+        return "all"
+    if wish == "none":
+        return "none"
+    if type(wish) is int and wish >= 1:
+        return wish
+    raise InvalidValueError(
+        f"demonstration_frames is {wish!r}; it has to be 'all', 'none' or a whole number of at "
+        "least 1."
+    )
+
+
+def check_observe_every(wish: object) -> int | None:
+    """After how many control steps somebody wants observations from within a chunk.
+
+    Raises:
+        InvalidValueError: it is neither None nor a whole number from 1 on.
+    """
+    if wish is None or (type(wish) is int and wish >= 1):
+        return wish
+    raise InvalidValueError(
+        f"observe_every is {wish!r}; it has to be None or a whole number of at least 1."
+    )
+
+
+class Observation(TypedDict):
+    """What the robot sees and feels now.
+
+    Pictures are uint8 (256, 256, 3), present for the cameras that the policy asks for. Depth and
+    calibration are there for the same cameras if the environment was made with ``depth=True``,
+    ``calibration=True``.
+    """
+
+    front_rgb: NDArray[np.uint8]
+    wrist_rgb: NDArray[np.uint8]
+    joint_positions: NDArray[np.float32]
+    """(7,) arm joint angles, rad."""
+    gripper: NDArray[np.float32]
+    """(2,) finger positions, m, 0 to 0.04."""
+    end_effector: NDArray[np.float64]
+    """(6,) x, y, z (m) and roll, pitch, yaw (rad, extrinsic x-y-z) of the tool centre, world."""
+    instruction: str
+    front_depth: NotRequired[NDArray[np.int16]]
+    """(256, 256, 1) distance along the viewing direction, mm; 0 where nothing is seen."""
+    wrist_depth: NotRequired[NDArray[np.int16]]
+    front_extrinsic: NotRequired[NDArray[np.float32]]
+    """(3, 4) from the world's frame to the camera's (OpenCV: x right, y down, z forward)."""
+    wrist_extrinsic: NotRequired[NDArray[np.float32]]
+    front_intrinsic: NotRequired[NDArray[np.float32]]
+    """(3, 3) from the camera's frame to pixels."""
+    wrist_intrinsic: NotRequired[NDArray[np.float32]]
+    history: NotRequired[tuple[Observation, ...]]
+    """With ``observe_every=n``: the observations after every n-th control step since the last."""
+
+
+Demonstration = Mapping[str, NDArray[Any]]
+"""As `Observation` without instruction and history, one more leading axis T: what was shown before.
+
+T is 0 in tasks without a video. The frame that follows it is the first observation. Pictures are
+drawn when they are read for the first time, and then kept; so nobody waits for what is not read.
+"""

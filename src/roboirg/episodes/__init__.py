@@ -1,0 +1,1 @@
+"""The splits: which episodes there are, and fingerprints that notice a change."""

@@ -1,0 +1,170 @@
+"""Train, validation and test episodes: which seeds, which difficulty.
+
+An episode's seed is ``base + 100 * index + rejected``, where the base depends on split and task
+and `rejected` counts the seeds that were passed over: those that give no valid scene, those with a
+setting that cannot be expressed, and those that the oracle does not solve. The counts are shipped
+in ``splits.json``, with a fingerprint of every task's episodes that tells when scenes have
+changed; ``roboirg build-splits`` finds them anew. Difficulties repeat easy, easy, medium, hard
+(RoboMME's cycle).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import json
+import operator
+from collections.abc import Mapping
+from importlib import resources
+from typing import NamedTuple, SupportsIndex
+
+import numpy as np
+
+from roboirg.core.episode import SPLITS, Difficulty, Episode, Split
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.episodes.fingerprint import fingerprint
+from roboirg.tasks import Task, get_task
+
+SIZES: Mapping[Split, int] = {"train": 100, "val": 50, "test": 50}
+CYCLE: tuple[Difficulty, ...] = ("easy", "easy", "medium", "hard")
+SEED_STRIDE = 100
+MAX_REJECTED = SEED_STRIDE - 1
+"""Seeds that may be passed over for an episode; the next one is the next episode's first.
+
+VideoPlaceOrder needs many: on about three of four tables with three cubes not all fits.
+"""
+SPLITS_FILE = "splits.json"
+
+
+class TaskSplits(NamedTuple):
+    """What is shipped about the splits of a task.
+
+    Attributes:
+        sha256: of all its episodes, see `roboirg.episodes.fingerprint`.
+        passed_over: seeds that were, by episode (``"train/3"``); episodes with none are left out.
+    """
+
+    sha256: str
+    passed_over: Mapping[str, int]
+
+
+def base_seed(task: Task, split: Split) -> int:
+    """Seed of the first slot of a split."""
+    if split == "train":
+        return 1000 * task.code
+    return (1_000_000 if split == "val" else 500_000) + 10_000 * task.code
+
+
+def slot_seed(task: Task, split: Split, index: int) -> int:
+    """The first seed that is tried for an episode."""
+    return base_seed(task, split) + SEED_STRIDE * index
+
+
+def slot_difficulty(index: int) -> Difficulty:
+    """The difficulty of an episode of any split."""
+    return CYCLE[index % len(CYCLE)]
+
+
+def slot_key(split: Split, index: int) -> str:
+    """The name of an episode among those of its task, for example ``"test/3"``."""
+    return f"{split}/{index}"
+
+
+def check_split(split: str) -> Split:
+    """The name as a split.
+
+    Raises:
+        UnknownNameError: there is no such split.
+    """
+    for known in SPLITS:
+        if split == known:
+            return known
+    raise UnknownNameError("split", split, SPLITS)
+
+
+def make_episode(
+    task_name: str, seed: int, difficulty: Difficulty, split: Split = "test", index: int = 0
+) -> Episode:
+    """The episode that a seed gives, whether or not it belongs to a split.
+
+    Raises:
+        UnknownNameError: there is no such task.
+        SceneRejectedError: the seed yields no valid scene.
+    """
+    task = get_task(task_name)
+    scene, goal = task.sample(np.random.default_rng(seed), difficulty)
+    return Episode(
+        task=task.name,
+        split=split,
+        index=index,
+        seed=seed,
+        difficulty=difficulty,
+        scene=scene,
+        goal=goal,
+        stages=task.stages(scene, goal),
+        demonstration=task.demonstration(scene),
+    )
+
+
+@functools.cache
+def shipped() -> Mapping[str, TaskSplits]:
+    """What is shipped about the splits, by task."""
+    text = resources.files("roboirg.episodes").joinpath(SPLITS_FILE).read_text(encoding="utf-8")
+    return {task: TaskSplits(**entry) for task, entry in json.loads(text).items()}
+
+
+def splits_text(splits: Mapping[str, TaskSplits]) -> str:
+    """The text of ``splits.json``: JSON, a line for each task."""
+    lines = [f"{json.dumps(task)}: {json.dumps(entry._asdict())}" for task, entry in splits.items()]
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def get_episode(task_name: str, split: str, index: SupportsIndex) -> Episode:
+    """Episode number `index` (from 0) of a split of a task.
+
+    A task that is not in ``splits.json`` has the episodes of the first seeds.
+
+    Raises:
+        UnknownNameError: there is no such task or split.
+        InvalidValueError: the split has no episode of that number.
+    """
+    task, split_name = get_task(task_name), check_split(split)
+    return _episode(task.name, split_name, _check_index(split_name, index))
+
+
+def fingerprint_of(task_name: str, passed_over: Mapping[str, int]) -> str:
+    """The fingerprint of all episodes of a task, given how many seeds each passed over.
+
+    Raises:
+        SceneRejectedError: one of the seeds yields no valid scene.
+    """
+    return fingerprint(
+        _slot_episode(task_name, split, index, passed_over.get(slot_key(split, index), 0))
+        for split in SPLITS
+        for index in range(SIZES[split])
+    )
+
+
+def _check_index(split: Split, index: SupportsIndex) -> int:
+    size = SIZES[split]
+    number = -1
+    if not isinstance(index, bool):
+        with contextlib.suppress(TypeError):
+            number = operator.index(index)
+    if not 0 <= number < size:
+        raise InvalidValueError(
+            f"There is no episode {index!r}: split {split!r} has episodes 0 to {size - 1}."
+        )
+    return number
+
+
+@functools.lru_cache(maxsize=4096)
+def _episode(task: str, split: Split, index: int) -> Episode:
+    entry = shipped().get(task)
+    passed_over = entry.passed_over.get(slot_key(split, index), 0) if entry else 0
+    return _slot_episode(task, split, index, passed_over)
+
+
+def _slot_episode(task: str, split: Split, index: int, passed_over: int) -> Episode:
+    seed = slot_seed(get_task(task), split, index) + passed_over
+    return make_episode(task, seed, slot_difficulty(index), split, index)

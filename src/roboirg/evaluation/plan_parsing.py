@@ -1,0 +1,150 @@
+"""Lists and numbers as they are typed on a command line or in a plan file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+from roboirg import language
+from roboirg.core.errors import InvalidValueError
+from roboirg.episodes import splits
+
+WHOLE = "all"
+"""The word for all of them."""
+
+_MOST_NUMBERS = 10_000
+_MOST_DIGITS = 18
+_LONGEST_WORD = 40
+_NUMBERS_HINT = "write numbers and ranges such as 0,3,5-9"
+
+
+def parse_names(kind: str, text: str) -> tuple[str, ...]:
+    """Names separated by commas, each once.
+
+    Raises:
+        InvalidValueError: there is none.
+    """
+    names = tuple(dict.fromkeys(word.strip() for word in text.split(",") if word.strip()))
+    if not names:
+        raise InvalidValueError(f"No {kind} was given.")
+    return names
+
+
+def parse_policies(specs: Iterable[str]) -> tuple[str, ...]:
+    """Policies, each once; several names may stand in one text, separated by commas.
+
+    Raises:
+        InvalidValueError: there is none.
+    """
+    # Addresses and their options have commas of their own.
+    parts = (
+        (spec.strip(),) if "://" in spec or "?" in spec else parse_names("policy", spec)
+        for spec in specs
+    )
+    policies = tuple(dict.fromkeys(name for names in parts for name in names))
+    if not policies:
+        raise InvalidValueError("No policy was given.")
+    return policies
+
+
+def split_name(policy: str) -> tuple[str, str]:
+    """A policy's name and its spec; without a name of its own, that is the spec."""
+    found = re.fullmatch(r"([\w.+ -]+)=(.+)", policy)
+    return (policy, policy) if found is None else (found[1].strip(), found[2].strip())
+
+
+def says_all(text: str) -> bool:
+    """Whether a list of names is, or contains, the word for all of them."""
+    return WHOLE in (word.strip().lower() for word in text.split(","))
+
+
+def parse_episodes(text: str, split: str = "test") -> tuple[int, ...]:
+    """``4`` is the first four episodes; with a comma or a dash it is a list of positions.
+
+    Raises:
+        UnknownNameError: there is no such split.
+        InvalidValueError: it is neither, no episode at all, or the split has fewer.
+    """
+    size = splits.SIZES[splits.check_split(split)]
+    found = re.fullmatch(r"\s*(-?)(\d+)\s*", text)
+    if found is None:
+        ranges = _parse_ranges("episode", text, _NUMBERS_HINT)
+    else:
+        count = _number("number of episodes", found[2])
+        if found[1] or count == 0:
+            alone = "" if count else "; for episode 0 alone write '0,'"
+            raise InvalidValueError(
+                f"The number of episodes is {text.strip()}; it must be at least 1{alone}."
+            )
+        ranges = [range(count)]
+    for numbers in ranges:
+        if numbers[-1] >= size:
+            raise InvalidValueError(
+                f"There is no episode {numbers[-1]}: split {split!r} has episodes 0 to {size - 1}."
+            )
+    return _union(ranges)
+
+
+def parse_stages(text: str) -> tuple[int, ...]:
+    """Stages of the contextual setting, such as ``1,5``.
+
+    Raises:
+        InvalidValueError: it is no list of numbers.
+    """
+    sets = "; ".join(",".join(map(str, stages)) for stages in language.STAGE_SETS)
+    return _union(_parse_ranges("list of stages", text, f"the four are {sets}"))
+
+
+def parse_stage_sets(text: str) -> tuple[tuple[int, ...], ...]:
+    """Several lists of stages, such as ``1,5; 1-5``, each once.
+
+    Raises:
+        InvalidValueError: one of them is no list of numbers.
+    """
+    return tuple(dict.fromkeys(map(parse_stages, text.split(";"))))
+
+
+def parse_numbers(kind: str, text: str) -> tuple[int, ...]:
+    """Numbers and ranges separated by commas, such as ``0,3,5-9``, each once, in order.
+
+    Raises:
+        InvalidValueError: it is something else, or a very long list.
+    """
+    return _union(_parse_ranges(kind, text, _NUMBERS_HINT))
+
+
+def _parse_ranges(kind: str, text: str, hint: str) -> list[range]:
+    ranges = []
+    for part in parse_names(kind, text):
+        found = re.fullmatch(r"(\d+)(?:\s*-\s*(\d+))?", part)
+        first, last = (-1, -2) if found is None else _ends(kind, found[1], found[2])
+        if last < first:
+            raise InvalidValueError(f"{_short(part)!r} is no {kind}; {hint}.")
+        ranges.append(range(first, last + 1))
+    return ranges
+
+
+def _ends(kind: str, first: str, last: str | None) -> tuple[int, int]:
+    return _number(kind, first), _number(kind, last or first)
+
+
+def _number(kind: str, digits: str) -> int:
+    if len(digits) > _MOST_DIGITS:
+        raise InvalidValueError(
+            f"The {kind} {_short(digits)} has {len(digits)} digits; "
+            f"it must have at most {_MOST_DIGITS}."
+        )
+    return int(digits)
+
+
+def _union(ranges: Sequence[range]) -> tuple[int, ...]:
+    count = sum(map(len, ranges))
+    if count > _MOST_NUMBERS:
+        raise InvalidValueError(
+            f"A list of {count} numbers is too long; at most {_MOST_NUMBERS} are allowed."
+        )
+    return tuple(dict.fromkeys(number for numbers in ranges for number in numbers))
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _LONGEST_WORD else f"{text[:_LONGEST_WORD]}…"

@@ -1,0 +1,93 @@
+"""Telling how a search for seeds goes, and how many were passed over and why."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from roboirg.core.episode import DIFFICULTIES
+from roboirg.evaluation.seed_selection import REASONS, Found, Slot
+
+MINIMUM_WIDTH = 120
+"""Columns to use where the output is not a terminal."""
+
+_LINE_EVERY = 50
+"""Where there is no terminal, a line is printed after so many episodes."""
+
+
+def followed(found: Iterable[Found], slots: Sequence[Slot], console: Console) -> tuple[Found, ...]:
+    """All that is found, in the order of the slots, however it comes.
+
+    Meanwhile a bar or, without a terminal, a line now and then tells how far it is.
+    """
+    total = len(slots)
+    bar = Progress(
+        TextColumn("[bold]episodes"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[last]}"),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    )
+    collected: dict[Slot, Found] = {}
+    with bar:
+        task = bar.add_task("episodes", total=total, last="")
+        for one in found:
+            collected[one.slot] = one
+            bar.update(task, advance=1, last=one.slot.key)
+            if not console.is_terminal and len(collected) % _LINE_EVERY == 0:
+                console.print(f"\\[{len(collected)}/{total}] {one.slot.key}", highlight=False)
+    return tuple(collected[slot] for slot in slots)
+
+
+def summary_table(found: Sequence[Found]) -> Table:
+    """By task and difficulty: episodes, seeds tried, and how many were passed over and why."""
+    table = Table(title="Seeds passed over", title_justify="left", title_style="bold")
+    table.add_column("task")
+    table.add_column("difficulty")
+    for name in ("episodes", "seeds tried", *REASONS, "passed over"):
+        table.add_column(name, justify="right")
+    for task in dict.fromkeys(one.slot.task for one in found):
+        table.add_section()
+        for difficulty in DIFFICULTIES:
+            group = [
+                one for one in found if one.slot.task == task and one.slot.difficulty == difficulty
+            ]
+            reasons = Counter(rejection.reason for one in group for rejection in one.rejections)
+            tried = len(group) + reasons.total()
+            counts = (str(reasons[reason] or "") for reason in REASONS)
+            share = f"{100 * reasons.total() / tried:.0f} %" if tried else ""
+            table.add_row(task, difficulty, str(len(group)), str(tried), *counts, share)
+    return table
+
+
+def cause_lines(found: Sequence[Found]) -> list[str]:
+    """The exact causes by task, for all but want of room, each with a seed that shows it."""
+    counts: Counter[tuple[str, str, str]] = Counter()
+    examples: dict[tuple[str, str, str], str] = {}
+    for one in found:
+        for seed, reason, cause in one.rejections:
+            key = (one.slot.task, reason, cause)
+            if reason != "no room":
+                counts[key] += 1
+                examples.setdefault(key, f"{one.slot.key}, seed {seed}")
+    return [
+        f"{task}: {count} × {reason}: {cause} (first: {examples[task, reason, cause]})"
+        for (task, reason, cause), count in counts.items()
+    ]
+
+
+def print_summary(found: Sequence[Found], console: Console) -> None:
+    """The table and, below, the exact causes."""
+    if not console.is_terminal:
+        console.width = max(console.width, MINIMUM_WIDTH)
+    console.print(summary_table(found))
+    for line in cause_lines(found):
+        console.print(escape(line), highlight=False, soft_wrap=True)

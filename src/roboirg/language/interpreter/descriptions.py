@@ -1,0 +1,101 @@
+"""Descriptions: how words tell which thing, or of which colour, is meant."""
+
+from __future__ import annotations
+
+import re
+from typing import Literal, NamedTuple
+
+from roboirg.language.interpreter.places import Place, read_places
+from roboirg.language.interpreter.temporal_relations import Time, time_told
+from roboirg.language.interpreter.tokens import (
+    COLOUR,
+    Sentence,
+    colour_of,
+    colours_in,
+    ordinal_of,
+    word_set,
+)
+
+_PRONOUNS = word_set("it them")
+_POINTED = word_set("cube box tape one color")
+_PLACE_NOUNS = word_set("place spot position location")
+_SERIES_NOUNS = word_set("visit placement time pass placing stay occasion")
+_FORMER = {"former": 0, "latter": -1}
+
+Kind = Literal["any", "colour", "not", "other", "place", "introduced", "introduced place"]
+
+
+class Description(NamedTuple):
+    """How a command tells one thing that is to be handled.
+
+    Attributes:
+        kind: ``any`` says nothing; ``colour`` names it; ``not`` excludes colours; ``other`` is
+            the remaining one of some colours; ``place`` names where it is; ``introduced`` and
+            ``introduced place`` point at what was named before.
+        colours: named colours; empty where the words point at those of the context.
+        minus: for ``other``, the colour that it is not; None if the words only point at it.
+        place: the named place.
+        times: whether that place was said to be before or after things moved.
+        position: which of the introduced ones, from 0; None if any of them.
+    """
+
+    kind: Kind
+    colours: tuple[str, ...] = ()
+    minus: str | None = None
+    place: Place | None = None
+    times: frozenset[Time] = frozenset()
+    position: int | None = None
+
+
+_THAN = re.compile(
+    r"\b(other than|different from|different to|differs from|unlike|"
+    r"not (in|of|among|one of|part of)|neither|except|apart from|outside)\b"
+)
+_OTHER_OF = re.compile(r"\bthe other (?:one |color )?(?:of|in|from)\b")
+_ONE_NOT = re.compile(r"\bthe (?:one|color) (?:of|in|from)\b.*\b(?:not|other than|except)\b")
+_NOT = re.compile(rf"\b(?:not|other than|except) (?:in |for |the )?({COLOUR})\b")
+
+
+def describe(words: Sentence) -> Description:
+    """What the words for one thing tell about it."""
+    text = " ".join(words)
+    colours = colours_in(words)
+    places = read_places(words)
+    if places:
+        return Description("place", place=places[0], times=time_told(text))
+    if _OTHER_OF.search(text) or _ONE_NOT.search(text):
+        return _complement(text, colours)
+    if _THAN.search(text):
+        return Description("not", colours)
+    if colours:
+        return Description("colour", colours[:1])
+    return _pointer(words) or Description("any")
+
+
+def _complement(text: str, colours: tuple[str, ...]) -> Description:
+    found = _NOT.search(text)
+    minus = colour_of(found[1]) if found else None
+    among = tuple(dict.fromkeys(colours))
+    return Description("other", () if among == (minus,) else among, minus)
+
+
+def _pointer(words: Sentence) -> Description | None:
+    times = time_told(" ".join(words))
+    if "there" in words:
+        return Description("introduced place", times=times)
+    for before, word, after in zip(("", *words), words, (*words[1:], ""), strict=False):
+        position = _position(before, word)
+        if position is not None and after not in _SERIES_NOUNS:
+            kind: Kind = "introduced place" if after in _PLACE_NOUNS else "introduced"
+            return Description(kind, times=times, position=position)
+        if word in _PRONOUNS or (before == "that" and word in _POINTED):
+            return Description("introduced")
+    return None
+
+
+def _position(before: str, word: str) -> int | None:
+    """``the former``, ``the second``; a bare ``first`` is an adverb."""
+    if word in _FORMER:
+        return _FORMER[word]
+    rank = ordinal_of(word)
+    return None if rank is None or before != "the" else rank - 1

@@ -1,0 +1,45 @@
+"""Where things stand, before and after they change places."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Collection
+from dataclasses import replace
+
+from roboirg.core.episode import Scene, SceneObject
+from roboirg.core.motions import Swap
+from roboirg.language.interpreter.places import Place, find
+from roboirg.language.interpreter.temporal_relations import Time
+
+
+def standing_at(
+    place: Place, scene: Scene, kind: str, times: Collection[Time], *, mirrored: bool
+) -> tuple[SceneObject, ...]:
+    """What stands at a place at one of these times; at any time if none is given.
+
+    Args:
+        place: where.
+        scene: everything on the table, and what will move.
+        kind: of the things that are compared.
+        times: before or after things move.
+        mirrored: whether left and right are those of the front camera's picture.
+    """
+    found: list[str] = []
+    if "at first" in times or not times:
+        found += [item.name for item in find(place, scene, kind, mirrored=mirrored)]
+    if "at last" in times or not times:
+        settled = _settled(scene)
+        found += [item.name for item in find(place, settled, kind, mirrored=mirrored)]
+    return tuple(scene[name] for name in dict.fromkeys(found))
+
+
+@functools.lru_cache(maxsize=256)
+def _settled(scene: Scene) -> Scene:
+    """The scene with everything where it stands after the last exchange."""
+    places = {item.name: item.position for item in scene.objects}
+    for motion in scene.motions:
+        if isinstance(motion, Swap):
+            first, second = motion.first, motion.second
+            places[first], places[second] = places[second], places[first]
+    moved = (replace(item, position=places[item.name]) for item in scene.objects)
+    return replace(scene, objects=tuple(moved))

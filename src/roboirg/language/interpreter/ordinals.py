@@ -1,0 +1,142 @@
+"""Ordinals: an element of a series, named, pointed at, or told by another element."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+from typing import Literal, NamedTuple
+
+from roboirg.language.interpreter.quantities import Count, read_value
+from roboirg.language.interpreter.tokens import NUMBER, ORDINAL, number_of, ordinal_of
+
+Base = int | Literal["that", "last"]
+
+_NOUN = r"(?:visit|placement|pass|passage|stay|time|occasion|placing)"
+_ELEMENT = re.compile(
+    rf"\b(?P<ordinal>{ORDINAL}|last|final) (?:\w+ )?{_NOUN}\b"
+    rf"|\b{_NOUN} (?:number |no )?(?P<number>{NUMBER})\b(?! (?:after|before|visits|placements))"
+)
+_BASE = re.compile(
+    rf"\s*(?P<that>that|it|this)\b|\s*(?:the |its )?(?P<ordinal>{ORDINAL}|last|final)\b"
+    rf"|\s*(?:(?:the )?{_NOUN} )?(?:number )?(?P<number>{NUMBER})\b"
+)
+_STEP = re.compile(
+    rf"\b(?:(?P<step>right|just|directly|immediately|{NUMBER})(?: {_NOUN}s?)? )?"
+    r"(?P<way>after|before|following|preceding|later than|earlier than|behind|ahead of)\b"
+    r"(?! (?:the )?(?:button|press|pressing|placing|taking))"
+)
+_NEXT = re.compile(rf"\bthe (?:very )?(?P<way>next|following|previous|preceding) (?:one|{_NOUN})\b")
+_NEIGHBOR = re.compile(r"\b(?:neighbor\w* (?:of|to)|adjacent to|next to)\b")
+_PENULTIMATE = re.compile(
+    rf"\b(?P<rank>{ORDINAL}|next) (?:to|from) (?:the )?last\b|\bpenultimate\b"
+)
+_BARE = re.compile(rf"\b(?:its|the) (?P<ordinal>{ORDINAL}|last)\b")
+_POINTER = re.compile(rf"\b(?:that|this|the same) (?:very )?(?:one|number|{_NOUN})\b")
+_LATER = ("after", "following", "later than", "behind", "next")
+
+
+class Position(NamedTuple):
+    """How a command tells an element of a series.
+
+    Attributes:
+        base: the number of an element; ``that`` for an introduced one, ``last`` for the last.
+        offsets: how far the wanted one may be from it.
+        value: instead of these, its number by its relation to another number.
+    """
+
+    base: Base = "that"
+    offsets: tuple[int, ...] = (0,)
+    value: Count | None = None
+
+    def results(
+        self, positions: Collection[int], numbers: Collection[int], length: int
+    ) -> set[int] | None:
+        """Numbers of the elements that it can be; None if it can be any.
+
+        Args:
+            positions: introduced elements.
+            numbers: introduced numbers.
+            length: how many elements the series has.
+        """
+        if self.value is not None:
+            results = self.value.results(numbers or positions)
+            return None if results is None else results & set(range(1, length + 1))
+        if self.base == "that":
+            bases = positions or numbers
+            if not bases and self.offsets == (0,):
+                return None
+            bases = bases or range(1, length + 1)
+        else:
+            bases = [length if self.base == "last" else self.base]
+        # What does not exist has no neighbours, and is none.
+        existing = [one for one in bases if 1 <= one <= length]
+        results = {one + offset for one in existing for offset in self.offsets}
+        return {one for one in results if 1 <= one <= length}
+
+    @property
+    def points(self) -> bool:
+        """Whether it takes something introduced to understand it."""
+        return self.value.quantity is None if self.value is not None else self.base == "that"
+
+
+def named_positions(text: str) -> tuple[int, ...]:
+    """The elements of a series that a sentence names by number, in order."""
+    numbers = (_number(found) for found in _ELEMENT.finditer(text))
+    return tuple(one for one in numbers if isinstance(one, int))
+
+
+def read_position(text: str) -> Position | None:
+    """The element of a series that a command tells; None if it tells none."""
+    value = read_value(text)
+    if value is not None:
+        return Position(value=value)
+    return _read_last(text) or _read_relative(text) or _read_named(text)
+
+
+def _read_relative(text: str) -> Position | None:
+    # Before the others: in "the preceding one" no number one is preceded.
+    following = _NEXT.search(text)
+    if following:
+        return Position("that", (1 if following["way"] in _LATER else -1,))
+    for found in _STEP.finditer(text):
+        base = _base(text, found.end())
+        if base is not None:
+            step = number_of(found["step"] or "") or 1
+            return Position(base, (step if found["way"] in _LATER else -step,))
+    for found in _NEIGHBOR.finditer(text):
+        base = _base(text, found.end())
+        if base is not None:
+            return Position(base, (-1, 1))
+    return None
+
+
+def _read_last(text: str) -> Position | None:
+    found = _PENULTIMATE.search(text)
+    if found is None:
+        return None
+    return Position("last", (1 - (ordinal_of(found["rank"] or "") or 2),))
+
+
+def _read_named(text: str) -> Position | None:
+    found = _ELEMENT.search(text)
+    if found is None and not _POINTER.search(text):
+        found = _BARE.search(text)
+        return Position(_ordinal(found["ordinal"])) if found else None
+    return Position("that" if found is None else _number(found))
+
+
+def _base(text: str, at: int) -> Base | None:
+    found = _BASE.match(text, at)
+    if found is None:
+        return None
+    return "that" if found["that"] else _number(found)
+
+
+def _number(found: re.Match[str]) -> Base:
+    if found["ordinal"]:
+        return _ordinal(found["ordinal"])
+    return number_of(found["number"]) or 0
+
+
+def _ordinal(word: str) -> Base:
+    return ordinal_of(word) or "last"

@@ -1,0 +1,137 @@
+"""Quantities: plain numbers, numbers told by another one, and words that point at one."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+from roboirg.language.interpreter.tokens import COLOUR, NUMBER, THING, THINGS, Sentence, number_of
+
+_CONCEIVABLE = range(1, 11)
+"""What a quantity that was not heard may have been."""
+
+
+class Count(NamedTuple):
+    """``factor * quantity + offset``; without a quantity, one of the context."""
+
+    factor: float = 1.0
+    offset: int = 0
+    quantity: int | None = None
+
+    @property
+    def derived(self) -> bool:
+        """Whether something is computed."""
+        return (self.factor, self.offset) != (1.0, 0)
+
+    def results(self, told: Iterable[int]) -> set[int] | None:
+        """What it can be if the context names these numbers; None if it can be anything."""
+        quantities = [self.quantity] if self.quantity is not None else list(told)
+        if not quantities and not self.derived:
+            return None
+        results = [self.factor * one + self.offset for one in quantities or _CONCEIVABLE]
+        return {int(result) for result in results if result.is_integer()}
+
+
+class Quantity(NamedTuple):
+    """A quantity in a text, and from which to which character it goes."""
+
+    told: Count
+    start: int
+    end: int
+    plain: bool = False
+
+
+_NOUNS = rf"(?: (?:times?|{THING}|{THINGS}|ones?|visits?|{COLOUR}|such|of|the|them))"
+_TO = rf"(?P<quantity>that|it|this|the|{NUMBER})\b"
+_MORE = "more|larger|greater|higher|bigger|above|over"
+_LESS = "fewer|less|smaller|lower|below|under"
+_STEP = re.compile(
+    rf"\b(?P<step>{NUMBER}){_NOUNS}{{0,3}} (?P<way>{_MORE}|{_LESS}){_NOUNS}{{0,5}}(?: than)? {_TO}"
+)
+_PLUS = re.compile(rf"\b(?P<quantity>that|it|this|{NUMBER}) (?P<way>plus|minus) (?P<step>{NUMBER})")
+_SCALED = re.compile(
+    rf"\b(?P<factor>twice|double|thrice|triple|half|{NUMBER} times)"
+    rf"(?: as (?:many|often|much){_NOUNS}{{0,5}} as| of| the| as)? {_TO}"
+)
+_SAME = re.compile(
+    r"\b(?:that|as|this|so) (?:many|often)\b|\b(?:that|this|the same) (?:number|amount) of\b"
+)
+_SOME = re.compile(r"\ba (?:couple|pair) of\b")
+_ADVERB = re.compile(r"\b(?:once(?! (?:you|it|that|the|all|this))|twice|thrice)\b")
+_NOT_AFTER = (
+    "the", "that", "this", "those", "these", "which", "other", "another", "every", "each", "any",
+    "some", "no", "than", "as", "from", "red", "green", "blue", "yellow", "gray", "purple",
+    "number", "visit", "placement",
+)  # fmt: skip
+_POINTED = "".join(rf"(?<!\b{word} )" for word in _NOT_AFTER)
+"""After these words a number word only points, as in ``those two``, ``the red one``."""
+_PLAIN = re.compile(rf"{_POINTED}\b(?P<number>{NUMBER})\b(?! times as)")
+_SINGLE = re.compile(
+    r"(?<!\bas )(?<!\bthan )(?<!\bto )(?<!\bfrom )(?<!\bof )(?<!\bhides )(?<!\bover )"
+    rf"\b(?:an?|the)(?: single)? (?={COLOUR} (?:{THING}|one)\b)"
+)
+_FACTORS = {"twice": 2.0, "double": 2.0, "thrice": 3.0, "triple": 3.0, "half": 0.5}
+_ADVERBS = {"once": 1, "twice": 2, "thrice": 3}
+_TIMES = re.compile(r" (?:times?|rounds?|turns?|occasions?)\b")
+
+Reading = tuple[re.Pattern[str], Callable[[re.Match[str]], Count], bool]
+
+
+def _stepped(found: re.Match[str]) -> Count:
+    sign = 1 if re.fullmatch(f"{_MORE}|plus", found["way"]) else -1
+    return Count(offset=sign * (number_of(found["step"]) or 0), quantity=_quantity(found))
+
+
+def _scaled(found: re.Match[str]) -> Count:
+    factor = _FACTORS.get(found["factor"]) or float(number_of(found["factor"].split()[0]) or 1)
+    return Count(factor=factor, quantity=_quantity(found))
+
+
+def _quantity(found: re.Match[str]) -> int | None:
+    return number_of(found["quantity"])
+
+
+_DERIVED: tuple[Reading, ...] = ((_STEP, _stepped, False), (_PLUS, _stepped, False),
+                                 (_SCALED, _scaled, False))  # fmt: skip
+_READINGS: tuple[Reading, ...] = (
+    *_DERIVED,
+    (_SAME, lambda _found: Count(), False),
+    (_SOME, lambda _found: Count(quantity=2), True),
+    (_ADVERB, lambda found: Count(quantity=_ADVERBS[found[0]]), True),
+    (_PLAIN, lambda found: Count(quantity=number_of(found["number"])), True),
+    (_SINGLE, lambda _found: Count(quantity=1), True),
+)
+"""How to read a quantity; where two overlap, the first of this order holds."""
+
+
+def quantities(text: str) -> tuple[Quantity, ...]:
+    """All quantities of a sentence, in order."""
+    found: list[Quantity] = []
+    for pattern, read, plain in _READINGS:
+        for match in pattern.finditer(text):
+            start, end = match.span()
+            if all(end <= one.start or one.end <= start for one in found):
+                found.append(Quantity(read(match), start, end, plain))
+    return tuple(sorted(found, key=lambda one: one.start))
+
+
+def plain_numbers(words: Sentence) -> tuple[int, ...]:
+    """The numbers that a sentence names outright."""
+    found = _PLAIN.finditer(" ".join(words))
+    numbers = (number_of(match["number"]) for match in found)
+    return tuple(number for number in numbers if number is not None)
+
+
+def read_value(text: str) -> Count | None:
+    """A number that is told by another one: ``one less than that``."""
+    return next((one.told for one in quantities(text) if one.told.derived), None)
+
+
+def read_times(text: str) -> Count | None:
+    """How often something is to be done; None if nothing tells."""
+    found = quantities(text)
+    told = [one for one in found if not one.plain]
+    told += [one for one in found if one.plain and text[one.start : one.end] in _ADVERBS]
+    told += [one for one in found if one.plain and _TIMES.match(text, one.end)]
+    return told[0].told if told else None

@@ -1,0 +1,182 @@
+"""The listener: what each part of the command can mean, given the context and the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import TypeVar
+
+from roboirg.core.episode import ObjectKind, Scene, SceneObject
+from roboirg.core.motions import Shuttle
+from roboirg.language.interpreter.command import Item
+from roboirg.language.interpreter.descriptions import Description
+from roboirg.language.interpreter.discourse_context import Context
+from roboirg.language.interpreter.object_positions import standing_at
+from roboirg.language.interpreter.ordinals import Position
+from roboirg.language.interpreter.places import Place
+from roboirg.language.interpreter.quantities import Count
+from roboirg.language.interpreter.temporal_relations import MOMENTS, Moment, Time, When, neighbors
+
+Told = TypeVar("Told")
+_CHOSEN: tuple[ObjectKind, ...] = ("container", "box", "tape")
+"""Kinds of things among which commands choose, rather than among cubes, the first that there is."""
+
+Amounts = dict[str, set[int] | None]
+"""For each colour that is possible, how many; None if any number is."""
+
+
+class Listener:
+    """Evaluates the command's descriptions; None stands for "nothing tells".
+
+    Attributes:
+        complaints: what was pointed at without having been introduced, and the like.
+    """
+
+    def __init__(self, scene: Scene, context: Context, times: frozenset[Time]) -> None:
+        self.complaints: list[str] = []
+        self._scene = scene
+        self._context = context
+        self._times = times
+        kinds = {item.kind for item in scene.objects}
+        self._kind = next((kind for kind in _CHOSEN if kind in kinds), "cube")
+
+    @property
+    def chooses_box(self) -> bool:
+        """Whether commands choose among boxes to put something into."""
+        return self._kind == "box"
+
+    def objects(self, thing: Description) -> set[str] | None:
+        """The colours that a description leaves open; None if it says nothing."""
+        if thing.kind == "any":
+            return None
+        if thing.kind == "colour":
+            return set(thing.colours)
+        if thing.kind == "place" and thing.place is not None:
+            return self._at(thing.place, thing.times)
+        if thing.kind == "introduced place":
+            return self._introduced_place(thing)
+        if thing.kind == "introduced":
+            return self._introduced(thing)
+        return self._derived(thing)
+
+    def amounts(self, item: Item) -> Amounts:
+        """For each colour that an item leaves open, the numbers that it leaves open."""
+        colours = self.objects(item.thing)
+        if colours is None:
+            colours = self._colours()
+        count = item.number
+        if count is None:
+            return dict.fromkeys(colours)
+        return {colour: count.results(self._told(count, colour)) for colour in sorted(colours)}
+
+    def times(self, count: Count | None) -> set[int] | None:
+        """The numbers that the command leaves open."""
+        return None if count is None else count.results(self._told(count, None))
+
+    def _told(self, count: Count, colour: str | None) -> tuple[int, ...]:
+        """The introduced numbers that a count may start from; of that colour, if there are any."""
+        if count.quantity is not None:
+            return ()
+        of_colour = tuple(number for shade, number in self._context.amounts if shade == colour)
+        told = of_colour or self._context.numbers
+        if not told:
+            self._complain("a number")
+        return told
+
+    def positions(self, position: Position | None) -> set[int] | None:
+        """The elements of the series that the command leaves open."""
+        if position is None:
+            return None
+        positions, numbers = self._context.positions, self._context.numbers
+        if position.points and not positions and not numbers:
+            self._complain("an element of a series")
+        return position.results(positions, numbers, self._series_length())
+
+    def moments(self, when: When | None) -> set[Moment] | None:
+        """The moments about the press that the command leaves open."""
+        if when is None:
+            return None
+        told = set(when.moments) or self._introduced_moments(when)
+        if not told:
+            self._complain("a moment")
+            return None
+        if when.kind == "neighbor":
+            return neighbors(told, self._scene.past)
+        if when.kind == "other":
+            # Of two that were named without a choice, either may be the other one.
+            return set(MOMENTS) - told if len(told) == 1 else set(MOMENTS)
+        return told
+
+    def _introduced_moments(self, when: When) -> set[Moment]:
+        chosen = self._context.chosen
+        if chosen is not None and (when.kind != "introduced" or len(self._context.moments) > 1):
+            return {chosen}
+        return set(self._context.moments)
+
+    def _series_length(self) -> int:
+        passes = [motion.passes for motion in self._scene.motions if isinstance(motion, Shuttle)]
+        discs = {disc.name for disc in self._scene.of_kind("target")}
+        placed = [fact for fact in self._scene.past if fact.kind == "placed"]
+        return sum(passes) or sum(fact.place in discs for fact in placed)
+
+    def _derived(self, thing: Description) -> set[str] | None:
+        named = set(thing.colours or self._context.colours)
+        if thing.kind == "not":
+            if not named:
+                self._complain("excluded colours")
+                return None
+            return self._colours() - named
+        minus = thing.minus or self._context.singled
+        if not named or minus is None:
+            self._complain("the one that is not meant")
+        return (named or self._colours()) - {str(minus)}
+
+    def _introduced(self, thing: Description) -> set[str] | None:
+        if self._context.places and not self._context.colours:
+            return self._introduced_place(thing)
+        chosen = _chosen(self._context.colours, thing.position)
+        if not chosen:
+            self._complain("a colour")
+            return None
+        return set(chosen)
+
+    def _introduced_place(self, thing: Description) -> set[str] | None:
+        chosen = _chosen(self._context.places, thing.position)
+        if not chosen:
+            self._complain("a place")
+            return None
+        return set().union(*(self._at(place, thing.times) for place in chosen))
+
+    def _at(self, place: Place, times: frozenset[Time]) -> set[str]:
+        found = standing_at(
+            place,
+            self._scene,
+            self._kind,
+            times | self._times,
+            mirrored=self._context.mirrored,
+        )
+        cubes = [item if item.colour else self._scene.hidden_in(item.name) for item in found]
+        if None in cubes or not cubes:
+            self.complaints.append(f"nothing to handle at {place}")
+        return {str(cube.colour) for cube in cubes if cube is not None}
+
+    def _colours(self) -> set[str]:
+        return {str(cube.colour) for cube in self._cubes()}
+
+    def _cubes(self) -> Iterator[SceneObject]:
+        return (item for item in self._scene.objects if item.colour is not None)
+
+    def _complain(self, what: str) -> None:
+        self.complaints.append(f"{what}: nothing before the command introduces it")
+
+
+def common(options: Iterable[set[str] | None]) -> set[str] | None:
+    """What all of these leave open; None if none of them says anything."""
+    told = [one for one in options if one is not None]
+    return set.intersection(*told) if told else None
+
+
+def _chosen(introduced: tuple[Told, ...], position: int | None) -> tuple[Told, ...]:
+    """The introduced one at a position, or all of them."""
+    if position is None:
+        return introduced
+    return introduced[position:][:1]

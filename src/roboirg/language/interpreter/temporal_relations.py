@@ -1,0 +1,99 @@
+"""Moments: before or after a press of the button, and before or after things changed places."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+from typing import Literal, NamedTuple
+
+from roboirg.core.conditions import Fact
+
+Moment = Literal["before", "after"]
+Time = Literal["at first", "at last"]
+MOMENTS: tuple[Moment, Moment] = ("before", "after")
+
+_PRESS = re.compile(r"\b(?:press|pressed|presses|pressing|push|pushed|pushing|button)\b")
+_WORD: dict[str, Moment] = {
+    "before": "before", "prior to": "before", "preceding": "before", "preceded": "before",
+    "after": "after", "following": "after", "followed": "after",
+}  # fmt: skip
+_NAMED = re.compile(
+    r"\b(before|prior to|preceding|preceded|after|following|followed)\b(?! (?:that|this|which)\b)"
+)
+_NEIGHBOR = re.compile(r"\b(?:neighbor\w*|neighboring|adjacent|next to|beside)\b")
+_OTHER = re.compile(
+    r"\bother (?:one |moment )?(?:of|moment|time|point|than)\b|\bthe other one\b"
+    r"|\bnot (?:at |in )?(?:that|this|it|the one|the moment|when)\b|\bwhichever\b.*\bnot\b"
+)
+_NOT = re.compile(r"\bnot (?:the |one |right |just |moment |at |directly )*(before|after)\b")
+_POINTER = re.compile(
+    r"\b(?:that|this|the same) (?:very )?(?:moment|time|point|instant|part|placement|one)\b"
+    r"|\bthen\b(?! (?:press|take|put|place|set|to|go|pick|lift|push)\b)"
+)
+
+_MOVED = r"(?:moved?|moves|moving|swapped|changed|exchanged|shuffled|started|began)"
+_SUBJECT = r"(?:(?:any|every|some)\w+|all|they|it|things|the \w+|the swaps|any of \w+)"
+_AT_FIRST = re.compile(
+    rf"\b(?:before|until) {_SUBJECT} (?:\w+ )?{_MOVED}\b|\bbefore (?:the )?(?:\w+ )?{_MOVED}\b"
+    r"|\b(?:originally|initially|to begin with|at first|at the (?:start|beginning|outset)"
+    r"|in the beginning)\b"
+)
+_AT_LAST = re.compile(
+    rf"\bafter {_SUBJECT} (?:\w+ )?{_MOVED}\b|\b(?:stands?|is|are) now\b|\bnow (?:stands?|is|are)\b"
+)
+
+
+class When(NamedTuple):
+    """How a command tells a moment.
+
+    Attributes:
+        kind: ``named`` names it; ``other`` names or points at the one that it is not; ``neighbor``
+            names or points at the placement beside it; ``introduced`` points at it.
+        moments: those that are named.
+    """
+
+    kind: Literal["named", "other", "neighbor", "introduced"]
+    moments: tuple[Moment, ...] = ()
+
+
+def named_moments(text: str) -> tuple[Moment, ...]:
+    """The moments about a press of the button that a sentence names, in order."""
+    if not _PRESS.search(text):
+        return ()
+    return tuple(_WORD[found[1]] for found in _NAMED.finditer(text))
+
+
+def time_told(text: str) -> frozenset[Time]:
+    """Whether a sentence speaks of how things were before they moved, or afterwards."""
+    told: set[Time] = set()
+    if _AT_FIRST.search(text):
+        told.add("at first")
+    if _AT_LAST.search(text):
+        told.add("at last")
+    return frozenset(told)
+
+
+def read_when(text: str) -> When | None:
+    """The moment that a command tells; None if it tells none."""
+    named = named_moments(text)
+    if _NEIGHBOR.search(text):
+        return When("neighbor", named)
+    rejected = _NOT.search(text) if named else None
+    if rejected:
+        return When("other", (_WORD[rejected[1]],))
+    if _OTHER.search(text):
+        return When("other", named)
+    if named:
+        return When("named", named)
+    return When("introduced") if _POINTER.search(text) else None
+
+
+def neighbors(moments: Collection[Moment], past: tuple[Fact, ...]) -> set[Moment]:
+    """The moments about the press whose placements come next to those of the given ones."""
+    kinds = [fact.kind for fact in past]
+    pressed = kinds.index("pressed") if "pressed" in kinds else 0
+    earlier = kinds[:pressed].count("placed")
+    # Placements are numbered from 1; these two are the last before and the first after the press.
+    numbers: dict[Moment, int] = {"before": earlier, "after": earlier + 1}
+    near = {numbers[one] + step for one in moments for step in (-1, 1)}
+    return {one for one, number in numbers.items() if number in near}

@@ -1,0 +1,80 @@
+"""Colours: which cube, box or tape, or the container over which cube."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from roboirg.language import templates
+from roboirg.language.instruction import Expression
+from roboirg.language.number_words import plural
+from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed
+from roboirg.language.request import Part, Request
+from roboirg.language.slot_types.slot_type import Fields, Kind, rival_sentences
+
+REDUCED: Mapping[int, tuple[tuple[str, Expression], ...]] = {
+    1: (("it", "it"),),
+    2: (("the former", "former"), ("the latter", "latter")),
+    3: (("the first", "first"), ("the second", "second"), ("the third", "third")),
+}
+"""What points back at one, two or three introduced cubes."""
+
+
+def named(request: Request, part: Part) -> Phrase:
+    """``the red cube``."""
+    noun = request.task.commands.coloured
+    return antecedent(f"the {part.colour} {noun}", part.slot, part.value)
+
+
+def _stated(request: Request, parts: tuple[Part, ...]) -> Fields:
+    """``the red cube``, or the container that hides it."""
+    return {part.field: request.by_colour(named(request, part)) for part in parts}
+
+
+def _reduced(request: Request, parts: tuple[Part, ...]) -> Fields:
+    """``it``; ``the former`` and ``the latter``; ..."""
+    return {
+        part.field: request.by_colour(anaphor(words, expression, part.slot, part.value))
+        for part, (words, expression) in zip(parts, REDUCED[len(parts)], strict=True)
+    }
+
+
+def _introduce(request: Request, parts: tuple[Part, ...]) -> Phrase:
+    template = request.chooser.pick("colour introduction", templates.COLOUR_INTRODUCTIONS)
+    things = listed([named(request, part) for part in parts])
+    return fill(template, {"things": things}, plural=len(parts) > 1)
+
+
+def _pointing(request: Request, parts: tuple[Part, ...]) -> Phrase:
+    if len(parts) == 1:
+        words = f"that {request.task.commands.coloured}"
+        return anaphor(words, "that", parts[0].slot, parts[0].value)
+    return those(request, parts)
+
+
+def those(request: Request, parts: tuple[Part, ...]) -> Phrase:
+    """A plural for the cubes, boxes or tapes of all colours."""
+    values = " and ".join(part.colour for part in parts)
+    words = f"those {plural(request.task.commands.coloured)}"
+    return anaphor(words, "them", parts[0].slot, values)
+
+
+def rivals(request: Request, parts: tuple[Part, ...]) -> list[Phrase]:
+    """Remarks that name other colours."""
+    colours = request.task.commands.colours
+    return rival_sentences(templates.COMPETING_COLOUR_DISTRACTORS, colours, str, parts)
+
+
+def _described(parts: tuple[Part, ...], things: Sequence[Phrase]) -> Fields:
+    return {part.field: thing for part, thing in zip(parts, things, strict=True)}
+
+
+KIND = Kind(
+    name="colour",
+    stated=_stated,
+    reduced=_reduced,
+    introduce=_introduce,
+    pointing=_pointing,
+    reinforcements=templates.COLOUR_REINFORCEMENTS,
+    rivals=rivals,
+    described=_described,
+)

@@ -1,0 +1,69 @@
+"""What the words of a split are made of, as tables for the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from rich.table import Table
+
+from roboirg.language import corpus_statistics
+from roboirg.language.corpus_statistics import Counts
+from roboirg.language.instruction import SETTINGS, Instruction
+from roboirg.language.templates import RELATIONS, STEPS
+from roboirg.tasks import every_task
+
+
+def overview_tables(said: Sequence[Instruction]) -> Iterator[Table]:
+    """Expressions, lengths, patterns, relations and landmark classes."""
+    yield _lengths(corpus_statistics.word_counts(said))
+    yield expression_table(corpus_statistics.expression_counts(said))
+    by_task = (
+        ("Reasoning patterns (scenes)", corpus_statistics.pattern_counts(said), None),
+        ("Relations (scenes)", corpus_statistics.relation_counts(said), _RELATIONS),
+        ("Landmark classes (targets told)", corpus_statistics.landmark_counts(said), None),
+    )
+    for title, counts, order in by_task:
+        if counts:
+            yield _tallied(title, "task", counts, [*every_task()], order or _found(counts))
+
+
+_RELATIONS = [*(one.name for one in (*RELATIONS, *STEPS)), "neighbor"]
+
+
+def expression_table(counts: Counts) -> Table:
+    """In how many scenes each class of referring expression occurs, by setting."""
+    classes = corpus_statistics.expression_order(counts)
+    title = "Referring expressions (each once per scene)"
+    return _tallied(title, "setting", counts, SETTINGS, classes)
+
+
+def _lengths(lengths: Mapping[str, corpus_statistics.Lengths]) -> Table:
+    table = _table("Words per instruction", "setting", ("mean", "fewest", "most"))
+    for setting in SETTINGS:
+        if setting in lengths:
+            one = lengths[setting]
+            table.add_row(setting, f"{one.mean:.1f}", str(one.shortest), str(one.longest))
+    return table
+
+
+def _tallied(
+    title: str, kind: str, counts: Counts, rows: Sequence[str], columns: Sequence[str]
+) -> Table:
+    used = [name for name in columns if any(name in one for one in counts.values())]
+    table = _table(title, kind, used)
+    for name in rows:
+        if name in counts:
+            table.add_row(name, *(str(counts[name].get(column, "")) for column in used))
+    return table
+
+
+def _found(counts: Counts) -> list[str]:
+    return sorted({name for one in counts.values() for name in one})
+
+
+def _table(title: str, first: str, numbers: Sequence[str]) -> Table:
+    table = Table(title=title, title_justify="left", title_style="bold")
+    table.add_column(first)
+    for name in numbers:
+        table.add_column(name, justify="right")
+    return table

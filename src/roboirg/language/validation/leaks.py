@@ -1,0 +1,71 @@
+"""No leak: what an implicit command must not contain, in any spelling."""
+
+from __future__ import annotations
+
+import re
+from typing import cast
+
+from roboirg.core.episode import ALL_COLOURS, Goal, SlotValue
+from roboirg.language.instruction import Instruction
+
+_COLOUR_SLOTS = frozenset(("colour", "colours"))
+_DERIVED = {
+    "colour exclusion": _COLOUR_SLOTS,
+    "number deduction": frozenset(("repeats", "counts", "visit")),
+    "sequential relation": frozenset(("visit", "placement", "relation")),
+    "contextual logic": frozenset(("colours", "relation")),
+}
+"""The slots that each reasoning pattern hides."""
+_NUMBERS = {
+    1: frozenset(("1", "one", "ones", "once", "first", "single", "1st")),
+    2: frozenset(("2", "two", "twos", "twice", "second", "double", "2nd", "both", "pair")),
+    3: frozenset(("3", "three", "threes", "thrice", "third", "3rd")),
+    4: frozenset(("4", "four", "fours", "fourth", "4th")),
+    5: frozenset(("5", "five", "fives", "fifth", "5th")),
+}
+_COLOUR_WORDS = frozenset(
+    spelling for name in (*ALL_COLOURS, "grey") for spelling in (name, f"{name}s")
+)
+_TIME_WORDS = frozenset(
+    ("before", "after", "earlier", "later", "previous", "previously", "next", "following")
+)
+_RANKS = ("first", "second", "third")
+
+
+def leaked(instruction: Instruction, goal: Goal) -> frozenset[str]:
+    """The words of an implicit command that give a hidden value away, and its landmarks."""
+    words = frozenset(re.findall(r"[a-z0-9]+", _without_ranks(instruction).lower()))
+    found = [words & _spellings(goal[slot]) for slot in hidden_slots(instruction, goal)]
+    places = cast("list[str]", instruction.metadata["landmarks"])
+    named = [place for place in places if place in instruction.command]
+    return frozenset(named).union(*found)
+
+
+def hidden_slots(instruction: Instruction, goal: Goal) -> frozenset[str]:
+    """The slots that the command of an implicit form must not state."""
+    slots = frozenset(goal.as_mapping())
+    if instruction.setting in ("direct", "contextual"):
+        return slots
+    if instruction.setting == "spatial":
+        return slots & _COLOUR_SLOTS
+    return slots & _DERIVED[str(instruction.metadata["pattern"])]
+
+
+def _spellings(value: SlotValue) -> frozenset[str]:
+    if isinstance(value, tuple):
+        several: tuple[str | int, ...] = value
+        return frozenset().union(*(_spellings(one) for one in several))
+    if isinstance(value, int):
+        return _NUMBERS[value]
+    # Any colour: naming another one tells something too.
+    return _COLOUR_WORDS if value in ALL_COLOURS else _TIME_WORDS
+
+
+def _without_ranks(instruction: Instruction) -> str:
+    """The command without what only ranks the introduced values: *the first* of three colours."""
+    text = instruction.command
+    last = len(instruction.utterances) - 1
+    for mention in reversed(instruction.mentions):
+        if mention.utterance == last and mention.expression in _RANKS:
+            text = text[: mention.start] + text[mention.end :]
+    return text

@@ -1,0 +1,97 @@
+"""What the run engine costs beside the episodes that it plays."""
+
+from __future__ import annotations
+
+import atexit
+import functools
+import shutil
+import tempfile
+import time
+from pathlib import Path
+
+from roboirg.evaluation.executors.executor import LocalProcesses
+from roboirg.evaluation.plan import Plan, make_plan
+from roboirg.evaluation.progress import Silent
+from roboirg.evaluation.rollout import Player
+from roboirg.evaluation.rollout_result import Course, describe, utc_now
+from roboirg.evaluation.runner import run_plan
+from roboirg.records.record import EventRecord, Job, Record
+from roboirg.records.store import RECORDS_FILE, RecordStore
+
+MANY = 100_000
+_EVENTS = 60
+"""About as many as an episode of BinFill has."""
+
+
+def engine() -> float:
+    """Seconds per episode from plan to record, by way of a worker, if nothing is played."""
+    plan = make_plan(["random"], tasks="PickXtimes", settings="explicit,direct", episodes="50")
+    clock = _Clock()
+    with tempfile.TemporaryDirectory() as folder:
+        run_plan(plan, Path(folder), _nothing, LocalProcesses(1), reporter=clock)
+    # Without the start of the process, which a run has once.
+    return (clock.times[-1] - clock.times[0]) / (len(clock.times) - 1)
+
+
+def episode() -> float:
+    """Seconds per episode of the oracle, without pictures: the quickest there are."""
+    plan = make_plan(["oracle"], tasks="PickXtimes,StopCube", settings="explicit", episodes="3")
+    start = time.perf_counter()
+    jobs = plan.jobs()
+    with tempfile.TemporaryDirectory() as folder:
+        for job in jobs:
+            Player(Path(folder))(job)
+    return (time.perf_counter() - start) / len(jobs)
+
+
+def resume() -> float:
+    """Seconds until a run that has 100,000 records knows what is left to be played."""
+    plan, folder = _many()
+    start = time.perf_counter()
+    plan.jobs()
+    with RecordStore(folder) as store:
+        if len(store.stored) != MANY:
+            raise AssertionError(f"{len(store.stored)} of {MANY} records were found")
+    return time.perf_counter() - start
+
+
+class _Clock(Silent):
+    """Notes when records arrive."""
+
+    def __init__(self) -> None:
+        self.times: list[float] = []
+
+    def advance(self, record: Record, *, is_new: bool = True) -> None:
+        """Note the time."""
+        del record, is_new
+        self.times.append(time.perf_counter())
+
+
+def _nothing(job: Job) -> Record:
+    event = EventRecord(step=1, kind="picked", subject="cube_red")
+    course = Course("success", cause=None, events=[event] * _EVENTS)
+    return describe(job, course, started_at=utc_now())
+
+
+@functools.cache
+def _many() -> tuple[Plan, Path]:
+    """A plan of that many jobs, and a folder with all of their records."""
+    plan = make_plan(
+        ["random"],
+        tasks="PickXtimes",
+        settings="explicit,direct",
+        episodes="50",
+        policy_seeds=f"0-{MANY // 100 - 1}",
+    )
+    folder = Path(tempfile.mkdtemp(prefix="roboirg-bench-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    lines: dict[tuple[int, str], bytes] = {}
+    with (folder / RECORDS_FILE).open("wb") as file:
+        for job in plan.jobs():
+            place = (job.episode, job.setting)
+            if place not in lines:
+                lines[place] = _nothing(job).model_dump_json().encode() + b"\n"
+            file.write(
+                lines[place].replace(b'"policy_seed":0', b'"policy_seed":%d' % job.policy_seed)
+            )
+    return plan, folder

@@ -1,0 +1,63 @@
+"""What a process does of which the start or the memory is measured; it imports nothing else."""
+
+from __future__ import annotations
+
+import json
+import pathlib
+import sys
+import time
+from typing import Literal
+
+import roboirg
+
+Path = Literal["ours", "stock"]
+TASK = "PickXtimes"
+
+
+def observe(path: Path, index: int) -> None:
+    """Play an episode without a video up to its first observation."""
+    if path == "ours":
+        roboirg.make(TASK, episode=index).reset()
+        return
+    from roboirg.core.observations import CAMERAS
+    from roboirg.episodes.splits import get_episode
+    from roboirg.simulation.episode_session import Session
+    from roboirg.simulation.rendering.render_mode import STOCK
+
+    session = Session(get_episode(TASK, "test", index), visible=True, rendering=STOCK)
+    session.play_demonstration()
+    session.world.cameras.pictures(CAMERAS)
+    for camera in CAMERAS:
+        session.world.cameras.segmentation(camera)
+
+
+def _most_resident() -> float:
+    """The most memory that this process has held, GiB.
+
+    From Linux's status file: what `resource` tells may be the parent's before the fork.
+    """
+    status = pathlib.Path("/proc/self/status").read_text(encoding="ascii")
+    line = next(line for line in status.splitlines() if line.startswith("VmHWM"))
+    return int(line.split()[1]) / 2**20
+
+
+def _main(path: Path, what: str) -> None:
+    told: dict[str, float] = {}
+    start = time.perf_counter()
+    observe(path, 0)
+    if what == "next":
+        if path == "ours":
+            start = time.perf_counter()
+            observe(path, 1)
+        told["seconds"] = time.perf_counter() - start
+    elif what == "memory":
+        from roboirg.perf import stepping
+        from roboirg.perf.workloads import over_the_table
+
+        stepping.eager(over_the_table())
+        told["gibibytes"] = _most_resident()
+    sys.stdout.write(json.dumps(told))
+
+
+if __name__ == "__main__":
+    _main("stock" if sys.argv[1] == "stock" else "ours", sys.argv[2])

@@ -1,0 +1,95 @@
+"""Seconds per control step, with pictures, without, and with nothing but physics."""
+
+from __future__ import annotations
+
+import gc
+import statistics
+import time
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.observations import CAMERAS
+from roboirg.perf.workloads import STEPS, Workload
+from roboirg.simulation.rendering.render_mode import FAITHFUL, STOCK, Rendering
+
+Action = NDArray[np.float64]
+
+CHUNK = 16
+"""Control steps per picture pair of a policy that acts in chunks."""
+
+
+def eager(workload: Workload, rendering: Rendering = FAITHFUL) -> float:
+    """Both pictures after every step."""
+    return _with_pictures(workload, rendering, every=1)
+
+
+def lazy(workload: Workload, rendering: Rendering = FAITHFUL) -> float:
+    """Both pictures after every chunk."""
+    return _with_pictures(workload, rendering, every=CHUNK)
+
+
+def stock(workload: Workload) -> float:
+    """What RoboMME does: everything drawn at every step, colour and segmentation fetched."""
+    session = workload.begun(rendering=STOCK)
+    cameras = session.world.cameras
+    cameras.pictures(CAMERAS)
+
+    def step(action: Action) -> None:
+        session.step(action)
+        cameras.pictures(CAMERAS)
+        for camera in CAMERAS:
+            cameras.segmentation(camera)
+
+    return _median(workload, step)
+
+
+def floor(workload: Workload) -> float:
+    """Physics and the pictures of what is visible, without rules, words or observations."""
+    world = workload.begun().world
+    world.cameras.pictures(CAMERAS)
+
+    def step(action: Action) -> None:
+        world.advance(action)
+        world.cameras.pictures(CAMERAS)
+
+    return _median(workload, step)
+
+
+def without_pictures(workload: Workload) -> float:
+    """Physics and rules."""
+    return _median(workload, workload.begun(visible=False).step, CHUNK)
+
+
+def physics(workload: Workload) -> float:
+    """Physics alone."""
+    return _median(workload, workload.begun(visible=False).world.advance, CHUNK)
+
+
+def _with_pictures(workload: Workload, rendering: Rendering, every: int) -> float:
+    session = workload.begun(rendering=rendering)
+    cameras = session.world.cameras
+    cameras.pictures(CAMERAS)
+    count = 0
+
+    def step(action: Action) -> None:
+        nonlocal count
+        session.step(action)
+        count += 1
+        if count % every == 0:
+            cameras.pictures(CAMERAS)
+
+    return _median(workload, step, every)
+
+
+def _median(workload: Workload, step: Callable[[Action], object], together: int = 1) -> float:
+    """Seconds per step: the median over so many steps together, which a hiccup does not move."""
+    gc.collect()  # what an earlier measurement left behind
+    durations = []
+    for first in range(0, STEPS, together):
+        start = time.perf_counter()
+        for action in workload.actions[first : first + together]:
+            step(action)
+        durations.append((time.perf_counter() - start) / together)
+    return statistics.median(durations)

@@ -1,0 +1,1 @@
+"""Built-in policies: oracle, language baselines and random actions."""

@@ -1,0 +1,41 @@
+"""The random policy: valid actions without any sense."""
+
+from __future__ import annotations
+
+import zlib
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.actions import ARM_JOINTS, JOINT_HIGH, JOINT_LOW
+from roboirg.core.observations import Demonstration, Observation
+
+CHUNK = 16
+LARGEST_STEP = 0.045
+"""Radians per control step: 0.9 rad/s, the speed limit of the oracle's hands."""
+
+
+class RandomPolicy:
+    """Wanders towards random joint positions and opens and closes the gripper."""
+
+    cameras: ClassVar[tuple[str, ...]] = ()
+
+    def __init__(self, seed: int = 0) -> None:
+        self.seed = seed
+        self._rng = np.random.default_rng(seed)
+
+    def reset(self, instruction: str, demonstration: Demonstration) -> None:  # noqa: ARG002
+        """Begin a walk that depends on the seed and the instruction alone."""
+        self._rng = np.random.default_rng([self.seed, zlib.crc32(instruction.encode())])
+
+    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
+        """Sixteen actions towards a target within the joint limits."""
+        joints = np.asarray(observation["joint_positions"], dtype=np.float64)
+        target = self._rng.uniform(JOINT_LOW, JOINT_HIGH)
+        step = np.clip((target - joints) / CHUNK, -LARGEST_STEP, LARGEST_STEP)
+        path = joints + step * np.arange(1, CHUNK + 1)[:, None]
+        gripper = self._rng.uniform(-1.0, 1.0)
+        actions = np.column_stack([path, np.full(CHUNK, gripper)])
+        actions[:, :ARM_JOINTS] = np.clip(actions[:, :ARM_JOINTS], JOINT_LOW, JOINT_HIGH)
+        return actions

@@ -1,0 +1,131 @@
+"""What a model is shown and told: words, pictures and clips, and how these become files."""
+
+from __future__ import annotations
+
+import functools
+import io
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.errors import MissingDependencyError
+
+Pixels = NDArray[np.uint8]
+
+VIDEO_RATE = 30
+"""Frames per second at which MME-VLA's planners show control steps; the world has 20 a second."""
+QUALITY = 23
+"""x264's constant rate factor, its default."""
+
+
+class Picture(NamedTuple):
+    """One picture.
+
+    Attributes:
+        pixels: uint8 (height, width, 3), RGB.
+    """
+
+    pixels: Pixels
+
+
+@dataclass(frozen=True, eq=False)
+class Clip:
+    """A short film.
+
+    Attributes:
+        frames: uint8 (T, height, width, 3), T >= 1; height and width are even.
+        rate: frames per second.
+    """
+
+    frames: Pixels
+    rate: Fraction = Fraction(VIDEO_RATE)
+
+    @functools.cached_property
+    def file(self) -> bytes:
+        """As `mp4` makes it; made once, as a conversation shows its clips again and again."""
+        return mp4(self)
+
+
+Part = str | Picture | Clip
+
+
+class Turn(NamedTuple):
+    """What one side of a conversation says."""
+
+    role: Literal["user", "model"]
+    parts: tuple[Part, ...]
+
+
+def evenly(frames: Pixels, most: int) -> Pixels:
+    """At most so many of the frames, evenly spaced, the first and the last among them."""
+    if len(frames) <= most:
+        return frames
+    kept: Pixels = frames[np.linspace(0, len(frames) - 1, most).round().astype(int)]
+    return kept
+
+
+def summary(frames: Pixels, most: int, steps: int) -> Clip:
+    """At most so many frames of a video, spread over the time that the whole of it would take.
+
+    Args:
+        frames: uint8 (T, height, width, 3), T >= 1.
+        most: frames to keep.
+        steps: control steps from the first frame to after the last; each takes 1/30 s.
+    """
+    kept = evenly(frames, most)
+    return Clip(kept, Fraction(VIDEO_RATE * len(kept), max(steps, len(kept))))
+
+
+def png(picture: Picture) -> bytes:
+    """A picture as a PNG file.
+
+    Raises:
+        MissingDependencyError: PyAV is not installed.
+    """
+    _check_pyav()
+    import av
+
+    height, width = picture.pixels.shape[:2]
+    codec = av.CodecContext.create("png", "w")
+    codec.width, codec.height, codec.pix_fmt = width, height, "rgb24"
+    codec.time_base = Fraction(1)
+    frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture.pixels), format="rgb24")
+    frame.pts = 0
+    return b"".join(bytes(packet) for packet in (*codec.encode(frame), *codec.encode(None)))
+
+
+def mp4(clip: Clip) -> bytes:
+    """A clip as an MP4 file, H.264.
+
+    Raises:
+        MissingDependencyError: PyAV is not installed.
+    """
+    _check_pyav()
+    import av
+
+    file = io.BytesIO()
+    with av.open(file, "w", format="mp4") as container:
+        stream = container.add_stream("libx264", rate=clip.rate.limit_denominator(1000))
+        stream.height, stream.width = clip.frames.shape[1:3]
+        stream.pix_fmt = "yuv420p"
+        stream.options = {"crf": str(QUALITY), "preset": "veryfast"}
+        # One thread, so that the same frames give the same bytes.
+        stream.codec_context.thread_count = 1
+        for pixels in clip.frames:
+            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(pixels), format="rgb24")
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+    return file.getvalue()
+
+
+def _check_pyav() -> None:
+    try:
+        import av  # noqa: F401 - an extra, and slow to import
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"Pictures for a model need PyAV, which is not installed ({error}); run: "
+            "pip install 'roboirgbench[sim]'."
+        ) from error

@@ -1,0 +1,133 @@
+"""How ``system:…`` and ``vlm-listener:…`` on the command line become policies.
+
+| spec | what it is |
+| --- | --- |
+| ``system:NAME?server=host:port&vlm=URL`` | a system of the paper, or one from a file |
+| ``vlm-listener:PROVIDER?model=NAME&base_url=URL`` | a model says what is meant |
+
+Values with ``&`` or ``#`` in them are percent-encoded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qsl
+
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.policies.base import Policy
+from roboirg.policies.planning.models import ModelOptions
+from roboirg.policies.planning.option_checking import checked
+from roboirg.policies.planning.vlm_listener import ListenerOptions, VLMListener
+from roboirg.policies.requirements import (
+    wanted_actions,
+    wanted_cameras,
+    wanted_demonstration_frames,
+    wanted_history,
+    wanted_history_cameras,
+)
+
+if TYPE_CHECKING:
+    from roboirg.envs.environment import RoboIRGEnv
+
+SYSTEM = "system"
+LISTENER = "vlm-listener"
+
+Build = Callable[[int], Policy]
+
+
+class PolicyFactory:
+    """Makes policies, and has the attributes that a class of such policies would have.
+
+    Args:
+        spec: what it was made from.
+        build: a policy from a seed; without network, and without the libraries of providers.
+        sample: a policy that `build` made.
+    """
+
+    def __init__(self, spec: str, build: Build, sample: Policy) -> None:
+
+        self.spec, self._build = spec, build
+        self.__name__ = spec
+        self.cameras = wanted_cameras(sample)
+        self.actions = wanted_actions(sample).name
+        self.demonstration_frames = wanted_demonstration_frames(sample)
+        self.observe_every = wanted_history(sample)
+        self.history_cameras = wanted_history_cameras(sample)
+        self.grounded = bool(getattr(sample, "grounded", False))
+        self.version = str(getattr(sample, "version", "unknown"))
+
+    def __call__(self, seed: int = 0) -> Policy:
+        """A fresh policy."""
+        return self._build(seed)
+
+
+class PrivilegedPolicyFactory(PolicyFactory):
+    """Makes policies that look behind the scenes; having ``attach`` says so."""
+
+    def attach(self, env: RoboIRGEnv) -> None:
+        """Not for factories: attach what they make."""
+        raise TypeError(f"{self.spec} makes policies; attach(env) is for one of those, not {env}.")
+
+
+def find(spec: str) -> PolicyFactory | None:
+    """What makes the policies of a spec; None if the spec is of another kind.
+
+    Needs no network, and no client library of any provider.
+
+    Raises:
+        UnknownNameError: there is no such system, provider or option.
+        InvalidValueError: an option is missing, or has a value that it cannot have.
+    """
+    kind, colon, rest = spec.partition(":")
+    if not colon or kind not in BUILDERS:
+        return None
+    name, _, query = rest.partition("?")
+    build = BUILDERS[kind](spec, name, _options(spec, query))
+    sample = build(0)
+    made = PrivilegedPolicyFactory if hasattr(sample, "attach") else PolicyFactory
+    return made(spec, build, sample)
+
+
+def _system(spec: str, name: str, options: Mapping[str, str]) -> Build:
+    from roboirg.policies.planning.systems import build_system, find_system
+
+    if not name:
+        raise InvalidValueError(f"Policy {spec!r} names no system.")
+    system = find_system(name, options)
+    return lambda seed: build_system(system, seed)
+
+
+def _listener(_spec: str, name: str, options: Mapping[str, str]) -> Build:
+    """Options of listener and model stand side by side."""
+    own = [option for option in ListenerOptions.model_fields if option != "model"]
+    asked = [option for option in ModelOptions.model_fields if option != "provider"]
+    for option in options:
+        if option not in (*own, *asked):
+            raise UnknownNameError(f"option of {LISTENER}:", option, [*own, *asked])
+    values: dict[str, Any] = {key: value for key, value in options.items() if key in own}
+    model: dict[str, Any] = {key: value for key, value in options.items() if key not in own}
+    origin = f"policy {LISTENER}:{name}"
+    values["model"] = checked(ModelOptions, {"provider": name, **model}, origin)
+    settled = checked(ListenerOptions, values, origin)
+    return lambda seed: VLMListener(settled, seed)
+
+
+BUILDERS: Mapping[str, Callable[[str, str, Mapping[str, str]], Build]] = {
+    SYSTEM: _system,
+    LISTENER: _listener,
+}
+
+
+def _options(spec: str, query: str) -> dict[str, str]:
+    try:
+        pairs = parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query))
+    except ValueError as error:
+        raise InvalidValueError(
+            f"Policy {spec!r}: options are written ?name=value&name=value, not {query!r}."
+        ) from error
+    names = [name for name, _ in pairs]
+    for name in names:
+        if names.count(name) > 1:
+            raise InvalidValueError(f"Policy {spec!r} gives the option {name!r} twice.")
+    return dict(pairs)

@@ -1,0 +1,91 @@
+"""Policies named by a URL: the scheme says what kind, the query holds options."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import NamedTuple, TypeVar
+from urllib.parse import parse_qsl, unquote
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+
+_MARK = "://"
+_URL = re.compile(r"[\w+.-]*://")
+
+
+class PolicyUrl(NamedTuple):
+    """A URL taken apart.
+
+    Attributes:
+        text: all of it.
+        scheme: before ``://``.
+        place: after it, up to the query.
+        options: of the query.
+    """
+
+    text: str
+    scheme: str
+    place: str
+    options: Mapping[str, str]
+
+
+class UrlOptions(BaseModel):
+    """Options of a scheme: a field each, with its type, limits and default."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+Options = TypeVar("Options", bound=UrlOptions)
+
+
+def is_url(spec: str) -> bool:
+    """Whether a policy's spec is a URL; one that holds a URL among its options is none."""
+    return _URL.match(spec) is not None
+
+
+def split_url(spec: str) -> PolicyUrl:
+    """Take a URL apart.
+
+    Raises:
+        InvalidValueError: it names nothing after the scheme, or its query is malformed.
+    """
+    scheme, _, rest = spec.partition(_MARK)
+    place, _, query = rest.partition("?")
+    if not place.strip("/"):
+        raise InvalidValueError(f"Policy {spec!r} names nothing after {scheme}{_MARK}.")
+    try:
+        pairs = parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query))
+    except ValueError as error:
+        raise InvalidValueError(
+            f"Policy {spec!r}: options are written ?name=value&name=value, not {query!r}."
+        ) from error
+    options = dict(pairs)
+    if len(options) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise InvalidValueError(f"Policy {spec!r} gives the option {twice!r} twice.")
+    return PolicyUrl(spec, scheme, unquote(place), options)
+
+
+def read_options(url: PolicyUrl, kind: type[Options]) -> Options:
+    """The options of a URL, checked.
+
+    Raises:
+        UnknownNameError: the scheme has no such option; names the nearest.
+        InvalidValueError: an option has a value that it cannot have.
+    """
+    for name in url.options:
+        if name not in kind.model_fields:
+            raise UnknownNameError(f"option of {url.scheme}{_MARK}", name, kind.model_fields)
+    try:
+        return kind.model_validate(dict(url.options))
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = str(first["loc"][0])
+        message = first["msg"].removeprefix("Value error, ")
+        end = "" if message.endswith((".", "?")) else "."
+        raise InvalidValueError(
+            f"Policy {url.text!r}: option {name} is {url.options[name]!r}: {message}{end}"
+        ) from error

@@ -1,0 +1,1 @@
+"""The control loop on a real robot or its simulated twin."""

@@ -1,0 +1,113 @@
+"""What the arm may be told to do: checked before a command is sent."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from roboirg.core.actions import ARM_JOINTS, JOINT_HIGH, JOINT_LOW
+from roboirg.core.errors import InvalidActionError, InvalidValueError
+from roboirg.real.control.kinematics import tool_in_base
+from roboirg.real.control.robot import Command
+
+FR3_LOW = np.array([-2.7437, -1.7837, -2.9007, -3.0421, -2.8065, 0.5445, -3.0159])
+FR3_HIGH = np.array([2.7437, 1.7837, 2.9007, -0.1518, 2.8065, 4.5169, 3.0159])
+"""Joint limits of the Franka Research 3, rad (its maker's data sheet)."""
+LOW, HIGH = np.maximum(JOINT_LOW, FR3_LOW), np.minimum(JOINT_HIGH, FR3_HIGH)
+"""What both the Panda and the Research 3 reach, rad."""
+
+SLACK = 1e-9
+_AXES = ("x", "y", "z")
+
+
+class Limits(BaseModel):
+    """Limits of commands.
+
+    Attributes:
+        joint_speed: rad/s of every joint. Below the slowest joint of the Panda (2.175) and of the
+            Research 3 (2.62); the benchmark's demonstrations stay below 0.9.
+        workspace_low: least x, y, z of the tool centre, robot base frame, m.
+        workspace_high: greatest.
+        picture_age_s: of the newest picture of each camera; one and a half of its periods.
+        policy_timeout_s: that a policy may think; the arm holds its position meanwhile.
+        dead_man_s: without a sign of life of the control loop, after which the arm is stopped.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    joint_speed: float = Field(default=1.5, gt=0)
+    workspace_low: tuple[float, float, float] = (0.2, -0.5, 0.002)
+    workspace_high: tuple[float, float, float] = (0.9, 0.5, 0.8)
+    picture_age_s: float = Field(default=0.05, gt=0)
+    policy_timeout_s: float = Field(default=2.0, gt=0)
+    dead_man_s: float = Field(default=0.1, gt=0)
+
+    def check(
+        self,
+        command: Command,
+        last: NDArray[np.float64],
+        joints: NDArray[np.float64],
+        period_s: float,
+    ) -> None:
+        """Complain of a command that must not be sent.
+
+        Speeds are measured from the nearer of where a joint was told to be and where it is: an arm
+        lags behind its targets, and a policy that goes by what it sees starts from there.
+
+        Args:
+            command: joint targets and gripper.
+            last: the joint targets before, (7), rad.
+            joints: where the joints are, (7), rad.
+            period_s: from one command to the next.
+
+        Raises:
+            InvalidActionError: it is outside the limits; nothing has moved.
+        """
+        target = command[:ARM_JOINTS]
+        outside = np.flatnonzero((target < LOW - SLACK) | (target > HIGH + SLACK))
+        if len(outside):
+            joint = int(outside[0])
+            raise InvalidActionError(
+                f"joint {joint + 1} would go to {target[joint]:.3f} rad; its limits are "
+                f"{LOW[joint]:.3f} and {HIGH[joint]:.3f}."
+            )
+        nearest = np.clip(target, np.minimum(last, joints), np.maximum(last, joints))
+        speeds = np.abs(target - nearest) / period_s
+        fastest = int(np.argmax(speeds))
+        if speeds[fastest] > self.joint_speed + SLACK:
+            raise InvalidActionError(
+                f"joint {fastest + 1} would move at {speeds[fastest]:.2f} rad/s; at most "
+                f"{self.joint_speed:g}."
+            )
+        self._check_tool(tool_in_base(target)[:3, 3])
+
+    def _check_tool(self, tool: NDArray[np.float64]) -> None:
+        for axis, low, at, high in zip(
+            _AXES, self.workspace_low, tool, self.workspace_high, strict=True
+        ):
+            if not low - SLACK <= at <= high + SLACK:
+                raise InvalidActionError(
+                    f"the tool would go to {axis} = {at:.3f} m in the robot's base frame; the "
+                    f"workspace is from {low:g} to {high:g}."
+                )
+
+
+def read_limits(path: Path | None) -> Limits:
+    """Limits from a JSON file of some of the fields; the usual ones without a file.
+
+    Raises:
+        InvalidValueError: the file cannot be read, or says something else.
+    """
+    if path is None:
+        return Limits()
+    try:
+        return Limits.model_validate_json(path.read_bytes())
+    except OSError as error:
+        raise InvalidValueError(f"Cannot read the limits {path}: {error.strerror}.") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = ".".join(str(part) for part in first["loc"]) or "the file"
+        raise InvalidValueError(f"The limits {path}: {name}: {first['msg']}.") from error

@@ -1,0 +1,1 @@
+"""What operators read: the score page, printed sheets and figures."""

@@ -1,0 +1,1 @@
+"""Planning and running a study, and the log of its trials."""

@@ -1,0 +1,1 @@
+"""Records: one JSON object per episode, stored, merged and exported."""

@@ -1,0 +1,149 @@
+"""Records as a table for pandas, Polars or DuckDB: one row for each episode."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.records.record import Record
+
+if TYPE_CHECKING:
+    from pyarrow import Schema
+
+_TEXTS = [
+    "policy",
+    "task",
+    "split",
+    "setting",
+    "form",
+    "distractor",
+    "frame",
+    "actions",
+    "demonstration_frames",
+    "meshes",
+    "spec",
+    "difficulty",
+    "outcome",
+    "error",
+    "cause",
+    "policy_version",
+    "language_version",
+    "package_version",
+    "code",
+    "plan",
+    "command",
+    "video",
+    "film_lost",
+    "details",
+    "render_device",
+    "started_at",
+]
+_NUMBERS = [
+    "episode",
+    "distractors",
+    "policy_seed",
+    "max_steps",
+    "observe_every",
+    "seed",
+    "steps",
+    "demonstration_steps",
+    "environment_version",
+    "attempt",
+    "schema_version",
+]
+_AS_JSON = ("goal", "metadata", "policy_metadata", "usage", "timings")
+"""Every task and policy has keys of its own here."""
+_ROWS_AT_ONCE = 5_000
+
+
+def check_parquet_support() -> None:
+    """See before the work starts that Parquet can be written.
+
+    Raises:
+        MissingDependencyError: it cannot.
+    """
+    try:
+        import pyarrow.parquet  # noqa: F401
+    except ImportError as error:
+        raise MissingDependencyError(
+            "Parquet files need pyarrow; run: pip install 'roboirgbench[export]'."
+        ) from error
+
+
+def write_parquet(records: Iterable[Record], path: Path) -> int:
+    """Write records into a Parquet file, which appears whole or not at all.
+
+    Columns are the fields of a record. ``instruction``, ``mentions``, ``events`` and
+    ``attribution`` are nested; ``goal``, ``metadata``, ``policy_metadata``, ``usage`` and
+    ``timings`` are JSON texts.
+
+    Returns:
+        The number of rows.
+
+    Raises:
+        MissingDependencyError: pyarrow is not installed.
+        InvalidValueError: the file cannot be written.
+    """
+    check_parquet_support()
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    schema, count = _schema(), 0
+    partial = path.with_name(f".{path.name}.part")
+    rows = map(_row, records)
+    try:
+        with parquet.ParquetWriter(partial, schema, compression="zstd") as writer:
+            while batch := list(itertools.islice(rows, _ROWS_AT_ONCE)):
+                writer.write_table(pa.Table.from_pylist(batch, schema=schema))
+                count += len(batch)
+        partial.replace(path)
+    except OSError as error:
+        partial.unlink(missing_ok=True)
+        raise InvalidValueError(f"Cannot write {path}: {error.strerror or error}.") from error
+    return count
+
+
+def _row(record: Record) -> dict[str, Any]:
+    data = record.model_dump(mode="json")
+    for name in _AS_JSON:
+        data[name] = json.dumps(data[name], ensure_ascii=False)
+    frames = data["demonstration_frames"]
+    data["demonstration_frames"] = None if frames is None else str(frames)
+    for mention in data["mentions"]:
+        mention["value"] = str(mention["value"])
+    return data
+
+
+def _schema() -> Schema:
+    import pyarrow as pa
+
+    text, number, truth = pa.string(), pa.int64(), pa.bool_()
+    known = {
+        **dict.fromkeys((*_TEXTS, *_AS_JSON), text),
+        **dict.fromkeys(_NUMBERS, number),
+        "privileged": truth,
+        "duration_s": pa.float64(),
+        "stages": pa.list_(number),
+        "attribution": pa.struct(
+            {"kind": text, "failure": text, "subject": text, "step": number, "sentence": text}
+        ),
+        "instruction": pa.list_(pa.struct({"stage": text, "text": text})),
+        "mentions": pa.list_(
+            pa.struct(
+                {
+                    **dict.fromkeys(("utterance", "start", "end"), number),
+                    **dict.fromkeys(("role", "expression", "slot", "value"), text),
+                }
+            )
+        ),
+        "events": pa.list_(
+            pa.struct(
+                {"step": number, "kind": text, "subject": text, "place": text, "holds": truth}
+            )
+        ),
+    }
+    return pa.schema({name: known[name] for name in Record.model_fields})

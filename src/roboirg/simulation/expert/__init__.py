@@ -1,0 +1,1 @@
+"""The scripted expert: motion planning, grasping and motion primitives."""

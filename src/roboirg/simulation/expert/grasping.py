@@ -1,0 +1,91 @@
+"""How the oracle takes hold of a thing: fingers down, closing along one of its sides.
+
+The side nearest to the present closing axis makes the shortest turn. Where other things are in the
+way of the open fingers, another side is better.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from roboirg.core import object_sizes
+from roboirg.simulation.bodies import Body
+from roboirg.tasks.shared.placement import Circle, Footprint, Rectangle, overlap
+
+FINGER_OFFSET = 0.048
+"""From the tool's axis to the middle of an open finger, m."""
+FINGER_HALF = (0.008, 0.011)
+"""Half sides of a fingertip, along the closing axis and across it, m."""
+
+
+def grasp_rotations(name: str, bodies: Mapping[str, Body], tool: Rotation) -> list[Rotation]:
+    """Tool rotations in which an object can be grasped, the best first.
+
+    Args:
+        name: of the object.
+        bodies: all objects by name.
+        tool: the tool's present rotation.
+    """
+    matrix = bodies[name].entity.pose.to_transformation_matrix()[:3, :3]
+    flat = [axis[:2] for axis in matrix.T if abs(axis[2]) < math.sqrt(0.5)]
+    sides = [
+        sign * axis / np.linalg.norm(axis) for axis, sign in itertools.product(flat, (1.0, -1.0))
+    ]
+    closing_now = tool.as_matrix()[:2, 1]
+    obstacles = [
+        area for other, body in bodies.items() if other != name for area in _footprints(body)
+    ]
+    x, y, _ = bodies[name].position
+
+    def cost(side: NDArray[np.float64]) -> tuple[bool, float]:
+        fingers = _fingers(x, y, side)
+        blocked = any(overlap(*pair) for pair in itertools.product(fingers, obstacles))
+        return blocked, -float(side @ closing_now)
+
+    return [_rotation(side) for side in sorted(sides, key=cost)]
+
+
+def _fingers(x: float, y: float, side: NDArray[np.float64]) -> list[Rectangle]:
+    yaw = math.atan2(side[1], side[0])
+    return [
+        Rectangle(
+            x + sign * side[0] * FINGER_OFFSET,
+            y + sign * side[1] * FINGER_OFFSET,
+            *FINGER_HALF,
+            yaw,
+        )
+        for sign in (1.0, -1.0)
+    ]
+
+
+def _footprints(body: Body) -> Iterator[Footprint]:
+    """The areas near the table in which an object is in the way; its hidden insides are not."""
+    x, y, _ = body.position
+    yaw = math.atan2(*body.entity.pose.to_transformation_matrix()[1::-1, 0])
+    match body.item.kind:
+        case "cube":
+            yield Rectangle(x, y, object_sizes.CUBE_HALF, object_sizes.CUBE_HALF, yaw)
+        case "tape":
+            yield Circle(x, y, object_sizes.TAPE_RADIUS)
+        case "box":
+            yield Rectangle(x, y, object_sizes.BOX_HALF, object_sizes.BOX_HALF, yaw)
+        case "container":
+            half = object_sizes.CONTAINER_FOOTPRINT_HALF
+            yield Rectangle(x, y, half, half, yaw)
+        case "button":
+            yield Rectangle(x, y, *object_sizes.BUTTON_BASE_HALF[:2])
+        case "bin":
+            yield Rectangle(x, y, object_sizes.BIN_HALF, object_sizes.BIN_HALF, yaw)
+
+
+def _rotation(closing: NDArray[np.float64]) -> Rotation:
+    """Fingers down, closing along a horizontal direction (2)."""
+    along = np.array([*closing, 0.0])
+    approach = np.array([0.0, 0.0, -1.0])
+    return Rotation.from_matrix(np.stack([np.cross(along, approach), along, approach], axis=1))

@@ -1,0 +1,250 @@
+"""The Franka Panda with a wrist camera: loading, control, and what it feels."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sapien
+import sapien.physx
+import sapien.render
+from numpy.typing import NDArray
+from sapien.wrapper.urdf_loader import URDFLoader
+
+from roboirg.core.actions import ARM_JOINTS
+from roboirg.core.episode import ROBOT_BASE
+from roboirg.core.observations import CAMERAS, FRONT
+from roboirg.simulation import physics_settings
+from roboirg.simulation.model_files import find_model_files
+from roboirg.simulation.rendering.culling import Drawable
+from roboirg.simulation.rendering.render_mode import FAITHFUL, Rendering
+from roboirg.simulation.rendering.robot_meshes import finish, link_hull, link_shapes
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
+
+FINGERS = ("panda_leftfinger", "panda_rightfinger")
+TOOL_LINK = "panda_hand_tcp"
+CAMERA_LINK = "camera_link"
+BASE_LINK = "panda_link0"
+
+GRASP_FORCE = 0.5
+"""Newtons on each finger at which an object counts as grasped (ManiSkill)."""
+GRASP_ANGLE = math.radians(85.0)
+"""Largest angle between a finger's force and its opening direction."""
+STILL_SPEED = 0.2
+"""Joint speed, rad/s, up to which the robot counts as still."""
+
+
+class Robot:
+    """A Panda in a scene, fixed at its base, at home with an open gripper.
+
+    Args:
+        scene: where to build it; it has to be the first thing that is built.
+        visible: whether to load its pictures' meshes too.
+        rendering: which meshes.
+
+    Attributes:
+        drawables: what is known of its bodies that cameras draw.
+    """
+
+    def __init__(
+        self, scene: sapien.Scene, *, visible: bool, rendering: Rendering = FAITHFUL
+    ) -> None:
+        loader = _loader(visible, rendering.meshes == "stock")
+        builder = loader.builder
+        builder.set_scene(scene)
+        builder.initial_pose = sapien.Pose(ROBOT_BASE)
+        self.articulation = builder.build()
+        for link in self.articulation.links:
+            link.disable_gravity = True
+        for joint in self.articulation.active_joints:
+            joint.set_drive_properties(
+                physics_settings.STIFFNESS,
+                physics_settings.DAMPING,
+                physics_settings.FORCE_LIMIT,
+                mode="force",
+            )
+            joint.set_friction(0.0)
+        self.links = {link.name: link for link in self.articulation.links}
+        self.drawables: dict[sapien.render.RenderBodyComponent, Drawable] = {}
+        self._add_meshes(loader.visuals, rendering)
+        self.tool = self.links[TOOL_LINK]
+        self._joints = list(self.articulation.active_joints)
+        self._fingers = [self.links[name] for name in FINGERS]
+        self.reset()
+
+    def _add_meshes(self, visuals: Mapping[str, Sequence[Any]], rendering: Rendering) -> None:
+        for name, records in visuals.items():
+            if name == BASE_LINK and rendering.culling:
+                # It never moves, and the front camera draws only what it can see of it.
+                others = [camera for camera in CAMERAS if camera != FRONT]
+                self._add_body(name, records, rendering, (FRONT,), sapien.Pose(ROBOT_BASE))
+                self._add_body(name, records, rendering, others)
+            else:
+                self._add_body(name, records, rendering, CAMERAS)
+
+    def _add_body(
+        self,
+        link: str,
+        records: Sequence[Any],
+        rendering: Rendering,
+        cameras: Sequence[str],
+        fixed_at: sapien.Pose | None = None,
+    ) -> None:
+        """Give a link what some cameras draw of it.
+
+        Args:
+            link: its name.
+            records: SAPIEN's, of its meshes.
+            rendering: which meshes.
+            cameras: that draw it.
+            fixed_at: where the link is for ever, world frame, if only what the front camera can
+                see of it there is wanted.
+        """
+        component, hulls = sapien.render.RenderBodyComponent(), []
+        for record in records:
+            path, pose = Path(record.filename), record.pose
+            place = None if fixed_at is None else fixed_at * pose
+            for shape in link_shapes(path, record.material, rendering, place):
+                shape.local_pose = pose
+                component.attach(shape)
+            matrix = pose.to_transformation_matrix()
+            hulls.append(link_hull(path, rendering) @ matrix[:3, :3].T + matrix[:3, 3])
+        self.links[link].entity.add_component(component)
+        finish(component, rendering)
+        self.drawables[component] = Drawable(np.concatenate(hulls), cameras)
+
+    def reset(self) -> None:
+        """Put the robot at home, at rest."""
+        qpos = np.append(physics_settings.HOME, [physics_settings.FINGER_OPEN] * 2)
+        self.articulation.set_qpos(qpos)
+        self.articulation.set_qvel(np.zeros_like(qpos))
+        self.articulation.set_qf(np.zeros_like(qpos))
+        for joint, target in zip(self._joints, qpos, strict=True):
+            joint.set_drive_target(float(target))
+
+    def set_targets(self, action: NDArray[np.floating[Any]]) -> None:
+        """Drive towards an action (8): seven joint targets (rad) and the gripper in [-1, 1]."""
+        for joint, target in zip(self._joints, action[:ARM_JOINTS], strict=False):
+            joint.set_drive_target(float(target))
+        share = (min(max(float(action[ARM_JOINTS]), -1.0), 1.0) + 1.0) / 2.0
+        span = physics_settings.FINGER_OPEN - physics_settings.FINGER_SQUEEZE
+        for joint in self._joints[ARM_JOINTS:]:
+            joint.set_drive_target(physics_settings.FINGER_SQUEEZE + share * span)
+
+    @property
+    def arm_positions(self) -> NDArray[np.float64]:
+        """Joint angles of the arm (7), rad."""
+        return np.asarray(self.articulation.get_qpos()[:ARM_JOINTS], dtype=np.float64)
+
+    @property
+    def finger_positions(self) -> NDArray[np.float64]:
+        """Positions of the two fingers, m: 0 closed, 0.04 open."""
+        return np.asarray(self.articulation.get_qpos()[ARM_JOINTS:], dtype=np.float64)
+
+    @property
+    def tool_pose(self) -> sapien.Pose:
+        """Pose of the tool centre point between the fingertips, world frame."""
+        return self.tool.entity_pose
+
+    def is_still(self) -> bool:
+        """Whether no arm joint moves faster than 0.2 rad/s."""
+        speeds = np.abs(self.articulation.get_qvel()[:ARM_JOINTS])
+        return bool(speeds.max() <= STILL_SPEED)
+
+    def grasps(
+        self, body: sapien.physx.PhysxBaseComponent, contacts: list[sapien.physx.PhysxContact]
+    ) -> bool:
+        """Whether both fingers push the body with enough force against their opening direction.
+
+        Args:
+            body: the object's physical component.
+            contacts: of the last physics step.
+        """
+        for finger, sign in zip(self._fingers, (1.0, -1.0), strict=True):
+            force = _force_on(finger, body, contacts)
+            size = float(np.linalg.norm(force))
+            if size < GRASP_FORCE:
+                return False
+            opening = sign * finger.entity_pose.to_transformation_matrix()[:3, 1]
+            cosine = float(np.dot(opening, force)) / size
+            if math.acos(min(max(cosine, -1.0), 1.0)) > GRASP_ANGLE:
+                return False
+        return True
+
+
+def rotation_of(pose: sapien.Pose) -> Rotation:
+    """The rotation of a pose; SAPIEN's quaternions have the scalar first, SciPy's last."""
+    # SciPy takes a quarter of a second to import, and only planning needs it.
+    from scipy.spatial.transform import Rotation
+
+    w, x, y, z = np.asarray(pose.q, dtype=np.float64)
+    return Rotation.from_quat([x, y, z, w])
+
+
+def _force_on(
+    finger: sapien.physx.PhysxArticulationLinkComponent,
+    body: sapien.physx.PhysxBaseComponent,
+    contacts: list[sapien.physx.PhysxContact],
+) -> NDArray[np.float64]:
+    """Mean force of `body` on `finger` in the last physics step, N, world frame."""
+    impulse = np.zeros(3)
+    for contact in contacts:
+        first, second = contact.bodies
+        if first == finger and second == body:
+            sign = 1.0
+        elif first == body and second == finger:
+            sign = -1.0
+        else:
+            continue
+        for point in contact.points:
+            impulse += sign * point.impulse
+    return impulse * physics_settings.PHYSICS_RATE
+
+
+class _Loader(URDFLoader):  # type: ignore[misc]  # SAPIEN's wrappers have no types
+    """Reads the robot's description.
+
+    Args:
+        visible: whether the robot is to be seen at all.
+        stock: whether it is built with its meshes as they are installed.
+
+    Attributes:
+        builder: builds the robot, any number of times.
+        visuals: how the description wants the meshes shown that the builder leaves out, by link.
+    """
+
+    def __init__(self, *, visible: bool, stock: bool) -> None:
+        super().__init__()
+        self._visible = visible
+        self._stock = stock
+        self.visuals: dict[str, list[Any]] = {}
+        self.fix_root_link = True
+        # The loader wants a scene even to parse; the one to build in is set later.
+        self.set_scene(sapien.Scene([sapien.physx.PhysxCpuSystem()]))
+        for finger in FINGERS:
+            self.set_link_material(finger, 2.0, 2.0, 0.0)
+            self.set_link_patch_radius(finger, 0.1)
+            self.set_link_min_patch_radius(finger, 0.1)
+        urdf = find_model_files().robot
+        builders, _, _ = self.parse(str(urdf), str(urdf.with_suffix(".srdf")))
+        self.builder = builders[0]
+
+    def _build_link(self, link: Any, link_builder: Any) -> None:  # noqa: ANN401
+        if not self._visible:
+            link.visuals.clear()
+        super()._build_link(link, link_builder)
+        if link_builder.visual_records and not self._stock:
+            self.visuals[link.name] = link_builder.visual_records[:]
+            link_builder.visual_records.clear()
+
+
+@functools.cache
+def _loader(visible: bool, stock: bool) -> _Loader:
+    """The parsed robot description; parsing takes longer than building."""
+    return _Loader(visible=visible, stock=stock)

@@ -1,0 +1,1 @@
+"""Cameras, culling, shaders and meshes: how pictures are drawn."""

@@ -1,0 +1,231 @@
+"""View-frustum culling: a camera draws only the bodies that reach into its view.
+
+They are tested by their bounding boxes, and those of the robot by their convex hulls.
+
+Without shadows that cannot change a pixel. SAPIEN records what a camera draws once, and again only
+when the scene has changed since; bodies whose shading mode it does not know are left out of the
+record, and a change of the mode alone makes no camera record again. So each camera keeps the
+record of its own bodies until they become others. Where SAPIEN does not behave so
+(`keeps_records`), bodies are made invisible for one picture at a time, which is slower.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import sapien
+import sapien.render
+from numpy.typing import NDArray
+
+from roboirg.core.observations import CAMERAS
+from roboirg.simulation.rendering.render_device import render_system
+from roboirg.simulation.rendering.shaders import COLOUR, STOCK_COLOUR, slim_shader, stand_in_table
+from roboirg.simulation.rendering.viewpoint import NEAR
+
+MARGIN = 0.002
+"""Metres by which boxes are grown before the test."""
+HULL_MARGIN = 1e-4
+"""Metres by which convex hulls are; the renderer's numbers are good for 1/100 of that. The hand
+stays 1 mm outside the wrist camera's view, so that a larger margin would have it drawn."""
+
+_DRAWN, _LEFT_OUT = 0, 99
+"""Shading modes; the latter is unknown to SAPIEN."""
+
+
+@dataclass(frozen=True)
+class Drawable:
+    """What is known of a body that can be drawn.
+
+    Attributes:
+        hull: vertices (n, 3) of its convex hull in the frame of its entity, m.
+        cameras: that draw it if it reaches into their views.
+    """
+
+    hull: NDArray[np.float64]
+    cameras: Collection[str] = CAMERAS
+
+
+class Bodies:
+    """All that can be drawn in a scene.
+
+    Args:
+        scene: with all its bodies built.
+        drawables: what is known of some of them; for the others boxes do.
+    """
+
+    def __init__(
+        self, scene: sapien.Scene, drawables: Mapping[sapien.render.RenderBodyComponent, Drawable]
+    ) -> None:
+        self._bodies = [
+            component
+            for entity in scene.entities
+            for component in entity.components
+            if isinstance(component, sapien.render.RenderBodyComponent)
+        ]
+        known = [drawables.get(body) for body in self._bodies]
+        self._hulls = [None if one is None else one.hull for one in known]
+        self._boxes = np.stack(
+            [
+                _box(_points(body) if hull is None else hull)
+                for body, hull in zip(self._bodies, self._hulls, strict=True)
+            ]
+        )
+        self._drawn_by = {
+            camera: np.array([one is None or camera in one.cameras for one in known])
+            for camera in CAMERAS
+        }
+        self._set = np.ones(len(self._bodies), dtype=bool)
+        self._recorded: dict[sapien.render.RenderCameraComponent, NDArray[np.bool_]] = {}
+
+    def poses(self) -> NDArray[np.float64]:
+        """Where the bodies are now, (n, 4, 4)."""
+        return np.stack([body.entity.pose.to_transformation_matrix() for body in self._bodies])
+
+    def visible(
+        self, camera: str, poses: NDArray[np.float64], view: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
+        """For each body whether a camera is to draw it.
+
+        Args:
+            camera: its name.
+            poses: of the bodies, (n, 4, 4).
+            view: extrinsic matrix of the camera (3, 4).
+        """
+        outside = _outside(np.einsum("bij,bkj->bki", poses, self._boxes) @ view.T)
+        seen = self._drawn_by[camera] & ~outside.all(axis=-1).any(axis=0)
+        for number in np.flatnonzero(seen & outside.any(axis=(0, -1))):
+            hull = self._hulls[number]
+            if hull is not None:
+                to_camera = view @ poses[number]
+                points = hull @ to_camera[:, :3].T + to_camera[:, 3]
+                seen[number] = not _outside(points, HULL_MARGIN).all(axis=-1).any()
+        return np.asarray(seen)
+
+    def take(self, camera: sapien.render.RenderCameraComponent, visible: NDArray[np.bool_]) -> None:
+        """Have a camera draw these bodies; the picture is fetched later."""
+        if not keeps_records():
+            self._take_at_once(camera, visible)
+            return
+        # The modes are written even if the record stands: others may have made it outdated.
+        for number in np.flatnonzero(visible != self._set):
+            self._bodies[number].shading_mode = _DRAWN if visible[number] else _LEFT_OUT
+        self._set = visible
+        recorded = self._recorded.get(camera)
+        if recorded is None or not np.array_equal(recorded, visible):
+            outdate_records(self._bodies[0])
+            self._recorded[camera] = visible
+        camera.take_picture()
+
+    def _take_at_once(
+        self, camera: sapien.render.RenderCameraComponent, visible: NDArray[np.bool_]
+    ) -> None:
+        hidden = [body for body, seen in zip(self._bodies, visible, strict=True) if not seen]
+        for body in hidden:
+            body.visibility = 0.0
+        camera.take_picture()
+        camera.get_picture("PositionSegmentation")  # waits until it is drawn
+        for body in hidden:
+            body.visibility = 1.0
+
+
+def _outside(points: NDArray[np.float64], margin: float = 0.0) -> NDArray[np.bool_]:
+    """For each plane of a view's frustum, (5, ...), which points are outside of it.
+
+    The half view is 45 degrees, so the planes are z = NEAR, |x| = z and |y| = z.
+
+    Args:
+        points: (..., 3), m, in the camera's frame: x right, y down, z forward (OpenCV).
+        margin: metres by which they have to be.
+    """
+    x, y, z = np.moveaxis(points, -1, 0)
+    slack = math.sqrt(2.0) * margin
+    return np.stack([z < NEAR - margin, *(side > z + slack for side in (x, -x, y, -y))])
+
+
+def outdate_records(body: sapien.render.RenderBodyComponent) -> None:
+    """Have every camera of a body's scene record anew before its next picture."""
+    body.visibility = 0.0
+    body.visibility = 1.0
+
+
+@functools.cache
+def keeps_records() -> bool:
+    """Whether SAPIEN records as described above: tried out once in a process, in a tiny scene."""
+    scene = sapien.Scene([render_system()])
+    body = sapien.render.RenderBodyComponent()
+    body.attach(
+        sapien.render.RenderShapeBox(
+            [0.4, 0.4, 0.4], sapien.render.RenderMaterial(emission=[1.0, 1.0, 1.0, 1.0])
+        )
+    )
+    thing, eye = sapien.Entity(), sapien.Entity()
+    thing.add_component(body)
+    thing.set_pose(sapien.Pose([1.0, 0.0, 0.0]))
+    # With the usual shader, which then need not be compiled again.
+    shader = slim_shader()
+    camera = sapien.render.RenderCameraComponent(2, 2, shader or "")
+    eye.add_component(camera)
+    for entity in (thing, eye):
+        scene.add_entity(entity)
+    camera.set_texture("BRDFLUT", stand_in_table())
+
+    def shows() -> bool:
+        scene.update_render()
+        camera.take_picture()
+        return bool(camera.get_picture(STOCK_COLOUR if shader is None else COLOUR)[..., 0].any())
+
+    seen = [shows()]
+    for mode in (_LEFT_OUT, _DRAWN):
+        body.shading_mode = mode
+        seen.append(shows())
+        outdate_records(body)
+        seen.append(shows())
+    return seen == [True, True, False, False, True]
+
+
+_boxes_of_files: dict[tuple[object, ...], NDArray[np.float64]] = {}
+
+
+def _box(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Homogeneous corners (8, 4) of the box around points (n, 3), with the margin."""
+    low, high = points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
+    grid = np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1)
+    return np.column_stack([grid.reshape(-1, 3), np.ones(8)])
+
+
+def _points(body: sapien.render.RenderBodyComponent) -> NDArray[np.float64]:
+    """Corners (n, 3) of the boxes of a body's shapes in its entity's frame."""
+    corners: list[NDArray[np.float64]] = [_shape_corners(shape) for shape in body.render_shapes]
+    return np.concatenate(corners)
+
+
+def _shape_corners(shape: sapien.render.RenderShape) -> NDArray[np.float64]:
+    """Corners of a shape's box in its entity's frame, (8, 3)."""
+    low, high = _shape_bounds(shape)
+    grid = np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1)
+    matrix = shape.local_pose.to_transformation_matrix()
+    return np.asarray(grid.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3])
+
+
+def _shape_bounds(
+    shape: sapien.render.RenderShape,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lowest and highest coordinates in the shape's own frame."""
+    if isinstance(shape, sapien.render.RenderShapeBox):
+        half = np.asarray(shape.half_size, dtype=np.float64)
+        return -half, half
+    if isinstance(shape, sapien.render.RenderShapeCylinder):
+        half = np.array([shape.half_length, shape.radius, shape.radius], dtype=np.float64)
+        return -half, half
+    key = (shape.filename, *shape.scale)
+    bounds = _boxes_of_files.get(key) if shape.filename else None
+    if bounds is None:
+        points = np.concatenate([part.vertices for part in shape.parts]) * shape.scale
+        bounds = np.stack([points.min(axis=0), points.max(axis=0)]).astype(np.float64)
+        if shape.filename:
+            _boxes_of_files[key] = bounds
+    return bounds[0], bounds[1]

@@ -1,0 +1,47 @@
+"""Meshes with fewer triangles, for pictures that may differ a little from the faithful ones."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.errors import MissingDependencyError
+
+LINK_SHARE = 0.1
+CAMERA_SHARE = 0.05
+"""Of the triangles, which are kept; those of the camera are of its visible ones."""
+SMALL = 500
+"""Triangles of parts too small to be lightened."""
+
+
+def lighten(
+    corners: NDArray[np.float32], *, share: float
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Fewer triangles in nearly the same shape.
+
+    Args:
+        corners: of the triangles, (n, 3, 3), metres.
+        share: of the triangles, to be kept.
+
+    Returns:
+        Corners (m, 3, 3) and normals (m, 3).
+
+    Raises:
+        MissingDependencyError: fast-simplification is not installed.
+    """
+    try:
+        import fast_simplification
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"Light meshes need fast-simplification ({error}); "
+            "run: pip install 'roboirgbench[light]'"
+        ) from error
+    points, faces = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    points, faces = fast_simplification.simplify(
+        points, faces.reshape(-1, 3).astype(np.int32), target_reduction=1.0 - share
+    )
+    kept = points[faces].astype(np.float32)
+    normals = np.cross(kept[:, 1] - kept[:, 0], kept[:, 2] - kept[:, 0])
+    sizes = np.linalg.norm(normals, axis=1, keepdims=True)
+    whole = sizes[:, 0] > 0
+    return kept[whole], (normals[whole] / sizes[whole]).astype(np.float32)

@@ -1,0 +1,62 @@
+"""Grounded subgoals: a stage in words with the pixel at which the front camera sees its object."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from roboirg.core.episode import Stage
+from roboirg.judging import plain_subgoal
+from roboirg.simulation.bodies import Body
+from roboirg.simulation.rendering.cameras import Cameras
+
+CAMERA = "front"
+
+
+class Grounding:
+    """Follows the stages of one episode; draws only until it has seen a stage's object.
+
+    Args:
+        bodies: the scene's objects by name.
+        cameras: of the same world.
+
+    Attributes:
+        text: the present subgoal, with ``at <y, x>`` (row and column in the front picture) from
+            the first frame on in which the stage is due and its object visible.
+    """
+
+    def __init__(self, bodies: Mapping[str, Body], cameras: Cameras) -> None:
+        self._bodies = bodies
+        self._cameras = cameras
+        self._stage: Stage | None = None
+        self._settled = False
+        self.text = ""
+
+    def update(self, stage: Stage | None) -> None:
+        """To be called after every control step.
+
+        Args:
+            stage: whose label is current; None, once all are completed, keeps the last.
+        """
+        if stage is None:
+            return
+        if stage is not self._stage:
+            self._stage, self.text = stage, plain_subgoal(stage)
+            self._settled = stage.points_at is None
+        if self._settled or stage.points_at is None:
+            return
+        pixel = self._pixel(stage.points_at)
+        if pixel is not None:
+            row, column = pixel
+            self.text = stage.subgoal.replace("{at}", f"at <{row}, {column}>")
+            self._settled = True
+
+    def _pixel(self, name: str) -> tuple[int, int] | None:
+        """Row and column of the middle of what is seen of an object; None if it is not seen."""
+        body = self._bodies[name]
+        # Of a button only the cap counts (RoboMME).
+        entity = body.entity if body.button is None else body.button.links[1].entity
+        seen = self._cameras.segmentation(CAMERA) == entity.per_scene_id
+        rows, columns = np.nonzero(seen)
+        return (int(rows.mean()), int(columns.mean())) if len(rows) else None

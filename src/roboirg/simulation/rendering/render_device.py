@@ -1,0 +1,174 @@
+"""Which device draws the pictures: a GPU where one can, otherwise Mesa's lavapipe.
+
+The environment variable ``ROBOIRG_RENDER_DEVICE`` overrides the choice with SAPIEN's name of a
+device: ``cuda:0``, ``pci:0000:01:00.0`` or ``pci:1`` (the number of the PCI bus, hexadecimal).
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+from roboirg.core.errors import MissingDependencyError, RenderDeviceError
+
+if TYPE_CHECKING:
+    import sapien
+
+DEVICE_VARIABLE = "ROBOIRG_RENDER_DEVICE"
+
+REMEDY = (
+    "install Mesa >= 23.2 (mesa-vulkan-drivers, libvulkan1, libegl1; `make setup` does it) "
+    "or the Vulkan driver of your GPU"
+)
+
+# Lavapipe has no place on the PCI bus and reports this one; "cpu" is SAPIEN's name of the
+# processor as a physics device and cannot render.
+_SOFTWARE_ALIAS = "pci:0000:00:00.0"
+_SOFTWARE_NAMES = ("llvmpipe", "lavapipe", "swiftshader")
+_PCI_DEVICES = Path("/sys/bus/pci/devices")
+_DISPLAY_CLASS = "0x03"
+_MOST_CUDA_DEVICES = 64
+
+
+@dataclass(frozen=True)
+class RenderDevice:
+    """What to tell a person about a render device.
+
+    Attributes:
+        name: the driver's name of the device, such as ``"llvmpipe (LLVM 15.0.6, 256 bits)"``.
+        alias: SAPIEN's name of the device, good for ``ROBOIRG_RENDER_DEVICE``.
+        is_software: the pictures are drawn by the processor.
+    """
+
+    name: str
+    alias: str
+    is_software: bool
+
+
+def describe(device: sapien.Device) -> RenderDevice:
+    """Return the description of a SAPIEN device."""
+    alias = f"cuda:{device.cuda_id}" if device.cuda_id >= 0 else f"pci:{device.pci_string}"
+    name = str(device.name)
+    return RenderDevice(name, alias, any(word in name.lower() for word in _SOFTWARE_NAMES))
+
+
+def find_render_device(name: str | None = None) -> sapien.Device:
+    """Return the device that draws the pictures.
+
+    Args:
+        name: SAPIEN's name of a device; by default ``ROBOIRG_RENDER_DEVICE``, and without that
+            the first GPU that can render, else lavapipe.
+
+    Raises:
+        MissingDependencyError: SAPIEN is not installed.
+        RenderDeviceError: the named device cannot render or does not exist, or none can.
+    """
+    name = name or os.environ.get(DEVICE_VARIABLE) or None
+    if name is not None:
+        return _named_device(name)
+    software = None
+    for alias in _aliases():
+        device = _device(alias)
+        if device is None or not device.can_render():
+            continue
+        if not describe(device).is_software:
+            return device
+        software = software or device
+    if software is None:
+        raise RenderDeviceError(f"No Vulkan device can render; {REMEDY}.")
+    return software
+
+
+def render_system(*, keep_engine: bool = True) -> sapien.render.RenderSystem:
+    """Return a new render system, for one scene: scenes that share one spoil each other's pictures.
+
+    SAPIEN frees its whole render engine (shaders, meshes, tables) when the last system goes, and
+    making it again takes seconds; so the first call also makes one that lives as long as the
+    process and keeps the engine, unless that is not wanted. SAPIEN renders on one device per
+    process, so ``ROBOIRG_RENDER_DEVICE`` is read once.
+
+    Raises:
+        MissingDependencyError: SAPIEN is not installed.
+        RenderDeviceError: no device can render, or its driver refuses.
+    """
+    if keep_engine:
+        _engine_keeper()
+    return _new_system(_chosen_device())
+
+
+@functools.cache
+def _chosen_device() -> sapien.Device:
+    return find_render_device()
+
+
+@functools.cache
+def _engine_keeper() -> sapien.render.RenderSystem:
+    return _new_system(_chosen_device())
+
+
+def _new_system(device: sapien.Device) -> sapien.render.RenderSystem:
+    try:
+        return _sapien().render.RenderSystem(device)
+    except RuntimeError as error:
+        found = describe(device)
+        raise RenderDeviceError(
+            f"SAPIEN cannot render on {found.alias} ({found.name}): {error}; {REMEDY}."
+        ) from error
+
+
+@functools.cache
+def _sapien() -> ModuleType:
+    try:
+        # By name, so that this module loads where SAPIEN is not installed.
+        sapien = importlib.import_module("sapien")
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"The simulator is not installed ({error}); "
+            "run: pip install 'roboirgbench[sim]' (in a checkout: make setup)"
+        ) from error
+    # Below "error" SAPIEN speaks of extensions that only its own viewer window needs.
+    sapien.set_log_level("error")
+    sapien.render.set_log_level("error")
+    return sapien
+
+
+def _device(alias: str) -> sapien.Device | None:
+    try:
+        return _sapien().Device(alias)
+    except (RuntimeError, ValueError, IndexError):
+        # RuntimeError: no such device; the others: SAPIEN could not read the number in the name.
+        return None
+
+
+def _named_device(name: str) -> sapien.Device:
+    device = _device(name)
+    if device is not None and device.can_render():
+        return device
+    known = [found for found in map(_device, _aliases()) if found is not None]
+    names = [describe(found).alias for found in known if found.can_render()]
+    if not names:
+        raise RenderDeviceError(f"The render device {name!r} cannot be used; {REMEDY}.")
+    fault = "does not exist" if device is None else "cannot render"
+    raise RenderDeviceError(
+        f"The render device {name!r} {fault}; set {DEVICE_VARIABLE} to one of "
+        f"{', '.join(dict.fromkeys(names))}."
+    )
+
+
+def _aliases() -> Iterator[str]:
+    """SAPIEN has no list of devices, so the places where one can be are tried, GPUs first."""
+    for number in range(_MOST_CUDA_DEVICES):
+        if _device(f"cuda:{number}") is None:
+            break
+        yield f"cuda:{number}"
+    for address in sorted(_PCI_DEVICES.glob("*")):
+        kind = address / "class"
+        if kind.is_file() and kind.read_text().startswith(_DISPLAY_CLASS):
+            yield f"pci:{address.name}"
+    yield _SOFTWARE_ALIAS

@@ -1,0 +1,1 @@
+"""What several tasks share: fixtures, placement, layouts, stages of videos."""

@@ -1,0 +1,166 @@
+"""Things that several tasks place in the same way: the button, cubes, target discs, the bin."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from roboirg.core import object_sizes
+from roboirg.core.episode import COLOURS, Colour, SceneObject
+from roboirg.core.errors import SceneRejectedError
+from roboirg.core.motions import Point
+from roboirg.tasks.shared.placement import Circle, Footprint, Rectangle, Region, place
+
+ORDINALS = ("first", "second", "third", "fourth", "fifth")
+
+BIN_YAW = math.radians(20.0)
+"""The bin is turned by at most so much to either side."""
+
+
+def draw_number(rng: np.random.Generator, bounds: tuple[int, int]) -> int:
+    """A whole number from the first bound to the second, both included; each is as likely."""
+    low, high = bounds
+    return int(rng.integers(low, high + 1))
+
+
+def draw_button(rng: np.random.Generator, region: Region, name: str = "button") -> SceneObject:
+    """A button anywhere in the region; it is placed first and needs no clearance."""
+    x, y = region.draw(rng)
+    return SceneObject(name, "button", Point(x, y, object_sizes.BUTTON_HEIGHT))
+
+
+def button_keep_out(button: SceneObject) -> Rectangle:
+    """The axis-aligned square around a button that stays free."""
+    half = object_sizes.BUTTON_KEEP_OUT_HALF
+    return Rectangle(button.position.x, button.position.y, half, half)
+
+
+def button_footprint(button: SceneObject) -> Rectangle:
+    """The square that the base of a button covers."""
+    half_x, half_y, _ = object_sizes.BUTTON_BASE_HALF
+    return Rectangle(button.position.x, button.position.y, half_x, half_y, button.yaw)
+
+
+def cube_footprint(cube: SceneObject) -> Rectangle:
+    """The square that a cube covers."""
+    half = object_sizes.CUBE_HALF
+    return Rectangle(cube.position.x, cube.position.y, half, half, cube.yaw)
+
+
+def draw_cube(
+    rng: np.random.Generator,
+    name: str,
+    colour: Colour,
+    region: Region,
+    gap: float,
+    obstacles: Sequence[Footprint],
+) -> SceneObject:
+    """A cube with any yaw, at least `gap` metres from all obstacles.
+
+    Raises:
+        SceneRejectedError: no free place was found.
+    """
+
+    def draw() -> SceneObject:
+        x, y = region.draw(rng, inset=object_sizes.CUBE_HALF)
+        yaw = 2.0 * math.pi * rng.random()
+        return SceneObject(name, "cube", Point(x, y, object_sizes.CUBE_HALF), yaw, colour)
+
+    return placed(name, draw, lambda cube: cube_footprint(cube).grown(gap), obstacles)
+
+
+def draw_coloured_cubes(
+    rng: np.random.Generator,
+    count: int,
+    region: Region,
+    gap: float,
+    obstacles: Sequence[Footprint],
+) -> tuple[SceneObject, ...]:
+    """So many cubes of different colours, ``cube_red`` and so on, the colours in random order.
+
+    Raises:
+        SceneRejectedError: a cube found no free place.
+    """
+    taken = list(obstacles)
+    cubes: list[SceneObject] = []
+    for index in rng.permutation(len(COLOURS))[:count]:
+        colour = COLOURS[index]
+        cube = draw_cube(rng, f"cube_{colour}", colour, region, gap, taken)
+        cubes.append(cube)
+        taken.append(cube_footprint(cube))
+    return tuple(cubes)
+
+
+def draw_target(
+    rng: np.random.Generator,
+    name: str,
+    radius: float,
+    region: Region,
+    gap: float,
+    obstacles: Sequence[Footprint],
+    rgb: tuple[float, float, float] | None = None,
+) -> SceneObject:
+    """A target disc of `radius` metres, at least `gap` metres from all obstacles.
+
+    Raises:
+        SceneRejectedError: no free place was found.
+    """
+
+    def draw() -> SceneObject:
+        x, y = region.draw(rng, inset=radius)
+        place = Point(x, y, object_sizes.TARGET_HEIGHT)
+        return SceneObject(name, "target", place, radius=radius, rgb=rgb)
+
+    def clearance(target: SceneObject) -> Circle:
+        return Circle(target.position.x, target.position.y, radius + gap)
+
+    return placed(name, draw, clearance, obstacles)
+
+
+def marker_over(target: SceneObject, name: str) -> SceneObject:
+    """The disc that lights up over a target: a little wider, and high enough to cover it."""
+    x, y, z = target.position
+    radius = object_sizes.MARKER_RADIUS_SHARE * float(target.radius or 0.0)
+    return SceneObject(name, "marker", Point(x, y, z - object_sizes.MARKER_DEPTH), radius=radius)
+
+
+def draw_bin(
+    rng: np.random.Generator, region: Region, obstacles: Sequence[Footprint], name: str = "bin"
+) -> SceneObject:
+    """A bin whose centre is anywhere in the region and whose walls touch no obstacle.
+
+    Raises:
+        SceneRejectedError: no free place was found.
+    """
+
+    def draw() -> SceneObject:
+        x, y = region.draw(rng)
+        yaw = (2.0 * rng.random() - 1.0) * BIN_YAW
+        return SceneObject(name, "bin", Point(x, y, object_sizes.BIN_HEIGHT / 2), yaw)
+
+    return placed(name, draw, bin_footprint, obstacles)
+
+
+def bin_footprint(item: SceneObject) -> Rectangle:
+    """The square that a bin covers, its hole included."""
+    half = object_sizes.BIN_HALF
+    return Rectangle(item.position.x, item.position.y, half, half, item.yaw)
+
+
+def placed(
+    name: str,
+    draw: Callable[[], SceneObject],
+    clearance: Callable[[SceneObject], Footprint],
+    obstacles: Sequence[Footprint],
+) -> SceneObject:
+    """An object where its clearance is free of obstacles.
+
+    Raises:
+        SceneRejectedError: no free place was found.
+    """
+    item = place(draw, clearance, obstacles)
+    if item is None:
+        raise SceneRejectedError(f"no place for {name}")
+    return item

@@ -1,0 +1,55 @@
+"""Objects that change places two by two, one exchange after the other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+from roboirg.core.episode import SceneObject
+from roboirg.core.motions import Motion, Point, Swap
+
+SWAP_STEPS = 50
+"""Control steps of one exchange (RoboMME)."""
+
+
+def plan_swaps(
+    objects: Sequence[SceneObject],
+    initiators: Sequence[str],
+    *,
+    start: int,
+    lane: float,
+    stage: int | None = None,
+) -> tuple[Swap, ...]:
+    """Each initiator in turn changes places with the object that is then nearest to it.
+
+    Args:
+        objects: all that may be partners; those that do not move are pinned meanwhile.
+        initiators: names of the objects that begin an exchange, in order.
+        start: step of the first exchange; the others follow back to back.
+        lane: sideways swing, m.
+        stage: index of the demonstration's stage from which `start` counts; None: from reset.
+    """
+    places: dict[str, Point] = {item.name: item.position for item in objects}
+    swaps: list[Swap] = []
+    for number, first in enumerate(initiators):
+        second = nearest(places, first)
+        pinned = tuple(name for name in places if name not in (first, second))
+        begin = start + number * SWAP_STEPS
+        swaps.append(Swap(first, second, begin, SWAP_STEPS, lane, pinned, stage))
+        places[first], places[second] = places[second], places[first]
+    return tuple(swaps)
+
+
+def last_step(motions: Iterable[Motion]) -> int:
+    """The step at which the last exchange is complete; 0 if there is none."""
+    return max((one.start + one.steps for one in motions if isinstance(one, Swap)), default=0)
+
+
+def nearest(places: dict[str, Point], name: str) -> str:
+    """The object nearest to a named one in the plane."""
+    here = places[name]
+
+    def distance(other: str) -> float:
+        return math.hypot(places[other].x - here.x, places[other].y - here.y)
+
+    return min((other for other in places if other != name), key=distance)

@@ -1,0 +1,169 @@
+"""What the Unmask tasks share: containers that appear over cubes and have to be lifted."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from roboirg.core import object_sizes
+from roboirg.core.conditions import Condition, Fact
+from roboirg.core.episode import (
+    COLOURS,
+    Colour,
+    Goal,
+    Primitive,
+    Scene,
+    SceneObject,
+    Stage,
+)
+from roboirg.core.errors import SceneRejectedError
+from roboirg.core.motions import Away, Point
+from roboirg.tasks.shared.placement import Circle, Footprint, Rectangle, Region, place
+from roboirg.tasks.task import Commands, Wording
+
+APPEAR_STEP = 32
+"""Containers are away until this step, then stand over the cubes at once."""
+
+
+def container_footprint(container: SceneObject) -> Rectangle:
+    """The square that a container covers."""
+    half = object_sizes.CONTAINER_FOOTPRINT_HALF
+    return Rectangle(container.position.x, container.position.y, half, half, container.yaw)
+
+
+def draw_containers(
+    rng: np.random.Generator,
+    count: int,
+    region: Region,
+    gap: float,
+    obstacles: Sequence[Footprint] = (),
+) -> list[SceneObject]:
+    """Up to `count` containers in one region; see `draw_containers_in`."""
+    return draw_containers_in(rng, [region] * count, gap, obstacles)
+
+
+def draw_containers_in(
+    rng: np.random.Generator,
+    regions: Iterable[Region],
+    gap: float,
+    obstacles: Sequence[Footprint] = (),
+) -> list[SceneObject]:
+    """A container in each region, `gap` metres free around it; ends at the first that fits nowhere.
+
+    As in RoboMME the gap counts on both sides: around the new container and around those placed.
+    """
+    radius = object_sizes.CONTAINER_HALF + gap
+    taken = list(obstacles)
+    containers: list[SceneObject] = []
+    for index, region in enumerate(regions):
+        spot = place(
+            functools.partial(region.draw, rng, inset=object_sizes.CONTAINER_HALF),
+            lambda spot: Circle(*spot, radius),
+            taken,
+        )
+        if spot is None:
+            break
+        position = Point(*spot, object_sizes.CONTAINER_HEIGHT)
+        yaw = rng.random() * math.pi / 2
+        container = SceneObject(f"container_{index}", "container", position, yaw)
+        containers.append(container)
+        taken.append(container_footprint(container).grown(gap))
+    return containers
+
+
+def hide_cubes(
+    rng: np.random.Generator, containers: Sequence[SceneObject]
+) -> tuple[SceneObject, ...]:
+    """A red, a green and a blue cube, in random order under the first three containers.
+
+    Raises:
+        SceneRejectedError: there are fewer than three containers.
+    """
+    if len(containers) < len(COLOURS):
+        raise SceneRejectedError("fewer than three containers fit")
+    order = rng.permutation(len(COLOURS))
+    return tuple(
+        _hidden_cube(COLOURS[index], container)
+        for index, container in zip(order, containers, strict=False)
+    )
+
+
+def _hidden_cube(colour: Colour, container: SceneObject) -> SceneObject:
+    x, y, _ = container.position
+    position = Point(x, y, object_sizes.HIDDEN_CUBE_HALF)
+    return SceneObject(f"cube_{colour}", "hidden_cube", position, 0.0, colour, container.name)
+
+
+def goals(scene: Scene) -> tuple[Goal, ...]:
+    """Any hidden cube, or any two of them in order."""
+    hidden = [str(cube.colour) for cube in scene.of_kind("hidden_cube")]
+    single = [(colour,) for colour in hidden]
+    pairs = list(itertools.permutations(hidden, 2))
+    return tuple(Goal.of(colours=colours) for colours in (*single, *pairs))
+
+
+def pick_stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
+    """Lift the container over each named cube in turn, putting it down in between."""
+    covers = {cube.colour: cube.inside for cube in scene.of_kind("hidden_cube")}
+    containers = tuple(item.name for item in scene.of_kind("container"))
+    plan: list[Stage] = []
+    for colour in goal.texts("colours"):
+        target = next(str(cover) for hidden, cover in covers.items() if hidden == colour)
+        wrong = tuple(Fact("lifted", other) for other in containers if other != target)
+        if plan:
+            plan.append(_put_down(plan[-1].primitive.subject, containers))
+        lift = Stage(
+            expects=Fact("lifted", target),
+            forbids=wrong,
+            primitive=Primitive("pick_container", target),
+            subgoal=f"pick up the container {{at}} that hides the {colour} cube",
+            points_at=target,
+        )
+        plan.append(lift)
+    return tuple(plan)
+
+
+def _put_down(held: str, containers: Sequence[str]) -> Stage:
+    return Stage(
+        expects=Fact("put_down", held),
+        forbids=tuple(Fact("lifted", other) for other in containers if other != held),
+        primitive=Primitive("put_down", held),
+        subgoal="put down the container",
+    )
+
+
+def appearing(containers: Sequence[SceneObject]) -> tuple[Away, ...]:
+    """Every container is away for the first 32 steps and then stands at its place."""
+    return tuple(Away(container.name, 0, APPEAR_STEP) for container in containers)
+
+
+def press_stage(expects: Condition, button: str, which: str = "button") -> Stage:
+    """A button is pressed; nothing that happens meanwhile is held against the policy.
+
+    Args:
+        expects: the condition that completes the stage.
+        button: name of the one that the oracle presses.
+        which: what the subgoal calls it.
+    """
+    return Stage(
+        expects=expects,
+        forbids=(),
+        primitive=Primitive("press", button),
+        subgoal=f"press the {which} {{at}}",
+        points_at=button,
+    )
+
+
+def commands(*wordings: Wording) -> Commands:
+    """The commands of an Unmask task: what its sentences tell is the container over a cube."""
+    return Commands(
+        thing="container",
+        by_colour="the container that hides {cube}",
+        by_place="the container {place}",
+        patterns=("colour exclusion",),
+        wordings=wordings,
+    )

@@ -1,0 +1,77 @@
+"""What the two tasks share in which containers change places over their cubes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from roboirg.core.episode import COLOURS, Difficulty, Goal, Scene, SceneObject
+from roboirg.core.motions import Away, Motion
+from roboirg.tasks.shared.fixtures import draw_number
+from roboirg.tasks.shared.placement import Footprint, Region
+from roboirg.tasks.shared.swapping import last_step, plan_swaps
+from roboirg.tasks.shared.unmask import appearing, draw_containers_in, hide_cubes
+
+CONTAINERS: dict[Difficulty, int] = {"easy": 3, "medium": 4, "hard": 4}
+SWAPS: dict[Difficulty, tuple[int, int]] = {"easy": (1, 2), "medium": (1, 2), "hard": (2, 3)}
+PICKS: dict[Difficulty, tuple[int, int]] = {"easy": (1, 2), "medium": (1, 1), "hard": (2, 2)}
+"""Fewest and most, in the two tasks in which containers change places; each is uniform."""
+START = 64
+LANE = 0.07
+SPOT_HALF = 0.07
+"""Half side of the square about a layout point in which a container has to stand, m."""
+SPOT_GAP = 0.02
+
+
+def draw_containers_about(
+    rng: np.random.Generator,
+    points: Iterable[tuple[float, float]],
+    obstacles: Sequence[Footprint] = (),
+) -> list[SceneObject]:
+    """Containers near the points of a layout, one for each; see `draw_containers_in`."""
+    regions = [Region(x, y, SPOT_HALF, SPOT_HALF) for x, y in points]
+    return draw_containers_in(rng, regions, SPOT_GAP, obstacles)
+
+
+def sample(
+    rng: np.random.Generator,
+    difficulty: Difficulty,
+    containers: Sequence[SceneObject],
+    buttons: Sequence[SceneObject] = (),
+) -> tuple[Scene, Goal]:
+    """Scene and goal of a task in which containers change places, once all have been placed.
+
+    The cubes are out of the world while the containers move, and come back under their own ones.
+    That the exchanges may cancel out is RoboMME's rule.
+
+    Raises:
+        SceneRejectedError: there are fewer than three containers.
+    """
+    order = rng.permutation(len(COLOURS))
+    cubes = hide_cubes(rng, [containers[index] for index in order if index < len(containers)])
+    swaps = plan_swaps(
+        containers,
+        _initiators(rng, difficulty, containers),
+        start=START,
+        lane=LANE,
+    )
+    end = last_step(swaps)
+    away = [Away(cube.name, START, end, under=cube.inside) for cube in cubes]
+    # The cubes come last: when they return, their containers have arrived.
+    motions: tuple[Motion, ...] = (*appearing(containers), *swaps, *away)
+    picks = draw_number(rng, PICKS[difficulty])
+    colours = tuple(str(cube.colour) for cube in cubes[:picks])
+    return Scene((*buttons, *containers, *cubes), motions), Goal.of(colours=colours)
+
+
+def _initiators(
+    rng: np.random.Generator, difficulty: Difficulty, containers: Sequence[SceneObject]
+) -> tuple[str, ...]:
+    """Who begins an exchange: first two different ones with a cube, then any other container."""
+    number = draw_number(rng, SWAPS[difficulty])
+    names = [container.name for container in containers]
+    first, second = (names[index] for index in rng.permutation(len(COLOURS))[:2])
+    others = [name for name in names if name not in (first, second)]
+    third = others[int(rng.integers(len(others)))]
+    return (first, second, third)[:number]

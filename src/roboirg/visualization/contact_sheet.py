@@ -1,0 +1,127 @@
+"""Contact sheets: pictures of several moments on one page, each with its caption. Plays nothing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.util.text_overlay import Colour, Frame, wrapped, write_text
+
+PER_BAND = 6
+"""Moments side by side; further ones go below."""
+
+_MARGIN, _GAP, _PAD = 24, 8, 6
+_PICTURE = 256
+_BAR = 6
+"""Height of the coloured bar over a moment, pixels."""
+_CAPTION_LINES = 5
+
+_TITLE_SCALE, _TITLE_LINE = 0.8, 34
+_TEXT_SCALE, _TEXT_LINE = 0.45, 18
+
+_PAPER: Colour = (255, 255, 255)
+_INK: Colour = (31, 35, 40)
+_PALE: Colour = (101, 109, 118)
+_VIDEO: Colour = (255, 176, 32)
+_TURN: Colour = (9, 105, 218)
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """What is shown of one moment.
+
+    Attributes:
+        step: control steps since reset.
+        caption: what has just happened.
+        pictures: RGB, uint8 (256, 256, 3), one for each camera, drawn one above the other.
+        is_demonstration: whether it belongs to the video; such moments have a bar of its colour.
+    """
+
+    step: int
+    caption: str
+    pictures: tuple[Frame, ...]
+    is_demonstration: bool = False
+
+
+def compose_sheet(title: str, subtitle: str, moments: Sequence[Moment]) -> Frame:
+    """All moments in their order, under a title.
+
+    Args:
+        title: one line.
+        subtitle: broken into lines where it is long.
+        moments: at least one; as many pictures in each.
+
+    Returns:
+        RGB, uint8 (height, width, 3).
+    """
+    # Bands of like length: eight moments are four and four.
+    columns = math.ceil(len(moments) / math.ceil(len(moments) / PER_BAND))
+    # A single narrow column would break the title.
+    width = 2 * _MARGIN + max(columns, 3) * (_PICTURE + _GAP) - _GAP
+    lines = wrapped(subtitle, width - 2 * _MARGIN, _TEXT_SCALE)
+    head = _strip(width, _MARGIN + _TITLE_LINE + (len(lines) + 1) * _TEXT_LINE)
+    y = _MARGIN + _TITLE_LINE // 2
+    write_text(head, title, _MARGIN, y, _TITLE_SCALE, _INK, thickness=2)
+    for number, line in enumerate(lines):
+        write_text(head, line, _MARGIN, y + _TITLE_LINE + number * _TEXT_LINE, _TEXT_SCALE, _PALE)
+    bands = [
+        _band(moments[start : start + columns], width) for start in range(0, len(moments), columns)
+    ]
+    sheet: Frame = np.concatenate([head, *bands], axis=0)
+    return sheet
+
+
+def write_png(image: Frame, path: Path) -> None:
+    """Write a picture, RGB, as a PNG file.
+
+    Raises:
+        InvalidValueError: the file cannot be written.
+    """
+    import cv2
+
+    _, data = cv2.imencode(".png", cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data.tobytes())
+    except OSError as error:
+        raise InvalidValueError(f"The picture {path} cannot be written: {error}.") from error
+
+
+def thinned(count: int, most: int) -> tuple[int, ...]:
+    """Positions of at most `most` of `count` things, evenly spaced, both ends among them."""
+    if count <= most:
+        return tuple(range(count))
+    if most < 2:  # noqa: PLR2004 - the ends are two
+        return (count - 1,) * most
+    return tuple(round(number * (count - 1) / (most - 1)) for number in range(most))
+
+
+def _band(moments: Sequence[Moment], width: int) -> Frame:
+    """Moments side by side: a bar, the caption, the pictures."""
+    captions = [wrapped(moment.caption, _PICTURE, _TEXT_SCALE) for moment in moments]
+    longest = min(_CAPTION_LINES, max(map(len, captions)))
+    caption_height = _BAR + _PAD + (1 + longest) * _TEXT_LINE + _PAD
+    heights = max(len(moment.pictures) for moment in moments)
+    band = _strip(width, caption_height + heights * (_PICTURE + _GAP) + _MARGIN - _GAP)
+    for column, moment in enumerate(moments):
+        x = _MARGIN + column * (_PICTURE + _GAP)
+        colour = _VIDEO if moment.is_demonstration else _TURN
+        band[:_BAR, x : x + _PICTURE] = np.array(colour, np.uint8)
+        y = _BAR + _PAD + _TEXT_LINE - 4
+        when = f"step {moment.step}" + (" (video)" if moment.is_demonstration else "")
+        write_text(band, when, x, y, _TEXT_SCALE, _PALE)
+        for number, line in enumerate(captions[column][:longest], start=1):
+            write_text(band, line, x, y + number * _TEXT_LINE, _TEXT_SCALE, _INK)
+        for row, picture in enumerate(moment.pictures):
+            top = caption_height + row * (_PICTURE + _GAP)
+            band[top : top + _PICTURE, x : x + _PICTURE] = picture
+    return band
+
+
+def _strip(width: int, height: int) -> Frame:
+    return np.full((height, width, 3), _PAPER, np.uint8)

@@ -1,0 +1,134 @@
+"""An episode in words and tables for the terminal."""
+
+from __future__ import annotations
+
+import math
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.padding import Padding
+from rich.table import Table
+
+from roboirg.core.conditions import Fact
+from roboirg.core.episode import Episode, Scene, SceneObject
+from roboirg.core.motions import Away, Glow, Motion, Point, Shuttle, Swap, Vanish
+from roboirg.judging import plain_subgoal
+from roboirg.language import expressible, instruct
+from roboirg.tasks import get_task
+
+MINIMUM_WIDTH = 100
+"""Columns to use where the output is not a terminal."""
+
+_RELATIONS = {"placed": "placed on", "binned": "in", "stopped": "stopped on", "hovering": "over"}
+
+
+def print_episode(episode: Episode, console: Console) -> None:
+    """Everything but pictures: objects, motions, video, goal, and what is said in each setting."""
+    if not console.is_terminal:
+        console.width = max(console.width, MINIMUM_WIDTH)
+    console.print(
+        f"[bold]{episode.key}[/] {episode.difficulty}, seed {episode.seed}", highlight=False
+    )
+    console.print(objects_table(episode.scene))
+    _print_list("moves by itself", motion_lines(episode.scene), console)
+    _print_list("the video shows", video_lines(episode), console)
+    goal = ", ".join(f"{slot} {_value(value)}" for slot, value in episode.goal.slots)
+    _print_list("goal", [goal], console)
+    console.print(instructions_table(episode))
+
+
+def objects_table(scene: Scene) -> Table:
+    """All objects with their places at the start, metres and degrees."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for name in ("object", "kind", "colour"):
+        table.add_column(name)
+    for name in ("x", "y", "z", "yaw"):
+        table.add_column(name, justify="right")
+    for item in scene.objects:
+        place = (f"{value:.3f}" for value in item.position)
+        yaw = f"{math.degrees(item.yaw):.0f}°"
+        table.add_row(item.name, _kind(item), item.colour or "", *place, yaw)
+    return table
+
+
+def motion_lines(scene: Scene) -> list[str]:
+    """The scripted movements in words; those that say the same of several objects are one."""
+    subjects: dict[str, list[str]] = {}
+    for motion in scene.motions:
+        subject, words = _motion_words(motion)
+        subjects.setdefault(words, []).append(subject)
+    return [f"{', '.join(names)}: {words}" for words, names in subjects.items()]
+
+
+def video_lines(episode: Episode) -> list[str]:
+    """The stages of the demonstration, and what of it counts."""
+    shown = [plain_subgoal(stage) for stage in episode.demonstration if stage.recorded]
+    lines = [f"{number}. {words}" for number, words in enumerate(shown, start=1)]
+    if episode.scene.past:
+        lines.append("that is: " + ", ".join(fact_words(fact) for fact in episode.scene.past))
+    return lines
+
+
+def fact_words(fact: Fact) -> str:
+    """A fact in words, with the objects' names."""
+    words = _RELATIONS.get(fact.kind, fact.kind.replace("_", " "))
+    return " ".join(part for part in (fact.subject, words, fact.place) if part)
+
+
+def instructions_table(episode: Episode) -> Table:
+    """What is said in every setting, and its resolved form."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_lines=False)
+    table.add_column("setting", style="bold")
+    table.add_column("form", style="dim")
+    table.add_column("instruction", overflow="fold")
+    sayable = expressible(episode)
+    for setting in get_task(episode.task).settings:
+        if setting not in sayable:
+            table.add_row(setting, "", "cannot be expressed")
+            continue
+        for form in ("implicit",) if setting == "explicit" else ("implicit", "resolved"):
+            text = instruct(episode, setting, form).text
+            table.add_row(setting if form == "implicit" else "", form, escape(text))
+    return table
+
+
+def _motion_words(motion: Motion) -> tuple[str, str]:
+    """Who moves, and how."""
+    match motion:
+        case Away(subject, start, end, under):
+            begin = f"away from step {start}" if start else "away"
+            back = f", then under {under}" if under else ""
+            return subject, f"{begin} until step {end}{back}"
+        case Swap(first, second, start, steps, _, _, stage):
+            since = "" if stage is None else f" of the video's stage {stage + 1}"
+            return f"{first} and {second}", f"change places, step {start} to {start + steps}{since}"
+        case Shuttle(subject, begin, end, interval, passes, stopped_by):
+            return subject, (
+                f"runs from {_plane(begin)} to {_plane(end)} and back, {passes} passes of "
+                f"{interval} steps, until {fact_words(stopped_by)}"
+            )
+        case Glow(subject, during, linger):
+            return subject, f"seen while {fact_words(during)}, and {linger} steps longer"
+        case Vanish(subject, when):
+            words = fact_words(when)
+            return subject, f"gone for good once {words.removeprefix(f'{subject} ')}"
+
+
+def _print_list(title: str, lines: list[str], console: Console) -> None:
+    if lines:
+        console.print(f"[bold]{title}[/]")
+    for line in lines:
+        console.print(Padding.indent(escape(line), 2), highlight=False)
+
+
+def _kind(item: SceneObject) -> str:
+    return item.kind.replace("_", " ") + (f" in {item.inside}" if item.inside else "")
+
+
+def _plane(point: Point) -> str:
+    return f"({point.x:.2f}, {point.y:.2f})"
+
+
+def _value(value: object) -> str:
+    return " and ".join(str(part) for part in value) if isinstance(value, tuple) else str(value)
