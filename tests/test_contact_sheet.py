@@ -55,14 +55,14 @@ def test_captions_are_drawn_and_long_ones_stay_in_their_column():
     compose_sheet("—", "naïve", moments(1, caption="×" * 400))  # no letters of the font
 
 
-def test_moments_of_the_video_have_another_colour():
+def test_moments_of_the_video_have_another_color():
     one = Moment(3, "", (picture(0),))
     assert (compose_sheet("", "", [one]) == (9, 105, 218)).all(axis=-1).any()
     assert not (compose_sheet("", "", [one]) == (255, 176, 32)).all(axis=-1).any()
     assert (compose_sheet("", "", moments(1)) == (255, 176, 32)).all(axis=-1).any()
 
 
-def test_pictures_are_written_in_their_colours(tmp_path):
+def test_pictures_are_written_in_their_colors(tmp_path):
     image = np.zeros((4, 5, 3), np.uint8)
     image[..., 0] = 200
     write_png(image, tmp_path / "new" / "sheet.png")

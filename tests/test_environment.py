@@ -48,7 +48,7 @@ def test_gymnasium_s_checker_is_content(task):
         f"roboirg.envs.registration:{environment_id(task)}", cameras=(), setting="direct"
     )
     with warnings.catch_warnings():
-        # Joint targets are in radians and positions in metres, not in [-1, 1].
+        # Joint targets are in radians and positions in meters, not in [-1, 1].
         warnings.filterwarnings("ignore", message=".*(Box action|Box observation).*")
         check_env(env.unwrapped)
 
@@ -62,10 +62,10 @@ def test_observations_hold_what_they_promise():
     assert info["demonstration"]["front_rgb"].shape == (66, 256, 256, 3)
     assert info["demonstration"]["joint_positions"].shape == (66, 7)
     assert info["elapsed_steps"] == 67
-    # The video shows coloured cubes, then only containers; so does the first observation.
+    # The video shows colored cubes, then only containers; so does the first observation.
     video = info["demonstration"]["front_rgb"].astype(int)
-    coloured = (np.ptp(video, axis=-1) > 200).any(axis=(1, 2))
-    assert coloured.tolist() == [True] * 32 + [False] * 34
+    colored = (np.ptp(video, axis=-1) > 200).any(axis=(1, 2))
+    assert colored.tolist() == [True] * 32 + [False] * 34
     assert not (np.ptp(observation["front_rgb"].astype(int), axis=-1) > 200).any()
     observation, reward, terminated, truncated, info = env.step(HOME_ACTION)
     assert observation in env.observation_space
@@ -98,7 +98,7 @@ def test_subgoals_are_grounded_once_their_object_is_seen_and_then_frozen():
     _, info = env.reset()
     assert info["demonstration_subgoals"] == ["static"] * 66
     stage = env.episode.stages[0]
-    name = env.episode.scene.hidden_in(stage.points_at).colour
+    name = env.episode.scene.hidden_in(stage.points_at).color
     assert info["subgoal"] == f"pick up the container that hides the {name} cube"
     found = re.fullmatch(
         rf"pick up the container at <(\d+), (\d+)> that hides the {name} cube",

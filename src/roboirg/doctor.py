@@ -283,14 +283,14 @@ def _render_test_frame() -> str:
     middle, corner = picture[32, 32, :3], picture[0, 0, :3]
     if not _is_reddish(middle) or _is_reddish(corner):
         raise RenderDeviceError(
-            f"the picture of a red box has the colour {np.round(middle, 2).tolist()} in the "
+            f"the picture of a red box has the color {np.round(middle, 2).tolist()} in the "
             f"middle and {np.round(corner, 2).tolist()} in the corner."
         )
     return f"64 x 64 pixels in {time.perf_counter() - start:.1f} s"
 
 
-def _is_reddish(colour: Sequence[float]) -> bool:
-    red, green, blue = (float(part) for part in colour)
+def _is_reddish(color: Sequence[float]) -> bool:
+    red, green, blue = (float(part) for part in color)
     return red > 0.2 and red > 2 * max(green, blue)  # noqa: PLR2004 - in units of full brightness
 
 

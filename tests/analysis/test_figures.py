@@ -10,7 +10,7 @@ import typer
 from typer.testing import CliRunner
 
 from roboirg.analysis.figures import FIGURES, Content, write_figures
-from roboirg.analysis.figures.failures import COLOURS, UNKNOWN, draw_failures
+from roboirg.analysis.figures.failures import COLORS, UNKNOWN, draw_failures
 from roboirg.analysis.figures.forms import PARTS, draw_forms
 from roboirg.analysis.published import published_rows
 from roboirg.analysis.stats.run_summary import ALL
@@ -90,7 +90,7 @@ def test_figures_say_what_the_records_say(tmp_path: Path, name: str, words: list
 
 
 def widths(panel: Axes) -> dict[str, list[float]]:
-    """The lengths of a panel's bars by colour, from the top down."""
+    """The lengths of a panel's bars by color, from the top down."""
     from matplotlib.colors import to_hex
 
     found: dict[str, list[float]] = {}
@@ -104,7 +104,7 @@ def test_the_forms_bars_are_the_overlap() -> None:
     drawn = draw_forms(content(planned=PLAN.jobs()))
     assert drawn is not None
     listener, forgetful = (widths(panel) for panel in drawn.axes)
-    both, resolved, implicit, neither = (colour.lower() for _, colour, _ in PARTS)
+    both, resolved, implicit, neither = (color.lower() for _, color, _ in PARTS)
     assert set(listener[both]) == set(forgetful[resolved]) == {100.0}
     assert {*listener[resolved], *forgetful[both], *forgetful[implicit], *forgetful[neither]} == {0}
 
@@ -121,7 +121,7 @@ def test_the_failures_bars_are_shares_of_what_was_played() -> None:
         one.attribution is not None and one.attribution.failure == "wrong_count"
         for one in results()
     )
-    assert sum(forgetful[COLOURS["wrong_count"]]) == pytest.approx(100 * miscounted / 6)
+    assert sum(forgetful[COLORS["wrong_count"]]) == pytest.approx(100 * miscounted / 6)
 
 
 def test_published_values_are_ghosts_on_request(
@@ -162,9 +162,9 @@ def test_what_is_incomplete_is_called_so(tmp_path: Path) -> None:
     assert "<!-- listener -->" in drawn
 
 
-def test_every_failure_has_a_colour_of_its_own() -> None:
-    assert set(COLOURS) == {*GROUNDING, *EXECUTION, UNKNOWN}
-    assert len(set(COLOURS.values())) == len(COLOURS)
+def test_every_failure_has_a_color_of_its_own() -> None:
+    assert set(COLORS) == {*GROUNDING, *EXECUTION, UNKNOWN}
+    assert len(set(COLORS.values())) == len(COLORS)
 
 
 def test_runs_that_hold_the_same_episodes_stand_apart(tmp_path: Path) -> None:

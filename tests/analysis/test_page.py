@@ -44,7 +44,7 @@ def records() -> list[Record]:
     found = []
     for index, job in enumerate(PLAN.jobs()):
         told = describe(job, Course("success", cause=None), started_at="now")
-        subject = f"cube_{told.goal.get('colour', 'red')}"
+        subject = f"cube_{told.goal.get('color', 'red')}"
         events = [
             EventRecord(step=-20, kind="still", subject="robot"),
             EventRecord(step=-10, kind="over", subject=subject, place="target"),
@@ -492,9 +492,9 @@ def test_ten_thousand_episodes_cost_no_more_than_a_page_of_them(
 
 CONTRASTS = """(() => {
   const canvas = document.createElement("canvas").getContext("2d", { willReadFrequently: true });
-  const rgba = (colour) => {
+  const rgba = (color) => {
     canvas.clearRect(0, 0, 1, 1);
-    canvas.fillStyle = colour;
+    canvas.fillStyle = color;
     canvas.fillRect(0, 0, 1, 1);
     const [r, g, b, a] = canvas.getImageData(0, 0, 1, 1).data;
     return [r, g, b, a / 255];

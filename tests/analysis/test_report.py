@@ -210,10 +210,10 @@ def test_stages_are_found_again_from_the_events() -> None:
         policies=("listener",), tasks=("PickXtimes",), episodes=(0,), settings=("explicit",)
     )
     (job,) = plan.jobs()
-    colour = describe(job, Course(), started_at="now").goal["colour"]
+    color = describe(job, Course(), started_at="now").goal["color"]
     events = [
         EventRecord(step=-1, kind="still", subject="robot"),
-        EventRecord(step=30, kind="picked", subject=f"cube_{colour}"),
+        EventRecord(step=30, kind="picked", subject=f"cube_{color}"),
     ]
     record = describe(job, Course("failure", cause="x", steps=50, events=events), started_at="now")
     (details,) = Page(text := render([record])).details

@@ -32,7 +32,7 @@ def record(outcome: str, episode: int = 0, setting: str = "explicit", **fields: 
     return describe(job, Course(outcome, cause=cause), started_at="now")  # type: ignore[arg-type]
 
 
-# By hand, z = 1.96: 8 of 10 is 0.8 with weight 0.38415, centre 0.99207 / 1.38415 = 0.71674,
+# By hand, z = 1.96: 8 of 10 is 0.8 with weight 0.38415, center 0.99207 / 1.38415 = 0.71674,
 # half 1.96 * sqrt(0.016 + 0.0096036) / 1.38415 = 0.22658. Also in Newcombe 1998, table I.
 @pytest.mark.parametrize(
     ("successes", "trials", "low", "high"),

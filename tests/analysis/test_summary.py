@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from roboirg.analysis.stats.run_summary import ALL, Scope, summarise
+from roboirg.analysis.stats.run_summary import ALL, Scope, summarize
 from roboirg.analysis.stats.samples import Sample, Trial, gather, labels, wilson
 from roboirg.analysis.stats.success_rates import EXPLICIT, Variant
 
@@ -16,7 +16,7 @@ DIRECT = Variant("direct")
 
 def figures(results, planned=()):
     samples = gather([("run", results)], planned)
-    found = summarise(samples, np.random.default_rng(0))
+    found = summarize(samples, np.random.default_rng(0))
     return {(one.contestant.policy, one.scope, one.variant): one for one in found}
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from roboirg.evaluation.video_writer import DEMONSTRATION_COLOUR, GAP, Film, VideoOptions, compose
+from roboirg.evaluation.video_writer import DEMONSTRATION_COLOR, GAP, Film, VideoOptions, compose
 
 av = pytest.importorskip("av")
 
@@ -31,7 +31,7 @@ def test_a_film_is_small_playable_and_appears_when_complete(tmp_path: Path) -> N
         assert (stream.width, stream.height, stream.average_rate) == (512 + GAP, 256, 10)
         frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(stream)]
     assert len(frames) > 21
-    assert np.abs(frames[0][1, 100].astype(int) - DEMONSTRATION_COLOUR).max() < 40
+    assert np.abs(frames[0][1, 100].astype(int) - DEMONSTRATION_COLOR).max() < 40
     assert abs(int(frames[-1][128, 128, 0]) - 90) < 8
     assert abs(int(frames[-1][128, 384, 0]) - 200) < 8
 
@@ -60,7 +60,7 @@ def test_throwing_away_never_raises(tmp_path: Path) -> None:
 
 def test_only_the_demonstration_has_a_border() -> None:
     pictures = [Grey().picture("front"), Grey().picture("wrist")]
-    assert tuple(compose(pictures, is_demonstration=True)[0, 0]) == DEMONSTRATION_COLOUR
+    assert tuple(compose(pictures, is_demonstration=True)[0, 0]) == DEMONSTRATION_COLOR
     assert tuple(compose(pictures, is_demonstration=False)[0, 0]) == (90, 90, 90)
 
 

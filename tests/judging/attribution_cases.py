@@ -83,14 +83,14 @@ def others(staged: Staged, name: str, *but: str) -> list[str]:
     return [item.name for item in same if item.name not in (name, *but)]
 
 
-def of_colour(staged: Staged, colour: str) -> list[str]:
-    return [c.name for c in staged.episode.scene.of_kind("cube") if c.colour == colour]
+def of_color(staged: Staged, color: str) -> list[str]:
+    return [c.name for c in staged.episode.scene.of_kind("cube") if c.color == color]
 
 
 def unwanted(staged: Staged) -> list[str]:
-    """Cubes of colours that BinFill's goal does not name."""
-    named = staged.episode.goal.texts("colours")
-    return [c.name for c in staged.episode.scene.of_kind("cube") if c.colour not in named]
+    """Cubes of colors that BinFill's goal does not name."""
+    named = staged.episode.goal.texts("colors")
+    return [c.name for c in staged.episode.scene.of_kind("cube") if c.color not in named]
 
 
 # Nothing, or not enough
@@ -351,7 +351,7 @@ def presses_the_same_button_twice(staged: Staged) -> None:
 
 
 @case("wrong_object", "BinFill")
-def bins_a_colour_that_was_not_named(staged: Staged) -> bool | None:
+def bins_a_color_that_was_not_named(staged: Staged) -> bool | None:
     if not unwanted(staged):
         return False
     wrong = unwanted(staged)[0]
@@ -360,7 +360,7 @@ def bins_a_colour_that_was_not_named(staged: Staged) -> bool | None:
 
 
 @case("wrong_object", "BinFill", early=False)
-def has_a_cube_of_another_colour_in_the_hand(staged: Staged) -> bool | None:
+def has_a_cube_of_another_color_in_the_hand(staged: Staged) -> bool | None:
     if not unwanted(staged):
         return False
     staged.lift(unwanted(staged)[0]).tick(20)
@@ -368,7 +368,7 @@ def has_a_cube_of_another_colour_in_the_hand(staged: Staged) -> bool | None:
 
 
 @case("wrong_object", "BinFill", early=False)
-def bins_another_colour_and_stops(staged: Staged) -> bool | None:
+def bins_another_color_and_stops(staged: Staged) -> bool | None:
     if not unwanted(staged):
         return False
     wrong = unwanted(staged)[0]
@@ -453,8 +453,8 @@ def once_too_often(staged: Staged) -> None:
 @case("wrong_count", "BinFill")
 def one_cube_too_many(staged: Staged) -> bool | None:
     used = [s.primitive.subject for s in staged.episode.stages]
-    colour = staged.episode.goal.texts("colours")[0]
-    spare = [cube for cube in of_colour(staged, colour) if cube not in used]
+    color = staged.episode.goal.texts("colors")[0]
+    spare = [cube for cube in of_color(staged, color) if cube not in used]
     if not spare:
         return False
     until(staged, "press")
@@ -465,8 +465,8 @@ def one_cube_too_many(staged: Staged) -> bool | None:
 @case("wrong_count", "BinFill", early=False)
 def one_cube_too_many_in_the_hand(staged: Staged) -> bool | None:
     used = [s.primitive.subject for s in staged.episode.stages]
-    colour = staged.episode.goal.texts("colours")[0]
-    spare = [cube for cube in of_colour(staged, colour) if cube not in used]
+    color = staged.episode.goal.texts("colors")[0]
+    spare = [cube for cube in of_color(staged, color) if cube not in used]
     if not spare:
         return False
     until(staged, "press")
@@ -603,7 +603,7 @@ def puts_another_container_back(staged: Staged) -> bool | None:
 
 
 @case("out_of_time", "BinFill", early=False)
-def puts_another_colour_back(staged: Staged) -> bool | None:
+def puts_another_color_back(staged: Staged) -> bool | None:
     if not unwanted(staged):
         return False
     wrong, right = unwanted(staged)[0], staged.episode.stages[0].primitive.subject
@@ -628,7 +628,7 @@ def a_slip_does_not_excuse_two_that_are_missing(staged: Staged) -> bool | None:
 
 
 @case("wrong_object", "BinFill")
-def the_other_colour_came_before_the_slip(staged: Staged) -> bool | None:
+def the_other_color_came_before_the_slip(staged: Staged) -> bool | None:
     stages = staged.episode.stages
     if not unwanted(staged) or len(stages) < 7:
         return False

@@ -196,11 +196,11 @@ def test_what_shows_late_is_dated_when_it_was_done() -> None:
     episode = next(
         found
         for found in (get_episode("BinFill", "test", index) for index in range(50))
-        if len(found.goal.texts("colours")) < len({c.colour for c in found.scene.of_kind("cube")})
+        if len(found.goal.texts("colors")) < len({c.color for c in found.scene.of_kind("cube")})
         and len(found.stages) >= 7
     )
-    named = episode.goal.texts("colours")
-    wrong = next(c.name for c in episode.scene.of_kind("cube") if c.colour not in named)
+    named = episode.goal.texts("colors")
+    wrong = next(c.name for c in episode.scene.of_kind("cube") if c.color not in named)
     staged = Staged(episode).lift(wrong).fill(wrong, "bin")
     done = staged.step
     found = staged.play(episode.stages[2:]).finding()

@@ -29,13 +29,13 @@ def scene_of(task, suits):
 # BinFill: two red cubes and a blue one; there are green ones, too.
 
 
-def colour_numbers(scene):
-    colours = [cube.colour for cube in scene.of_kind("cube")]
-    return [colours.count(colour) for colour in ("red", "blue", "green")]
+def color_numbers(scene):
+    colors = [cube.color for cube in scene.of_kind("cube")]
+    return [colors.count(color) for color in ("red", "blue", "green")]
 
 
-FILL_SCENE = scene_of(bin_fill, lambda scene: min(colour_numbers(scene)) >= 3)
-FILL = bin_fill.stages(FILL_SCENE, Goal.of(colours=("red", "blue"), counts=(2, 1)))
+FILL_SCENE = scene_of(bin_fill, lambda scene: min(color_numbers(scene)) >= 3)
+FILL = bin_fill.stages(FILL_SCENE, Goal.of(colors=("red", "blue"), counts=(2, 1)))
 
 
 def picked(cube):
@@ -66,7 +66,7 @@ def filled(*cubes, then=()):
     ],
     ids=["as planned", "other order", "other cubes"],
 )
-def test_bin_fill_accepts_any_order_and_any_cubes_of_the_colours(cubes):
+def test_bin_fill_accepts_any_order_and_any_cubes_of_the_colors(cubes):
     assert filled(*cubes, then=[[]]).status is Status.ONGOING
     assert filled(*cubes, then=[[], [PRESSED]]).status is Status.SUCCESS
     assert filled(*cubes, then=[[PRESSED]]).status is Status.SUCCESS
@@ -138,7 +138,7 @@ def test_bin_fill_needs_every_drop():
 # SwingXtimes: the red cube, twice.
 
 SWING_SCENE = scene_of(swing_x_times, lambda _scene: True)
-SWING = swing_x_times.stages(SWING_SCENE, Goal.of(colour="red", repeats=2))
+SWING = swing_x_times.stages(SWING_SCENE, Goal.of(color="red", repeats=2))
 HELD, LYING = picked("cube_red"), Fact("lying", "cube_red")
 RIGHT, LEFT = (Fact("over", "cube_red", f"target_{side}") for side in ("right", "left"))
 TAKE = [[LYING], [HELD]]
@@ -215,7 +215,7 @@ def test_swing_does_not_count_a_cube_that_stays_over_a_target_again():
 
 
 def test_swing_with_another_cube_of_the_scene_follows_that_cube():
-    stages = swing_x_times.stages(SWING_SCENE, Goal.of(colour="blue", repeats=1))
+    stages = swing_x_times.stages(SWING_SCENE, Goal.of(color="blue", repeats=1))
     assert played(stages, SWING_SCENE, [[HELD]]).status is Status.FAILURE
     blue = [Fact("over", "cube_blue", f"target_{side}") for side in ("right", "left")]
     steps = [[picked("cube_blue")], blue[:1], blue[1:], [Fact("lying", "cube_blue")], [PRESSED]]

@@ -109,8 +109,8 @@ def test_every_forbidden_fact_of_every_stage_fails(task, index):
 
 def test_causes_call_things_by_what_they_are():
     episode = get_episode("VideoUnmask", "test", 3)
-    first, second = episode.goal.texts("colours")
-    covers = {str(cube.colour): str(cube.inside) for cube in episode.scene.of_kind("hidden_cube")}
+    first, second = episode.goal.texts("colors")
+    covers = {str(cube.color): str(cube.inside) for cube in episode.scene.of_kind("hidden_cube")}
     judge = Judge(episode.stages, episode.scene)
     judge.update(0, frozenset([Fact("lifted", covers[second])]))
     assert judge.cause == (
@@ -128,8 +128,8 @@ def test_causes_call_things_by_what_they_are():
 
 def test_pick_x_times_rules():
     episode = get_episode("PickXtimes", "test", 2)
-    colour, repeats = episode.goal.text("colour"), episode.goal.number("repeats")
-    cube, target = f"cube_{colour}", "target"
+    color, repeats = episode.goal.text("color"), episode.goal.number("repeats")
+    cube, target = f"cube_{color}", "target"
     others = [c.name for c in episode.scene.of_kind("cube") if c.name != cube]
     picked, placed = Fact("picked", cube), Fact("placed", cube, target)
     pressed = Fact("pressed", "button")

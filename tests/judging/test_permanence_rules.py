@@ -41,9 +41,7 @@ def verdict(episode, *steps):
 
 def named(episode):
     """The containers over the named cubes, in order, and all other containers."""
-    wanted = [
-        str(episode.scene[f"cube_{colour}"].inside) for colour in episode.goal.texts("colours")
-    ]
+    wanted = [str(episode.scene[f"cube_{color}"].inside) for color in episode.goal.texts("colors")]
     names = [item.name for item in episode.scene.of_kind("container")]
     return wanted, [name for name in names if name not in wanted]
 
@@ -80,10 +78,10 @@ def test_any_other_container_fails_the_first_pick(task, seed):
         judge = verdict(episode, *PRESSES[task], [lifted(wrong)])
         assert judge.status is Status.FAILURE
         hidden = episode.scene.hidden_in(wrong)
-        what = f"the container over the {hidden.colour} cube" if hidden else "an empty container"
-        colour = episode.goal.texts("colours")[0]
+        what = f"the container over the {hidden.color} cube" if hidden else "an empty container"
+        color = episode.goal.texts("colors")[0]
         assert judge.cause == (
-            f"lifted {what} while due: pick up the container that hides the {colour} cube"
+            f"lifted {what} while due: pick up the container that hides the {color} cube"
         )
 
 

@@ -180,7 +180,7 @@ every_place_goal = pytest.mark.parametrize(
 
 
 def place_facts(episode):
-    cube = f"cube_{episode.goal.text('colour')}"
+    cube = f"cube_{episode.goal.text('color')}"
     visits = [fact.place for fact in episode.scene.past if fact.kind == "placed"]
     if episode.task == "VideoPlaceButton":
         answer = {"before": visits[0], "after": visits[1]}[episode.goal.text("relation")]

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from language_variants import SPATIAL_TASKS, random_episodes
 
-from roboirg.core.episode import COLOURS, Point, Scene, SceneObject
+from roboirg.core.episode import COLORS, Point, Scene, SceneObject
 from roboirg.core.motions import Away
 from roboirg.language import FORMS, expressible, instruct, resolve
 from roboirg.language.interpreter.places import find, read_places
@@ -16,7 +16,7 @@ from roboirg.language.landmarks import MARGIN, landmarks, selectors
 
 GRID = st.integers(-17, 17).map(lambda step: step / 100)
 PLACES = st.lists(st.tuples(GRID, GRID), min_size=1, max_size=8, unique=True)
-"""Centimetre grid: ties, exact margins and collinear rows are common."""
+"""Centimeter grid: ties, exact margins and collinear rows are common."""
 
 
 def containers(places):
@@ -30,8 +30,8 @@ def containers(places):
 
 def cubes(places, button=(-0.2, 0.0), target=(0.0, 0.1)):
     things = [
-        SceneObject(f"cube_{colour}", "cube", Point(x, y, 0.02), colour=colour)
-        for colour, (x, y) in zip(COLOURS, places, strict=False)
+        SceneObject(f"cube_{color}", "cube", Point(x, y, 0.02), color=color)
+        for color, (x, y) in zip(COLORS, places, strict=False)
     ]
     fixtures = [
         SceneObject(kind, kind, Point(*place, 0.0))
@@ -169,7 +169,7 @@ def test_a_place_of_two_things_makes_two_goals():
     scene = cubes([(0.1, 0.1), (-0.1, 0.105), (0.0, 0.0)])
     text = "Take the cube at the far left and place it on the target once."
     goals = resolve(text, scene, "PickXtimes").goals
-    assert {goal.text("colour") for goal in goals} == {"red", "green"}
+    assert {goal.text("color") for goal in goals} == {"red", "green"}
 
 
 @pytest.mark.parametrize("task", SPATIAL_TASKS)
@@ -207,15 +207,15 @@ def test_the_bin_is_a_fixture():
     assert found["farthest from the bin"] is scene["cube_green"]
 
 
-def test_a_place_of_a_counted_colour_is_that_of_one_of_its_cubes():
+def test_a_place_of_a_counted_color_is_that_of_one_of_its_cubes():
     for episode in random_episodes("BinFill", 80):
         if "spatial" not in expressible(episode):
             continue
         said = instruct(episode, "spatial").metadata["landmarks"]
-        for colour, phrase in zip(episode.goal.texts("colours"), said, strict=True):
+        for color, phrase in zip(episode.goal.texts("colors"), said, strict=True):
             places = selectors(episode.scene, "cube", "robot")
             found = {one.selected() for one in places if one.landmark.phrase == phrase}
-            assert {item.colour for item in found if item is not None} == {colour}
+            assert {item.color for item in found if item is not None} == {color}
 
 
 @pytest.mark.parametrize("gap", [0.0, MARGIN / 2, math.nextafter(MARGIN, 0.0), MARGIN])

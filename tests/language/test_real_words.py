@@ -7,23 +7,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 from language_variants import random_episodes
 
-from roboirg.core.episode import ALL_COLOURS, Goal, Point, Scene, SceneObject
+from roboirg.core.episode import ALL_COLORS, Goal, Point, Scene, SceneObject
 from roboirg.language import expressible, instruct, resolve
 from roboirg.language.interpreter.places import Towards, read_places
 from roboirg.language.interpreter.tokens import split_sentences
 from roboirg.language.landmarks import MARGIN, landmarks
 
-GREEN = SceneObject("box_green", "box", Point(0.05, 0.15, 0.03), colour="green")
-PURPLE = SceneObject("box_purple", "box", Point(0.05, -0.15, 0.03), colour="purple")
+GREEN = SceneObject("box_green", "box", Point(0.05, 0.15, 0.03), color="green")
+PURPLE = SceneObject("box_purple", "box", Point(0.05, -0.15, 0.03), color="purple")
 BOXES = Scene((GREEN, PURPLE, SceneObject("tape", "tape", Point(-0.1, 0, 0.0175), 0.0, "yellow")))
-YELLOW = SceneObject("tape_yellow", "tape", Point(-0.1, 0.1, 0.0175), colour="yellow")
-GRAY = SceneObject("tape_gray", "tape", Point(0.0, -0.1, 0.0175), colour="gray")
+YELLOW = SceneObject("tape_yellow", "tape", Point(-0.1, 0.1, 0.0175), color="yellow")
+GRAY = SceneObject("tape_gray", "tape", Point(0.0, -0.1, 0.0175), color="gray")
 TARGET = SceneObject("target", "target", Point(0.1, 0.0, 0.005), radius=0.05)
 TAPES = Scene((YELLOW, GRAY, TARGET))
 
 
 @pytest.mark.parametrize(
-    ("text", "colours"),
+    ("text", "colors"),
     [
         ("Put the tape into the green box.", {"green"}),
         ("Put the yellow tape into the purple box!", {"purple"}),
@@ -39,13 +39,13 @@ TAPES = Scene((YELLOW, GRAY, TARGET))
         ("Put the tape into the box whose color is not in that pair.", {"green", "purple"}),
     ],
 )
-def test_other_people_name_a_box(text, colours):
+def test_other_people_name_a_box(text, colors):
     goals = resolve(text, BOXES, "PutInBox").goals
-    assert {goal.text("colour") for goal in goals} == colours
+    assert {goal.text("color") for goal in goals} == colors
 
 
 @pytest.mark.parametrize(
-    ("text", "colour", "repeats"),
+    ("text", "color", "repeats"),
     [
         ("Take the grey tape, put it on the target two times", "gray", 2),
         ("Move the right tape to the target twice.", "gray", 2),
@@ -57,8 +57,8 @@ def test_other_people_name_a_box(text, colours):
          "gray", 2),
     ],
 )  # fmt: skip
-def test_other_people_name_a_tape_and_a_number(text, colour, repeats):
-    assert resolve(text, TAPES, "PickByCount").goals == (Goal.of(colour=colour, repeats=repeats),)
+def test_other_people_name_a_tape_and_a_number(text, color, repeats):
+    assert resolve(text, TAPES, "PickByCount").goals == (Goal.of(color=color, repeats=repeats),)
 
 
 GRID = st.integers(-20, 20).map(lambda step: step / 100)
@@ -67,8 +67,8 @@ GRID = st.integers(-20, 20).map(lambda step: step / 100)
 @given(GRID, GRID, GRID, GRID, st.sampled_from(["box", "tape"]))
 def test_two_of_a_kind_are_told_by_their_sides_alone(left, right, near, far, kind):
     """Whoever wins by the margin along y, however the two stand along x."""
-    one = SceneObject("one", kind, Point(near, left, 0.03), colour="green")
-    two = SceneObject("two", kind, Point(far, right, 0.03), colour="gray")
+    one = SceneObject("one", kind, Point(near, left, 0.03), color="green")
+    two = SceneObject("two", kind, Point(far, right, 0.03), color="gray")
     scene = Scene((one, two))
     for mine, other in itertools.permutations((one, two)):
         ahead = mine.position.y - other.position.y
@@ -79,8 +79,8 @@ def test_two_of_a_kind_are_told_by_their_sides_alone(left, right, near, far, kin
 
 @pytest.mark.parametrize("kind", ["box", "tape"])
 def test_for_the_camera_sides_are_mirrored(kind):
-    left = SceneObject("left", kind, Point(0.0, 0.15, 0.03), colour="green")
-    right = SceneObject("right", kind, Point(0.0, -0.15, 0.03), colour="gray")
+    left = SceneObject("left", kind, Point(0.0, 0.15, 0.03), color="green")
+    right = SceneObject("right", kind, Point(0.0, -0.15, 0.03), color="gray")
     (landmark,) = landmarks(Scene((left, right)), kind, left, "camera")
     assert landmark.phrase == "on the right"
     assert landmark.sided
@@ -91,11 +91,11 @@ def test_sides_of_other_things_are_no_places():
     assert read_places(words) == (Towards("left", 0),)
 
 
-def test_the_excluded_pair_is_the_tape_s_colour_and_the_other_box_s():
+def test_the_excluded_pair_is_the_tape_s_color_and_the_other_box_s():
     for episode in random_episodes("PutInBox", 40):
         said = instruct(episode, "reasoning")
-        pair = {"green", "purple", "yellow"} - {episode.goal.text("colour")}
-        assert set(ALL_COLOURS) & set(said.turns[0].lower().rstrip(".").split()) == pair
+        pair = {"green", "purple", "yellow"} - {episode.goal.text("color")}
+        assert set(ALL_COLORS) & set(said.turns[0].lower().rstrip(".").split()) == pair
 
 
 def test_a_number_is_derived_from_another_one():
@@ -113,13 +113,13 @@ def test_a_number_is_derived_from_another_one():
 
 
 @pytest.mark.parametrize("task", ["PutInBox", "PickByCount"])
-def test_competing_remarks_name_colours_of_the_table_only(task):
-    colours = {"PutInBox": {"green", "purple", "yellow"}, "PickByCount": {"yellow", "gray"}}[task]
+def test_competing_remarks_name_colors_of_the_table_only(task):
+    colors = {"PutInBox": {"green", "purple", "yellow"}, "PickByCount": {"yellow", "gray"}}[task]
     for episode in random_episodes(task, 10):
         said = instruct(episode, "contextual", distractor="competing", distractors=40)
         remarks = " ".join(one.text for one in said.utterances if one.stage == "distractor")
-        named = set(ALL_COLOURS) & set(remarks.replace(",", " ").split())
-        assert named == colours - {episode.goal.text("colour")}
+        named = set(ALL_COLORS) & set(remarks.replace(",", " ").split())
+        assert named == colors - {episode.goal.text("color")}
 
 
 @pytest.mark.parametrize("task", ["PutInBox", "PickByCount"])

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from language_variants import first_episodes
 
-from roboirg.core.episode import COLOURS, Goal, Point, Scene, SceneObject
+from roboirg.core.episode import COLORS, Goal, Point, Scene, SceneObject
 from roboirg.core.errors import UnknownNameError
 from roboirg.episodes.splits import get_episode
 from roboirg.language import expressible, instruct, interpreter, resolve
@@ -49,7 +49,7 @@ def test_it_shares_nothing_with_the_generators(path):
             assert module.startswith(ALLOWED), module
     tree = ast.parse(path.read_text())
     attributes = {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
-    assert not attributes & {"commands", "wordings", "by_colour", "by_place", "patterns"}
+    assert not attributes & {"commands", "wordings", "by_color", "by_place", "patterns"}
 
 
 WORDS = (
@@ -101,16 +101,16 @@ def test_unknown_task():
 SCENE = Scene(
     (
         SceneObject("button", "button", Point(-0.2, 0.0, 0.0)),
-        SceneObject("cube_red", "cube", Point(0.0, 0.1, 0.02), colour="red"),
-        SceneObject("cube_green", "cube", Point(-0.1, -0.1, 0.02), colour="green"),
-        SceneObject("cube_blue", "cube", Point(0.05, 0.0, 0.02), colour="blue"),
+        SceneObject("cube_red", "cube", Point(0.0, 0.1, 0.02), color="red"),
+        SceneObject("cube_green", "cube", Point(-0.1, -0.1, 0.02), color="green"),
+        SceneObject("cube_blue", "cube", Point(0.05, 0.0, 0.02), color="blue"),
         SceneObject("target", "target", Point(-0.1, 0.12, 0.0), radius=0.04),
     )
 )
 
 
 @pytest.mark.parametrize(
-    ("text", "colour", "repeats"),
+    ("text", "color", "repeats"),
     [
         ("Pick up the red cube and place it on the target 3 times, then press it.", "red", 3),
         ("GRAB   THE RED CUBE , put it on the target TWICE and press the button", "red", 2),
@@ -131,8 +131,8 @@ SCENE = Scene(
         ("I like green. Ignore the red thing. Pick it up and put it on the disc once.", "green", 1),
     ],
 )  # fmt: skip
-def test_sentences_of_other_people(text, colour, repeats):
-    assert resolve(text, SCENE, "PickXtimes").goals == (Goal.of(colour=colour, repeats=repeats),)
+def test_sentences_of_other_people(text, color, repeats):
+    assert resolve(text, SCENE, "PickXtimes").goals == (Goal.of(color=color, repeats=repeats),)
 
 
 def test_what_is_left_open_by_commands_alone():
@@ -146,30 +146,30 @@ def test_what_is_left_open_by_commands_alone():
     assert count("Take the red cube and place it on the target two more times than that.") == 3
 
 
-def test_picks_tell_how_many_colours_a_goal_has():
+def test_picks_tell_how_many_colors_a_goal_has():
     one = resolve("Lift the container that hides it.", UNMASK, "VideoUnmask").goals
-    assert {len(goal.texts("colours")) for goal in one} == {1}
+    assert {len(goal.texts("colors")) for goal in one} == {1}
     text = "Lift the container over the former, put it down, then lift the one over the latter."
     two = resolve(text, UNMASK, "VideoUnmask").goals
-    assert {len(goal.texts("colours")) for goal in two} == {2}
+    assert {len(goal.texts("colors")) for goal in two} == {2}
     assert len(two) == 6
 
 
 def test_waved_aside_values_do_not_count():
     lift = "Lift the container that hides it."
     text = f"Blue is nice. My neighbor prefers red, but that does not matter here. {lift}"
-    assert resolve(text, UNMASK, "VideoUnmask").goals == (Goal.of(colours=("blue",)),)
+    assert resolve(text, UNMASK, "VideoUnmask").goals == (Goal.of(colors=("blue",)),)
 
 
 def test_rivals_that_are_not_waved_aside_make_a_text_ambiguous():
     take = "Take it and place it on the target that many times."
     goals = resolve(f"I like red. I also like blue. Three! {take}", SCENE, "PickXtimes").goals
-    assert {goal.text("colour") for goal in goals} == {"red", "blue"}
+    assert {goal.text("color") for goal in goals} == {"red", "blue"}
     goals = resolve(f"Five. I like red. My cat has four kittens. {take}", SCENE, "PickXtimes").goals
     assert {goal.number("repeats") for goal in goals} == {4, 5}
     text = "Look at the cube at the far left. I see the cube closest to you. Take the cube there."
     goals = resolve(text, SCENE, "PickXtimes").goals
-    assert {goal.text("colour") for goal in goals} == {"red", "green"}
+    assert {goal.text("color") for goal in goals} == {"red", "green"}
 
 
 @pytest.mark.parametrize("task", every_task())
@@ -182,7 +182,7 @@ def test_case_spaces_digits_and_spelling_do_not_matter(task):
             digits = digits.replace(f" {word}", f" {number}")
         for ordinal, word in (("2nd", "second"), ("3rd", "third"), ("4th", "fourth")):
             digits = digits.replace(f" {word}", f" {ordinal}")
-        british = text.replace("color", "colour").replace("neighbor", "neighbour")
+        british = text.replace("color", "color").replace("neighbor", "neighbor")
         short = british.replace("did not", "didn’t").replace("does not", "doesn't")
         for other in (text.upper(), text.replace(" ", "  \t"), digits, british, short, text + "\n"):
             assert resolve(other, episode.scene, task).goals == (episode.goal,), other
@@ -196,4 +196,4 @@ def test_an_empty_container_holds_no_goal():
     found = resolve("Lift the container closest to you.", lone, "VideoUnmask")
     assert not found.goals
     assert found.not_understood
-    assert set(COLOURS) == {cube.colour for cube in hard.of_kind("hidden_cube")}
+    assert set(COLORS) == {cube.color for cube in hard.of_kind("hidden_cube")}

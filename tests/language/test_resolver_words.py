@@ -8,20 +8,20 @@ from hypothesis import strategies as st
 from language_variants import first_episodes
 
 from roboirg.core.conditions import Fact
-from roboirg.core.episode import COLOURS, Goal, Point, Scene, SceneObject
+from roboirg.core.episode import COLORS, Goal, Point, Scene, SceneObject
 from roboirg.core.motions import Away, Swap
 from roboirg.language import resolve
 
 
 def cube(name, x, y):
-    return SceneObject(name, "cube", Point(x, y, 0.02), colour=name.split("_")[1])
+    return SceneObject(name, "cube", Point(x, y, 0.02), color=name.split("_")[1])
 
 
-def container(number, x, y, colour=None):
+def container(number, x, y, color=None):
     name = f"container_{number}"
     box = SceneObject(name, "container", Point(x, y, 0.05))
-    hidden = SceneObject(f"cube_{colour}", "hidden_cube", Point(x, y, 0.02), 0.0, colour, name)
-    return (box, hidden) if colour else (box,)
+    hidden = SceneObject(f"cube_{color}", "hidden_cube", Point(x, y, 0.02), 0.0, color, name)
+    return (box, hidden) if color else (box,)
 
 
 BUTTON = SceneObject("button", "button", Point(-0.2, 0.0, 0.0))
@@ -50,8 +50,8 @@ AROUND = Scene(ORDERED.objects, past=ORDERED.past[1:4])
 
 
 def filled(**counts):
-    named = [colour for colour in ("red", "blue", "green") if colour in counts]
-    return Goal.of(colours=tuple(named), counts=tuple(counts[colour] for colour in named))
+    named = [color for color in ("red", "blue", "green") if color in counts]
+    return Goal.of(colors=tuple(named), counts=tuple(counts[color] for color in named))
 
 
 @pytest.mark.parametrize(
@@ -72,17 +72,17 @@ def filled(**counts):
         ("I own three green cubes. Put one cube fewer than that of the red cubes into the bin.",
          {"red": 2}),
         ("Put half as many green cubes as 8 into the bin.", {"green": 4}),
-        (("My house is red and blue. Put two cubes that aren't in either of those colours, so "
+        (("My house is red and blue. Put two cubes that aren't in either of those colors, so "
          "other than that pair, into the bin."), {"green": 2}),
         (("My house is red and blue. I prefer blue. Put three cubes in the colour of those two "
-         "that I don't prefer into the bin, and one of a colour different from both."),
+         "that I don't prefer into the bin, and one of a color different from both."),
          {"red": 3, "green": 1}),
         ("Put four cubes in the other colour of red and green, not green, into the bin.",
          {"red": 4}),
         ("Drop two cubes of the same colour as the one farthest from you into the bin.",
          {"green": 2}),
         (("See the cube closest to the far right corner of the table. Put two cubes in the same "
-         "colour as the one there into the bin."), {"green": 2}),
+         "color as the one there into the bin."), {"green": 2}),
         (("See the cube closest to you and the cube farthest from you? Put two cubes coloured like "
          "the one at the second place and one coloured like the one at the first into the bin."),
          {"green": 2, "red": 1}),
@@ -103,13 +103,13 @@ def left_over(text, scene=FILL, task="BinFill"):
 
 def test_amounts_that_are_left_open():
     assert left_over("Put that many of them into the bin.") == {
-        filled(**{colour: number})
-        for colour, most in (("red", 5), ("blue", 4), ("green", 4))
+        filled(**{color: number})
+        for color, most in (("red", 5), ("blue", 4), ("green", 4))
         for number in range(1, most + 1)
     }
     pairs = left_over("Put two cubes of a color other than that pair and one cube in the color of "
                       "that pair that I did not choose into the bin.")  # fmt: skip
-    assert pairs == {filled(**{one: 2, two: 1}) for one, two in itertools.permutations(COLOURS, 2)}
+    assert pairs == {filled(**{one: 2, two: 1}) for one, two in itertools.permutations(COLORS, 2)}
     assert left_over("Put twice as many red cubes as that into the bin.") == {
         filled(red=2), filled(red=4)
     }  # fmt: skip
@@ -176,7 +176,7 @@ def test_visits_that_are_left_open():
 
 
 @pytest.mark.parametrize(
-    ("text", "colour", "placement"),
+    ("text", "color", "placement"),
     [
         ("Put the red cube on the target of the third placement.", "red", 3),
         ("Take the blue cube and put it on the disc of placement number 2.", "blue", 2),
@@ -186,11 +186,11 @@ def test_visits_that_are_left_open():
         (("I liked the third placement. Take the red cube and put it on the target of the "
          "preceding one."), "red", 2),
         (("I liked the third placement. Take the red cube and put it on the target of the "
-         "placement that's a neighbour of that."), "red", 2),
+         "placement that's a neighbor of that."), "red", 2),
     ],
 )  # fmt: skip
-def test_placements_in_other_words(text, colour, placement):
-    goal = Goal.of(colour=colour, placement=placement)
+def test_placements_in_other_words(text, color, placement):
+    goal = Goal.of(color=color, placement=placement)
     assert resolve(text, ORDERED, "VideoPlaceOrder").goals == (goal,)
 
 
@@ -217,7 +217,7 @@ def test_placements_in_other_words(text, colour, placement):
     ],
 )  # fmt: skip
 def test_moments_in_other_words(text, relation):
-    goal = Goal.of(colour="red", relation=relation)
+    goal = Goal.of(color="red", relation=relation)
     assert resolve(text, AROUND, "VideoPlaceButton").goals == (goal,)
 
 
@@ -249,52 +249,52 @@ def test_repeats_in_other_words():
     assert repeats("Lift it and put it down one time fewer than that.") == {1, 2, 3}
     swing = "Swing the blue cube to the right and left targets two times fewer than five."
     *_, episode = first_episodes("SwingXtimes", "train", 4)
-    goal = Goal.of(colour="blue", repeats=3)
+    goal = Goal.of(color="blue", repeats=3)
     assert resolve(swing, episode.scene, "SwingXtimes").goals == (goal,)
 
 
 def test_places_of_things_that_move_depend_on_when():
-    def colours(text):
+    def colors(text):
         found = left_over(text, SWAPPED, "VideoUnmaskSwap")
-        return {goal.texts("colours") for goal in found}
+        return {goal.texts("colors") for goal in found}
 
-    assert colours("Lift the container that was at the far left before they moved.") == {("red",)}
-    assert colours("Lift the container that was originally at the far left.") == {("red",)}
-    assert colours("Lift the container that is now at the far left.") == {("blue",)}
-    assert colours("Lift the container at the far left.") == {("red",), ("blue",)}
-    assert colours("Lift the container second from the left.") == {("green",)}
+    assert colors("Lift the container that was at the far left before they moved.") == {("red",)}
+    assert colors("Lift the container that was originally at the far left.") == {("red",)}
+    assert colors("Lift the container that is now at the far left.") == {("blue",)}
+    assert colors("Lift the container at the far left.") == {("red",), ("blue",)}
+    assert colors("Lift the container second from the left.") == {("green",)}
     first = "See the container at the far left? That was before anything moved."
-    assert colours(f"{first} Lift the container there.") == {("red",)}
+    assert colors(f"{first} Lift the container there.") == {("red",)}
     later = "See the container at the far left? That was after everything had moved."
-    assert colours(f"{later} Lift the container there.") == {("blue",)}
+    assert colors(f"{later} Lift the container there.") == {("blue",)}
     two = "Press both buttons first, then lift the container that was at the far right before the "
     two += "swaps started, put it back, and lift the container that was second from the left then."
-    assert colours(two) == {("blue", "green")}
+    assert colors(two) == {("blue", "green")}
 
 
 def test_order_words_are_no_pointers():
-    def colours(text):
+    def colors(text):
         found = left_over(f"I like red. I like blue. {text}", SWAPPED, "VideoUnmaskSwap")
-        return {goal.texts("colours") for goal in found}
+        return {goal.texts("colors") for goal in found}
 
-    assert colours("Lift the container first that hides the latter.") == {("blue",)}
-    assert colours("Lift for the first time the container that hides the latter.") == {("blue",)}
-    assert colours("First lift the container that hides the latter.") == {("blue",)}
-    assert colours("Lift the container that hides the second, but press the button first.") == {
+    assert colors("Lift the container first that hides the latter.") == {("blue",)}
+    assert colors("Lift for the first time the container that hides the latter.") == {("blue",)}
+    assert colors("First lift the container that hides the latter.") == {("blue",)}
+    assert colors("Lift the container that hides the second, but press the button first.") == {
         ("blue",)
     }
     two = "First lift the one over the latter, put it down, but then lift the one over the former."
-    assert colours(two) == {("blue", "red")}
+    assert colors(two) == {("blue", "red")}
 
 
 def test_late_cubes_are_nowhere_yet():
-    place = "Put two cubes of the same color as the one closest to the far right corner into the"
+    place = "Put two cubes of the same colour as the one closest to the far right corner into the"
     assert left_over(f"{place} bin.") == {filled(green=2)}
     there_at_once = Scene(FILL.objects)
     assert left_over(f"{place} bin.", there_at_once) == {filled(red=2)}
 
 
-COUNTS = st.dictionaries(st.sampled_from(COLOURS), st.integers(1, 4), min_size=1)
+COUNTS = st.dictionaries(st.sampled_from(COLORS), st.integers(1, 4), min_size=1)
 WORDED = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 NUMBERS = st.tuples(st.integers(1, 10), st.booleans())
 """A number, and whether it is said in a word."""
@@ -307,8 +307,8 @@ def spelled(number, worded):
 @given(COUNTS, st.randoms(), st.booleans())
 def test_any_amounts_in_any_order_are_read(counts, random, worded):
     items = [
-        f"{spelled(number, worded)} {colour} cube{'' if number == 1 else 's'}"
-        for colour, number in counts.items()
+        f"{spelled(number, worded)} {color} cube{'' if number == 1 else 's'}"
+        for color, number in counts.items()
     ]
     random.shuffle(items)
     text = f"Put {' and '.join(items)} into the bin."
@@ -321,7 +321,7 @@ def test_any_introduced_amounts_are_pointed_at(counts, words):
     pointers = {"former": ("former", "latter"), "first": ("first", "second", "third")}[words]
     if len(counts) > len(pointers) or (words == "former" and len(counts) == 1):
         return
-    asked = " and ".join(f"{number} of the {colour} cubes" for colour, number in counts.items())
+    asked = " and ".join(f"{number} of the {color} cubes" for color, number in counts.items())
     items = [f"that many of the {pointer}" for pointer in pointers[: len(counts)]]
     text = f"I need {asked}. Drop {', '.join(items)} into the bin."
     expected = {filled(**counts)} if sum(counts.values()) <= 5 else set()

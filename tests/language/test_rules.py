@@ -9,7 +9,7 @@ from collections import Counter
 import pytest
 from language_variants import SPATIAL_TASKS, TASKS, split_episodes
 
-from roboirg.core.episode import ALL_COLOURS
+from roboirg.core.episode import ALL_COLORS
 from roboirg.episodes.splits import get_episode
 from roboirg.language import FORMS, STAGE_SETS, instruct, templates
 from roboirg.language.number_words import CARDINALS, ORDINALS
@@ -17,7 +17,7 @@ from roboirg.language.patterns import deduction, sequence
 from roboirg.language.variants import tellings
 from roboirg.tasks import every_task, get_task
 
-COLOUR_NAMES = frozenset(ALL_COLOURS)
+COLOR_NAMES = frozenset(ALL_COLORS)
 
 
 def words_of(text):
@@ -46,7 +46,7 @@ def check_spans(instruction):
         assert span == span.strip()
         assert (mention.expression is None) == (mention.role == "antecedent")
         if mention.role == "anaphor":
-            assert COLOUR_NAMES.isdisjoint(words)
+            assert COLOR_NAMES.isdisjoint(words)
         if mention.expression not in (None, "pair", "other") and "those" not in words:
             assert mention.expression in words
 
@@ -124,19 +124,19 @@ def check_english(text):
     lower = text.lower()
     assert not re.search(r"\ba [aeio]", lower), text
     assert not re.search(r"\ban [^aeiou]", lower), text
-    assert not re.search(r"\b(up|down) it\b|colour|favourite|neighbour", text), text
+    assert not re.search(r"\b(up|down) it\b|color|favorite|neighbor", text), text
     check_numbers(lower)
     check_agreement(lower)
 
 
 def check_numbers(lower):
     things = "(time|cube|container|box|tape|cat|minute|meeting)"
-    colour = f"({'|'.join(ALL_COLOURS)})"
+    color = f"({'|'.join(ALL_COLORS)})"
     assert not re.search(rf"\b(one|1) {things}e?s\b", lower), lower
     assert not re.search(rf"\b({MANY}) {things}\b", lower), lower
-    assert not re.search(rf"\bone (more |fewer )?{colour} (cubes|boxes|tapes)\b", lower), lower
-    assert not re.search(rf"\b({MANY}|many) {colour} (cube|box|tape)\b", lower), lower
-    assert not re.search(rf"\bof the {colour} (cube|box|tape)\b", lower), lower
+    assert not re.search(rf"\bone (more |fewer )?{color} (cubes|boxes|tapes)\b", lower), lower
+    assert not re.search(rf"\b({MANY}|many) {color} (cube|box|tape)\b", lower), lower
+    assert not re.search(rf"\bof the {color} (cube|box|tape)\b", lower), lower
 
 
 MANY = "|".join(CARDINALS[2:])
@@ -160,7 +160,7 @@ def check_agreement(lower):
 
 
 def test_neutral_remarks_and_cues_name_nothing_that_fills_a_slot():
-    forbidden = {*ALL_COLOURS, "left", "right", "front", "back", "near", "far", "there", "corner"}
+    forbidden = {*ALL_COLORS, "left", "right", "front", "back", "near", "far", "there", "corner"}
     forbidden |= {"closest", "farthest", "next", "last", "before", *THING.split("|")}
     forbidden |= {"button", "target", "it", "them", "former", "latter", "half", "all"}
     forbidden |= {"after", "earlier", "then", "visit", "placement", "moment", "bin", "video"}
@@ -197,16 +197,16 @@ def test_patterns_are_balanced_in_every_difficulty(task):
         assert max(counts.values()) - min(counts.values()) <= 2
 
 
-def test_the_patterns_of_amounts_go_by_the_number_of_colours():
+def test_the_patterns_of_amounts_go_by_the_number_of_colors():
     found: dict[int, Counter] = {}
     for episode in split_episodes("BinFill"):
         pattern = instruct(episode, "reasoning").metadata["pattern"]
-        found.setdefault(len(episode.goal.texts("colours")), Counter())[pattern] += 1
-    assert set(found[1]) == {"colour exclusion", "number deduction"}
+        found.setdefault(len(episode.goal.texts("colors")), Counter())[pattern] += 1
+    assert set(found[1]) == {"color exclusion", "number deduction"}
     assert set(found[2]) == {"contextual logic", "number deduction"}
     assert set(found[3]) == {"number deduction"}
-    for colours in (1, 2):
-        assert min(found[colours].values()) > 0.3 * found[colours].total()
+    for colors in (1, 2):
+        assert min(found[colors].values()) > 0.3 * found[colors].total()
 
 
 def test_of_two_placements_none_is_told_by_its_direction():
@@ -231,17 +231,17 @@ def test_a_relation_leaves_the_number_open():
     ]
 
 
-def test_amounts_keep_count_and_colour_together():
+def test_amounts_keep_count_and_color_together():
     for episode in split_episodes("BinFill"):
         amounts = list(
-            zip(episode.goal.texts("colours"), episode.goal.numbers("counts"), strict=True)
+            zip(episode.goal.texts("colors"), episode.goal.numbers("counts"), strict=True)
         )
         said = instruct(episode)
         values = [mention.value for mention in said.mentions]
-        assert values == [value for colour, count in amounts for value in (count, colour)]
-        for colour, count in amounts:
+        assert values == [value for color, count in amounts for value in (count, color)]
+        for color, count in amounts:
             cubes = "cube" if count == 1 else "cubes"
-            assert f"{CARDINALS[count]} {colour} {cubes}" in said.text
+            assert f"{CARDINALS[count]} {color} {cubes}" in said.text
 
 
 def test_where_things_move_places_are_those_before():

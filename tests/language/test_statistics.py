@@ -43,7 +43,7 @@ def test_lengths_patterns_relations_and_landmarks():
     assert lengths["explicit"].mean < lengths["direct"].mean < lengths["contextual"].mean
     assert all(one.shortest <= one.mean <= one.longest for one in lengths.values())
     patterns = corpus_statistics.pattern_counts(said())
-    assert patterns["PickXtimes"] == {"colour exclusion": 25, "number deduction": 25}
+    assert patterns["PickXtimes"] == {"color exclusion": 25, "number deduction": 25}
     assert sum(corpus_statistics.relation_counts(said())["PickXtimes"].values()) == 25
     assert set(corpus_statistics.relation_counts(said())["VideoPlaceOrder"]) >= {
         "right after",

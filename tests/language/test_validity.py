@@ -67,11 +67,11 @@ def exceptions(task):
 
 
 def test_the_exceptions_of_necessity_are_the_named_ones():
-    easy = {("easy", "spatial"): 1.0, ("easy", "colour exclusion"): 1.0}
+    easy = {("easy", "spatial"): 1.0, ("easy", "color exclusion"): 1.0}
     assert exceptions("PickXtimes") == exceptions("SwingXtimes") == easy
     others = exceptions("BinFill")
     assert easy.items() <= others.items()
-    assert {way for _, way in others} <= {"spatial", "colour exclusion", "contextual logic"}
+    assert {way for _, way in others} <= {"spatial", "color exclusion", "contextual logic"}
     # Few of the medium and hard spatial episodes; room for chance.
     assert others.get(("medium", "spatial"), 0) < 0.5
     assert others.get(("hard", "spatial"), 0) < 0.5

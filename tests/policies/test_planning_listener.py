@@ -100,7 +100,7 @@ def test_the_schema_allows_every_answer(task):
         | st.sampled_from(["red", "blue", "Red ", "before", "x"]),
         lambda inner: (
             st.lists(inner, max_size=3)
-            | st.dictionaries(st.sampled_from(["colour", "colours", "repeats", "visit"]), inner)
+            | st.dictionaries(st.sampled_from(["color", "colors", "repeats", "visit"]), inner)
         ),
     )
 )
@@ -115,11 +115,11 @@ def test_any_reply_is_a_goal_or_unparsable(reply):
     ("reply", "words"),
     [
         ("red, three times", "no JSON object"),
-        ('{"colour": "red"}', "'repeats' is missing"),
-        ('{"colour": "pink", "repeats": 2}', "'colour' cannot be \"pink\".*blue, green, red"),
-        ('{"colour": "red", "repeats": true}', "'repeats' cannot be true"),
-        ('{"colour": "red", "repeats": "two"}', "'repeats' cannot be \"two\""),
-        ('{"colour": "red", "repeats": 2.0}', "'repeats' cannot be 2.0"),
+        ('{"color": "red"}', "'repeats' is missing"),
+        ('{"color": "pink", "repeats": 2}', "'color' cannot be \"pink\".*blue, green, red"),
+        ('{"color": "red", "repeats": true}', "'repeats' cannot be true"),
+        ('{"color": "red", "repeats": "two"}', "'repeats' cannot be \"two\""),
+        ('{"color": "red", "repeats": 2.0}', "'repeats' cannot be 2.0"),
     ],
 )
 def test_wrong_replies_are_explained(reply, words):
@@ -130,7 +130,7 @@ def test_wrong_replies_are_explained(reply, words):
 def test_values_that_do_not_go_together_are_no_goal():
     for task, reply in [
         ("BinFill", {"red": 0, "blue": 0, "green": 0}),
-        ("VideoUnmask", {"colours": ["red", "red"]}),
+        ("VideoUnmask", {"colors": ["red", "red"]}),
     ]:
         with pytest.raises(UnparsableReply, match="meant together"):
             slots_of(task).read(json.dumps(reply))
@@ -138,9 +138,9 @@ def test_values_that_do_not_go_together_are_no_goal():
 
 def test_fences_words_and_capitals_around_an_answer_do_no_harm():
     goal = slots_of("PickXtimes").read(
-        'Let {me} think.\n```json\n{"why": "x", "colour": " Red", "repeats": 2}\n```'
+        'Let {me} think.\n```json\n{"why": "x", "color": " Red", "repeats": 2}\n```'
     )
-    assert dict(goal.as_mapping()) == {"colour": "red", "repeats": 2}
+    assert dict(goal.as_mapping()) == {"color": "red", "repeats": 2}
 
 
 def test_a_listener_that_is_told_the_truth_decides_on_the_true_goal_in_all_settings():
@@ -238,14 +238,14 @@ def test_what_is_not_in_the_scene_is_counted_and_nothing_is_done():
         for one in (get_episode("PickXtimes", "test", index) for index in range(50))
         if len(one.scene.of_kind("cube")) == 1
     )
-    (there,) = {cube.colour for cube in episode.scene.of_kind("cube")}
-    absent = next(colour for colour in ("red", "green", "blue") if colour != there)
-    with fake_vlm([json.dumps({"colour": absent, "repeats": 1})]) as server:
+    (there,) = {cube.color for cube in episode.scene.of_kind("cube")}
+    absent = next(color for color in ("red", "green", "blue") if color != there)
+    with fake_vlm([json.dumps({"color": absent, "repeats": 1})]) as server:
         policy = make_listener(server)
         policy.attach(stand_in(episode))
         policy.reset("Do it.", {})
         assert policy.usage() == usage(calls=1, impossible=1)
-        assert policy.metadata["understood"] == {"colour": absent, "repeats": 1}
+        assert policy.metadata["understood"] == {"color": absent, "repeats": 1}
 
 
 def test_a_new_episode_has_a_new_account():

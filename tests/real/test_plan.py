@@ -42,7 +42,7 @@ def check_balance(task, episodes):
     found = tallies(episodes)
     orders = balanced_order(task)
     assert spread(found["arrangement"], orders) <= 1
-    for respect in ("colour", "left", "repeats"):
+    for respect in ("color", "left", "repeats"):
         assert spread(found[respect], {getattr(one, respect) for one in orders}) <= 1, respect
     assert spread(found["side"], ("left", "right")) <= 2
 
@@ -124,16 +124,16 @@ def test_the_paper_s_study_is_the_default():
     assert len(plan.trials) == 2 * 5 * 10 * 2
     assert len(plan.demonstrations) == 2 * 50
     picks = [t.episode for t in plan.trials if t.job.task == "PickByCount"]
-    assert set(tallies(picks)["colour"].values()) == {50}
+    assert set(tallies(picks)["color"].values()) == {50}
     assert set(tallies(picks)["repeats"].values()) == {50}
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_all_arrangements_are_there_and_neighbours_are_opposites(task):
+def test_all_arrangements_are_there_and_neighbors_are_opposites(task):
     order = balanced_order(task)
     assert len(set(order)) == len(order) == (4 if task == "PutInBox" else 8)
     for one, other in zip(order[::2], order[1::2], strict=True):
-        assert one.colour != other.colour
+        assert one.color != other.color
         assert one.left != other.left
         assert one.repeats != other.repeats or one.repeats is None
 
@@ -230,13 +230,13 @@ def test_operators_choose_among_the_failures_of_the_task(task, wrong):
             "nothing_reached", "missed_grasp", "dropped", "misplaced", "out_of_time",
         ]  # fmt: skip
         assert len({one.key for one in choices}) == len(choices)
-        meant = str(trial.episode.goal["colour"])
+        meant = str(trial.episode.goal["color"])
         for one in choices:
             if one.failure in ("wrong_place", "wrong_object"):
                 assert meant not in one.words
 
 
-def test_sides_follow_from_colours():
+def test_sides_follow_from_colors():
     assert Arrangement("green", "green").side == "left"
     assert Arrangement("green", "purple").side == "right"
 

@@ -47,18 +47,18 @@ def test_waypoints_alone_do_a_whole_task():
     env = make("waypoint")
     objects = {name: body.position for name, body in env.session.world.bodies.items()}
     slots = env.episode.goal.as_mapping()
-    cube, target, button = objects[f"cube_{slots['colour']}"], objects["target"], objects["button"]
-    yaw = env.episode.scene[f"cube_{slots['colour']}"].yaw
+    cube, target, button = objects[f"cube_{slots['color']}"], objects["target"], objects["button"]
+    yaw = env.episode.scene[f"cube_{slots['color']}"].yaw
     yaw = (yaw + np.pi / 4) % (np.pi / 2) - np.pi / 4
 
     def go(place, height, gripper, turn=0.0):
         return env.step([place.x, place.y, height, np.pi, 0.0, turn, gripper])
 
     for _ in range(slots["repeats"]):
-        cube = env.session.world.bodies[f"cube_{slots['colour']}"].position
+        cube = env.session.world.bodies[f"cube_{slots['color']}"].position
         for height, gripper in ((0.15, 1), (0.02, -1), (0.15, 0)):
             go(cube, height, gripper, yaw)
-        assert Fact("picked", f"cube_{slots['colour']}") in env.session.world.facts
+        assert Fact("picked", f"cube_{slots['color']}") in env.session.world.facts
         # Neither -1 nor +1: the gripper stays as it was, closed.
         for height, gripper in ((0.15, 0.3), (0.02, 1), (0.15, 0.999)):
             go(target, height, gripper, yaw)

@@ -22,13 +22,13 @@ WINDOW = 12
 
 
 DEPTH_NOISE = 1e-5
-"""Metres."""
+"""Meters."""
 
 
 def painted(corners, shift, noise, *, both_sides):
     """The triangle that a renderer would show at each pixel of the window; -1 for none.
 
-    Each triangle's corners are shifted by so many pixels, and its depth by so many metres.
+    Each triangle's corners are shifted by so many pixels, and its depth by so many meters.
     """
     places = FOCAL_LENGTH * corners[..., :2] / corners[..., 2:] + SIZE / 2
     places = np.round((places + shift) * GRID) / GRID
@@ -80,39 +80,39 @@ def test_whatever_a_renderer_shows_is_kept(corners, both_sides, seed):
         assert shown[winner[winner >= 0]].all()
 
 
-def square(depth, half, centre=(0.0, 0.0), *, back=False):
-    """Two triangles across the view, `half` pixels from the centre to the sides."""
-    ends = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], dtype=float) * half + centre
+def square(depth, half, center=(0.0, 0.0), *, back=False):
+    """Two triangles across the view, `half` pixels from the center to the sides."""
+    ends = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], dtype=float) * half + center
     points = np.column_stack([ends / FOCAL_LENGTH, np.ones(4)]) * depth
     order = [(0, 1, 2), (0, 2, 3)] if back else [(0, 2, 1), (0, 3, 2)]
     return points[order]
 
 
 def test_what_is_behind_something_else_is_left_out():
-    wide, hidden = square(1.0, 8), square(1.01, 1.5, centre=(4, -4))
+    wide, hidden = square(1.0, 8), square(1.01, 1.5, center=(4, -4))
     peeping, nearer = square(1.01, 9), square(0.99, 2)
     corners = np.concatenate([wide, hidden, peeping, nearer])
     assert shown_triangles(corners).tolist() == [True] * 2 + [False] * 2 + [True] * 4
 
 
 def test_what_is_nearly_as_near_is_kept():
-    behind = square(1.0003, 1.5, centre=(4, -4))
+    behind = square(1.0003, 1.5, center=(4, -4))
     assert shown_triangles(np.concatenate([square(1.0, 8), behind])).all()
 
 
 def test_what_turns_its_back_hides_nothing():
-    behind = square(1.1, 1.5, centre=(4, -4))
+    behind = square(1.1, 1.5, center=(4, -4))
     assert shown_triangles(np.concatenate([square(1.0, 8, back=True), behind])).all()
 
 
 def test_what_lies_between_the_middles_of_pixels_is_left_out():
     assert not shown_triangles(square(1.0, 0.4)).any()
-    assert shown_triangles(square(1.0, 0.4, centre=(0.5, 0.5))).all()
+    assert shown_triangles(square(1.0, 0.4, center=(0.5, 0.5))).all()
     assert shown_triangles(square(1.0, 0.49)).all(), "it may be rounded to where it is shown"
 
 
 def test_what_is_out_of_the_picture_is_left_out_and_what_is_at_the_eye_is_kept():
-    beside = square(1.0, 8, centre=(SIZE, 0))
+    beside = square(1.0, 8, center=(SIZE, 0))
     behind = square(1.0, 8) * [1, 1, -1]
     assert shown_triangles(np.concatenate([beside, behind])).tolist() == [False] * 2 + [True] * 2
 

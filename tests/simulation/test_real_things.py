@@ -109,7 +109,7 @@ def test_beside_a_box_is_not_inside():
 def test_what_is_held_over_a_box_is_not_inside():
     episode = get_episode("PutInBox", "test", 0)
     world = World(episode.scene, visible=False)
-    hands, box = Hands(world), f"box_{episode.goal.text('colour')}"
+    hands, box = Hands(world), f"box_{episode.goal.text('color')}"
     execute(world, hands.perform(Primitive("pick_cube", "tape")))
     into = hands.perform(Primitive("put_into", "tape", box))
     inside = Fact("binned", "tape", box)
@@ -135,15 +135,15 @@ def test_a_box_is_open_and_the_hand_does_not_touch_it(index):
 
     env.set_frame_hook(look)
     assert play(env, Mistaken(episode.goal))["status"] == "success"
-    assert touched <= {"tape", f"box_{episode.goal.text('colour')}"}
+    assert touched <= {"tape", f"box_{episode.goal.text('color')}"}
 
 
 @pytest.mark.parametrize("index", range(4))
 def test_the_other_box_is_a_failure(index):
     episode = get_episode("PutInBox", "val", index)
-    mine = episode.goal.text("colour")
+    mine = episode.goal.text("color")
     other = {"green": "purple", "purple": "green"}[mine]
-    info = play(roboirg.make(episode, cameras=()), Mistaken(Goal.of(colour=other)))
+    info = play(roboirg.make(episode, cameras=()), Mistaken(Goal.of(color=other)))
     assert info["status"] == "failure"
     assert info["cause"] == (
         f"put the tape into the {other} box while due: put the tape into the {mine} box"
@@ -157,16 +157,16 @@ def of_number(repeats):
 
 def test_once_too_often_is_a_failure():
     episode = of_number(1)
-    colour = episode.goal.text("colour")
-    again = Mistaken(Goal.of(colour=colour, repeats=2))
+    color = episode.goal.text("color")
+    again = Mistaken(Goal.of(color=color, repeats=2))
     info = play(roboirg.make(episode, cameras=()), again)
     assert info["status"] == "failure"
-    assert info["cause"].startswith(f"picked up the {colour} tape again")
+    assert info["cause"].startswith(f"picked up the {color} tape again")
 
 
 def test_once_too_few_runs_out_of_time():
     episode = of_number(2)
-    once = Mistaken(Goal.of(colour=episode.goal.text("colour"), repeats=1))
+    once = Mistaken(Goal.of(color=episode.goal.text("color"), repeats=1))
     info = play(roboirg.make(episode, cameras=(), max_steps=700), once)
     assert info["status"] == "timeout"
 

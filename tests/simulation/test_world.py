@@ -41,7 +41,7 @@ def test_objects_rest_where_and_weigh_what_the_facts_say():
     assert cube.physics.mass == pytest.approx(0.064)
     assert button.physics.mass == pytest.approx(0.0427, abs=1e-4)
     assert button.pressed_depth == pytest.approx(0.0005, abs=5e-5)
-    cubes = {Fact("lying", f"cube_{colour}") for colour in ("red", "green", "blue")}
+    cubes = {Fact("lying", f"cube_{color}") for color in ("red", "green", "blue")}
     assert world.facts == {Fact("still", "robot"), Fact("home", "robot"), *cubes}
 
 

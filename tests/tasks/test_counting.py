@@ -42,8 +42,8 @@ def scenes(task, difficulty):
     return found
 
 
-def of_colour(scene, colour):
-    return [cube for cube in scene.of_kind("cube") if cube.colour == colour]
+def of_color(scene, color):
+    return [cube for cube in scene.of_kind("cube") if cube.color == color]
 
 
 each_difficulty = pytest.mark.parametrize("difficulty", DIFFICULTIES)
@@ -119,30 +119,30 @@ def test_bin_fill_spawns_what_is_wanted_and_more(difficulty):
     for scene, goal in scenes("BinFill", difficulty):
         cubes = scene.of_kind("cube")
         assert CUBES[difficulty][0] <= len(cubes) <= CUBES[difficulty][1]
-        present = {cube.colour for cube in cubes}
+        present = {cube.color for cube in cubes}
         assert len(present) == {"easy": 1, "medium": 2, "hard": 3}[difficulty]
-        colours, counts = goal.texts("colours"), goal.numbers("counts")
+        colors, counts = goal.texts("colors"), goal.numbers("counts")
         assert GOAL_CUBES[difficulty][0] <= sum(counts) <= GOAL_CUBES[difficulty][1]
-        assert list(colours) == [c for c in ("red", "blue", "green") if c in colours]
-        for colour, count in zip(colours, counts, strict=True):
-            assert 1 <= count <= len(of_colour(scene, colour))
-        for colour in present:
-            names = [cube.name for cube in of_colour(scene, colour)]
-            assert names == [f"cube_{colour}_{number}" for number in range(len(names))]
+        assert list(colors) == [c for c in ("red", "blue", "green") if c in colors]
+        for color, count in zip(colors, counts, strict=True):
+            assert 1 <= count <= len(of_color(scene, color))
+        for color in present:
+            names = [cube.name for cube in of_color(scene, color)]
+            assert names == [f"cube_{color}_{number}" for number in range(len(names))]
 
 
-def test_bin_fill_draws_all_numbers_and_all_choices_of_colours():
+def test_bin_fill_draws_all_numbers_and_all_choices_of_colors():
     for difficulty in DIFFICULTIES:
         drawn = scenes("BinFill", difficulty)
         totals = {len(scene.of_kind("cube")) for scene, _ in drawn}
         wanted = {sum(goal.numbers("counts")) for _, goal in drawn}
         assert totals == set(range(CUBES[difficulty][0], CUBES[difficulty][1] + 1))
         assert wanted == set(range(GOAL_CUBES[difficulty][0], GOAL_CUBES[difficulty][1] + 1))
-        named = Counter(len(goal.texts("colours")) for _, goal in drawn)
+        named = Counter(len(goal.texts("colors")) for _, goal in drawn)
         assert set(named) == {"easy": {1}, "medium": {1, 2}, "hard": {1, 2, 3}}[difficulty]
-        colours = Counter(colour for _, goal in drawn for colour in goal.texts("colours"))
-        assert set(colours) == {"red", "green", "blue"}
-        assert min(colours.values()) > 0.6 * max(colours.values())
+        colors = Counter(color for _, goal in drawn for color in goal.texts("colors"))
+        assert set(colors) == {"red", "green", "blue"}
+        assert min(colors.values()) > 0.6 * max(colors.values())
 
 
 @each_difficulty
@@ -187,8 +187,8 @@ def test_bin_fill_cubes_come_late_in_half_of_the_episodes_and_all_vanish(difficu
             late += 1
             expected = {
                 (cube.name, 50 * number)
-                for colour in ("red", "green", "blue")
-                for number, cube in enumerate(of_colour(scene, colour))
+                for color in ("red", "green", "blue")
+                for number, cube in enumerate(of_color(scene, color))
                 if number > 0
             }
             assert {(motion.subject, motion.end) for motion in coming} == expected
@@ -199,7 +199,7 @@ def test_bin_fill_cubes_come_late_in_half_of_the_episodes_and_all_vanish(difficu
 
 def test_bin_fill_goals_are_all_that_can_be_put_in():
     scene, _ = scenes("BinFill", "hard")[0]
-    there = {c: len(of_colour(scene, c)) for c in ("red", "blue", "green")}
+    there = {c: len(of_color(scene, c)) for c in ("red", "blue", "green")}
     possible = [
         counts
         for counts in itertools.product(*(range(number + 1) for number in there.values()))
@@ -210,13 +210,13 @@ def test_bin_fill_goals_are_all_that_can_be_put_in():
 
 
 @each_difficulty
-def test_bin_fill_stages_take_the_cubes_colour_by_colour_as_they_appear(difficulty):
+def test_bin_fill_stages_take_the_cubes_color_by_color_as_they_appear(difficulty):
     for scene, goal in scenes("BinFill", difficulty):
         stages = bin_fill.stages(scene, goal)
-        counts = dict(zip(goal.texts("colours"), goal.numbers("counts"), strict=True))
+        counts = dict(zip(goal.texts("colors"), goal.numbers("counts"), strict=True))
         assert len(stages) == 2 * sum(counts.values()) + 1
         picks, drops = stages[:-1:2], stages[1:-1:2]
-        names = [f"cube_{colour}_{n}" for colour, count in counts.items() for n in range(count)]
+        names = [f"cube_{color}_{n}" for color, count in counts.items() for n in range(count)]
         assert [stage.primitive.subject for stage in picks] == names
         assert [stage.primitive.subject for stage in drops] == names
         assert {stage.primitive.kind for stage in picks} == {"pick_cube"}
@@ -224,10 +224,10 @@ def test_bin_fill_stages_take_the_cubes_colour_by_colour_as_they_appear(difficul
         assert {stage.primitive.place for stage in drops} == {"bin"}
 
 
-def test_bin_fill_subgoals_count_within_a_colour():
+def test_bin_fill_subgoals_count_within_a_color():
     scene, _ = scenes("BinFill", "hard")[0]
     goal = next(g for g in bin_fill.goals(scene) if g.numbers("counts") == (2, 1))
-    first, second = goal.texts("colours")
+    first, second = goal.texts("colors")
     assert [stage.subgoal for stage in bin_fill.stages(scene, goal)] == [
         f"pick up the first {first} cube {{at}}",
         "put it into the bin {at}",
@@ -248,9 +248,9 @@ def test_swing_scenes_are_as_in_the_facts(difficulty):
     for scene, goal in scenes("SwingXtimes", difficulty):
         cubes = scene.of_kind("cube")
         assert len(cubes) == (1 if difficulty == "easy" else 3)
-        assert {cube.name for cube in cubes} == {f"cube_{cube.colour}" for cube in cubes}
+        assert {cube.name for cube in cubes} == {f"cube_{cube.color}" for cube in cubes}
         repeats.add(goal.number("repeats"))
-        chosen.add(goal.text("colour"))
+        chosen.add(goal.text("color"))
         taken = [button_keep_out(scene["button"])]
         for cube in cubes:
             assert -0.33 <= cube.position.x <= 0.13
@@ -271,7 +271,7 @@ def test_swing_scenes_are_as_in_the_facts(difficulty):
 @each_difficulty
 def test_swing_markers_cover_their_targets_and_glow_for_the_target_cube(difficulty):
     for scene, goal in scenes("SwingXtimes", difficulty):
-        cube = f"cube_{goal.text('colour')}"
+        cube = f"cube_{goal.text('color')}"
         for side in ("right", "left"):
             marker, target = scene[f"marker_{side}"], scene[f"target_{side}"]
             assert marker.kind == "marker"
@@ -294,7 +294,7 @@ def test_swing_stages_go_right_then_left_with_the_goals_cube(difficulty):
             repeats = goal.number("repeats")
             assert len(stages) == 2 * repeats + 3
             assert {stage.primitive.subject for stage in stages[:-1]} == {
-                f"cube_{goal.text('colour')}"
+                f"cube_{goal.text('color')}"
             }
             sides = [stage.primitive.place for stage in stages[1:-2]]
             assert sides == ["target_right", "target_left"] * repeats
@@ -306,14 +306,14 @@ def test_swing_stages_go_right_then_left_with_the_goals_cube(difficulty):
 def test_swing_subgoals_number_the_repetitions():
     scene, _ = scenes("SwingXtimes", "easy")[0]
     goal = swing_x_times.goals(scene)[1]
-    colour = goal.text("colour")
+    color = goal.text("color")
     assert [stage.subgoal for stage in swing_x_times.stages(scene, goal)] == [
-        f"pick up the {colour} cube {{at}}",
+        f"pick up the {color} cube {{at}}",
         "move to the top of the right-side target {at} for the first time",
         "move to the top of the left-side target {at} for the first time",
         "move to the top of the right-side target {at} for the second time",
         "move to the top of the left-side target {at} for the second time",
-        f"put the {colour} cube on the table",
+        f"put the {color} cube on the table",
         "press the button {at} to stop",
     ]
 

@@ -72,17 +72,17 @@ def test_few_seeds_are_rejected(task, difficulty):
 
 @each_task
 @each_difficulty
-def test_one_cube_of_each_colour_is_under_the_first_three_containers(task, difficulty):
+def test_one_cube_of_each_color_is_under_the_first_three_containers(task, difficulty):
     used = Counter()
     for episode in episodes(task, difficulty):
         hidden = episode.scene.of_kind("hidden_cube")
-        assert sorted(str(cube.colour) for cube in hidden) == ["blue", "green", "red"]
+        assert sorted(str(cube.color) for cube in hidden) == ["blue", "green", "red"]
         assert {cube.inside for cube in hidden} == {c.name for c in containers(episode)[:3]}
         for cube in hidden:
-            assert cube.name == f"cube_{cube.colour}"
+            assert cube.name == f"cube_{cube.color}"
             assert cube.position[:2] == episode.scene[cube.inside].position[:2]
             assert cube.position.z == pytest.approx(0.02 / 1.2)
-            used[cube.colour, cube.inside] += 1
+            used[cube.color, cube.inside] += 1
     assert len(used) == 9
     assert min(used.values()) > 0.25 * len(episodes(task, difficulty))
 
@@ -93,9 +93,9 @@ def test_the_goal_names_the_first_cubes_in_order(task, difficulty):
     numbers = set()
     for episode in episodes(task, difficulty):
         hidden = episode.scene.of_kind("hidden_cube")
-        colours = episode.goal.texts("colours")
-        assert colours == tuple(str(cube.colour) for cube in hidden[: len(colours)])
-        numbers.add(len(colours))
+        colors = episode.goal.texts("colors")
+        assert colors == tuple(str(cube.color) for cube in hidden[: len(colors)])
+        numbers.add(len(colors))
         assert len(get_task(task).goals(episode.scene)) == 3 + 6
     assert numbers == PICKS[task, difficulty]
 
@@ -203,7 +203,7 @@ def test_shape_and_swaps_and_picks_do_not_tell_each_other():
     for episode in episodes("VideoUnmaskSwap", "easy"):
         points = layout_points(np.random.default_rng(episode.seed), 3)
         line = min(math.hypot(*point) for point in points) < 1e-9
-        found[line, len(swaps(episode)), len(episode.goal.texts("colours"))] += 1
+        found[line, len(swaps(episode)), len(episode.goal.texts("colors"))] += 1
     assert len(found) == 8
     assert min(found.values()) > 0.06 * len(SEEDS)
 
@@ -273,13 +273,13 @@ def final_places(episode):
 
 @each_swap_task
 def test_exchanges_may_cancel_out_only_if_there_are_two(task):
-    cancelled = Counter()
+    canceled = Counter()
     for episode in itertools.chain(*(episodes(task, one) for one in DIFFICULTIES)):
         places = final_places(episode)
         assert sorted(places.values()) == sorted(places)
-        cancelled[len(swaps(episode)), all(one == places[one] for one in places)] += 1
-    assert {number for number, same in cancelled if same} == {2}
-    assert {number for number, same in cancelled if not same} == {1, 2, 3}
+        canceled[len(swaps(episode)), all(one == places[one] for one in places)] += 1
+    assert {number for number, same in canceled if same} == {2}
+    assert {number for number, same in canceled if not same} == {1, 2, 3}
 
 
 @each_swap_task
@@ -339,8 +339,8 @@ def test_subgoals_in_order(task):
     }.get(task, [])
     for episode in episodes(task, "hard")[:30]:
         first, second = (
-            (colour, str(episode.scene[f"cube_{colour}"].inside))
-            for colour in episode.goal.texts("colours")
+            (color, str(episode.scene[f"cube_{color}"].inside))
+            for color in episode.goal.texts("colors")
         )
         expected = [
             *presses,

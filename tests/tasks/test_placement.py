@@ -26,7 +26,7 @@ footprints = st.one_of(rectangles, circles)
 
 
 def outline(shape: Rectangle | Circle, inside: float) -> np.ndarray:
-    """Points all over a shape shrunk (inside > 0) or grown (inside < 0) by some metres."""
+    """Points all over a shape shrunk (inside > 0) or grown (inside < 0) by some meters."""
     u = np.linspace(-1, 1, 41)
     if isinstance(shape, Circle):
         angle, share = np.meshgrid(np.linspace(0, 2 * math.pi, 120), np.linspace(0, 1, 15))

@@ -57,14 +57,14 @@ def test_difficulties_do_not_differ(task):
 
 @each_task
 def test_one_of_the_pair_is_on_the_robot_s_left_and_one_on_its_right(task):
-    kind, colours = PAIRS[task]
+    kind, colors = PAIRS[task]
     orders = Counter()
     for scene, _ in scenes(task):
         left, right = sorted(scene.of_kind(kind), key=lambda item: -item.position.y)
         assert left.position.y > 0.05 > -0.05 > right.position.y
-        assert left_to_right(scene, kind) == (left.colour, right.colour)
-        assert {left.colour, right.colour} == colours
-        orders[left.colour] += 1
+        assert left_to_right(scene, kind) == (left.color, right.color)
+        assert {left.color, right.color} == colors
+        orders[left.color] += 1
     # 200 expected; five standard deviations of a fair draw are 50.
     assert all(150 <= count <= 250 for count in orders.values())
 
@@ -73,8 +73,7 @@ def test_one_of_the_pair_is_on_the_robot_s_left_and_one_on_its_right(task):
 def test_every_goal_is_as_likely_on_either_side(task):
     kind, _ = PAIRS[task]
     found = Counter(
-        (goal, left_to_right(scene, kind).index(goal.text("colour")))
-        for scene, goal in scenes(task)
+        (goal, left_to_right(scene, kind).index(goal.text("color"))) for scene, goal in scenes(task)
     )
     assert len(found) == 2 * len(get_task(task).goals(scenes(task)[0][0]))
     expected = SEEDS / len(found)
@@ -104,8 +103,8 @@ def judged(task, goal, *steps):
 
 def test_the_tape_belongs_into_the_one_box():
     picked = Fact("picked", "tape")
-    inside = {colour: Fact("binned", "tape", f"box_{colour}") for colour in ("green", "purple")}
-    goal = Goal.of(colour="green")
+    inside = {color: Fact("binned", "tape", f"box_{color}") for color in ("green", "purple")}
+    goal = Goal.of(color="green")
     # Dropped beside the boxes, it may be picked up again.
     dropped = ([picked], [], [Fact("lying", "tape")], [picked], [])
     assert judged("PutInBox", goal, *dropped).status is Status.ONGOING
@@ -129,7 +128,7 @@ def waiting(steps):
 
 @pytest.mark.parametrize("repeats", [1, 2])
 def test_as_often_as_wanted_and_then_no_more(repeats):
-    goal = Goal.of(colour="gray", repeats=repeats)
+    goal = Goal.of(color="gray", repeats=repeats)
 
     def after(*steps):
         return judged("PickByCount", goal, *CYCLE * repeats, *steps)
@@ -144,13 +143,13 @@ def test_as_often_as_wanted_and_then_no_more(repeats):
 
 
 def test_too_few_is_no_success_however_long_one_waits():
-    goal = Goal.of(colour="gray", repeats=2)
+    goal = Goal.of(color="gray", repeats=2)
     judge = judged("PickByCount", goal, *CYCLE, *waiting(3 * WAIT_STEPS))
     assert (judge.status, judge.index) == (Status.ONGOING, 2)
 
 
 def test_the_other_tape_is_not_to_be_picked():
-    goal = Goal.of(colour="gray", repeats=1)
+    goal = Goal.of(color="gray", repeats=1)
     assert judged("PickByCount", goal, [OTHER]).cause.startswith("picked up the yellow tape while")
     assert judged("PickByCount", goal, [PICKED], [OTHER]).status is Status.FAILURE
     # Beside the target, and once more.
@@ -160,8 +159,8 @@ def test_the_other_tape_is_not_to_be_picked():
 
 def test_failures_are_named():
     scene, _ = scenes("PickByCount")[0]
-    *_, leave = get_task("PickByCount").stages(scene, Goal.of(colour="gray", repeats=1))
+    *_, leave = get_task("PickByCount").stages(scene, Goal.of(color="gray", repeats=1))
     assert [rule.failure for rule in leave.forbids] == ["wrong_count", "wrong_object"]
     scene, _ = scenes("PutInBox")[0]
-    for stage in get_task("PutInBox").stages(scene, Goal.of(colour="green")):
+    for stage in get_task("PutInBox").stages(scene, Goal.of(color="green")):
         assert [rule.failure for rule in stage.forbids] == ["wrong_place"]

@@ -123,15 +123,15 @@ def test_repick_scenes(difficulty):
         assert len(scene.objects) == len(cubes) + 1
         assert abs(button.position.x + 0.2) <= 0.05
         assert abs(button.position.y) <= 0.05
-        colours = Counter(cube.colour for cube in cubes)
-        assert all(cube.name.startswith(f"cube_{cube.colour}_") for cube in cubes)
+        colors = Counter(cube.color for cube in cubes)
+        assert all(cube.name.startswith(f"cube_{cube.color}_") for cube in cubes)
         if difficulty == "hard":
-            assert colours == {"red": 5, "green": 5, "blue": 5}
+            assert colors == {"red": 5, "green": 5, "blue": 5}
             for cube in cubes:
                 assert -0.28 <= cube.position.x <= 0.08
                 assert -0.23 <= cube.position.y <= 0.23
         else:
-            assert list(colours.values()) == [3]
+            assert list(colors.values()) == [3]
             # A corner of the outermost layout point's square: 0.15 + sqrt(2) * 0.05.
             assert all(math.hypot(*cube.position[:2]) <= 0.2208 for cube in cubes)
         target = scene.past[0].subject
@@ -216,8 +216,8 @@ def test_place_scenes(task, difficulty):
         cubes, targets = scene.of_kind("cube"), scene.of_kind("target")
         assert [item.name for item in targets] == [f"target_{n}" for n in range(discs)]
         assert len(cubes) == (1 if difficulty == "easy" else 3)
-        assert len({cube.colour for cube in cubes}) == len(cubes)
-        assert all(cube.name == f"cube_{cube.colour}" for cube in cubes)
+        assert len({cube.color for cube in cubes}) == len(cubes)
+        assert all(cube.name == f"cube_{cube.color}" for cube in cubes)
         assert site.radius == radius
         assert site.position.z == 0.005
         assert abs(site.position.x + 0.1) <= spread + 1e-9
@@ -249,13 +249,13 @@ def test_place_discs_and_site_keep_their_distances(task, difficulty):
 @every_place_task
 def test_place_draws_every_cube(task):
     chosen = Counter(
-        scene.of_kind("cube").index(scene[f"cube_{goal.text('colour')}"])
+        scene.of_kind("cube").index(scene[f"cube_{goal.text('color')}"])
         for scene, goal in drawn(task, "medium")
     )
     assert set(chosen) == {0, 1, 2}
     for scene, goal in drawn(task, "medium"):
         placed = [fact for fact in scene.past if fact.kind == "placed"]
-        assert {fact.subject for fact in placed} == {f"cube_{goal.text('colour')}"}
+        assert {fact.subject for fact in placed} == {f"cube_{goal.text('color')}"}
 
 
 @every_place_task
@@ -302,7 +302,7 @@ def test_place_button_goals():
     goals = VIDEO_PLACE_BUTTON.goals(scene)
     assert len(goals) == 6
     for one in goals:
-        cube = f"cube_{one.text('colour')}"
+        cube = f"cube_{one.text('color')}"
         answer = {"before": "target_0", "after": "target_1"}[one.text("relation")]
         stages = VIDEO_PLACE_BUTTON.stages(scene, one)
         assert shown(stages) == [("pick_cube", cube), ("place_on", cube, answer)]
@@ -354,7 +354,7 @@ def test_place_order_goals():
         goals = VIDEO_PLACE_ORDER.goals(scene)
         assert len(goals) == 3 * len(visits)
         for goal in goals:
-            cube = f"cube_{goal.text('colour')}"
+            cube = f"cube_{goal.text('color')}"
             answer = visits[goal.number("placement") - 1]
             stages = VIDEO_PLACE_ORDER.stages(scene, goal)
             assert shown(stages) == [("pick_cube", cube), ("place_on", cube, answer)]

@@ -35,15 +35,15 @@ HEIGHTS = {
     "box": (0.02,),
     "tape": (0.0175,),
 }
-"""Of the origin of a thing that lies on the table, metres."""
+"""Of the origin of a thing that lies on the table, meters."""
 
 REACH = 0.85
-"""How far from its base the robot is asked to handle anything, metres in the plane. Its own is
+"""How far from its base the robot is asked to handle anything, meters in the plane. Its own is
 0.855; the farthest corner of all regions in which things are placed is 0.815 away."""
 
 # Front camera, RoboMME: world to camera, OpenCV convention, and 90 degrees over 256 pixels.
 FRONT = np.array([[0, 1, 0, 0], [0.89443, 0, -0.44721, -0.08944], [-0.44721, 0, -0.89443, 0.49194]])
-FOCAL = CENTRE = 128
+FOCAL = CENTER = 128
 
 each_task = pytest.mark.parametrize("task", TASKS)
 
@@ -216,7 +216,7 @@ def test_everything_is_in_the_front_picture(task):
     for episode in episodes(task):
         for item in episode.scene.objects:
             right, down, ahead = FRONT @ (*item.position, 1)
-            u, v = CENTRE + FOCAL * right / ahead, CENTRE + FOCAL * down / ahead
+            u, v = CENTER + FOCAL * right / ahead, CENTER + FOCAL * down / ahead
             assert ahead > 0
             assert 0 <= u < 256, item
             assert 0 <= v < 256, item
@@ -227,7 +227,7 @@ def test_pick_x_times_scenes_are_as_in_the_facts():
         cubes, (target,) = episode.scene.of_kind("cube"), episode.scene.of_kind("target")
         (button,) = episode.scene.of_kind("button")
         assert len(cubes) == (1 if episode.difficulty == "easy" else 3)
-        assert len({cube.colour for cube in cubes}) == len(cubes)
+        assert len({cube.color for cube in cubes}) == len(cubes)
         assert episode.goal.number("repeats") in (
             range(4, 6) if episode.difficulty == "hard" else range(1, 4)
         )
@@ -252,14 +252,14 @@ def test_video_unmask_scenes_are_as_in_the_facts():
     for episode in episodes("VideoUnmask"):
         containers = episode.scene.of_kind("container")
         hidden = episode.scene.of_kind("hidden_cube")
-        colours = episode.goal.texts("colours")
+        colors = episode.goal.texts("colors")
         allowed = {"easy": {3}, "medium": {4, 5}, "hard": set(range(4, 10))}
         assert len(containers) in allowed[episode.difficulty]
-        assert sorted(str(cube.colour) for cube in hidden) == ["blue", "green", "red"]
+        assert sorted(str(cube.color) for cube in hidden) == ["blue", "green", "red"]
         assert [cube.inside for cube in hidden] == ["container_0", "container_1", "container_2"]
-        assert colours == tuple(str(cube.colour) for cube in hidden[: len(colours)])
-        assert len(colours) == (2 if episode.difficulty == "hard" else 1)
-        assert len(episode.stages) == 2 * len(colours) - 1
+        assert colors == tuple(str(cube.color) for cube in hidden[: len(colors)])
+        assert len(colors) == (2 if episode.difficulty == "hard" else 1)
+        assert len(episode.stages) == 2 * len(colors) - 1
         for container in containers:
             assert abs(container.position.x) <= 0.1725
             assert abs(container.position.y) <= 0.1725

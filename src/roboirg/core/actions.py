@@ -58,7 +58,7 @@ _POSE_HIGH = np.concatenate([REACH_HIGH, np.full(3, math.pi), [1.0]])
 _POSE = "x, y, z in m, roll, pitch, yaw in rad and the gripper"
 
 EE_POSE = ActionSpace("ee_pose", _POSE_LOW, _POSE_HIGH, f"{_POSE} in [-1, 1]")
-"""Pose of the tool centre, world frame, extrinsic x-y-z angles; one control step."""
+"""Pose of the tool center, world frame, extrinsic x-y-z angles; one control step."""
 
 WAYPOINT = ActionSpace("waypoint", _POSE_LOW, _POSE_HIGH, f"{_POSE}, -1 to close it, +1 to open it")
 """The same pose, reached in a straight move of many steps; then the gripper closes or opens."""

@@ -54,16 +54,16 @@ class Fact(NamedTuple):
 released within 0.05 (xy), z <= 0.035, fingers more than 0.02 open, the hand more than 0.02 away |
     | ``lifted`` | container | its origin is above z 0.15 |
     | ``put_down`` | container | its origin is at z <= 0.07, released, the hand above z 0.05 |
-    | ``reached`` | cube, tape or container | the tool centre is within 0.03 of its origin |
+    | ``reached`` | cube, tape or container | the tool center is within 0.03 of its origin |
     | ``held`` | cube, tape or container | both fingers grasp it, at whatever height |
     | ``pressed`` | button | its cap is more than 0.005 down |
     | ``hovering`` | robot, button | the hand is within 0.03 (xy) of the button and below z 0.2 |
-    | ``near`` | shuttle, target | its centre is within 0.06 (xy) of the target's |
+    | ``near`` | shuttle, target | its center is within 0.06 (xy) of the target's |
     | ``stopped`` | shuttle, target | it has been stopped for good, and is near |
     | ``still`` | ``"robot"`` | no arm joint moves faster than 0.2 rad/s |
     | ``home`` | ``"robot"`` | all nine joints are within 0.01 of the home position |
 
-    Thresholds, metres: RoboMME, evaluation mode. ``reached`` and ``held`` are our own: no stage
+    Thresholds, meters: RoboMME, evaluation mode. ``reached`` and ``held`` are our own: no stage
     asks for them, they tell how something failed.
     """
 

@@ -5,7 +5,7 @@ world plays it, the judge measures it. Nothing here computes beyond looking thin
 
 Frames: the world frame has its origin in the middle of the work area on the table top, x away
 from the robot, y to the robot's left, z up. The robot's base stands at (-0.615, 0, 0) with the
-same axes, so robot-frame and world-frame directions agree. Units are metres, radians and control
+same axes, so robot-frame and world-frame directions agree. Units are meters, radians and control
 steps (20 per second). Quaternions are (w, x, y, z).
 """
 
@@ -18,7 +18,7 @@ from typing import Literal, NamedTuple, get_args
 from roboirg.core.conditions import Condition, Fact, Rule
 from roboirg.core.motions import Motion, Point
 
-Colour = Literal["red", "green", "blue", "yellow", "gray", "purple"]
+Color = Literal["red", "green", "blue", "yellow", "gray", "purple"]
 Difficulty = Literal["easy", "medium", "hard"]
 Split = Literal["train", "val", "test"]
 Suite = Literal["counting", "permanence", "reference", "real"]
@@ -36,9 +36,9 @@ ObjectKind = Literal[
     "tape",
 ]
 
-COLOURS: tuple[Colour, ...] = ("red", "green", "blue")
+COLORS: tuple[Color, ...] = ("red", "green", "blue")
 """Those of cubes."""
-ALL_COLOURS: tuple[Colour, ...] = get_args(Colour)
+ALL_COLORS: tuple[Color, ...] = get_args(Color)
 SUITES: tuple[Suite, ...] = get_args(Suite)
 BENCHMARK_SUITES: tuple[Suite, ...] = ("counting", "permanence", "reference")
 """The suites of the benchmark; the tasks of the real robot are beside it."""
@@ -49,7 +49,7 @@ ENVIRONMENT_VERSION = 0
 """Goes up whenever scores could change: scenes, rules, physics, observations."""
 
 ROBOT_BASE = (-0.615, 0.0, 0.0)
-"""Position of the Panda's base link in the world frame, metres; its rotation is the identity."""
+"""Position of the Panda's base link in the world frame, meters; its rotation is the identity."""
 
 SlotValue = str | int | tuple[str, ...] | tuple[int, ...]
 
@@ -64,12 +64,12 @@ class SceneObject:
             is a round place that nobody sees, a ``shuttle`` a cube that runs by itself and touches
             nothing, a ``marker`` a disc that lights up over a target, a ``box`` an open box that
             stands fast, a ``tape`` a roll of adhesive tape that lies flat.
-        position: of the object's origin, world frame, metres.
+        position: of the object's origin, world frame, meters.
         yaw: rotation about the vertical, radians.
-        colour: of a cube, box or tape; None for things whose colour tells nothing.
+        color: of a cube, box or tape; None for things whose color tells nothing.
         inside: name of the container that stands over this (hidden) cube, else None.
-        radius: of a target, site or marker, metres; None for the other kinds.
-        thickness: of a target, metres; None for the usual 0.005.
+        radius: of a target, site or marker, meters; None for the other kinds.
+        thickness: of a target, meters; None for the usual 0.005.
         rgb: 0 to 1 each, of a target's rings or a shuttle; None for the usual of the kind.
     """
 
@@ -77,7 +77,7 @@ class SceneObject:
     kind: ObjectKind
     position: Point
     yaw: float = 0.0
-    colour: Colour | None = None
+    color: Color | None = None
     inside: str | None = None
     radius: float | None = None
     thickness: float | None = None
@@ -118,12 +118,12 @@ class Scene:
 class Goal:
     """What an instruction must convey: a value for each slot. Goals compare by value.
 
-    Slots by task: BinFill ``colours`` (one to three names, in the order red, blue, green) and
-    ``counts`` (a number for each); PickXtimes and SwingXtimes ``colour`` and ``repeats``; StopCube
-    ``visit`` (2 for the second); the four Unmask tasks ``colours`` (one or two names, in the order
-    of picking); VideoRepick ``repeats``; VideoPlaceButton ``colour`` and ``relation`` (before or
-    after); VideoPlaceOrder ``colour`` and ``placement`` (1 for the first); PutInBox ``colour`` (of
-    the box); PickByCount ``colour`` (of the tape) and ``repeats``.
+    Slots by task: BinFill ``colors`` (one to three names, in the order red, blue, green) and
+    ``counts`` (a number for each); PickXtimes and SwingXtimes ``color`` and ``repeats``; StopCube
+    ``visit`` (2 for the second); the four Unmask tasks ``colors`` (one or two names, in the order
+    of picking); VideoRepick ``repeats``; VideoPlaceButton ``color`` and ``relation`` (before or
+    after); VideoPlaceOrder ``color`` and ``placement`` (1 for the first); PutInBox ``color`` (of
+    the box); PickByCount ``color`` (of the tape) and ``repeats``.
     """
 
     slots: tuple[tuple[str, SlotValue], ...]

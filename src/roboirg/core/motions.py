@@ -12,7 +12,7 @@ from roboirg.core.conditions import Fact
 
 
 class Point(NamedTuple):
-    """A position in the world frame, metres."""
+    """A position in the world frame, meters."""
 
     x: float
     y: float

@@ -1,4 +1,4 @@
-"""Sizes of the objects, as RoboMME builds them; of boxes and tapes, our own. Metres."""
+"""Sizes of the objects, as RoboMME builds them; of boxes and tapes, our own. Meters."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ TARGET_THICKNESS = 0.005
 """Thickness of a target disc, unless its scene says otherwise."""
 
 TARGET_HEIGHT = TARGET_THICKNESS
-"""Height of a target disc's centre above the table: it floats by half its thickness."""
+"""Height of a target disc's center above the table: it floats by half its thickness."""
 
 MARKER_HALF_THICKNESS = 0.014
 MARKER_DEPTH = 0.01
-"""How far the centre of a marker is below the centre of the target that it lights up."""
+"""How far the center of a marker is below the center of the target that it lights up."""
 MARKER_RADIUS_SHARE = 1.003
 """Radius of a marker, in radii of its target."""
 
@@ -34,7 +34,7 @@ BUTTON_CAP_RADIUS = 0.015 * BUTTON_SCALE
 BUTTON_CAP_HALF_LENGTH = 0.006 * BUTTON_SCALE
 BUTTON_TRAVEL = 0.1 * BUTTON_SCALE
 BUTTON_HEIGHT = BUTTON_BASE_HALF[2]
-"""Height of the button's origin, the centre of its base."""
+"""Height of the button's origin, the center of its base."""
 BUTTON_KEEP_OUT_HALF = 1.5 * BUTTON_BASE_HALF[0]
 """Half side of the square around a button that stays free of other things."""
 

@@ -85,7 +85,7 @@ class Observation(TypedDict):
     gripper: NDArray[np.float32]
     """(2,) finger positions, m, 0 to 0.04."""
     end_effector: NDArray[np.float64]
-    """(6,) x, y, z (m) and roll, pitch, yaw (rad, extrinsic x-y-z) of the tool centre, world."""
+    """(6,) x, y, z (m) and roll, pitch, yaw (rad, extrinsic x-y-z) of the tool center, world."""
     instruction: str
     front_depth: NotRequired[NDArray[np.int16]]
     """(256, 256, 1) distance along the viewing direction, mm; 0 where nothing is seen."""

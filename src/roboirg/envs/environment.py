@@ -43,14 +43,14 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
 
     Observation: `front_rgb` and `wrist_rgb` uint8 (256, 256, 3) for the cameras asked for;
     `joint_positions` float32 (7,) rad; `gripper` float32 (2,) m; `end_effector` float64 (6,)
-    position (m) and extrinsic x-y-z angles (rad) of the tool centre in the world frame;
+    position (m) and extrinsic x-y-z angles (rad) of the tool center in the world frame;
     `instruction` text. With `depth`, `front_depth` and `wrist_depth` int16 (256, 256, 1) mm; with
     `calibration`, `front_extrinsic` float32 (3, 4), `front_intrinsic` (3, 3), and of the wrist.
     With `observe_every`, `history`: a tuple of such observations.
 
     Action: of the space that `actions` names. `joint_angle` (8,): absolute joint targets in rad
     and the gripper, +1 open to -1 closed; one control step of 0.05 s. `ee_pose` (7,): position (m)
-    and extrinsic x-y-z angles (rad) of the tool centre in the world frame and the gripper; one
+    and extrinsic x-y-z angles (rad) of the tool center in the world frame and the gripper; one
     control step. `waypoint` (7,): the same pose, reached in a straight move of many control steps;
     there -1 closes the gripper and +1 opens it in six more, anything else leaves it. The episode
     fails at a pose that cannot be reached.

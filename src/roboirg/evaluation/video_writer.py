@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 Frame = NDArray[np.uint8]
 
-DEMONSTRATION_COLOUR = (255, 176, 32)
+DEMONSTRATION_COLOR = (255, 176, 32)
 """RGB of the border around what was shown before the policy's turn."""
 
 BORDER = 6
@@ -80,7 +80,7 @@ def check_video_support() -> None:
 def compose(
     pictures: Sequence[Frame], caption: str = "", *, is_demonstration: bool = False
 ) -> Frame:
-    """Pictures side by side, a line between them; what was shown before has a coloured border.
+    """Pictures side by side, a line between them; what was shown before has a colored border.
 
     Args:
         pictures: uint8 (height, width, 3), all of one height.
@@ -91,9 +91,9 @@ def compose(
     parts = [part for picture in pictures for part in (line, picture)][1:]
     frame: Frame = np.concatenate(parts, axis=1)
     if is_demonstration:
-        colour = np.array(DEMONSTRATION_COLOUR, np.uint8)
-        frame[:BORDER] = frame[-BORDER:] = colour
-        frame[:, :BORDER] = frame[:, -BORDER:] = colour
+        color = np.array(DEMONSTRATION_COLOR, np.uint8)
+        frame[:BORDER] = frame[-BORDER:] = color
+        frame[:, :BORDER] = frame[:, -BORDER:] = color
     return np.concatenate([frame, _bar(caption, frame.shape[1])]) if caption else frame
 
 

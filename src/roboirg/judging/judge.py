@@ -123,9 +123,9 @@ def describe_object(name: str, scene: Scene) -> str:
         return name
     if item.kind != "container":
         noun = item.kind.removeprefix("hidden_")
-        return f"the {item.colour} {noun}" if item.colour else f"the {item.kind}"
+        return f"the {item.color} {noun}" if item.color else f"the {item.kind}"
     hidden = scene.hidden_in(name)
-    return f"the container over the {hidden.colour} cube" if hidden else "an empty container"
+    return f"the container over the {hidden.color} cube" if hidden else "an empty container"
 
 
 def plain_subgoal(stage: Stage) -> str:

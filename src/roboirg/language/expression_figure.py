@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLOURS = {
+COLORS = {
     "direct": "#0072B2",
     "reasoning": "#D55E00",
     "contextual": "#009E73",
     "spatial": "#CC79A7",
 }
-"""Of Okabe and Ito, told apart by colour-blind people too."""
+"""Of Okabe and Ito, told apart by color-blind people too."""
 FORMATS = ("png", "svg")
 PANEL_INCHES, SIDE_INCHES = 2.6, 0.9
 ROW_INCHES, MARGIN_INCHES = 0.29, 1.25
@@ -98,7 +98,7 @@ def _drawn(said: Sequence[Instruction], title: str) -> Figure:
         panels = figure.subplots(1, len(settings), sharex=True, sharey=True, squeeze=False)[0]
         for panel, setting in zip(panels, settings, strict=True):
             numbers = [counts[setting].get(one, 0) for one in classes]
-            _draw_panel(panel, classes, numbers, COLOURS[setting])
+            _draw_panel(panel, classes, numbers, COLORS[setting])
             panel.set_title(f"{setting} ({scenes[setting]} scenes)", fontsize=10)
         most = max(number for one in counts.values() for number in one.values())
         panels[0].set_xlim(0, ROOM * most)
@@ -107,9 +107,9 @@ def _drawn(said: Sequence[Instruction], title: str) -> Figure:
     return figure
 
 
-def _draw_panel(panel: Axes, classes: Iterable[str], numbers: list[int], colour: str) -> None:
+def _draw_panel(panel: Axes, classes: Iterable[str], numbers: list[int], color: str) -> None:
     positions = range(len(numbers))
-    bars = panel.barh(positions, numbers, color=colour, height=0.72)
+    bars = panel.barh(positions, numbers, color=color, height=0.72)
     panel.bar_label(bars, [str(one) if one else "" for one in numbers], padding=3, fontsize=8)
     panel.set_yticks(positions, list(classes))
     panel.set_axisbelow(True)

@@ -37,7 +37,7 @@ class Mention:
         end: one past the last character.
         role: antecedent or anaphor.
         expression: class of an anaphor; None for an antecedent.
-        slot: name of the goal slot, or ``reference`` for what only leads to the goal: two colours
+        slot: name of the goal slot, or ``reference`` for what only leads to the goal: two colors
             or moments, the one of them that was chosen, the quantity or position to count from.
         value: what it stands for: of a goal slot one of the goal's values, or all of them
             (``red and green``) for a plural.

@@ -17,7 +17,7 @@ from roboirg.core.motions import Away
 from roboirg.tasks.task import Thing
 
 MARGIN = 0.03
-"""Metres by which a landmark's object must win over any other in the quantity compared."""
+"""Meters by which a landmark's object must win over any other in the quantity compared."""
 COLUMN_MARGIN = 6.0
 """The same in columns of the front camera's picture (256 pixels wide)."""
 
@@ -40,7 +40,7 @@ class Landmark(NamedTuple):
     Attributes:
         phrase: what follows the noun: "the cube *at the far left*".
         level: class, in the order of preference: 1 extremes and the sides of a pair, 2 corners,
-            3 ranks, 4 fixtures, 5 cubes of another colour, 6 nearest to an object of class 1 or 2,
+            3 ranks, 4 fixtures, 5 cubes of another color, 6 nearest to an object of class 1 or 2,
             7 to one of class 3, 8 second nearest to one of class 1 or 2, 9 third nearest to one of
             those.
         sided: whether the words name left or right, so that it matters whose.
@@ -64,8 +64,8 @@ class Reading(NamedTuple):
         values = [(self.quantity(item), position) for position, item in enumerate(candidates)]
         order = sorted(values, reverse=True)
         value, position = order[rank]
-        neighbours = order[max(rank - 1, 0) : rank] + order[rank + 1 :][:1]
-        if any(abs(value - other) < self.margin for other, _ in neighbours):
+        neighbors = order[max(rank - 1, 0) : rank] + order[rank + 1 :][:1]
+        if any(abs(value - other) < self.margin for other, _ in neighbors):
             return None
         return candidates[position]
 
@@ -122,7 +122,7 @@ def selectors(scene: Scene, thing: Thing, frame: Frame) -> Iterator[Selector]:
     ranked = tuple(_ranks(candidates, frame))
     yield from (*named, *ranked)
     yield from _fixtures(scene, candidates)
-    yield from _other_colours(candidates)
+    yield from _other_colors(candidates)
     yield from _chains(thing, candidates, named, level=6)
     yield from _chains(thing, candidates, ranked, level=7)
     yield from _chains(thing, candidates, named, level=8, rank=1)
@@ -216,12 +216,12 @@ def _fixtures(scene: Scene, candidates: tuple[SceneObject, ...]) -> Iterator[Sel
         yield Selector(Landmark(f"farthest from the {kind}", 4), (Reading(away),), candidates)
 
 
-def _other_colours(candidates: Sequence[SceneObject]) -> Iterator[Selector]:
+def _other_colors(candidates: Sequence[SceneObject]) -> Iterator[Selector]:
     for anchor in candidates:
-        like = [item for item in candidates if item.colour == anchor.colour]
-        if anchor.colour is None or len(like) != 1:
+        like = [item for item in candidates if item.color == anchor.color]
+        if anchor.color is None or len(like) != 1:
             continue
-        landmark = Landmark(f"closest to the {anchor.colour} cube", 5)
+        landmark = Landmark(f"closest to the {anchor.color} cube", 5)
         yield Selector(landmark, (_nearness(anchor.position),), _without(candidates, anchor))
 
 

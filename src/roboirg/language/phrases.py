@@ -102,9 +102,9 @@ def speak(
             mentions.append(Mention(index, start, end, *piece.tag))
         start = end
     text = "".join(piece.text for piece in phrase)
-    return Utterance(stage, _capitalised(text)), tuple(mentions)
+    return Utterance(stage, _capitalized(text)), tuple(mentions)
 
 
-def _capitalised(text: str) -> str:
+def _capitalized(text: str) -> str:
     """A capital at the start of every sentence; no character is added or removed."""
     return re.sub(r"(^|[.!?] )([a-z])", lambda found: found[1] + found[2].upper(), text)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
-from roboirg.core.episode import Colour, Episode, Goal, Scene, SceneObject
+from roboirg.core.episode import Color, Episode, Goal, Scene, SceneObject
 from roboirg.core.errors import InvalidValueError
 from roboirg.language.instruction import Form, Setting, UtteranceStage
 from roboirg.language.landmarks import Frame
@@ -18,25 +18,25 @@ from roboirg.tasks import Task, get_task
 Distractor = Literal["neutral", "competing"]
 DISTRACTORS: tuple[Distractor, ...] = ("neutral", "competing")
 
-PartKind = Literal["number", "visit", "placement", "relation", "colour", "amount"]
+PartKind = Literal["number", "visit", "placement", "relation", "color", "amount"]
 PART_KINDS: Mapping[str, PartKind] = {
-    "colour": "colour",
-    "colours": "colour",
+    "color": "color",
+    "colors": "color",
     "counts": "amount",
     "repeats": "number",
     "visit": "visit",
     "placement": "placement",
     "relation": "relation",
 }
-"""What kind of value each goal slot holds; colours that have counts are amounts with them."""
-COLOUR_SLOTS = ("colour", "colours")
+"""What kind of value each goal slot holds; colors that have counts are amounts with them."""
+COLOR_SLOTS = ("color", "colors")
 
 
 class Part(NamedTuple):
     """One value of the goal that an instruction has to convey.
 
     Attributes:
-        field: its field in the task's commands, ``repeats`` or ``colours.1``.
+        field: its field in the task's commands, ``repeats`` or ``colors.1``.
         slot: name of the goal slot.
         kind: what kind of value it is.
         value: the value.
@@ -48,8 +48,8 @@ class Part(NamedTuple):
     value: str | int
 
     @property
-    def colour(self) -> str:
-        """The value of a part that is a colour."""
+    def color(self) -> str:
+        """The value of a part that is a color."""
         return str(self.value)
 
     @property
@@ -86,13 +86,13 @@ class Request:
         return tuple(part for part in self.parts if part.kind == kind)
 
     @property
-    def coloured(self) -> tuple[Part, ...]:
-        """The parts that are colours, counted or not."""
-        return tuple(part for part in self.parts if part.slot in COLOUR_SLOTS)
+    def colored(self) -> tuple[Part, ...]:
+        """The parts that are colors, counted or not."""
+        return tuple(part for part in self.parts if part.slot in COLOR_SLOTS)
 
-    def count_of(self, colour: Part) -> int:
-        """How many things of a colour are wanted; one unless the goal counts them."""
-        _, _, index = colour.field.partition(".")
+    def count_of(self, color: Part) -> int:
+        """How many things of a color are wanted; one unless the goal counts them."""
+        _, _, index = color.field.partition(".")
         counts = {part.field: part for part in self.parts if part.slot == "counts"}
         return counts[f"counts.{index}"].number if counts else 1
 
@@ -100,33 +100,32 @@ class Request:
         """What a slot of numbers could hold in this scene, all other slots being as they are."""
         return _numbers_instead(self.task.name, self.episode.scene, self.episode.goal, slot)
 
-    def other_colours(self, colour: str) -> tuple[Colour, ...]:
-        """The colours that the task speaks of, without this one."""
-        colours = self.task.commands.colours
-        if colour not in colours:
+    def other_colors(self, color: str) -> tuple[Color, ...]:
+        """The colors that the task speaks of, without this one."""
+        colors = self.task.commands.colors
+        if color not in colors:
             raise InvalidValueError(
-                f"{colour!r} is no colour of {self.task.name}; its colours are "
-                f"{', '.join(colours)}."
+                f"{color!r} is no color of {self.task.name}; its colors are {', '.join(colors)}."
             )
-        return tuple(other for other in colours if other != colour)
+        return tuple(other for other in colors if other != color)
 
-    def by_colour(self, cube: Phrase) -> Phrase:
+    def by_color(self, cube: Phrase) -> Phrase:
         """The thing to handle, told by its cube."""
-        return fill(self.task.commands.by_colour, {"cube": cube})
+        return fill(self.task.commands.by_color, {"cube": cube})
 
     def by_place(self, place: Phrase, *, plural: bool = False) -> Phrase:
         """The thing to handle, told by its place."""
         return fill(self.task.commands.by_place, {"place": place}, plural=plural)
 
     def targets(self, part: Part) -> tuple[SceneObject, ...]:
-        """The objects that a colour part may want handled: cubes, or the container over one."""
+        """The objects that a color part may want handled: cubes, or the container over one."""
         scene = self.episode.scene
-        cubes = [item for item in scene.objects if item.colour == part.value]
+        cubes = [item for item in scene.objects if item.color == part.value]
         return tuple(cube if cube.inside is None else scene[cube.inside] for cube in cubes)
 
     def command(self, fields: Mapping[str, Phrase]) -> Phrase:
         """The task's command with its fields filled; the same wording in all settings."""
-        handled = max(1, len(self.parts_of("colour")))
+        handled = max(1, len(self.parts_of("color")))
         wordings = [one for one in self.task.commands.wordings if one.parts == handled]
         return fill(self.chooser.pick(f"command-{handled}", wordings).text, fields)
 
@@ -167,7 +166,7 @@ def _parts(goal: Goal) -> tuple[Part, ...]:
     parts: list[Part] = []
     counted = "counts" in dict(goal.slots)
     for slot, value in goal.slots:
-        kind = "amount" if counted and slot in COLOUR_SLOTS else PART_KINDS[slot]
+        kind = "amount" if counted and slot in COLOR_SLOTS else PART_KINDS[slot]
         if isinstance(value, tuple):
             several: tuple[str | int, ...] = value
             fields = (f"{slot}.{index}" for index in range(len(several)))

@@ -1,7 +1,7 @@
 """The wordings that all tasks share. Changing any of them needs a new `LANGUAGE_VERSION`.
 
 Fields and alternatives are explained in `phrases`. American spelling, as in the data that
-policies are trained on. Neutral distractors and cues must name no colour, number, ordinal, side
+policies are trained on. Neutral distractors and cues must name no color, number, ordinal, side
 or place; a test reads them.
 """
 
@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 LANGUAGE_VERSION = "1.1.0"
 
-COLOUR_INTRODUCTIONS = (
+COLOR_INTRODUCTIONS = (
     "I have always had a soft spot for {things}.",
     "{things} [is|are] the nicest [thing|things] on this table.",
     "My daughter keeps talking about {things}.",
@@ -94,7 +94,7 @@ MOVED_INTRODUCTIONS = (
 )
 """What is added to these where things change places."""
 
-COLOUR_REINFORCEMENTS = (
+COLOR_REINFORCEMENTS = (
     "{ref} [was a present|were presents] from my aunt.",
     "I would recognize {ref} anywhere.",
     "I could not do without {ref}.",
@@ -143,7 +143,7 @@ NEUTRAL_DISTRACTORS = (
     "We ran out of milk at breakfast.",
     "The movie last night was much too long.",
 )
-COMPETING_COLOUR_DISTRACTORS = (
+COMPETING_COLOR_DISTRACTORS = (
     "My neighbor prefers {other}, but that does not matter here.",
     "My friend painted his door {other}, but never mind that.",
     "There is a {other} car outside, which has nothing to do with your task.",
@@ -183,7 +183,7 @@ EXCLUSIONS = (
 )
 PAIR_ANAPHORS = ("that pair", "those two")
 COMPLEMENTS = ("the {thing} in {other}", "the {thing} with {other}")
-"""The second pick: of the two excluded colours, the one that was not chosen."""
+"""The second pick: of the two excluded colors, the one that was not chosen."""
 AMOUNT_PAIR_ANAPHORS = ("that pair",)
 """Next to numbers of cubes *those two* would be two cubes."""
 AMOUNT_EXCLUSIONS = (
@@ -208,7 +208,7 @@ class Relation(NamedTuple):
     Attributes:
         name: for records.
         times: how often, told by a reference quantity.
-        cubes: how many cubes of a colour.
+        cubes: how many cubes of a color.
         value: which number.
         offset: the result is ``factor * reference + offset``.
         factor: see `offset`.
@@ -237,7 +237,7 @@ RELATIONS = (
     Relation(
         "one fewer",
         "one time fewer than {number}",
-        "one fewer {colour} cube than {number}",
+        "one fewer {color} cube than {number}",
         "one less than {number}",
         offset=-1,
         spells=1,
@@ -245,7 +245,7 @@ RELATIONS = (
     Relation(
         "one more",
         "one more time than {number}",
-        "one more {colour} cube than {number}",
+        "one more {color} cube than {number}",
         "one more than {number}",
         offset=1,
         spells=1,
@@ -253,7 +253,7 @@ RELATIONS = (
     Relation(
         "two fewer",
         "two fewer times than {number}",
-        "two fewer {colour} cubes than {number}",
+        "two fewer {color} cubes than {number}",
         "two less than {number}",
         offset=-2,
         spells=2,
@@ -261,7 +261,7 @@ RELATIONS = (
     Relation(
         "two more",
         "two more times than {number}",
-        "two more {colour} cubes than {number}",
+        "two more {color} cubes than {number}",
         "two more than {number}",
         offset=2,
         spells=2,
@@ -269,7 +269,7 @@ RELATIONS = (
     Relation(
         "twice",
         "twice as many times as {number}",
-        "twice as many {colour} cubes as {number}",
+        "twice as many {color} cubes as {number}",
         "twice {number}",
         factor=2.0,
         spells=2,
@@ -277,7 +277,7 @@ RELATIONS = (
     Relation(
         "half",
         "half as many times as {number}",
-        "half as many {colour} cubes as {number}",
+        "half as many {color} cubes as {number}",
         "half of {number}",
         factor=0.5,
     ),

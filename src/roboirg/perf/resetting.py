@@ -23,7 +23,7 @@ def shown_episode() -> Episode:
 
 
 def stock(episode: Episode) -> float:
-    """What RoboMME does: planned and drawn at every reset, colour and segmentation fetched."""
+    """What RoboMME does: planned and drawn at every reset, color and segmentation fetched."""
     start = time.perf_counter()
     session = Session(episode, visible=True, rendering=STOCK)
     cameras = session.world.cameras

@@ -31,7 +31,7 @@ def lazy(workload: Workload, rendering: Rendering = FAITHFUL) -> float:
 
 
 def stock(workload: Workload) -> float:
-    """What RoboMME does: everything drawn at every step, colour and segmentation fetched."""
+    """What RoboMME does: everything drawn at every step, color and segmentation fetched."""
     session = workload.begun(rendering=STOCK)
     cameras = session.world.cameras
     cameras.pictures(CAMERAS)

@@ -11,7 +11,7 @@ from roboirg.core.observations import CAMERAS, DemonstrationFrames, Observation
 
 PICTURE = (256, 256, 3)
 _FINGER_RANGE = 0.04
-"""Metres."""
+"""Meters."""
 
 
 class MadeUpEpisode(NamedTuple):

@@ -1,4 +1,4 @@
-"""Objects of a scene as SAPIEN bodies: shapes, masses and colours as RoboMME builds them.
+"""Objects of a scene as SAPIEN bodies: shapes, masses and colors as RoboMME builds them.
 
 Boxes and rolls of tape are our own.
 """
@@ -23,9 +23,9 @@ from roboirg.simulation.rendering.tube_mesh import Rgba, ring
 
 Triple = tuple[float, float, float]
 Cuboid = tuple[Triple, Triple]
-"""Centre and half sides in the object's frame, m."""
+"""Center and half sides in the object's frame, m."""
 
-COLOUR_RGBA: dict[str, Rgba] = {
+COLOR_RGBA: dict[str, Rgba] = {
     "red": (1.0, 0.0, 0.0, 1.0),
     "green": (0.0, 1.0, 0.0, 1.0),
     "blue": (0.0, 0.0, 1.0, 1.0),
@@ -34,9 +34,9 @@ COLOUR_RGBA: dict[str, Rgba] = {
     "purple": (160 / 255, 32 / 255, 240 / 255, 1.0),
 }
 WHITE: Rgba = (1.0, 1.0, 1.0, 1.0)
-GRAY: Rgba = COLOUR_RGBA["gray"]
-PURPLE: Rgba = COLOUR_RGBA["purple"]
-RED: Rgba = COLOUR_RGBA["red"]
+GRAY: Rgba = COLOR_RGBA["gray"]
+PURPLE: Rgba = COLOR_RGBA["purple"]
+RED: Rgba = COLOR_RGBA["red"]
 WOOD: Rgba = (0.8, 0.6, 0.4, 1.0)
 BLACK: Rgba = (0.0, 0.0, 0.0, 1.0)
 
@@ -122,7 +122,7 @@ def _build_cube(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
     builder = ActorBuilder()
     builder.add_box_collision(half_size=[half] * 3)
     if visible:
-        material = _material(COLOUR_RGBA[str(item.colour)])
+        material = _material(COLOR_RGBA[str(item.color)])
         builder.add_box_visual(half_size=[half] * 3, material=material)
     return _finish(builder, scene, item, "dynamic")
 
@@ -142,10 +142,10 @@ def _build_container(scene: sapien.Scene, item: SceneObject, visible: bool) -> B
         ((0.0, 0.0, 0.0), (object_sizes.CUBE_HALF,) * 3),
     ]
     builder = ActorBuilder()
-    for centre, half in boxes:
-        builder.add_box_collision(sapien.Pose(centre), half_size=half)
+    for center, half in boxes:
+        builder.add_box_collision(sapien.Pose(center), half_size=half)
         if visible:
-            builder.add_box_visual(sapien.Pose(centre), half_size=half, material=_material(WHITE))
+            builder.add_box_visual(sapien.Pose(center), half_size=half, material=_material(WHITE))
     return _finish(builder, scene, item, "dynamic")
 
 
@@ -165,7 +165,7 @@ def _build_marker(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body
 def _ringed_disc(
     scene: sapien.Scene, item: SceneObject, rgba: Rgba, half: float, visible: bool
 ) -> Body:
-    """Five concentric discs, coloured and white in turn; nothing collides with them."""
+    """Five concentric discs, colored and white in turn; nothing collides with them."""
     radius = float(item.radius or 0.0)
     builder = ActorBuilder()
     for index, share in enumerate(RING_SHARES if visible else ()):
@@ -211,7 +211,7 @@ def _build_bin(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
 
 def _build_box(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
     """Four walls and a floor, which stand fast."""
-    rgba = COLOUR_RGBA[str(item.colour)]
+    rgba = COLOR_RGBA[str(item.color)]
     red, green, blue, _ = rgba
     dark = (FLOOR_SHADE * red, FLOOR_SHADE * green, FLOOR_SHADE * blue, 1.0)
     wall, height, floor = (
@@ -241,12 +241,12 @@ def _walls(half: float, wall: float, height: float) -> list[Cuboid]:
 
 
 def _add_boxes(builder: ActorBuilder, cuboids: Sequence[Cuboid], rgba: Rgba | None) -> None:
-    """Boxes to be touched and, if they have a colour, seen."""
-    for centre, half in cuboids:
-        builder.add_box_collision(sapien.Pose(centre), half_size=half)
+    """Boxes to be touched and, if they have a color, seen."""
+    for center, half in cuboids:
+        builder.add_box_collision(sapien.Pose(center), half_size=half)
         if rgba is not None:
             material = _material(rgba)
-            builder.add_box_visual(sapien.Pose(centre), half_size=half, material=material)
+            builder.add_box_visual(sapien.Pose(center), half_size=half, material=material)
 
 
 def _build_tape(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
@@ -257,13 +257,13 @@ def _build_tape(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
     builder = ActorBuilder()
     for number in range(object_sizes.TAPE_SIDES):
         angle = 2 * math.pi * number / object_sizes.TAPE_SIDES
-        centre = (math.cos(angle) * (inner + wall), math.sin(angle) * (inner + wall), 0.0)
+        center = (math.cos(angle) * (inner + wall), math.sin(angle) * (inner + wall), 0.0)
         turned = [math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2)]
-        builder.add_box_collision(sapien.Pose(centre, turned), half_size=half)
+        builder.add_box_collision(sapien.Pose(center, turned), half_size=half)
     body = _finish(builder, scene, item, "dynamic")
     if visible:
         component = sapien.render.RenderBodyComponent()
-        component.attach(ring(outer, inner, object_sizes.TAPE_HALF, COLOUR_RGBA[str(item.colour)]))
+        component.attach(ring(outer, inner, object_sizes.TAPE_HALF, COLOR_RGBA[str(item.color)]))
         body.entity.add_component(component)
     return body
 

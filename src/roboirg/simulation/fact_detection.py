@@ -31,7 +31,7 @@ NEAR_DISTANCE = 0.06
 HOME_TOLERANCE = 0.01
 REACHED_DISTANCE = 0.03
 REACH = 0.12
-"""What is farther from the tool centre point than this cannot be between the fingers, m."""
+"""What is farther from the tool center point than this cannot be between the fingers, m."""
 
 Contacts = list[sapien.physx.PhysxContact]
 

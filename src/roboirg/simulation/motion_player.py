@@ -18,7 +18,7 @@ from roboirg.simulation.bodies import Body
 Bodies = Mapping[str, Body]
 
 _SPACING = 0.5
-"""Metres between the spots of objects that are away, so that they do not touch."""
+"""Meters between the spots of objects that are away, so that they do not touch."""
 
 
 class Moment(NamedTuple):

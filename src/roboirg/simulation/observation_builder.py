@@ -137,10 +137,10 @@ def drawn_space(wishes: Wishes) -> dict[str, spaces.Space[Any]]:
     fields: dict[str, spaces.Space[Any]] = {
         f"{camera}_rgb": spaces.Box(0, 255, (SIZE, SIZE, 3), np.uint8) for camera in wishes.cameras
     }
-    millimetres = np.iinfo(np.int16)
+    millimeters = np.iinfo(np.int16)
     for camera in wishes.cameras if wishes.depth else ():
         fields[f"{camera}_depth"] = spaces.Box(
-            int(millimetres.min), int(millimetres.max), (SIZE, SIZE, 1), np.int16
+            int(millimeters.min), int(millimeters.max), (SIZE, SIZE, 1), np.int16
         )
     return fields
 

@@ -149,7 +149,7 @@ class Robot:
 
     @property
     def tool_pose(self) -> sapien.Pose:
-        """Pose of the tool centre point between the fingertips, world frame."""
+        """Pose of the tool center point between the fingertips, world frame."""
         return self.tool.entity_pose
 
     def is_still(self) -> bool:

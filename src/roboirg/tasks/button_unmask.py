@@ -26,9 +26,9 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     obstacles = [button_keep_out(button)]
     containers = unmask.draw_containers(rng, CONTAINERS[difficulty], REGION, GAP, obstacles)
     cubes = unmask.hide_cubes(rng, containers)
-    colours = tuple(str(cube.colour) for cube in cubes[: PICKS[difficulty]])
+    colors = tuple(str(cube.color) for cube in cubes[: PICKS[difficulty]])
     scene = Scene((button, *containers, *cubes), motions=unmask.appearing(containers))
-    return scene, Goal.of(colours=colours)
+    return scene, Goal.of(colors=colors)
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
@@ -38,22 +38,21 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 
 COMMANDS = unmask.commands(
-    Wording("Lift {colours.0}, but press the button first."),
-    Wording("Pick up {colours.0}, but make sure to press the button first."),
-    Wording("I want you to lift {colours.0}, but to press the button first."),
+    Wording("Lift {colors.0}, but press the button first."),
+    Wording("Pick up {colors.0}, but make sure to press the button first."),
+    Wording("I want you to lift {colors.0}, but to press the button first."),
     Wording(
-        "Press the button first, then lift {colours.0}, put it back down, "
-        "and then lift {colours.1}.",
+        "Press the button first, then lift {colors.0}, put it back down, and then lift {colors.1}.",
         parts=2,
     ),
     Wording(
-        "First press the button, then pick up {colours.0}, set it down again, "
-        "and after that pick up {colours.1}.",
+        "First press the button, then pick up {colors.0}, set it down again, "
+        "and after that pick up {colors.1}.",
         parts=2,
     ),
     Wording(
-        "I want you to press the button first, then to lift {colours.0}, "
-        "to put it down, and finally to lift {colours.1}.",
+        "I want you to press the button first, then to lift {colors.0}, "
+        "to put it down, and finally to lift {colors.1}.",
         parts=2,
     ),
 )

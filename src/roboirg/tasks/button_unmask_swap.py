@@ -63,22 +63,22 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 COMMANDS = replace(
     unmask.commands(
-        Wording("Lift {colours.0}, but press both buttons first."),
-        Wording("Pick up {colours.0}, but make sure to press both buttons first."),
-        Wording("I want you to lift {colours.0}, but to press both buttons first."),
+        Wording("Lift {colors.0}, but press both buttons first."),
+        Wording("Pick up {colors.0}, but make sure to press both buttons first."),
+        Wording("I want you to lift {colors.0}, but to press both buttons first."),
         Wording(
-            "Press both buttons first, then lift {colours.0}, put it back down, "
-            "and then lift {colours.1}.",
+            "Press both buttons first, then lift {colors.0}, put it back down, "
+            "and then lift {colors.1}.",
             parts=2,
         ),
         Wording(
-            "First press both buttons, then pick up {colours.0}, set it down again, "
-            "and after that pick up {colours.1}.",
+            "First press both buttons, then pick up {colors.0}, set it down again, "
+            "and after that pick up {colors.1}.",
             parts=2,
         ),
         Wording(
-            "I want you to press both buttons first, then to lift {colours.0}, "
-            "to put it down, and finally to lift {colours.1}.",
+            "I want you to press both buttons first, then to lift {colors.0}, "
+            "to put it down, and finally to lift {colors.1}.",
             parts=2,
         ),
     ),

@@ -10,13 +10,13 @@ from __future__ import annotations
 import numpy as np
 
 from roboirg.core.conditions import Elapsed, Fact, Rule
-from roboirg.core.episode import Colour, Difficulty, Goal, Primitive, Scene, Stage
+from roboirg.core.episode import Color, Difficulty, Goal, Primitive, Scene, Stage
 from roboirg.tasks.shared.fixtures import ORDINALS, draw_number, draw_target
 from roboirg.tasks.shared.placement import Circle, Footprint, Region
 from roboirg.tasks.shared.real_table import Side, draw_sides, draw_tape, on_side
 from roboirg.tasks.task import Commands, Task, Wording
 
-TAPES: tuple[Colour, ...] = ("yellow", "gray")
+TAPES: tuple[Color, ...] = ("yellow", "gray")
 REPEATS = (1, 2)
 
 TARGET_REGION = Region(0.06, 0.0, 0.1, 0.1)
@@ -34,27 +34,27 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     target = draw_target(rng, "target", TARGET_RADIUS, TARGET_REGION, 0.0, ())
     obstacles: list[Footprint] = [Circle(target.position.x, target.position.y, TARGET_RADIUS)]
     left, right = draw_sides(rng, TAPES)
-    sides: dict[Colour, Side] = {left: "left", right: "right"}
+    sides: dict[Color, Side] = {left: "left", right: "right"}
     tapes = tuple(
         draw_tape(
             rng,
-            f"tape_{colour}",
-            colour,
-            on_side(LEFT_TAPE_REGION, sides[colour]),
+            f"tape_{color}",
+            color,
+            on_side(LEFT_TAPE_REGION, sides[color]),
             TAPE_GAP,
             obstacles,
         )
-        for colour in TAPES
+        for color in TAPES
     )
     chosen = TAPES[int(rng.integers(len(TAPES)))]
-    goal = Goal.of(colour=str(chosen), repeats=draw_number(rng, REPEATS))
+    goal = Goal.of(color=str(chosen), repeats=draw_number(rng, REPEATS))
     return Scene((*tapes, target)), goal
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
     """Every tape of the scene, once or twice."""
     return tuple(
-        Goal.of(colour=str(tape.colour), repeats=repeats)
+        Goal.of(color=str(tape.color), repeats=repeats)
         for tape in scene.of_kind("tape")
         for repeats in range(REPEATS[0], REPEATS[1] + 1)
     )
@@ -62,28 +62,28 @@ def goals(scene: Scene) -> tuple[Goal, ...]:
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     """Pick and place, as often as wanted, then leave all tapes alone for a while."""
-    colour = goal.text("colour")
-    tape = f"tape_{colour}"
+    color = goal.text("color")
+    tape = f"tape_{color}"
     wrong = tuple(
-        Rule(Fact("picked", item.name), f"picked up the {item.colour} tape", failure="wrong_object")
+        Rule(Fact("picked", item.name), f"picked up the {item.color} tape", failure="wrong_object")
         for item in scene.of_kind("tape")
         if item.name != tape
     )
-    again = Rule(Fact("picked", tape), f"picked up the {colour} tape again", failure="wrong_count")
+    again = Rule(Fact("picked", tape), f"picked up the {color} tape again", failure="wrong_count")
     plan: list[Stage] = []
     for ordinal in ORDINALS[: goal.number("repeats")]:
         pick = Stage(
             expects=Fact("picked", tape),
             forbids=wrong,
             primitive=Primitive("pick_cube", tape),
-            subgoal=f"pick up the {colour} tape {{at}} for the {ordinal} time",
+            subgoal=f"pick up the {color} tape {{at}} for the {ordinal} time",
             points_at=tape,
         )
         put = Stage(
             expects=Fact("placed", tape, "target"),
             forbids=wrong,
             primitive=Primitive("place_on", tape, "target"),
-            subgoal=f"place the {colour} tape onto the target {{at}}",
+            subgoal=f"place the {color} tape onto the target {{at}}",
             points_at="target",
         )
         plan += [pick, put]
@@ -99,14 +99,14 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 COMMANDS = Commands(
     thing="tape",
-    coloured="tape",
-    colours=TAPES,
+    colored="tape",
+    colors=TAPES,
     by_place="the tape {place}",
     patterns=("number deduction",),
     wordings=(
-        Wording("Take {colour} and place it on the target {repeats}."),
-        Wording("Grab {colour} and set it on the target {repeats}."),
-        Wording("I want you to take {colour} and put it down on the target {repeats}."),
+        Wording("Take {color} and place it on the target {repeats}."),
+        Wording("Grab {color} and set it on the target {repeats}."),
+        Wording("I want you to take {color} and put it down on the target {repeats}."),
     ),
 )
 

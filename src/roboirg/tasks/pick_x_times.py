@@ -15,7 +15,7 @@ from roboirg.tasks.shared.fixtures import (
     button_keep_out,
     cube_footprint,
     draw_button,
-    draw_coloured_cubes,
+    draw_colored_cubes,
     draw_number,
     draw_target,
 )
@@ -34,22 +34,22 @@ TARGET_GAP = 0.04
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
-    """Button, cubes of different colours, target disc; target cube and repeats are uniform."""
+    """Button, cubes of different colors, target disc; target cube and repeats are uniform."""
     repeats = draw_number(rng, REPEATS[difficulty])
     button = draw_button(rng, BUTTON_REGION)
     obstacles: list[Footprint] = [button_keep_out(button)]
-    cubes = draw_coloured_cubes(rng, CUBES[difficulty], WORK_REGION, CUBE_GAP, obstacles)
+    cubes = draw_colored_cubes(rng, CUBES[difficulty], WORK_REGION, CUBE_GAP, obstacles)
     obstacles += [cube_footprint(cube) for cube in cubes]
     target = draw_target(rng, "target", TARGET_RADIUS, WORK_REGION, TARGET_GAP, obstacles)
     chosen = cubes[int(rng.integers(len(cubes)))]
-    goal = Goal.of(colour=str(chosen.colour), repeats=repeats)
+    goal = Goal.of(color=str(chosen.color), repeats=repeats)
     return Scene((button, *cubes, target)), goal
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
     """Every cube of the scene, one to five times."""
     return tuple(
-        Goal.of(colour=str(cube.colour), repeats=repeats)
+        Goal.of(color=str(cube.color), repeats=repeats)
         for cube in scene.of_kind("cube")
         for repeats in range(1, MAX_REPEATS + 1)
     )
@@ -57,8 +57,8 @@ def goals(scene: Scene) -> tuple[Goal, ...]:
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     """Pick and place, as often as wanted, then press: 2 N + 1 stages."""
-    colour = goal.text("colour")
-    cube = f"cube_{colour}"
+    color = goal.text("color")
+    cube = f"cube_{color}"
     cubes = tuple(item.name for item in scene.of_kind("cube"))
     pressed = Fact("pressed", "button")
     wrong = (*(Fact("picked", other) for other in cubes if other != cube), pressed)
@@ -68,14 +68,14 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
             expects=Fact("picked", cube),
             forbids=wrong,
             primitive=Primitive("pick_cube", cube),
-            subgoal=f"pick up the {colour} cube {{at}} for the {ordinal} time",
+            subgoal=f"pick up the {color} cube {{at}} for the {ordinal} time",
             points_at=cube,
         )
         put = Stage(
             expects=Fact("placed", cube, "target"),
             forbids=wrong,
             primitive=Primitive("place_on", cube, "target"),
-            subgoal=f"place the {colour} cube onto the target {{at}}",
+            subgoal=f"place the {color} cube onto the target {{at}}",
             points_at="target",
         )
         plan += [pick, put]
@@ -91,19 +91,19 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 COMMANDS = Commands(
     thing="cube",
-    by_colour="{cube}",
+    by_color="{cube}",
     by_place="the cube {place}",
-    patterns=("colour exclusion", "number deduction"),
+    patterns=("color exclusion", "number deduction"),
     wordings=(
         Wording(
-            "Take {colour} and place it on the target {repeats}, then press the button to stop."
+            "Take {color} and place it on the target {repeats}, then press the button to stop."
         ),
         Wording(
-            "Grab {colour} and set it on the target {repeats}, "
+            "Grab {color} and set it on the target {repeats}, "
             "and press the button when you are done."
         ),
         Wording(
-            "I want you to take {colour} and put it down on the target {repeats}, "
+            "I want you to take {color} and put it down on the target {repeats}, "
             "and to press the button at the end."
         ),
     ),

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from roboirg.core.conditions import Fact, Rule
-from roboirg.core.episode import Colour, Difficulty, Goal, Primitive, Scene, Stage
+from roboirg.core.episode import Color, Difficulty, Goal, Primitive, Scene, Stage
 from roboirg.tasks.shared.placement import Footprint, Region
 from roboirg.tasks.shared.real_table import (
     Side,
@@ -22,8 +22,8 @@ from roboirg.tasks.shared.real_table import (
 )
 from roboirg.tasks.task import Commands, Task, Wording
 
-BOXES: tuple[Colour, ...] = ("green", "purple")
-TAPE: Colour = "yellow"
+BOXES: tuple[Color, ...] = ("green", "purple")
+TAPE: Color = "yellow"
 
 LEFT_BOX_REGION = Region(0.03, 0.15, 0.05, 0.05)
 TAPE_REGION = Region(-0.13, 0.0, 0.08, 0.18)
@@ -34,29 +34,29 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     """A box on either side, the tape before them; sides and target box are uniform."""
     del difficulty
     left, right = draw_sides(rng, BOXES)
-    sides: dict[Colour, Side] = {left: "left", right: "right"}
+    sides: dict[Color, Side] = {left: "left", right: "right"}
     boxes = tuple(
-        draw_box(rng, f"box_{colour}", colour, on_side(LEFT_BOX_REGION, sides[colour]))
-        for colour in BOXES
+        draw_box(rng, f"box_{color}", color, on_side(LEFT_BOX_REGION, sides[color]))
+        for color in BOXES
     )
     obstacles: list[Footprint] = [box_footprint(box) for box in boxes]
     tape = draw_tape(rng, "tape", TAPE, TAPE_REGION, TAPE_GAP, obstacles)
-    goal = Goal.of(colour=str(BOXES[int(rng.integers(len(BOXES)))]))
+    goal = Goal.of(color=str(BOXES[int(rng.integers(len(BOXES)))]))
     return Scene((*boxes, tape)), goal
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
     """Every box of the scene."""
-    return tuple(Goal.of(colour=str(box.colour)) for box in scene.of_kind("box"))
+    return tuple(Goal.of(color=str(box.color)) for box in scene.of_kind("box"))
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     """Pick the tape and put it into the box, and into no other."""
-    target = f"box_{goal.text('colour')}"
+    target = f"box_{goal.text('color')}"
     wrong = tuple(
         Rule(
             Fact("binned", "tape", box.name),
-            f"put the tape into the {box.colour} box",
+            f"put the tape into the {box.color} box",
             failure="wrong_place",
         )
         for box in scene.of_kind("box")
@@ -73,7 +73,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
         expects=Fact("binned", "tape", target),
         forbids=wrong,
         primitive=Primitive("put_into", "tape", target),
-        subgoal=f"put the tape into the {goal.text('colour')} box {{at}}",
+        subgoal=f"put the tape into the {goal.text('color')} box {{at}}",
         points_at=target,
     )
     return pick, put_in
@@ -81,15 +81,15 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 COMMANDS = Commands(
     thing="box",
-    coloured="box",
-    # Excluding the tape's colour and that of a box leaves the other box.
-    colours=(*BOXES, TAPE),
+    colored="box",
+    # Excluding the tape's color and that of a box leaves the other box.
+    colors=(*BOXES, TAPE),
     by_place="the box {place}",
-    patterns=("colour exclusion",),
+    patterns=("color exclusion",),
     wordings=(
-        Wording("Put the tape into {colour}."),
-        Wording("Please place the tape into {colour}."),
-        Wording("I want you to put the tape into {colour}."),
+        Wording("Put the tape into {color}."),
+        Wording("Please place the tape into {color}."),
+        Wording("I want you to put the tape into {color}."),
     ),
 )
 

@@ -24,7 +24,7 @@ TARGET_REGION = Region(0.0, 0.0, 0.1, 0.1)
 TARGET_RADIUS = 0.036
 TARGET_THICKNESS = 0.01
 HEIGHT = 0.01
-"""Of the centres of the target and of the cube, which is half sunk in the table, m."""
+"""Of the centers of the target and of the cube, which is half sunk in the table, m."""
 PATH_HALF = 0.3
 """Half the length of the cube's path, m; the target is in its middle."""
 PATH_ANGLE = math.radians(30.0)

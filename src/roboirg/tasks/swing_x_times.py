@@ -16,7 +16,7 @@ from roboirg.tasks.shared.fixtures import (
     button_keep_out,
     cube_footprint,
     draw_button,
-    draw_coloured_cubes,
+    draw_colored_cubes,
     draw_number,
     draw_target,
     marker_over,
@@ -48,7 +48,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     repeats = draw_number(rng, REPEATS[difficulty])
     button = draw_button(rng, BUTTON_REGION)
     obstacles: list[Footprint] = [button_keep_out(button)]
-    cubes = draw_coloured_cubes(rng, CUBES[difficulty], CUBE_REGION, CUBE_GAP, obstacles)
+    cubes = draw_colored_cubes(rng, CUBES[difficulty], CUBE_REGION, CUBE_GAP, obstacles)
     obstacles += [cube_footprint(cube) for cube in cubes]
     targets: list[SceneObject] = []
     for side, region in SIDES.items():
@@ -64,14 +64,14 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
         Glow(marker.name, Fact("over", chosen.name, target.name), LINGER)
         for marker, target in zip(markers, targets, strict=True)
     )
-    goal = Goal.of(colour=str(chosen.colour), repeats=repeats)
+    goal = Goal.of(color=str(chosen.color), repeats=repeats)
     return Scene((button, *cubes, *targets, *markers), motions), goal
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
     """Every cube of the scene, one to three times."""
     return tuple(
-        Goal.of(colour=str(cube.colour), repeats=repeats)
+        Goal.of(color=str(cube.color), repeats=repeats)
         for cube in scene.of_kind("cube")
         for repeats in range(1, MAX_REPEATS + 1)
     )
@@ -79,8 +79,8 @@ def goals(scene: Scene) -> tuple[Goal, ...]:
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     """Pick, over the right and the left target as often as wanted, put down, press: 2 N + 3."""
-    colour, repeats = goal.text("colour"), goal.number("repeats")
-    cube = f"cube_{colour}"
+    color, repeats = goal.text("color"), goal.number("repeats")
+    cube = f"cube_{color}"
     pressed = Fact("pressed", "button")
     visits = tuple(Fact("over", cube, f"target_{side}") for side in SIDES)
     # Visits in a wrong order complete nothing and still count, so they end here, too.
@@ -91,7 +91,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
         expects=Fact("picked", cube),
         forbids=wrong,
         primitive=Primitive("pick_cube", cube),
-        subgoal=f"pick up the {colour} cube {{at}}",
+        subgoal=f"pick up the {color} cube {{at}}",
         points_at=cube,
     )
     swings = [
@@ -101,7 +101,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
         expects=Fact("lying", cube),
         forbids=wrong,
         primitive=Primitive("put_down", cube),
-        subgoal=f"put the {colour} cube on the table",
+        subgoal=f"put the {color} cube on the table",
     )
     press = Stage(
         expects=pressed,
@@ -125,18 +125,18 @@ def _swing(cube: str, side: str, ordinal: str, wrong: tuple[Fact | Rule, ...]) -
 
 
 COMMANDS = Commands(
-    patterns=("colour exclusion", "number deduction"),
+    patterns=("color exclusion", "number deduction"),
     wordings=(
         Wording(
-            "Take {colour}, carry it from above the target on your right to above the target on "
+            "Take {color}, carry it from above the target on your right to above the target on "
             "your left {repeats}, put it down, and press the button to stop."
         ),
         Wording(
-            "Grab {colour} and swing it from above the target on your right to above the target "
+            "Grab {color} and swing it from above the target on your right to above the target "
             "on your left {repeats}, then put it down and press the button at the end."
         ),
         Wording(
-            "I want you to take {colour}, to move it from over the target on your right to over "
+            "I want you to take {color}, to move it from over the target on your right to over "
             "the target on your left {repeats}, and to put it down and press the button when you "
             "are done."
         ),

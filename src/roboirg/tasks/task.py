@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from roboirg.core.episode import COLOURS, Colour, Difficulty, Goal, Scene, Stage, Suite
+from roboirg.core.episode import COLORS, Color, Difficulty, Goal, Scene, Stage, Suite
 
 Thing = Literal["cube", "container", "box", "tape"]
 """What can be told by a place: its kind and its name in words."""
@@ -23,8 +23,8 @@ class Wording(NamedTuple):
 
     Attributes:
         text: a sentence with a field for each part of the goal: ``{repeats}`` for a slot with one
-            value, ``{colours.0}``, ``{colours.1}`` for a slot with several; ``{cubes}`` for all
-            colours together with their counts.
+            value, ``{colors.0}``, ``{colors.1}`` for a slot with several; ``{cubes}`` for all
+            colors together with their counts.
         parts: how many things are handled one after the other in this sentence.
     """
 
@@ -41,18 +41,18 @@ class Commands:
         wordings: at least two for each number of parts.
         thing: what the goal chooses among, for example ``"cube"``; places are told among all
             things of that kind.
-        coloured: what has the colour that tells the thing: itself, or the cube in a container.
-        colours: those that are spoken of; colour exclusion takes exactly three.
-        by_colour: the thing told by a colour; ``{cube}`` is what has that colour.
+        colored: what has the color that tells the thing: itself, or the cube in a container.
+        colors: those that are spoken of; color exclusion takes exactly three.
+        by_color: the thing told by a color; ``{cube}`` is what has that color.
         by_place: the thing told by a place, after its count if it has one: ``cube[|s] ...``.
     """
 
     patterns: tuple[str, ...]
     wordings: tuple[Wording, ...]
     thing: Thing = "cube"
-    coloured: Thing = "cube"
-    colours: tuple[Colour, ...] = COLOURS
-    by_colour: str = "{cube}"
+    colored: Thing = "cube"
+    colors: tuple[Color, ...] = COLORS
+    by_color: str = "{cube}"
     by_place: str = "the cube {place}"
 
 

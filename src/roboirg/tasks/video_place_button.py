@@ -31,14 +31,14 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     past = (before, PRESSED, after)
     swaps = (video_place.draw_swap(rng, discs, past),) if difficulty == "hard" else ()
     relation = RELATIONS[int(rng.integers(len(RELATIONS)))]
-    return Scene(objects, swaps, past), Goal.of(colour=str(cube.colour), relation=relation)
+    return Scene(objects, swaps, past), Goal.of(color=str(cube.color), relation=relation)
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
     """Any cube, to the disc used before the press or to the one used after it."""
     return tuple(
-        Goal.of(colour=colour, relation=relation)
-        for colour in video_place.colours_of(scene)
+        Goal.of(color=color, relation=relation)
+        for color in video_place.colors_of(scene)
         for relation in RELATIONS
     )
 
@@ -47,15 +47,15 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     """Pick the cube, and place it where one was placed right before or after the press."""
     step = -1 if goal.text("relation") == "before" else 1
     placing = scene.past[scene.past.index(PRESSED) + step]
-    return video_place.place_stages(scene, goal.text("colour"), str(placing.place))
+    return video_place.place_stages(scene, goal.text("color"), str(placing.place))
 
 
 COMMANDS = Commands(
     patterns=("contextual logic", "sequential relation"),
     wordings=(
-        Wording("Going by the video, take {colour} and put it on {relation}."),
-        Wording("Think back to the video, take {colour} and place it on {relation}."),
-        Wording("Remember what you saw in the video, take {colour} and set it down on {relation}."),
+        Wording("Going by the video, take {color} and put it on {relation}."),
+        Wording("Think back to the video, take {color} and place it on {relation}."),
+        Wording("Remember what you saw in the video, take {color} and set it down on {relation}."),
     ),
 )
 

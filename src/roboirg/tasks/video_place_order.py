@@ -35,14 +35,14 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     pressed_after = int(rng.integers(1, placements + 1))
     past = (*shown[:pressed_after], PRESSED, *shown[pressed_after:])
     swaps = (video_place.draw_swap(rng, discs, past),) if difficulty == "hard" else ()
-    return Scene(objects, swaps, past), Goal.of(colour=str(cube.colour), placement=placement)
+    return Scene(objects, swaps, past), Goal.of(color=str(cube.color), placement=placement)
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
     """Any cube, to any of the discs that were visited."""
     return tuple(
-        Goal.of(colour=colour, placement=placement)
-        for colour in video_place.colours_of(scene)
+        Goal.of(color=color, placement=placement)
+        for color in video_place.colors_of(scene)
         for placement in range(1, len(video_place.visited(scene)) + 1)
     )
 
@@ -50,17 +50,15 @@ def goals(scene: Scene) -> tuple[Goal, ...]:
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     """Pick the cube, and place it on the disc of that number in the order of visits."""
     answer = video_place.visited(scene)[goal.number("placement") - 1]
-    return video_place.place_stages(scene, goal.text("colour"), answer)
+    return video_place.place_stages(scene, goal.text("color"), answer)
 
 
 COMMANDS = Commands(
     patterns=("sequential relation",),
     wordings=(
-        Wording("Going by the video, take {colour} and put it on {placement}."),
-        Wording("Think back to the video, take {colour} and place it on {placement}."),
-        Wording(
-            "Remember what you saw in the video, take {colour} and set it down on {placement}."
-        ),
+        Wording("Going by the video, take {color} and put it on {placement}."),
+        Wording("Think back to the video, take {color} and place it on {placement}."),
+        Wording("Remember what you saw in the video, take {color} and set it down on {placement}."),
     ),
 )
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from roboirg.core.conditions import All, Elapsed, Fact, Rule
-from roboirg.core.episode import COLOURS, Difficulty, Goal, Primitive, Scene, SceneObject, Stage
+from roboirg.core.episode import COLORS, Difficulty, Goal, Primitive, Scene, SceneObject, Stage
 from roboirg.core.motions import Swap
 from roboirg.tasks.shared import video_stages
 from roboirg.tasks.shared.fixtures import (
@@ -36,7 +36,7 @@ LAYOUT_HALF = 0.07
 """Half side of the square around a point of the layout in which its cube lies."""
 CLUTTER_REGION = Region(-0.1, 0.0, 0.2, 0.25)
 CLUTTER_ROUNDS = 5
-"""How many cubes of each colour a cluttered table has."""
+"""How many cubes of each color a cluttered table has."""
 
 SWAP_LANE = 0.07
 SWAP_STAGE = 3
@@ -66,27 +66,27 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
 
 
 def _draw_layout(rng: np.random.Generator, button: SceneObject) -> list[SceneObject]:
-    """Three cubes of one colour, each near its point of a layout."""
-    colour = COLOURS[int(rng.integers(len(COLOURS)))]
+    """Three cubes of one color, each near its point of a layout."""
+    color = COLORS[int(rng.integers(len(COLORS)))]
     obstacles: list[Footprint] = [button_keep_out(button)]
     cubes: list[SceneObject] = []
     for number, point in enumerate(layout_points(rng, LAYOUT_CUBES)):
         region = Region(*point, LAYOUT_HALF, LAYOUT_HALF)
-        cube = draw_cube(rng, f"cube_{colour}_{number}", colour, region, GAP, obstacles)
+        cube = draw_cube(rng, f"cube_{color}_{number}", color, region, GAP, obstacles)
         cubes.append(cube)
         obstacles.append(cube_footprint(cube))
     return cubes
 
 
 def _draw_clutter(rng: np.random.Generator, button: SceneObject) -> list[SceneObject]:
-    """Five cubes of each colour, anywhere; in each round one of each, in any order."""
+    """Five cubes of each color, anywhere; in each round one of each, in any order."""
     obstacles: list[Footprint] = [button_keep_out(button)]
     cubes: list[SceneObject] = []
     for number in range(CLUTTER_ROUNDS):
-        for index in rng.permutation(len(COLOURS)):
-            colour = COLOURS[index]
-            name = f"cube_{colour}_{number}"
-            cube = draw_cube(rng, name, colour, CLUTTER_REGION, GAP, obstacles)
+        for index in rng.permutation(len(COLORS)):
+            color = COLORS[index]
+            name = f"cube_{color}_{number}"
+            cube = draw_cube(rng, name, color, CLUTTER_REGION, GAP, obstacles)
             cubes.append(cube)
             obstacles.append(cube_footprint(cube))
     return cubes

@@ -27,9 +27,9 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     """Containers at random, three of them over a cube; the first placed are the ones to lift."""
     containers = unmask.draw_containers(rng, CONTAINERS[difficulty], REGION, GAP)
     cubes = unmask.hide_cubes(rng, containers)
-    colours = tuple(str(cube.colour) for cube in cubes[: PICKS[difficulty]])
+    colors = tuple(str(cube.color) for cube in cubes[: PICKS[difficulty]])
     scene = Scene((*containers, *cubes), motions=unmask.appearing(containers))
-    return scene, Goal.of(colours=colours)
+    return scene, Goal.of(colors=colors)
 
 
 def demonstration(_scene: Scene) -> tuple[Stage, ...]:
@@ -38,22 +38,21 @@ def demonstration(_scene: Scene) -> tuple[Stage, ...]:
 
 
 COMMANDS = unmask.commands(
-    Wording("Think back to the video and lift {colours.0}."),
-    Wording("Going by what the video showed, pick up {colours.0}."),
-    Wording("Remember what you saw in the video, then lift {colours.0}."),
+    Wording("Think back to the video and lift {colors.0}."),
+    Wording("Going by what the video showed, pick up {colors.0}."),
+    Wording("Remember what you saw in the video, then lift {colors.0}."),
     Wording(
-        "Think back to the video and lift {colours.0}, put it back down, "
-        "and then lift {colours.1}.",
+        "Think back to the video and lift {colors.0}, put it back down, and then lift {colors.1}.",
         parts=2,
     ),
     Wording(
-        "Going by what the video showed, pick up {colours.0}, set it down again, "
-        "and after that pick up {colours.1}.",
+        "Going by what the video showed, pick up {colors.0}, set it down again, "
+        "and after that pick up {colors.1}.",
         parts=2,
     ),
     Wording(
-        "Remember what you saw in the video, then lift {colours.0}, put it down, "
-        "and finally lift {colours.1}.",
+        "Remember what you saw in the video, then lift {colors.0}, put it down, "
+        "and finally lift {colors.1}.",
         parts=2,
     ),
 )

@@ -30,24 +30,24 @@ def demonstration(scene: Scene) -> tuple[Stage, ...]:
 
 COMMANDS = replace(
     unmask.commands(
-        Wording("Going by everything that happened in the video, lift {colours.0}."),
+        Wording("Going by everything that happened in the video, lift {colors.0}."),
         Wording(
-            "Keep in mind what the video showed from beginning to end, and pick up {colours.0}."
+            "Keep in mind what the video showed from beginning to end, and pick up {colors.0}."
         ),
-        Wording("Remember all that you saw in the video, then lift {colours.0}."),
+        Wording("Remember all that you saw in the video, then lift {colors.0}."),
         Wording(
-            "Going by everything that happened in the video, lift {colours.0}, put it back down, "
-            "and then lift {colours.1}.",
+            "Going by everything that happened in the video, lift {colors.0}, put it back down, "
+            "and then lift {colors.1}.",
             parts=2,
         ),
         Wording(
-            "Keep in mind what the video showed from beginning to end, and pick up {colours.0}, "
-            "set it down again, and after that pick up {colours.1}.",
+            "Keep in mind what the video showed from beginning to end, and pick up {colors.0}, "
+            "set it down again, and after that pick up {colors.1}.",
             parts=2,
         ),
         Wording(
-            "Remember all that you saw in the video, then lift {colours.0}, put it down, "
-            "and finally lift {colours.1}.",
+            "Remember all that you saw in the video, then lift {colors.0}, put it down, "
+            "and finally lift {colors.1}.",
             parts=2,
         ),
     ),

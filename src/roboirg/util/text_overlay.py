@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 Frame = NDArray[np.uint8]
-Colour = tuple[int, int, int]
+Color = tuple[int, int, int]
 """RGB, 0 to 255."""
 
 _FONT = 0  # cv2.FONT_HERSHEY_SIMPLEX; importing OpenCV takes a while
 
 
 def write_text(
-    image: Frame, text: str, x: int, y: int, scale: float, colour: Colour, thickness: int = 1
+    image: Frame, text: str, x: int, y: int, scale: float, color: Color, thickness: int = 1
 ) -> None:
     """Put a line of text into a picture, with its base line at y; what is not ASCII becomes "?".
 
@@ -23,13 +23,13 @@ def write_text(
         x: of the left end, pixels.
         y: of the base line, pixels.
         scale: 1 is about 22 pixels high.
-        colour: RGB.
+        color: RGB.
         thickness: of the strokes, pixels.
     """
     import cv2
 
     ascii_text = text.encode("ascii", "replace").decode()
-    cv2.putText(image, ascii_text, (x, y), _FONT, scale, colour, thickness, cv2.LINE_AA)
+    cv2.putText(image, ascii_text, (x, y), _FONT, scale, color, thickness, cv2.LINE_AA)
 
 
 def wrapped(text: str, width: int, scale: float) -> list[str]:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.util.text_overlay import Colour, Frame, wrapped, write_text
+from roboirg.util.text_overlay import Color, Frame, wrapped, write_text
 
 PER_BAND = 6
 """Moments side by side; further ones go below."""
@@ -18,17 +18,17 @@ PER_BAND = 6
 _MARGIN, _GAP, _PAD = 24, 8, 6
 _PICTURE = 256
 _BAR = 6
-"""Height of the coloured bar over a moment, pixels."""
+"""Height of the colored bar over a moment, pixels."""
 _CAPTION_LINES = 5
 
 _TITLE_SCALE, _TITLE_LINE = 0.8, 34
 _TEXT_SCALE, _TEXT_LINE = 0.45, 18
 
-_PAPER: Colour = (255, 255, 255)
-_INK: Colour = (31, 35, 40)
-_PALE: Colour = (101, 109, 118)
-_VIDEO: Colour = (255, 176, 32)
-_TURN: Colour = (9, 105, 218)
+_PAPER: Color = (255, 255, 255)
+_INK: Color = (31, 35, 40)
+_PALE: Color = (101, 109, 118)
+_VIDEO: Color = (255, 176, 32)
+_TURN: Color = (9, 105, 218)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class Moment:
         step: control steps since reset.
         caption: what has just happened.
         pictures: RGB, uint8 (256, 256, 3), one for each camera, drawn one above the other.
-        is_demonstration: whether it belongs to the video; such moments have a bar of its colour.
+        is_demonstration: whether it belongs to the video; such moments have a bar of its color.
     """
 
     step: int
@@ -110,8 +110,8 @@ def _band(moments: Sequence[Moment], width: int) -> Frame:
     band = _strip(width, caption_height + heights * (_PICTURE + _GAP) + _MARGIN - _GAP)
     for column, moment in enumerate(moments):
         x = _MARGIN + column * (_PICTURE + _GAP)
-        colour = _VIDEO if moment.is_demonstration else _TURN
-        band[:_BAR, x : x + _PICTURE] = np.array(colour, np.uint8)
+        color = _VIDEO if moment.is_demonstration else _TURN
+        band[:_BAR, x : x + _PICTURE] = np.array(color, np.uint8)
         y = _BAR + _PAD + _TEXT_LINE - 4
         when = f"step {moment.step}" + (" (video)" if moment.is_demonstration else "")
         write_text(band, when, x, y, _TEXT_SCALE, _PALE)

@@ -39,16 +39,16 @@ def print_episode(episode: Episode, console: Console) -> None:
 
 
 def objects_table(scene: Scene) -> Table:
-    """All objects with their places at the start, metres and degrees."""
+    """All objects with their places at the start, meters and degrees."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for name in ("object", "kind", "colour"):
+    for name in ("object", "kind", "color"):
         table.add_column(name)
     for name in ("x", "y", "z", "yaw"):
         table.add_column(name, justify="right")
     for item in scene.objects:
         place = (f"{value:.3f}" for value in item.position)
         yaw = f"{math.degrees(item.yaw):.0f}°"
-        table.add_row(item.name, _kind(item), item.colour or "", *place, yaw)
+        table.add_row(item.name, _kind(item), item.color or "", *place, yaw)
     return table
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from roboirg.analysis.figures.figure_data import Content, by_key
 from roboirg.analysis.figures.figure_style import (
-    COLOURS,
+    COLORS,
     GHOST,
     draw_ghost,
     draw_point,
@@ -50,7 +50,7 @@ def draw_context(content: Content, *, published: bool = False) -> Figure | None:
                 at = place + SHIFT * (number - (len(names) - 1) / 2)
                 course.append((at, 100 * float(one.rate)))
                 draw_point(axes, at, float(one.rate), one.interval, number, content.name(who))
-        axes.plot(*zip(*course, strict=True), color=COLOURS[number % len(COLOURS)], linewidth=0.8)
+        axes.plot(*zip(*course, strict=True), color=COLORS[number % len(COLORS)], linewidth=0.8)
     for model in models:
         rows = {row.variant.stages: float(row.average) for row in ghosts if row.model == model}
         known = [(place, rows[stages]) for place, stages in enumerate(sets) if stages in rows]

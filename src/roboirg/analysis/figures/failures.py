@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 ROW_INCHES, MARGIN_INCHES = 0.2, 0.55
 UNKNOWN = "not attributed"
-COLOURS: Mapping[str, str] = {
+COLORS: Mapping[str, str] = {
     **dict(zip(GROUNDING, ("#7f2704", "#c0510a", "#ee8130", "#fbb477", "#fddfbf"), strict=True)),
     **dict(
         zip(
@@ -55,7 +55,7 @@ def draw_failures(content: Content) -> Figure | None:
     told = sorted({variant for _, variant in played}, key=Variant.sort_key)
     across = min(MOST_PANELS, len(names))
     down = -(-len(names) // across)
-    kinds = [kind for kind in COLOURS if any(own[kind] for own in counts.values())]
+    kinds = [kind for kind in COLORS if any(own[kind] for own in counts.values())]
     columns = LEGEND_COLUMNS[across]
     figure = new_figure(
         PAGE_INCHES if across > 1 else COLUMN_INCHES,
@@ -102,13 +102,13 @@ def _draw_bar(axes: Axes, place: int, counts: Counter[str] | None, played: int) 
     if not counts:
         axes.text(1, place, "none", va="center", fontsize=6.5, color="#777777")
     left = 0.0
-    for kind, colour in COLOURS.items():
+    for kind, color in COLORS.items():
         count = (counts or Counter())[kind]
         if not count:
             continue
         width = 100 * count / played
         axes.barh(
-            place, width, left=left, height=0.78, color=colour, edgecolor="white", linewidth=0.5
+            place, width, left=left, height=0.78, color=color, edgecolor="white", linewidth=0.5
         )
         if width >= WIDE_ENOUGH:
             axes.text(
@@ -126,7 +126,7 @@ def _add_legend(figure: Figure, kinds: list[str], columns: int) -> None:
         return group + kind.replace("_", " ")
 
     figure.legend(
-        [Patch(facecolor=COLOURS[kind], edgecolor="white") for kind in kinds],
+        [Patch(facecolor=COLORS[kind], edgecolor="white") for kind in kinds],
         [words(kind) for kind in kinds],
         loc="outside lower center", ncols=columns, columnspacing=1.0, handletextpad=0.4,
     )  # fmt: skip

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from roboirg.analysis.page.entries import in_order
-from roboirg.analysis.stats.run_summary import Scope, Summary, summarise
+from roboirg.analysis.stats.run_summary import Scope, Summary, summarize
 from roboirg.analysis.stats.samples import Contestant, Rules, Samples, Versions, gather, labels
 from roboirg.analysis.stats.success_rates import Variant
 from roboirg.records.record import Job, Result
@@ -76,5 +76,5 @@ def by_key(samples: Samples) -> Mapping[tuple[Contestant, Scope, Variant], Summa
     """Every figure of some samples, to be looked up."""
     return {
         (one.contestant, one.scope, one.variant): one
-        for one in summarise(samples, np.random.default_rng(SEED))
+        for one in summarize(samples, np.random.default_rng(SEED))
     }

@@ -1,4 +1,4 @@
-"""What all figures share: sizes, colours, signs, and the files they become."""
+"""What all figures share: sizes, colors, signs, and the files they become."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ COLUMN_INCHES, PAGE_INCHES = 3.4, 7.0
 LEGEND_COLUMNS, LEGEND_LINE_INCHES = 2, 0.16
 """Of a figure of one column."""
 DOTS_PER_INCH = 300
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
-"""Of Okabe and Ito, told apart by colour-blind people too; signs differ as well."""
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
+"""Of Okabe and Ito, told apart by color-blind people too; signs differ as well."""
 SIGNS = ("o", "s", "^", "D", "v", "P")
 GHOST, GHOST_SIGNS = "#8a8a8a", ("d", "X", "p", "<", ">", "h", "8", "*")
 
@@ -118,16 +118,16 @@ def draw_point(
     axes: Axes, place: float, rate: float, interval: Interval | None, number: int, label: str
 ) -> None:
     """A rate with its interval, both from 0 to 1."""
-    colour = COLOURS[number % len(COLOURS)]
+    color = COLORS[number % len(COLORS)]
     if interval is not None:
-        axes.plot([place] * 2, [100 * end for end in interval], color=colour, linewidth=1.1)
+        axes.plot([place] * 2, [100 * end for end in interval], color=color, linewidth=1.1)
     axes.plot(
         [place],
         [100 * rate],
         linestyle="none",
         marker=SIGNS[number % len(SIGNS)],
         markersize=4.6,
-        color=colour,
+        color=color,
         label=label,
     )
 

@@ -24,7 +24,7 @@ PARTS = (
     ("only implicit", "#009E73", "...."),
     ("neither", "#dddddd", ""),
 )
-"""What an episode did in the two forms: words, colour, pattern."""
+"""What an episode did in the two forms: words, color, pattern."""
 WORDS_AT, ROOM = 103, 160
 """Where the difference is written and where the panel ends, in percent of the episodes."""
 MOST_PANELS = 2
@@ -104,10 +104,10 @@ def _draw_bar(axes: Axes, place: float, gap: Gap) -> None:
     overlap = gap.overlap
     left = 0.0
     counts = (overlap.both, overlap.only_second, overlap.only_first, overlap.neither)
-    for (_, colour, pattern), count in zip(PARTS, counts, strict=True):
+    for (_, color, pattern), count in zip(PARTS, counts, strict=True):
         width = 100 * count / overlap.trials if overlap.trials else 0.0
         axes.barh(
-            place, width, left=left, height=0.78, color=colour, hatch=pattern, edgecolor="white",
+            place, width, left=left, height=0.78, color=color, hatch=pattern, edgecolor="white",
             linewidth=0.4,
         )  # fmt: skip
         left += width
@@ -120,6 +120,4 @@ def _draw_bar(axes: Axes, place: float, gap: Gap) -> None:
 def _handles() -> list[Patch]:
     from matplotlib.patches import Patch
 
-    return [
-        Patch(facecolor=colour, hatch=pattern, edgecolor="white") for _, colour, pattern in PARTS
-    ]
+    return [Patch(facecolor=color, hatch=pattern, edgecolor="white") for _, color, pattern in PARTS]

@@ -9,7 +9,7 @@ import numpy as np
 
 from roboirg.analysis.page.entries import Entries, in_order, task_order
 from roboirg.analysis.stats.intervals import Interval
-from roboirg.analysis.stats.run_summary import Scope, Summary, summarise
+from roboirg.analysis.stats.run_summary import Scope, Summary, summarize
 from roboirg.analysis.stats.samples import Contestant, Samples, gather
 from roboirg.analysis.stats.success_rates import EXPLICIT, Variant
 from roboirg.analysis.tables.run_tables import ALL_TASKS, percent, points
@@ -99,7 +99,7 @@ def _cells(
             "at": [places[one.contestant], lines[one.scope], told.index(one.variant)],
             **_cell(one, f"{names[one.contestant]}, {rows[lines[one.scope]].name}"),
         }
-        for one in summarise(samples, np.random.default_rng(SEED))
+        for one in summarize(samples, np.random.default_rng(SEED))
         if one.scope in lines
     ]
 

@@ -41,11 +41,11 @@ def wilson_interval(successes: int, trials: int, z: float = Z_95) -> Interval:
         raise ValueError(f"{successes} successes of {trials} trials are not a proportion")
     # In plain Python, because every `roboirg run` and page has it and needs no SciPy otherwise.
     rate, weight = successes / trials, z * z / trials
-    centre = (rate + weight / 2) / (1 + weight)
+    center = (rate + weight / 2) / (1 + weight)
     half = z * math.sqrt(rate * (1 - rate) / trials + weight / (4 * trials)) / (1 + weight)
     # At the ends the formula gives 0 and 1 exactly; floating point need not.
-    low = 0.0 if successes == 0 else centre - half
-    high = 1.0 if successes == trials else centre + half
+    low = 0.0 if successes == 0 else center - half
+    high = 1.0 if successes == trials else center + half
     return Interval(low, high)
 
 

@@ -113,9 +113,9 @@ def _rejections(
     """
     from scipy import stats
 
-    centre = episodes * discordance
-    reach = _REACH * math.sqrt(centre * (1 - discordance)) + _REACH
-    least, most = max(0, math.floor(centre - reach)), min(episodes, math.ceil(centre + reach))
+    center = episodes * discordance
+    reach = _REACH * math.sqrt(center * (1 - discordance)) + _REACH
+    least, most = max(0, math.floor(center - reach)), min(episodes, math.ceil(center + reach))
     unlike = np.arange(least, most + 1)
     fewest = stats.binom.ppf(alpha / 2, unlike, 0.5)
     fewest -= stats.binom.cdf(fewest, unlike, 0.5) > alpha / 2

@@ -80,7 +80,7 @@ class Summary:
         return self.trials > 0 and not self.errors and not self.missing
 
 
-def summarise(samples: Samples, rng: np.random.Generator) -> tuple[Summary, ...]:
+def summarize(samples: Samples, rng: np.random.Generator) -> tuple[Summary, ...]:
     """All figures, in the order of the samples: tasks first, then suites, then everything."""
     found = [
         _summary(who, scope, variant, cells, samples, rng)

@@ -145,7 +145,7 @@ def _text(cell: Cell | None, *, is_reference: bool) -> Text:
     if cell.rate is None:
         text.append("–", "dim")
     else:
-        text.append(percent(cell.rate), _colour(cell.rate))
+        text.append(percent(cell.rate), _color(cell.rate))
         if cell.gap is not None and not is_reference:
             text.append(f" ({gap_text(cell)})", "dim" if cell.gap >= 0 else "red")
     if cell.errors:
@@ -155,5 +155,5 @@ def _text(cell: Cell | None, *, is_reference: bool) -> Text:
     return text
 
 
-def _colour(rate: float) -> str:
+def _color(rate: float) -> str:
     return "green" if rate >= _GOOD else "yellow" if rate >= _FAIR else "red"

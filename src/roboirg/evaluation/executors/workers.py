@@ -74,7 +74,7 @@ class Worker:
             job: the first.
             crowded: whether there is a process on every core.
         """
-        # Spawned, not forked: a forked Vulkan driver or thread pool is undefined behaviour.
+        # Spawned, not forked: a forked Vulkan driver or thread pool is undefined behavior.
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
         board = Board(context)

@@ -40,7 +40,7 @@ def resolve(text: str, scene: Scene, task: str) -> Resolution:
 
     Args:
         text: the prompt.
-        scene: what the robot may know: objects, colours, positions, what moves; and from the
+        scene: what the robot may know: objects, colors, positions, what moves; and from the
             video what was done, and which cube is under which container.
         task: name of the task.
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from roboirg.language.interpreter.descriptions import Description, describe
 from roboirg.language.interpreter.quantities import Count, Quantity, quantities
-from roboirg.language.interpreter.tokens import Sentence, colours_in, word_set
+from roboirg.language.interpreter.tokens import Sentence, colors_in, word_set
 
 _TAKING = word_set(
     "take pick grab grasp lift raise carry move bring fetch get uncover remove hold swing"
@@ -33,7 +33,7 @@ class Command(NamedTuple):
     Attributes:
         text: all its words.
         handled: the words for each thing that is handled, in order; each thing once.
-        added: the words for things of other colours that are only said to be put somewhere.
+        added: the words for things of other colors that are only said to be put somewhere.
         entered: the words for each thing that something is put into.
     """
 
@@ -72,8 +72,8 @@ def read_command(words: Sentence) -> Command:
     # "Put the cube on the target" handles a cube too, "put it back" the one in the hand.
     told = taken or put
     fresh = [clause for clause in told if clause is told[0] or not _goes_on(clause)]
-    known = {colour for clause in taken for colour in colours_in(clause)}
-    added = [clause for clause in put if taken and set(colours_in(clause)) - known]
+    known = {color for clause in taken for color in colors_in(clause)}
+    added = [clause for clause in put if taken and set(colors_in(clause)) - known]
     return Command(
         " ".join(words),
         tuple(clause[1:] for clause in fresh),
@@ -127,5 +127,5 @@ def _counts_things(one: Quantity, text: str) -> bool:
 
 
 def _words_of(text: str, one: Quantity, end: int) -> Sentence:
-    # A derived quantity has its colour inside: "one fewer red cube than that".
+    # A derived quantity has its color inside: "one fewer red cube than that".
     return tuple(text[one.start : end].split())

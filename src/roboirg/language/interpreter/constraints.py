@@ -26,12 +26,12 @@ def tests_for(slots: Collection[str], command: Command, listener: Listener) -> l
     tests: list[Test] = []
     if "counts" in slots:
         tests.append(_amounts(command, listener))
-    elif "colours" in slots:
+    elif "colors" in slots:
         tests.append(_things_in_order(command, listener))
-    if "colour" in slots:
+    if "color" in slots:
         things = command.boxes if listener.chooses_box else command.things
-        colours = common(listener.objects(thing) for thing in things)
-        tests.append(lambda goal: colours is None or goal.text("colour") in colours)
+        colors = common(listener.objects(thing) for thing in things)
+        tests.append(lambda goal: colors is None or goal.text("color") in colors)
     if "repeats" in slots:
         tests.append(_number("repeats", listener.times(read_times(command.text))))
     tests += [
@@ -50,25 +50,25 @@ def _number(slot: str, options: Collection[int] | None) -> Test:
 
 
 def _things_in_order(command: Command, listener: Listener) -> Test:
-    """As many colours as things, each among those that its words leave open."""
+    """As many colors as things, each among those that its words leave open."""
     wanted = [listener.objects(thing) for thing in command.things]
 
     def fits(goal: Goal) -> bool:
-        colours = goal.texts("colours")
-        if wanted and len(wanted) != len(colours):
+        colors = goal.texts("colors")
+        if wanted and len(wanted) != len(colors):
             return False
-        pairs = zip(colours, wanted, strict=False)
-        return all(options is None or colour in options for colour, options in pairs)
+        pairs = zip(colors, wanted, strict=False)
+        return all(options is None or color in options for color, options in pairs)
 
     return fits
 
 
 def _amounts(command: Command, listener: Listener) -> Test:
-    """Each colour with its number is one of the items, in any order, and each item is one."""
+    """Each color with its number is one of the items, in any order, and each item is one."""
     items = [listener.amounts(item) for item in command.items]
 
     def fits(goal: Goal) -> bool:
-        told = list(zip(goal.texts("colours"), goal.numbers("counts"), strict=True))
+        told = list(zip(goal.texts("colors"), goal.numbers("counts"), strict=True))
         if not items:
             return True
         return len(items) == len(told) and any(
@@ -79,10 +79,10 @@ def _amounts(command: Command, listener: Listener) -> Test:
 
 
 def _agree(told: Sequence[tuple[str, int]], items: Sequence[Amounts]) -> bool:
-    for (colour, number), options in zip(told, items, strict=True):
-        if colour not in options:
+    for (color, number), options in zip(told, items, strict=True):
+        if color not in options:
             return False
-        numbers = options[colour]
+        numbers = options[color]
         if numbers is not None and number not in numbers:
             return False
     return True

@@ -1,4 +1,4 @@
-"""Descriptions: how words tell which thing, or of which colour, is meant."""
+"""Descriptions: how words tell which thing, or of which color, is meant."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Literal, NamedTuple
 from roboirg.language.interpreter.places import Place, read_places
 from roboirg.language.interpreter.temporal_relations import Time, time_told
 from roboirg.language.interpreter.tokens import (
-    COLOUR,
+    COLOR,
     Sentence,
-    colour_of,
-    colours_in,
+    color_of,
+    colors_in,
     ordinal_of,
     word_set,
 )
@@ -22,25 +22,25 @@ _PLACE_NOUNS = word_set("place spot position location")
 _SERIES_NOUNS = word_set("visit placement time pass placing stay occasion")
 _FORMER = {"former": 0, "latter": -1}
 
-Kind = Literal["any", "colour", "not", "other", "place", "introduced", "introduced place"]
+Kind = Literal["any", "color", "not", "other", "place", "introduced", "introduced place"]
 
 
 class Description(NamedTuple):
     """How a command tells one thing that is to be handled.
 
     Attributes:
-        kind: ``any`` says nothing; ``colour`` names it; ``not`` excludes colours; ``other`` is
-            the remaining one of some colours; ``place`` names where it is; ``introduced`` and
+        kind: ``any`` says nothing; ``color`` names it; ``not`` excludes colors; ``other`` is
+            the remaining one of some colors; ``place`` names where it is; ``introduced`` and
             ``introduced place`` point at what was named before.
-        colours: named colours; empty where the words point at those of the context.
-        minus: for ``other``, the colour that it is not; None if the words only point at it.
+        colors: named colors; empty where the words point at those of the context.
+        minus: for ``other``, the color that it is not; None if the words only point at it.
         place: the named place.
         times: whether that place was said to be before or after things moved.
         position: which of the introduced ones, from 0; None if any of them.
     """
 
     kind: Kind
-    colours: tuple[str, ...] = ()
+    colors: tuple[str, ...] = ()
     minus: str | None = None
     place: Place | None = None
     times: frozenset[Time] = frozenset()
@@ -53,29 +53,29 @@ _THAN = re.compile(
 )
 _OTHER_OF = re.compile(r"\bthe other (?:one |color )?(?:of|in|from)\b")
 _ONE_NOT = re.compile(r"\bthe (?:one|color) (?:of|in|from)\b.*\b(?:not|other than|except)\b")
-_NOT = re.compile(rf"\b(?:not|other than|except) (?:in |for |the )?({COLOUR})\b")
+_NOT = re.compile(rf"\b(?:not|other than|except) (?:in |for |the )?({COLOR})\b")
 
 
 def describe(words: Sentence) -> Description:
     """What the words for one thing tell about it."""
     text = " ".join(words)
-    colours = colours_in(words)
+    colors = colors_in(words)
     places = read_places(words)
     if places:
         return Description("place", place=places[0], times=time_told(text))
     if _OTHER_OF.search(text) or _ONE_NOT.search(text):
-        return _complement(text, colours)
+        return _complement(text, colors)
     if _THAN.search(text):
-        return Description("not", colours)
-    if colours:
-        return Description("colour", colours[:1])
+        return Description("not", colors)
+    if colors:
+        return Description("color", colors[:1])
     return _pointer(words) or Description("any")
 
 
-def _complement(text: str, colours: tuple[str, ...]) -> Description:
+def _complement(text: str, colors: tuple[str, ...]) -> Description:
     found = _NOT.search(text)
-    minus = colour_of(found[1]) if found else None
-    among = tuple(dict.fromkeys(colours))
+    minus = color_of(found[1]) if found else None
+    among = tuple(dict.fromkeys(colors))
     return Description("other", () if among == (minus,) else among, minus)
 
 

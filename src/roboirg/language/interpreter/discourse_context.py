@@ -11,7 +11,7 @@ from roboirg.language.interpreter.ordinals import named_positions
 from roboirg.language.interpreter.places import Place, read_places
 from roboirg.language.interpreter.quantities import plain_numbers, quantities
 from roboirg.language.interpreter.temporal_relations import Moment, Time, named_moments, time_told
-from roboirg.language.interpreter.tokens import COLOUR, Sentence, colours_in
+from roboirg.language.interpreter.tokens import COLOR, Sentence, colors_in
 
 _DISMISSAL = re.compile(
     r"\b(never mind|nothing to do with|not matter|no matter|ignore|forget (about )?"
@@ -22,7 +22,7 @@ _DISMISSAL = re.compile(
 class Remark(NamedTuple):
     """What one sentence names."""
 
-    colours: tuple[str, ...]
+    colors: tuple[str, ...]
     numbers: tuple[int, ...]
     amounts: tuple[tuple[str, int], ...]
     positions: tuple[int, ...]
@@ -37,10 +37,10 @@ class Context(NamedTuple):
     """What has been introduced so far, in order, and what was said about it.
 
     Attributes:
-        colours: introduced colours.
-        singled: a colour of those that was spoken of again, alone.
+        colors: introduced colors.
+        singled: a color of those that was spoken of again, alone.
         numbers: introduced quantities.
-        amounts: introduced quantities of cubes of a colour.
+        amounts: introduced quantities of cubes of a color.
         positions: introduced elements of a series, 1 for the first.
         moments: introduced moments of the video.
         chosen: a moment of those that was spoken of again, alone.
@@ -49,7 +49,7 @@ class Context(NamedTuple):
         mirrored: whether places were told as the camera sees them.
     """
 
-    colours: tuple[str, ...] = ()
+    colors: tuple[str, ...] = ()
     singled: str | None = None
     numbers: tuple[int, ...] = ()
     amounts: tuple[tuple[str, int], ...] = ()
@@ -68,7 +68,7 @@ def read_remark(words: Sentence) -> Remark:
     places = read_places(words)
     return Remark(
         # A cube that only tells a place is no referent of its own.
-        colours=() if places else colours_in(words),
+        colors=() if places else colors_in(words),
         numbers=() if places else plain_numbers(words),
         amounts=() if places else _amounts(text),
         positions=named_positions(text),
@@ -84,7 +84,7 @@ def _amounts(text: str) -> tuple[tuple[str, int], ...]:
     """``two of the red cubes and a blue one``."""
     found: list[tuple[str, int]] = []
     for one in quantities(text):
-        after = re.match(rf"\s*(?:cubes? )?(?:of )?(?:the )?({COLOUR})s?\b", text[one.end :])
+        after = re.match(rf"\s*(?:cubes? )?(?:of )?(?:the )?({COLOR})s?\b", text[one.end :])
         if one.plain and after and one.told.quantity is not None:
             found.append((after[1], one.told.quantity))
     return tuple(found)
@@ -101,13 +101,13 @@ def listen(sentences: Iterable[Sentence]) -> Context:
 
 
 def _heard(context: Context, remark: Remark) -> Context:
-    fresh = [colour for colour in remark.colours if colour not in context.colours]
-    again = not fresh and len(remark.colours) == 1
+    fresh = [color for color in remark.colors if color not in context.colors]
+    again = not fresh and len(remark.colors) == 1
     moments = (*context.moments, *remark.moments)
     introduced = tuple(dict.fromkeys(moments))
     return Context(
-        colours=tuple(dict.fromkeys((*context.colours, *fresh))),
-        singled=remark.colours[0] if again else context.singled,
+        colors=tuple(dict.fromkeys((*context.colors, *fresh))),
+        singled=remark.colors[0] if again else context.singled,
         numbers=tuple(dict.fromkeys((*context.numbers, *remark.numbers))),
         amounts=tuple(dict.fromkeys((*context.amounts, *remark.amounts))),
         positions=tuple(dict.fromkeys((*context.positions, *remark.positions))),

@@ -68,7 +68,7 @@ class Position(NamedTuple):
             bases = bases or range(1, length + 1)
         else:
             bases = [length if self.base == "last" else self.base]
-        # What does not exist has no neighbours, and is none.
+        # What does not exist has no neighbors, and is none.
         existing = [one for one in bases if 1 <= one <= length]
         results = {one + offset for one in existing for offset in self.offsets}
         return {one for one in results if 1 <= one <= length}

@@ -13,7 +13,7 @@ from typing import Literal
 
 from roboirg.core.episode import Scene, SceneObject
 from roboirg.core.motions import Away
-from roboirg.language.interpreter.tokens import Sentence, colour_of, ordinal_of
+from roboirg.language.interpreter.tokens import Sentence, color_of, ordinal_of
 
 Side = Literal["left", "right"]
 _SIDES: dict[str, Side] = {"left": "left", "right": "right"}
@@ -27,8 +27,8 @@ _FIXTURES = frozenset({"button", "target", "bin"})
 _FILLERS = frozenset({"the", "to", "from", "a", "on", "at"})
 _CORNER_FILLERS = frozenset({"of", "the", "table", "that", "is"})
 _THINGS = frozenset({"cube", "container", "box", "tape"})
-_COLOURED = _THINGS - {"container"}
-_PAIRED = _COLOURED - {"cube"}
+_COLORED = _THINGS - {"container"}
+_PAIRED = _COLORED - {"cube"}
 _TO_A_SIDE = frozenset({"on", "to", "at"})
 _SIDE_FILLERS = frozenset({"the", "your", "far"})
 
@@ -43,7 +43,7 @@ _VIEW = (-0.3, 0.0, -0.6)
 """The front camera's eye and where it looks from there."""
 _CUBE_HEIGHT = 0.02
 _TIE = 0.01
-"""Metres; what differs by less could be meant by the same words."""
+"""Meters; what differs by less could be meant by the same words."""
 _TANGENT_TIE = 2 / 128
 """Two pixels, as a tangent: the picture is 256 pixels wide and 90 degrees."""
 
@@ -68,7 +68,7 @@ class Beside:
     """By distance from something.
 
     Attributes:
-        anchor: a fixture's kind, a colour, or a place of its own.
+        anchor: a fixture's kind, a color, or a place of its own.
         kind: kind of the things that the anchor is one of, for a place.
         nearest: whether small distances come first.
         rank: 1 for the utmost one.
@@ -183,7 +183,7 @@ def _read_relative(words: Sentence, at: int, rank: int, depth: int) -> tuple[Pla
         return Towards(None, -1 if nearest else 1, rank), after + 1
     if noun in _FIXTURES:
         return _read_fixture(words, after, nearest=nearest, rank=rank)
-    if colour_of(noun) and following in _COLOURED:
+    if color_of(noun) and following in _COLORED:
         return Beside(noun, following, nearest, rank), after + 2
     if noun in _THINGS and depth < _MAX_DEPTH:
         inner = _read(words, _skip(words, after + 1), depth + 1)
@@ -285,6 +285,6 @@ def _anchors(place: Beside, scene: Scene, *, mirrored: bool) -> tuple[SceneObjec
     if not isinstance(place.anchor, str):
         return find(place.anchor, scene, place.kind, mirrored=mirrored)
     like = _present(scene, place.kind)
-    if colour_of(place.anchor):
-        like = [item for item in like if item.colour == place.anchor]
+    if color_of(place.anchor):
+        like = [item for item in like if item.color == place.anchor]
     return tuple(like) if len(like) == 1 else ()

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
-from roboirg.language.interpreter.tokens import COLOUR, NUMBER, THING, THINGS, Sentence, number_of
+from roboirg.language.interpreter.tokens import COLOR, NUMBER, THING, THINGS, Sentence, number_of
 
 _CONCEIVABLE = range(1, 11)
 """What a quantity that was not heard may have been."""
@@ -42,7 +42,7 @@ class Quantity(NamedTuple):
     plain: bool = False
 
 
-_NOUNS = rf"(?: (?:times?|{THING}|{THINGS}|ones?|visits?|{COLOUR}|such|of|the|them))"
+_NOUNS = rf"(?: (?:times?|{THING}|{THINGS}|ones?|visits?|{COLOR}|such|of|the|them))"
 _TO = rf"(?P<quantity>that|it|this|the|{NUMBER})\b"
 _MORE = "more|larger|greater|higher|bigger|above|over"
 _LESS = "fewer|less|smaller|lower|below|under"
@@ -69,7 +69,7 @@ _POINTED = "".join(rf"(?<!\b{word} )" for word in _NOT_AFTER)
 _PLAIN = re.compile(rf"{_POINTED}\b(?P<number>{NUMBER})\b(?! times as)")
 _SINGLE = re.compile(
     r"(?<!\bas )(?<!\bthan )(?<!\bto )(?<!\bfrom )(?<!\bof )(?<!\bhides )(?<!\bover )"
-    rf"\b(?:an?|the)(?: single)? (?={COLOUR} (?:{THING}|one)\b)"
+    rf"\b(?:an?|the)(?: single)? (?={COLOR} (?:{THING}|one)\b)"
 )
 _FACTORS = {"twice": 2.0, "double": 2.0, "thrice": 3.0, "triple": 3.0, "half": 0.5}
 _ADVERBS = {"once": 1, "twice": 2, "thrice": 3}

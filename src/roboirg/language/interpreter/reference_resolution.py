@@ -21,7 +21,7 @@ _CHOSEN: tuple[ObjectKind, ...] = ("container", "box", "tape")
 """Kinds of things among which commands choose, rather than among cubes, the first that there is."""
 
 Amounts = dict[str, set[int] | None]
-"""For each colour that is possible, how many; None if any number is."""
+"""For each color that is possible, how many; None if any number is."""
 
 
 class Listener:
@@ -45,11 +45,11 @@ class Listener:
         return self._kind == "box"
 
     def objects(self, thing: Description) -> set[str] | None:
-        """The colours that a description leaves open; None if it says nothing."""
+        """The colors that a description leaves open; None if it says nothing."""
         if thing.kind == "any":
             return None
-        if thing.kind == "colour":
-            return set(thing.colours)
+        if thing.kind == "color":
+            return set(thing.colors)
         if thing.kind == "place" and thing.place is not None:
             return self._at(thing.place, thing.times)
         if thing.kind == "introduced place":
@@ -59,25 +59,25 @@ class Listener:
         return self._derived(thing)
 
     def amounts(self, item: Item) -> Amounts:
-        """For each colour that an item leaves open, the numbers that it leaves open."""
-        colours = self.objects(item.thing)
-        if colours is None:
-            colours = self._colours()
+        """For each color that an item leaves open, the numbers that it leaves open."""
+        colors = self.objects(item.thing)
+        if colors is None:
+            colors = self._colors()
         count = item.number
         if count is None:
-            return dict.fromkeys(colours)
-        return {colour: count.results(self._told(count, colour)) for colour in sorted(colours)}
+            return dict.fromkeys(colors)
+        return {color: count.results(self._told(count, color)) for color in sorted(colors)}
 
     def times(self, count: Count | None) -> set[int] | None:
         """The numbers that the command leaves open."""
         return None if count is None else count.results(self._told(count, None))
 
-    def _told(self, count: Count, colour: str | None) -> tuple[int, ...]:
-        """The introduced numbers that a count may start from; of that colour, if there are any."""
+    def _told(self, count: Count, color: str | None) -> tuple[int, ...]:
+        """The introduced numbers that a count may start from; of that color, if there are any."""
         if count.quantity is not None:
             return ()
-        of_colour = tuple(number for shade, number in self._context.amounts if shade == colour)
-        told = of_colour or self._context.numbers
+        of_color = tuple(number for shade, number in self._context.amounts if shade == color)
+        told = of_color or self._context.numbers
         if not told:
             self._complain("a number")
         return told
@@ -119,23 +119,23 @@ class Listener:
         return sum(passes) or sum(fact.place in discs for fact in placed)
 
     def _derived(self, thing: Description) -> set[str] | None:
-        named = set(thing.colours or self._context.colours)
+        named = set(thing.colors or self._context.colors)
         if thing.kind == "not":
             if not named:
-                self._complain("excluded colours")
+                self._complain("excluded colors")
                 return None
-            return self._colours() - named
+            return self._colors() - named
         minus = thing.minus or self._context.singled
         if not named or minus is None:
             self._complain("the one that is not meant")
-        return (named or self._colours()) - {str(minus)}
+        return (named or self._colors()) - {str(minus)}
 
     def _introduced(self, thing: Description) -> set[str] | None:
-        if self._context.places and not self._context.colours:
+        if self._context.places and not self._context.colors:
             return self._introduced_place(thing)
-        chosen = _chosen(self._context.colours, thing.position)
+        chosen = _chosen(self._context.colors, thing.position)
         if not chosen:
-            self._complain("a colour")
+            self._complain("a color")
             return None
         return set(chosen)
 
@@ -154,16 +154,16 @@ class Listener:
             times | self._times,
             mirrored=self._context.mirrored,
         )
-        cubes = [item if item.colour else self._scene.hidden_in(item.name) for item in found]
+        cubes = [item if item.color else self._scene.hidden_in(item.name) for item in found]
         if None in cubes or not cubes:
             self.complaints.append(f"nothing to handle at {place}")
-        return {str(cube.colour) for cube in cubes if cube is not None}
+        return {str(cube.color) for cube in cubes if cube is not None}
 
-    def _colours(self) -> set[str]:
-        return {str(cube.colour) for cube in self._cubes()}
+    def _colors(self) -> set[str]:
+        return {str(cube.color) for cube in self._cubes()}
 
     def _cubes(self) -> Iterator[SceneObject]:
-        return (item for item in self._scene.objects if item.colour is not None)
+        return (item for item in self._scene.objects if item.color is not None)
 
     def _complain(self, what: str) -> None:
         self.complaints.append(f"{what}: nothing before the command introduces it")

@@ -24,17 +24,17 @@ _ORDINALS = {
     "first": 1, "second": 2, "third": 3, "fourth": 4, "fifth": 5,
     "1st": 1, "2nd": 2, "3rd": 3, "4th": 4, "5th": 5,
 }  # fmt: skip
-_COLOUR_NAMES = ("red", "green", "blue", "yellow", "gray", "purple")
-_COLOURS = {word: name for name in _COLOUR_NAMES for word in (name, f"{name}s")}
+_COLOR_NAMES = ("red", "green", "blue", "yellow", "gray", "purple")
+_COLORS = {word: name for name in _COLOR_NAMES for word in (name, f"{name}s")}
 
 NUMBER = rf"(?:{'|'.join(_NUMBERS)}|[0-9]+)"
 """A regular expression for a cardinal number, in words or digits."""
 ORDINAL = rf"(?:{'|'.join(_ORDINALS)})"
 """The same for an ordinal number."""
-COLOUR = rf"(?:{'|'.join(_COLOUR_NAMES)})"
-"""The same for a colour."""
+COLOR = rf"(?:{'|'.join(_COLOR_NAMES)})"
+"""The same for a color."""
 THING = r"(?:cube|box|tape)"
-"""The same for one of the things that have colours; the plural is `THINGS`."""
+"""The same for one of the things that have colors; the plural is `THINGS`."""
 THINGS = r"(?:cubes|boxes|tapes)"
 
 
@@ -67,11 +67,11 @@ def ordinal_of(word: str) -> int | None:
     return _ORDINALS.get(word)
 
 
-def colour_of(word: str) -> str | None:
-    """The colour that a word names, as an adjective or a noun."""
-    return _COLOURS.get(word)
+def color_of(word: str) -> str | None:
+    """The color that a word names, as an adjective or a noun."""
+    return _COLORS.get(word)
 
 
-def colours_in(words: Sentence) -> tuple[str, ...]:
-    """All colours that a sentence names, in order."""
-    return tuple(_COLOURS[word] for word in words if word in _COLOURS)
+def colors_in(words: Sentence) -> tuple[str, ...]:
+    """All colors that a sentence names, in order."""
+    return tuple(_COLORS[word] for word in words if word in _COLORS)

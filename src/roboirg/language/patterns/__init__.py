@@ -11,7 +11,7 @@ from roboirg.language.request import Request
 __all__ = ["PATTERNS", "REFERENCE", "Derived", "Pattern", "way"]
 
 PATTERNS: Mapping[str, tuple[Pattern, ...]] = {
-    "colour exclusion": (exclusion.ONE_COLOUR,),
+    "color exclusion": (exclusion.ONE_COLOR,),
     "number deduction": (deduction.TIMES, deduction.AMOUNTS, deduction.VISIT),
     "sequential relation": (sequence.ORDINAL, before_after.NEIGHBOR),
     "contextual logic": (exclusion.TWO_AMOUNTS, before_after.OTHER),

@@ -106,13 +106,13 @@ def _visit(request: Request) -> Derived:
 
 
 def _amounts(request: Request) -> Derived:
-    """The same relation for each colour, each with its own quantity."""
+    """The same relation for each color, each with its own quantity."""
     parts = request.parts_of("amount")
     deduction = _chosen(request)
     items = [
         fill(
             deduction.relation.cubes,
-            {"colour": _shade(shade), "number": _pointer(request, number)},
+            {"color": _shade(shade), "number": _pointer(request, number)},
         )
         for (shade, _), number in zip(amount.pairs(parts), deduction.references, strict=True)
     ]
@@ -121,7 +121,7 @@ def _amounts(request: Request) -> Derived:
 
 
 def _shade(part: Part) -> Phrase:
-    return antecedent(part.colour, part.slot, part.value)
+    return antecedent(part.color, part.slot, part.value)
 
 
 TIMES = Pattern(lambda request: _possible(request, "number"), _times)

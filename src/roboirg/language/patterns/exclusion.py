@@ -1,4 +1,4 @@
-"""Colour exclusion, and contextual logic on the two excluded colours."""
+"""Color exclusion, and contextual logic on the two excluded colors."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from roboirg.language.slot_types import described
 
 
 def _exclude(request: Request) -> Derived:
-    """The colour that is not among two; a second target is the other one of the two."""
-    target, *rest = request.coloured
-    others = request.other_colours(target.colour)
+    """The color that is not among two; a second target is the other one of the two."""
+    target, *rest = request.colored
+    others = request.other_colors(target.color)
     pair = request.chooser.pick("pair", list(itertools.permutations(others)))
     both = " and ".join(pair)
     named = antecedent(both, REFERENCE, both)
@@ -27,7 +27,7 @@ def _exclude(request: Request) -> Derived:
     options = templates.AMOUNT_EXCLUSIONS if counted else templates.EXCLUSIONS
     exclusion = request.chooser.pick("exclusion", options)
     things = [_thing(request, target, exclusion, {"pair": reference})]
-    patterns = ["colour exclusion"]
+    patterns = ["color exclusion"]
     for part in rest:
         context.append(_singled(request, part, pair))
         options = templates.AMOUNT_COMPLEMENTS if counted else templates.COMPLEMENTS
@@ -39,8 +39,8 @@ def _exclude(request: Request) -> Derived:
 
 
 def _thing(request: Request, part: Part, template: str, fields: dict[str, Phrase]) -> Phrase:
-    words = {"thing": plain(request.task.commands.coloured), **fields}
-    return request.by_colour(fill(template, words, plural=request.count_of(part) > 1))
+    words = {"thing": plain(request.task.commands.colored), **fields}
+    return request.by_color(fill(template, words, plural=request.count_of(part) > 1))
 
 
 def _singled(request: Request, part: Part, pair: tuple[str, ...]) -> Phrase:
@@ -60,17 +60,17 @@ def _other(request: Request, part: Part, pair: tuple[str, ...], word: str) -> Ph
 
 
 def _rejected(part: Part, pair: tuple[str, ...]) -> str:
-    return next(colour for colour in pair if colour != part.value)
+    return next(color for color in pair if color != part.value)
 
 
 def _allows_one(request: Request) -> bool:
     # The second of two picks is told by the pair of the first, whatever the main pattern's name.
-    return bool(request.parts_of("colour")) or len(request.coloured) == 1
+    return bool(request.parts_of("color")) or len(request.colored) == 1
 
 
 def _allows_two_amounts(request: Request) -> bool:
-    return bool(request.parts_of("amount")) and len(request.coloured) == 2  # noqa: PLR2004
+    return bool(request.parts_of("amount")) and len(request.colored) == 2  # noqa: PLR2004
 
 
-ONE_COLOUR = Pattern(_allows_one, _exclude)
+ONE_COLOR = Pattern(_allows_one, _exclude)
 TWO_AMOUNTS = Pattern(_allows_two_amounts, _exclude)

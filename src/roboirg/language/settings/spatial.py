@@ -1,4 +1,4 @@
-"""Spatial: the colour is told by a place, which the introduction names and the command points at.
+"""Spatial: the color is told by a place, which the introduction names and the command points at.
 
 Counts stay explicit.
 """
@@ -41,13 +41,13 @@ def usable(request: Request, part: Part) -> tuple[Landmark, ...]:
 
 
 def can_say(request: Request) -> bool:
-    """Whether every colour has a thing with a landmark."""
-    return all(usable(request, part) for part in request.coloured)
+    """Whether every color has a thing with a landmark."""
+    return all(usable(request, part) for part in request.colored)
 
 
 def say(request: Request) -> Draft:
-    """An introduction with a landmark for each colour, and a command that points there."""
-    parts = request.coloured
+    """An introduction with a landmark for each color, and a command that points there."""
+    parts = request.colored
     chosen = [
         request.chooser.pick(f"landmark-{part.field}", usable(request, part)) for part in parts
     ]

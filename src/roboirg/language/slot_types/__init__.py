@@ -1,6 +1,6 @@
 """The kinds of values that a goal can hold, and how each is spoken of.
 
-The order is the order of speaking: colours come last, so that ``it`` in the command follows the
+The order is the order of speaking: colors come last, so that ``it`` in the command follows the
 sentence about its cube.
 """
 
@@ -37,7 +37,7 @@ def kinds_in(request: Request) -> Iterator[tuple[Kind, tuple[Part, ...]]]:
 
 
 def described(request: Request, things: Sequence[Phrase]) -> Fields:
-    """The fields of the command for the goal's colours, given a description for each of them."""
+    """The fields of the command for the goal's colors, given a description for each of them."""
     fields: Fields = {}
     for kind, parts in kinds_in(request):
         if kind.described is not None:

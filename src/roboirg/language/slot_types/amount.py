@@ -1,4 +1,4 @@
-"""Amounts: how many cubes of each of one, two or three colours."""
+"""Amounts: how many cubes of each of one, two or three colors."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ FIELD = "cubes"
 
 
 def pairs(parts: tuple[Part, ...]) -> tuple[tuple[Part, Part], ...]:
-    """Each colour with its count."""
-    colours = [part for part in parts if part.slot == "colours"]
+    """Each color with its count."""
+    colors = [part for part in parts if part.slot == "colors"]
     counts = [part for part in parts if part.slot == "counts"]
-    return tuple(zip(colours, counts, strict=True))
+    return tuple(zip(colors, counts, strict=True))
 
 
 def amount(count: Phrase, thing: Phrase) -> Phrase:
@@ -30,7 +30,7 @@ def amount(count: Phrase, thing: Phrase) -> Phrase:
 
 def cubes(shade: Part, count: int) -> Phrase:
     """``red cube`` or ``red cubes``."""
-    return antecedent(f"{shade.colour} {noun(count)}", shade.slot, shade.value)
+    return antecedent(f"{shade.color} {noun(count)}", shade.slot, shade.value)
 
 
 def noun(count: int) -> str:
@@ -75,7 +75,7 @@ def _introduce(request: Request, parts: tuple[Part, ...]) -> Phrase:
 def introduce_references(
     request: Request, parts: tuple[Part, ...], slot: str, quantities: Sequence[int]
 ) -> Phrase:
-    """A sentence that names another quantity for each colour."""
+    """A sentence that names another quantity for each color."""
     purpose, options = "reference amounts", templates.REFERENCE_AMOUNT_INTRODUCTIONS
     things = [
         amount(antecedent(cardinal(quantity), slot, quantity), cubes(shade, quantity))
@@ -104,7 +104,7 @@ KIND = Kind(
     introduce=_introduce,
     pointing=_pointing,
     plural=lambda _parts: True,
-    reinforcements=templates.COLOUR_REINFORCEMENTS,
+    reinforcements=templates.COLOR_REINFORCEMENTS,
     rivals=_rivals,
     described=_described,
 )

@@ -1,4 +1,4 @@
-"""Colours: which cube, box or tape, or the container over which cube."""
+"""Colors: which cube, box or tape, or the container over which cube."""
 
 from __future__ import annotations
 
@@ -21,47 +21,47 @@ REDUCED: Mapping[int, tuple[tuple[str, Expression], ...]] = {
 
 def named(request: Request, part: Part) -> Phrase:
     """``the red cube``."""
-    noun = request.task.commands.coloured
-    return antecedent(f"the {part.colour} {noun}", part.slot, part.value)
+    noun = request.task.commands.colored
+    return antecedent(f"the {part.color} {noun}", part.slot, part.value)
 
 
 def _stated(request: Request, parts: tuple[Part, ...]) -> Fields:
     """``the red cube``, or the container that hides it."""
-    return {part.field: request.by_colour(named(request, part)) for part in parts}
+    return {part.field: request.by_color(named(request, part)) for part in parts}
 
 
 def _reduced(request: Request, parts: tuple[Part, ...]) -> Fields:
     """``it``; ``the former`` and ``the latter``; ..."""
     return {
-        part.field: request.by_colour(anaphor(words, expression, part.slot, part.value))
+        part.field: request.by_color(anaphor(words, expression, part.slot, part.value))
         for part, (words, expression) in zip(parts, REDUCED[len(parts)], strict=True)
     }
 
 
 def _introduce(request: Request, parts: tuple[Part, ...]) -> Phrase:
-    template = request.chooser.pick("colour introduction", templates.COLOUR_INTRODUCTIONS)
+    template = request.chooser.pick("color introduction", templates.COLOR_INTRODUCTIONS)
     things = listed([named(request, part) for part in parts])
     return fill(template, {"things": things}, plural=len(parts) > 1)
 
 
 def _pointing(request: Request, parts: tuple[Part, ...]) -> Phrase:
     if len(parts) == 1:
-        words = f"that {request.task.commands.coloured}"
+        words = f"that {request.task.commands.colored}"
         return anaphor(words, "that", parts[0].slot, parts[0].value)
     return those(request, parts)
 
 
 def those(request: Request, parts: tuple[Part, ...]) -> Phrase:
-    """A plural for the cubes, boxes or tapes of all colours."""
-    values = " and ".join(part.colour for part in parts)
-    words = f"those {plural(request.task.commands.coloured)}"
+    """A plural for the cubes, boxes or tapes of all colors."""
+    values = " and ".join(part.color for part in parts)
+    words = f"those {plural(request.task.commands.colored)}"
     return anaphor(words, "them", parts[0].slot, values)
 
 
 def rivals(request: Request, parts: tuple[Part, ...]) -> list[Phrase]:
-    """Remarks that name other colours."""
-    colours = request.task.commands.colours
-    return rival_sentences(templates.COMPETING_COLOUR_DISTRACTORS, colours, str, parts)
+    """Remarks that name other colors."""
+    colors = request.task.commands.colors
+    return rival_sentences(templates.COMPETING_COLOR_DISTRACTORS, colors, str, parts)
 
 
 def _described(parts: tuple[Part, ...], things: Sequence[Phrase]) -> Fields:
@@ -69,12 +69,12 @@ def _described(parts: tuple[Part, ...], things: Sequence[Phrase]) -> Fields:
 
 
 KIND = Kind(
-    name="colour",
+    name="color",
     stated=_stated,
     reduced=_reduced,
     introduce=_introduce,
     pointing=_pointing,
-    reinforcements=templates.COLOUR_REINFORCEMENTS,
+    reinforcements=templates.COLOR_REINFORCEMENTS,
     rivals=rivals,
     described=_described,
 )

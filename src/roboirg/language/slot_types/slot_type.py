@@ -25,8 +25,8 @@ class Kind:
         plural: whether these words are a plural.
         reinforcements: sentences with a field ``{ref}`` for those words.
         rivals: sentences that name values which are not meant.
-        described: of a kind that has colours: the fields, given a description of the thing or
-            things of each colour.
+        described: of a kind that has colors: the fields, given a description of the thing or
+            things of each color.
     """
 
     name: PartKind

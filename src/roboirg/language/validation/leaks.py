@@ -5,15 +5,15 @@ from __future__ import annotations
 import re
 from typing import cast
 
-from roboirg.core.episode import ALL_COLOURS, Goal, SlotValue
+from roboirg.core.episode import ALL_COLORS, Goal, SlotValue
 from roboirg.language.instruction import Instruction
 
-_COLOUR_SLOTS = frozenset(("colour", "colours"))
+_COLOR_SLOTS = frozenset(("color", "colors"))
 _DERIVED = {
-    "colour exclusion": _COLOUR_SLOTS,
+    "color exclusion": _COLOR_SLOTS,
     "number deduction": frozenset(("repeats", "counts", "visit")),
     "sequential relation": frozenset(("visit", "placement", "relation")),
-    "contextual logic": frozenset(("colours", "relation")),
+    "contextual logic": frozenset(("colors", "relation")),
 }
 """The slots that each reasoning pattern hides."""
 _NUMBERS = {
@@ -23,8 +23,8 @@ _NUMBERS = {
     4: frozenset(("4", "four", "fours", "fourth", "4th")),
     5: frozenset(("5", "five", "fives", "fifth", "5th")),
 }
-_COLOUR_WORDS = frozenset(
-    spelling for name in (*ALL_COLOURS, "grey") for spelling in (name, f"{name}s")
+_COLOR_WORDS = frozenset(
+    spelling for name in (*ALL_COLORS, "grey") for spelling in (name, f"{name}s")
 )
 _TIME_WORDS = frozenset(
     ("before", "after", "earlier", "later", "previous", "previously", "next", "following")
@@ -47,7 +47,7 @@ def hidden_slots(instruction: Instruction, goal: Goal) -> frozenset[str]:
     if instruction.setting in ("direct", "contextual"):
         return slots
     if instruction.setting == "spatial":
-        return slots & _COLOUR_SLOTS
+        return slots & _COLOR_SLOTS
     return slots & _DERIVED[str(instruction.metadata["pattern"])]
 
 
@@ -57,12 +57,12 @@ def _spellings(value: SlotValue) -> frozenset[str]:
         return frozenset().union(*(_spellings(one) for one in several))
     if isinstance(value, int):
         return _NUMBERS[value]
-    # Any colour: naming another one tells something too.
-    return _COLOUR_WORDS if value in ALL_COLOURS else _TIME_WORDS
+    # Any color: naming another one tells something too.
+    return _COLOR_WORDS if value in ALL_COLORS else _TIME_WORDS
 
 
 def _without_ranks(instruction: Instruction) -> str:
-    """The command without what only ranks the introduced values: *the first* of three colours."""
+    """The command without what only ranks the introduced values: *the first* of three colors."""
     text = instruction.command
     last = len(instruction.utterances) - 1
     for mention in reversed(instruction.mentions):

@@ -8,16 +8,16 @@ from roboirg.core.episode import Episode, Goal
 from roboirg.language.instruction import Instruction
 from roboirg.tasks import get_task
 
-_TOLD_COUNTS: frozenset[object] = frozenset(("spatial", "colour exclusion", "contextual logic"))
-"""The setting and the patterns whose commands state numbers and hide colours."""
+_TOLD_COUNTS: frozenset[object] = frozenset(("spatial", "color exclusion", "contextual logic"))
+"""The setting and the patterns whose commands state numbers and hide colors."""
 _NUMBER_SLOTS = ("repeats", "counts")
 
 
 def only_candidate(episode: Episode, instruction: Instruction) -> bool:
     """Whether the scene leaves a single goal with the numbers that the command states.
 
-    It does where all cubes have one colour, and in BinFill also where only one choice of colours
-    has so many cubes each, or where all colours are wanted in equal numbers.
+    It does where all cubes have one color, and in BinFill also where only one choice of colors
+    has so many cubes each, or where all colors are wanted in equal numbers.
     """
     if not {instruction.setting, instruction.metadata["pattern"]} & _TOLD_COUNTS:
         return False

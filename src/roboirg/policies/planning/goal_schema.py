@@ -14,7 +14,7 @@ from typing import Any
 
 from roboirg.core.episode import Goal, SlotValue, Split
 from roboirg.episodes.splits import SIZES, get_episode
-from roboirg.language.request import COLOUR_SLOTS, PART_KINDS
+from roboirg.language.request import COLOR_SLOTS, PART_KINDS
 from roboirg.policies.planning.vlm_query import UnparsableReply, json_object
 from roboirg.tasks import get_task
 
@@ -23,7 +23,7 @@ Answer = Mapping[str, Any]
 
 SOURCE: Split = "train"
 AMOUNT = "amount"
-LISTED = "colours"
+LISTED = "colors"
 LONGEST_QUOTE = 80
 
 
@@ -32,8 +32,8 @@ class Field:
     """One field of the answer.
 
     Attributes:
-        name: of the field: a goal slot, or a colour whose cubes are counted.
-        kind: what kind of value it holds, as in the goal's slots; ``colours`` for several.
+        name: of the field: a goal slot, or a color whose cubes are counted.
+        kind: what kind of value it holds, as in the goal's slots; ``colors`` for several.
         values: every value it can have, or that an item of it can have.
         lengths: of a list, its least and its greatest length; None for one value.
     """
@@ -60,7 +60,7 @@ class Slots:
     Attributes:
         fields: of an answer, in order.
         goals: every goal, by its answer as canonical JSON.
-        thing: what has the colours, in words.
+        thing: what has the colors, in words.
     """
 
     fields: tuple[Field, ...]
@@ -118,14 +118,14 @@ def slots_of(task: str) -> Slots:
     for index in range(SIZES[SOURCE]):
         for goal in known.goals(get_episode(task, SOURCE, index).scene):
             goals.setdefault(_canonical(answer_for(goal)), goal)
-    return _complete(goals, known.commands.coloured)
+    return _complete(goals, known.commands.colored)
 
 
 def answer_for(goal: Goal) -> dict[str, Any]:
-    """The answer that names a goal; colours it counts none of are left out."""
+    """The answer that names a goal; colors it counts none of are left out."""
     slots = goal.as_mapping()
     if "counts" in slots:
-        return dict(zip(goal.texts("colours"), goal.numbers("counts"), strict=True))
+        return dict(zip(goal.texts("colors"), goal.numbers("counts"), strict=True))
     return {
         slot: list(value) if isinstance(value, tuple) else value for slot, value in slots.items()
     }
@@ -159,7 +159,7 @@ def _field(name: str, values: Iterable[SlotValue | list[str]], counted: bool) ->
         items = _sorted(item for value in held if isinstance(value, list) for item in value)
         lengths = [len(value) for value in held if isinstance(value, list)]
         return Field(name, LISTED, items, (min(lengths), max(lengths)))
-    kind = "colour" if name in COLOUR_SLOTS else PART_KINDS[name]
+    kind = "color" if name in COLOR_SLOTS else PART_KINDS[name]
     return Field(name, kind, _sorted(held))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 NEAR = 8
-"""Control steps between neighbours of one group (MME-VLA; a comment of theirs says 10)."""
+"""Control steps between neighbors of one group (MME-VLA; a comment of theirs says 10)."""
 
 
 def merged(steps: Iterable[int], near: int = NEAR) -> tuple[int, ...]:
@@ -13,7 +13,7 @@ def merged(steps: Iterable[int], near: int = NEAR) -> tuple[int, ...]:
 
     Args:
         steps: at which frames were taken; in any order, repeated or not.
-        near: the most by which neighbours of a group are apart.
+        near: the most by which neighbors of a group are apart.
 
     Returns:
         In order of time, each of them one of `steps`.

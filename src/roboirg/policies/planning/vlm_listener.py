@@ -169,7 +169,7 @@ class VLMListener(HandedPolicy):
             yield f"- reasoning: {reasoning}"
         for field in slots.fields:
             meaning = self.prompts.fill(
-                f"meanings.{field.kind}", colour=field.name, thing=slots.thing
+                f"meanings.{field.kind}", color=field.name, thing=slots.thing
             )
             values = self._values(field)
             yield self.prompts.fill("field", name=field.name, meaning=meaning, values=values)

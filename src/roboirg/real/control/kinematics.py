@@ -22,13 +22,13 @@ LENGTHS = (
 FLANGE = 0.107
 """From the last joint to the flange, m."""
 HAND = 0.1034
-"""From the flange to the tool centre between the fingertips, m."""
+"""From the flange to the tool center between the fingertips, m."""
 HAND_YAW = -math.pi / 4
 """By which the hand is mounted."""
 
 
 def tool_in_base(joints: ArrayLike) -> NDArray[np.float64]:
-    """The tool centre's pose (4, 4) in the robot's base frame, m, of joint angles (7), rad."""
+    """The tool center's pose (4, 4) in the robot's base frame, m, of joint angles (7), rad."""
     pose = np.eye(4)
     for angle, (offset, length, twist) in zip(
         np.asarray(joints, dtype=np.float64), LENGTHS, strict=True
@@ -38,7 +38,7 @@ def tool_in_base(joints: ArrayLike) -> NDArray[np.float64]:
 
 
 def end_effector(joints: ArrayLike) -> NDArray[np.float64]:
-    """x, y, z (m) and roll, pitch, yaw (rad, extrinsic x-y-z) of the tool centre, world frame."""
+    """x, y, z (m) and roll, pitch, yaw (rad, extrinsic x-y-z) of the tool center, world frame."""
     pose = tool_in_base(joints)
     turned = pose[:3, :3]
     pitch = math.asin(-min(max(float(turned[2, 0]), -1.0), 1.0))

@@ -29,7 +29,7 @@ class Limits(BaseModel):
     Attributes:
         joint_speed: rad/s of every joint. Below the slowest joint of the Panda (2.175) and of the
             Research 3 (2.62); the benchmark's demonstrations stay below 0.9.
-        workspace_low: least x, y, z of the tool centre, robot base frame, m.
+        workspace_low: least x, y, z of the tool center, robot base frame, m.
         workspace_high: greatest.
         picture_age_s: of the newest picture of each camera; one and a half of its periods.
         policy_timeout_s: that a policy may think; the arm holds its position meanwhile.

@@ -1,6 +1,6 @@
 """An arrangement from above, as shapes: what the sheet and the page draw.
 
-Frame: the robot's base, x forward, y to its left, metres. Drawings have the robot at the bottom, so
+Frame: the robot's base, x forward, y to its left, meters. Drawings have the robot at the bottom, so
 left and right are as the robot sees them.
 """
 
@@ -32,8 +32,8 @@ class Shape(NamedTuple):
         yaw: counter-clockwise seen from above, rad.
         half: half the side, or the outer radius, m.
         hole: half the side, or radius, of the hole; 0 for none.
-        fill: colour.
-        label: what it is; colour alone does not say it.
+        fill: color.
+        label: what it is; color alone does not say it.
     """
 
     form: Literal["square", "ring", "disc"]
@@ -73,10 +73,10 @@ def _shape(item: SceneObject) -> Shape:
     x, y = item.position.x - ROBOT_BASE[0], item.position.y - ROBOT_BASE[1]
     if item.kind == "box":
         half, hole = object_sizes.BOX_HALF, object_sizes.BOX_HALF - object_sizes.BOX_WALL
-        fill = FILLS[str(item.colour)]
-        return Shape("square", x, y, item.yaw, half, hole, fill, f"{item.colour} box")
+        fill = FILLS[str(item.color)]
+        return Shape("square", x, y, item.yaw, half, hole, fill, f"{item.color} box")
     if item.kind == "tape":
-        fill, label = FILLS[str(item.colour)], f"{item.colour} tape"
+        fill, label = FILLS[str(item.color)], f"{item.color} tape"
         radius, hole = object_sizes.TAPE_RADIUS, object_sizes.TAPE_HOLE_RADIUS
         return Shape("ring", x, y, item.yaw, radius, hole, fill, label)
     return Shape("disc", x, y, item.yaw, float(item.radius or 0.0), 0.0, TARGET_FILL, item.name)

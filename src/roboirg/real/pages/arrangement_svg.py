@@ -18,7 +18,7 @@ from roboirg.real.pages.arrangement_drawing import (
 )
 
 SCALE = 1000.0
-"""Units of the picture per metre."""
+"""Units of the picture per meter."""
 LETTER = 26.0
 ROBOT = 60.0
 INTRODUCTION = "The table from above, the robot at the bottom."

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 FORMATS = ("png", "svg")
 NAME = "real"
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-"""Of Okabe and Ito, told apart by colour-blind people too."""
-PUBLISHED_COLOURS = ("#777777", "#aaaaaa")
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+"""Of Okabe and Ito, told apart by color-blind people too."""
+PUBLISHED_COLORS = ("#777777", "#aaaaaa")
 HATCH = "//"
 PANEL_INCHES = (5.2, 3.4)
 DOTS_PER_INCH = 200
@@ -137,7 +137,7 @@ def _bars(table: Table, row: Row, *, published: bool) -> list[tuple[str, Bar]]:
 def _draw(axes: Axes, task: str, series: Sequence[Series]) -> None:
     settings = [one for one in SETTING_ORDER if any((task, one) in each.bars for each in series)]
     width = 0.8 / len(series)
-    colours = {True: iter(PUBLISHED_COLOURS * len(series)), False: iter(COLOURS * len(series))}
+    colors = {True: iter(PUBLISHED_COLORS * len(series)), False: iter(COLORS * len(series))}
     for number, one in enumerate(series):
         shown = [place for place, setting in enumerate(settings) if (task, setting) in one.bars]
         bars = [one.bars[task, settings[place]] for place in shown]
@@ -146,7 +146,7 @@ def _draw(axes: Axes, task: str, series: Sequence[Series]) -> None:
             places,
             [bar.percent for bar in bars],
             width,
-            color=next(colours[one.published]),
+            color=next(colors[one.published]),
             hatch=HATCH if one.published else None,
             edgecolor="white",
             label=f"{one.name} (published)" if one.published else one.name,

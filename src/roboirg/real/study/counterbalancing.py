@@ -1,4 +1,4 @@
-"""Which arrangements a study has, so that no colour, side or number is more frequent than others.
+"""Which arrangements a study has, so that no color, side or number is more frequent than others.
 
 What is chosen depends on the tasks and the split alone, never on a seed.
 """
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from itertools import product
 from typing import NamedTuple
 
-from roboirg.core.episode import Colour, Episode, ObjectKind
+from roboirg.core.episode import Color, Episode, ObjectKind
 from roboirg.core.errors import InvalidValueError
 from roboirg.episodes.splits import SIZES, check_split, get_episode
 from roboirg.tasks import get_task
@@ -24,19 +24,19 @@ class Arrangement(NamedTuple):
     """What differs between the arrangements of a task, places aside.
 
     Attributes:
-        colour: of the target.
-        left: colour of the thing on the robot's left.
+        color: of the target.
+        left: color of the thing on the robot's left.
         repeats: how often the target is to be handled; None where the task has no number.
     """
 
-    colour: Colour
-    left: Colour
+    color: Color
+    left: Color
     repeats: int | None = None
 
     @property
     def side(self) -> str:
         """On which side of the robot the target is."""
-        return "left" if self.colour == self.left else "right"
+        return "left" if self.color == self.left else "right"
 
 
 def kind_of(task: str) -> ObjectKind:
@@ -59,9 +59,9 @@ def arrangement_of(episode: Episode) -> Arrangement:
     goal = episode.goal.as_mapping()
     left, _ = left_to_right(episode.scene, kind_of(episode.task))
     repeats = goal.get("repeats")
-    target = next(one.colour for one in episode.scene.objects if one.colour == goal["colour"])
-    if target is None:  # the task's goals are colours of its things
-        raise InvalidValueError(f"{episode.key} has no thing of the colour {goal['colour']!r}.")
+    target = next(one.color for one in episode.scene.objects if one.color == goal["color"])
+    if target is None:  # the task's goals are colors of its things
+        raise InvalidValueError(f"{episode.key} has no thing of the color {goal['color']!r}.")
     return Arrangement(target, left, repeats if isinstance(repeats, int) else None)
 
 
@@ -69,13 +69,13 @@ def balanced_order(task: str) -> tuple[Arrangement, ...]:
     """Every arrangement of a task once, in the order in which a study of any size takes them.
 
     Each and the next but one that follows it are opposites in all respects. So, whatever the
-    number of trials, each respect is as even as can be: target colours, left colours and numbers
-    differ by at most one, arrangements too, and the target's sides by at most two. (Colour and
-    left colour decide the side: of ten trials only two of the three can be even.)
+    number of trials, each respect is as even as can be: target colors, left colors and numbers
+    differ by at most one, arrangements too, and the target's sides by at most two. (Color and
+    left color decide the side: of ten trials only two of the three can be even.)
     """
     episode = get_episode(task, "train", 0)
-    colours = left_to_right(episode.scene, kind_of(task))
-    first, second = sorted(colours)
+    colors = left_to_right(episode.scene, kind_of(task))
+    first, second = sorted(colors)
     goals = get_task(task).goals(episode.scene)
     numbers = sorted({goal.as_mapping().get("repeats") for goal in goals}, key=str)
     ordered: list[Arrangement] = []
@@ -108,19 +108,19 @@ def balanced_episodes(task: str, split: str, count: int) -> tuple[int, ...]:
 
 
 def tallies(episodes: Sequence[Episode]) -> dict[str, Counter[object]]:
-    """How often each colour, side and number occurs, and each arrangement."""
+    """How often each color, side and number occurs, and each arrangement."""
     kinds = [arrangement_of(episode) for episode in episodes]
     return {
         "arrangement": Counter(kinds),
-        "colour": Counter(one.colour for one in kinds),
+        "color": Counter(one.color for one in kinds),
         "left": Counter(one.left for one in kinds),
         "repeats": Counter(one.repeats for one in kinds),
         "side": Counter(one.side for one in kinds),
     }
 
 
-def _arrangement(colour: Colour, left: Colour, repeats: object) -> Arrangement:
-    return Arrangement(colour, left, repeats if isinstance(repeats, int) else None)
+def _arrangement(color: Color, left: Color, repeats: object) -> Arrangement:
+    return Arrangement(color, left, repeats if isinstance(repeats, int) else None)
 
 
 def _by_arrangement(task: str, split: str) -> dict[Arrangement, list[int]]:

@@ -11,7 +11,7 @@ from roboirg.real.study.study_plan import PlannedDemonstration, PlannedTrial, St
 from roboirg.real.study.trial_text import places_of, turns_of
 
 TRIALS_FILE, DEMONSTRATIONS_FILE = "trials.csv", "demonstrations.csv"
-_ARRANGEMENT = ("target_colour", "target_side", "left_colour", "repeats")
+_ARRANGEMENT = ("target_color", "target_side", "left_color", "repeats")
 
 
 def trials_csv(plan: StudyPlan) -> str:
@@ -49,7 +49,7 @@ def demonstrations_csv(plan: StudyPlan) -> str:
 
 def _common(planned: PlannedTrial | PlannedDemonstration) -> dict[str, object]:
     arrangement = arrangement_of(planned.episode)
-    told = (arrangement.colour, arrangement.side, arrangement.left, arrangement.repeats or "")
+    told = (arrangement.color, arrangement.side, arrangement.left, arrangement.repeats or "")
     return {
         **dict(zip(_ARRANGEMENT, told, strict=True)),
         "places": "; ".join(places_of(planned)),

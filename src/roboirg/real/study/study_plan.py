@@ -2,7 +2,7 @@
 
 A block is one arrangement; in it every condition (a policy, told in one setting) is tried once, in
 a random order. So whatever drifts (light, grip, the operator) is the same for all conditions, and
-comparisons are between neighbours. The seed decides the orders and nothing else.
+comparisons are between neighbors. The seed decides the orders and nothing else.
 """
 
 from __future__ import annotations

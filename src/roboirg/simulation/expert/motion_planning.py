@@ -22,22 +22,22 @@ from roboirg.simulation.panda import TOOL_LINK, Robot, rotation_of
 from roboirg.simulation.physics_settings import HOME
 
 WAYPOINT_DISTANCE = 0.02
-"""Metres of tool travel between way points of a move."""
+"""Meters of tool travel between way points of a move."""
 WAYPOINT_ANGLE = 0.05
 """Radians of tool rotation between way points."""
 POSE_TOLERANCE = 1e-6
 MAX_ITERATIONS = 20
 DAMPING = 1e-6
 LONGEST_TRAVEL = 3.0
-"""Metres; nothing that far from the tool can be reached."""
+"""Meters; nothing that far from the tool can be reached."""
 
 INVERSE_TOLERANCE = 1e-3
-"""Largest error, in metres and radians, of joint positions found for a pose (RoboMME)."""
+"""Largest error, in meters and radians, of joint positions found for a pose (RoboMME)."""
 INVERSE_ITERATIONS = 100
 INVERSE_STARTS = 20
 """Joint positions from which a pose is tried: the present ones, home, and fixed others."""
 LARGEST_NEWTON_ERROR = 0.3
-"""Metres or radians of the pose error that one iteration looks at."""
+"""Meters or radians of the pose error that one iteration looks at."""
 LARGEST_NEWTON_STEP = 0.3
 """Radians."""
 
@@ -46,7 +46,7 @@ LARGEST_JOINT_STEP = 0.35
 
 
 class ToolPose(NamedTuple):
-    """Where the tool centre point is to be, world frame."""
+    """Where the tool center point is to be, world frame."""
 
     position: NDArray[np.float64]
     rotation: Rotation
@@ -171,7 +171,7 @@ class Planner:
         return np.asarray(jacobian.T @ np.linalg.solve(gain, error))
 
     def _error(self, arm: NDArray[np.float64], goal: ToolPose) -> NDArray[np.float64]:
-        """What is missing to a pose (6): metres, then radians, in the tool's frame."""
+        """What is missing to a pose (6): meters, then radians, in the tool's frame."""
         current = self.forward(arm)
         # Far is far: huge numbers would overflow.
         offset = np.clip(goal.position - current.position, -LONGEST_TRAVEL, LONGEST_TRAVEL)

@@ -25,7 +25,7 @@ STL_TRIANGLE = np.dtype(
 
 
 def read_stl(path: Path) -> NDArray[np.void]:
-    """The triangles of a binary STL file: records with a normal and three corners, metres."""
+    """The triangles of a binary STL file: records with a normal and three corners, meters."""
     data = path.read_bytes()
     count = int.from_bytes(data[STL_HEADER : STL_HEADER + 4], "little")
     return np.frombuffer(data, STL_TRIANGLE, count, offset=STL_HEADER + 4)

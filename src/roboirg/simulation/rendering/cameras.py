@@ -21,7 +21,7 @@ from roboirg.core.observations import CAMERAS, FRONT, WRIST
 from roboirg.simulation.panda import CAMERA_LINK, Robot
 from roboirg.simulation.rendering.culling import Bodies
 from roboirg.simulation.rendering.render_mode import FAITHFUL, Rendering
-from roboirg.simulation.rendering.shaders import COLOUR, STOCK_COLOUR, slim_shader, stand_in_table
+from roboirg.simulation.rendering.shaders import COLOR, STOCK_COLOR, slim_shader, stand_in_table
 from roboirg.simulation.rendering.viewpoint import (
     FAR,
     FIELD_OF_VIEW,
@@ -33,7 +33,7 @@ from roboirg.simulation.rendering.viewpoint import (
 )
 
 GEOMETRY = "PositionSegmentation"
-"""What the shaders write besides the colours: x, y, z in mm in the camera's frame (x right, y up,
+"""What the shaders write besides the colors: x, y, z in mm in the camera's frame (x right, y up,
 z backward) with the id of the entity, int16."""
 
 
@@ -68,7 +68,7 @@ class Cameras:
         shader = slim_shader() if rendering.slim_shader else None
         fixed = sapien.Entity()
         fixed.name = "front_camera"
-        self._colour = STOCK_COLOUR if shader is None else COLOUR
+        self._color = STOCK_COLOR if shader is None else COLOR
         self._components = {name: _component(name, shader or "") for name in CAMERAS}
         fixed.add_component(self._components[FRONT])
         fixed.set_pose(look_at(FRONT_EYE, FRONT_TARGET))
@@ -91,7 +91,7 @@ class Cameras:
         """What several cameras see now; quicker than one after the other."""
         self.draw(cameras)
         return {
-            camera: np.asarray(cv2.cvtColor(self._fetch(camera, self._colour), cv2.COLOR_RGBA2RGB))
+            camera: np.asarray(cv2.cvtColor(self._fetch(camera, self._color), cv2.COLOR_RGBA2RGB))
             for camera in cameras
         }
 

@@ -23,13 +23,13 @@ from numpy.typing import NDArray
 
 from roboirg.core.observations import CAMERAS
 from roboirg.simulation.rendering.render_device import render_system
-from roboirg.simulation.rendering.shaders import COLOUR, STOCK_COLOUR, slim_shader, stand_in_table
+from roboirg.simulation.rendering.shaders import COLOR, STOCK_COLOR, slim_shader, stand_in_table
 from roboirg.simulation.rendering.viewpoint import NEAR
 
 MARGIN = 0.002
-"""Metres by which boxes are grown before the test."""
+"""Meters by which boxes are grown before the test."""
 HULL_MARGIN = 1e-4
-"""Metres by which convex hulls are; the renderer's numbers are good for 1/100 of that. The hand
+"""Meters by which convex hulls are; the renderer's numbers are good for 1/100 of that. The hand
 stays 1 mm outside the wrist camera's view, so that a larger margin would have it drawn."""
 
 _DRAWN, _LEFT_OUT = 0, 99
@@ -139,7 +139,7 @@ def _outside(points: NDArray[np.float64], margin: float = 0.0) -> NDArray[np.boo
 
     Args:
         points: (..., 3), m, in the camera's frame: x right, y down, z forward (OpenCV).
-        margin: metres by which they have to be.
+        margin: meters by which they have to be.
     """
     x, y, z = np.moveaxis(points, -1, 0)
     slack = math.sqrt(2.0) * margin
@@ -176,7 +176,7 @@ def keeps_records() -> bool:
     def shows() -> bool:
         scene.update_render()
         camera.take_picture()
-        return bool(camera.get_picture(STOCK_COLOUR if shader is None else COLOUR)[..., 0].any())
+        return bool(camera.get_picture(STOCK_COLOR if shader is None else COLOR)[..., 0].any())
 
     seen = [shows()]
     for mode in (_LEFT_OUT, _DRAWN):

@@ -20,7 +20,7 @@ def lighten(
     """Fewer triangles in nearly the same shape.
 
     Args:
-        corners: of the triangles, (n, 3, 3), metres.
+        corners: of the triangles, (n, 3, 3), meters.
         share: of the triangles, to be kept.
 
     Returns:

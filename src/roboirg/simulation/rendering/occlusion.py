@@ -1,7 +1,7 @@
 """Occlusion culling of a body that never moves for a camera that never moves.
 
 The front camera sees the robot's base with some 700 pixels, and the base's mesh has 20,000
-triangles. Most of them lie behind others or between the centres of pixels, where they are never
+triangles. Most of them lie behind others or between the centers of pixels, where they are never
 drawn. Which do is found here, with tolerances for the roundings of whatever draws them.
 """
 
@@ -20,12 +20,12 @@ EDGE_TOLERANCE = 1.0 / 32
 """Pixels by which an edge may be drawn elsewhere: ten times what it may move where corners are
 rounded to 1/256 of a pixel, as they are by renderers with the usual 8 subpixel bits."""
 DEPTH_TOLERANCE = 5e-4
-"""Metres by which something may be drawn in front of what is nearer: eighty times the step of a
-depth buffer of single precision, from 1 cm to 100 m, at a metre."""
+"""Meters by which something may be drawn in front of what is nearer: eighty times the step of a
+depth buffer of single precision, from 1 cm to 100 m, at a meter."""
 
 
 class _Fragments(NamedTuple):
-    """Where triangles may be drawn: one row for each triangle and pixel centre.
+    """Where triangles may be drawn: one row for each triangle and pixel center.
 
     Attributes:
         triangle: its number.
@@ -49,7 +49,7 @@ def shown_triangles(corners: Floats) -> NDArray[np.bool_]:
     is taken to hide another.
 
     Args:
-        corners: of the triangles, (n, 3, 3), metres in the camera's frame: x right, y down,
+        corners: of the triangles, (n, 3, 3), meters in the camera's frame: x right, y down,
             z forward (OpenCV).
 
     Returns:
@@ -70,11 +70,11 @@ def shown_triangles(corners: Floats) -> NDArray[np.bool_]:
 def _fragments(corners: Floats) -> _Fragments:
     """Of triangles (n, 3, 3) in front of the camera."""
     places = FOCAL_LENGTH * corners[..., :2] / corners[..., 2:] + SIZE / 2
-    triangle, centre = _candidates(places)
+    triangle, center = _candidates(places)
     inverse = 1.0 / corners[triangle, :, 2]  # depth, which is linear in a picture
-    distance, area = _edge_distance(places[triangle], centre)
-    least, greatest = _range_near(places[triangle], inverse, centre)
-    column, row = centre.astype(np.intp).T
+    distance, area = _edge_distance(places[triangle], center)
+    least, greatest = _range_near(places[triangle], inverse, center)
+    column, row = center.astype(np.intp).T
     found = _Fragments(
         triangle,
         row * SIZE + column,
@@ -87,7 +87,7 @@ def _fragments(corners: Floats) -> _Fragments:
 
 
 def _candidates(places: Floats) -> tuple[NDArray[np.intp], Floats]:
-    """Triangles and the pixel centres in the boxes around them."""
+    """Triangles and the pixel centers in the boxes around them."""
     low = np.ceil(places.min(axis=1) - EDGE_TOLERANCE - 0.5)
     high = np.floor(places.max(axis=1) + EDGE_TOLERANCE - 0.5)
     low = np.clip(low, 0, SIZE).astype(np.intp)
@@ -103,8 +103,8 @@ def _candidates(places: Floats) -> tuple[NDArray[np.intp], Floats]:
 def _edge_distance(places: Floats, points: Floats) -> tuple[Floats, Floats]:
     """How far points (n, 2) are inside the edges of triangles (n, 3, 2), pixels; twice their areas.
 
-    The area of a triangle that faces the camera is negative: its corners come anticlockwise for the
-    one who looks, and y is down.
+    The area of a triangle that faces the camera is negative: its corners come counterclockwise for
+    the one who looks, and y is down.
     """
     edges = np.roll(places, -1, axis=1) - places
     area = _cross(edges[:, 0], edges[:, 1])

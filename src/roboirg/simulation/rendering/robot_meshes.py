@@ -104,7 +104,7 @@ def link_shapes(
 
 @functools.cache
 def link_hull(path: Path, rendering: Rendering) -> NDArray[np.float64]:
-    """Vertices (n, 3) of a link's convex hull, metres in the mesh's frame."""
+    """Vertices (n, 3) of a link's convex hull, meters in the mesh's frame."""
     return np.asarray(_derived(path, rendering)["hull"], np.float64)
 
 

@@ -26,7 +26,7 @@ from roboirg.simulation.rendering.mesh_cache import write_whole
 from roboirg.util.cache import cache_folder
 
 STOCK_SHADER = "minimal"
-STOCK_COLOUR, COLOUR = "Color", "ColorRaw"
+STOCK_COLOR, COLOR = "Color", "ColorRaw"
 """The pictures that hold RGBA: the stock shader completes its own in a second pass."""
 _COMMON = "common"
 _BACKGROUND = ("composite.vert", "composite0.frag")

@@ -38,7 +38,7 @@ class _Texture(NamedTuple):
         field: of the material.
         channels: of the installed texture, which are kept.
         format: of such arrays.
-        srgb: whether colours are stored as screens want them.
+        srgb: whether colors are stored as screens want them.
     """
 
     field: Literal["base_color_texture", "normal_texture", "roughness_texture"]

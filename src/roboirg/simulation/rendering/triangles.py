@@ -17,7 +17,7 @@ class Triangles(NamedTuple):
     """Triangles that are shaded flat.
 
     Attributes:
-        corners: (n, 3, 3), metres.
+        corners: (n, 3, 3), meters.
         normals: (n, 3).
     """
 
@@ -29,7 +29,7 @@ class Shared(NamedTuple):
     """Triangles that share corners; the normal of each is that of its first corner.
 
     Attributes:
-        vertices: (m, 3), metres.
+        vertices: (m, 3), meters.
         normals: (m, 3).
         triangles: (n, 3), indices of vertices.
     """

@@ -22,7 +22,7 @@ def ring(
         outer: radius, m.
         inner: radius of the hole, m.
         half: half its height, m.
-        rgba: colour, 0 to 1 each.
+        rgba: color, 0 to 1 each.
     """
     return _ring(outer, inner, half, rgba).clone()
 

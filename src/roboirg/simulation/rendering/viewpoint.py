@@ -14,7 +14,7 @@ FIELD_OF_VIEW = math.pi / 2
 FOCAL_LENGTH = SIZE / 2 / math.tan(FIELD_OF_VIEW / 2)
 """Pixels."""
 NEAR, FAR = 0.01, 100.0
-"""Metres from the eye between which things are drawn."""
+"""Meters from the eye between which things are drawn."""
 
 FRONT_EYE = (0.3, 0.0, 0.4)
 FRONT_TARGET = (0.0, 0.0, -0.2)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from roboirg.core import object_sizes
-from roboirg.core.episode import COLOURS, Colour, SceneObject
+from roboirg.core.episode import COLORS, Color, SceneObject
 from roboirg.core.errors import SceneRejectedError
 from roboirg.core.motions import Point
 from roboirg.tasks.shared.placement import Circle, Footprint, Rectangle, Region, place
@@ -52,12 +52,12 @@ def cube_footprint(cube: SceneObject) -> Rectangle:
 def draw_cube(
     rng: np.random.Generator,
     name: str,
-    colour: Colour,
+    color: Color,
     region: Region,
     gap: float,
     obstacles: Sequence[Footprint],
 ) -> SceneObject:
-    """A cube with any yaw, at least `gap` metres from all obstacles.
+    """A cube with any yaw, at least `gap` meters from all obstacles.
 
     Raises:
         SceneRejectedError: no free place was found.
@@ -66,28 +66,28 @@ def draw_cube(
     def draw() -> SceneObject:
         x, y = region.draw(rng, inset=object_sizes.CUBE_HALF)
         yaw = 2.0 * math.pi * rng.random()
-        return SceneObject(name, "cube", Point(x, y, object_sizes.CUBE_HALF), yaw, colour)
+        return SceneObject(name, "cube", Point(x, y, object_sizes.CUBE_HALF), yaw, color)
 
     return placed(name, draw, lambda cube: cube_footprint(cube).grown(gap), obstacles)
 
 
-def draw_coloured_cubes(
+def draw_colored_cubes(
     rng: np.random.Generator,
     count: int,
     region: Region,
     gap: float,
     obstacles: Sequence[Footprint],
 ) -> tuple[SceneObject, ...]:
-    """So many cubes of different colours, ``cube_red`` and so on, the colours in random order.
+    """So many cubes of different colors, ``cube_red`` and so on, the colors in random order.
 
     Raises:
         SceneRejectedError: a cube found no free place.
     """
     taken = list(obstacles)
     cubes: list[SceneObject] = []
-    for index in rng.permutation(len(COLOURS))[:count]:
-        colour = COLOURS[index]
-        cube = draw_cube(rng, f"cube_{colour}", colour, region, gap, taken)
+    for index in rng.permutation(len(COLORS))[:count]:
+        color = COLORS[index]
+        cube = draw_cube(rng, f"cube_{color}", color, region, gap, taken)
         cubes.append(cube)
         taken.append(cube_footprint(cube))
     return tuple(cubes)
@@ -102,7 +102,7 @@ def draw_target(
     obstacles: Sequence[Footprint],
     rgb: tuple[float, float, float] | None = None,
 ) -> SceneObject:
-    """A target disc of `radius` metres, at least `gap` metres from all obstacles.
+    """A target disc of `radius` meters, at least `gap` meters from all obstacles.
 
     Raises:
         SceneRejectedError: no free place was found.
@@ -129,7 +129,7 @@ def marker_over(target: SceneObject, name: str) -> SceneObject:
 def draw_bin(
     rng: np.random.Generator, region: Region, obstacles: Sequence[Footprint], name: str = "bin"
 ) -> SceneObject:
-    """A bin whose centre is anywhere in the region and whose walls touch no obstacle.
+    """A bin whose center is anywhere in the region and whose walls touch no obstacle.
 
     Raises:
         SceneRejectedError: no free place was found.

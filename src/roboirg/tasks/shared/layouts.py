@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 PlanePoint = tuple[float, float]
-"""x and y in the world frame, metres."""
+"""x and y in the world frame, meters."""
 
 FOUR: tuple[PlanePoint, ...] = ((-0.05, -0.1), (-0.05, 0.1), (0.1, 0.1), (0.1, -0.1))
 TRIANGLE: tuple[PlanePoint, ...] = ((-0.05, -0.1), (-0.05, 0.1), (0.1, 0.0))

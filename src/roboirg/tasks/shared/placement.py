@@ -21,7 +21,7 @@ Placement = TypeVar("Placement")
 
 @dataclass(frozen=True, slots=True)
 class Rectangle:
-    """A footprint: centre (m), half sides (m) and yaw (rad)."""
+    """A footprint: center (m), half sides (m) and yaw (rad)."""
 
     x: float
     y: float
@@ -30,7 +30,7 @@ class Rectangle:
     yaw: float = 0.0
 
     def grown(self, by: float) -> Rectangle:
-        """The rectangle with every side moved outwards by `by` metres."""
+        """The rectangle with every side moved outwards by `by` meters."""
         return Rectangle(self.x, self.y, self.half_x + by, self.half_y + by, self.yaw)
 
     def to_local(self, x: float, y: float) -> tuple[float, float]:
@@ -42,7 +42,7 @@ class Rectangle:
 
 @dataclass(frozen=True, slots=True)
 class Circle:
-    """A round footprint: centre and radius, metres."""
+    """A round footprint: center and radius, meters."""
 
     x: float
     y: float
@@ -53,7 +53,7 @@ Footprint = Rectangle | Circle
 
 
 class Region(NamedTuple):
-    """A rectangle of the table in which centres are drawn: centre and half extents, metres."""
+    """A rectangle of the table in which centers are drawn: center and half extents, meters."""
 
     x: float
     y: float
@@ -81,7 +81,7 @@ def overlap(first: Footprint, second: Footprint) -> bool:
 
 
 def distance_to(rectangle: Rectangle, x: float, y: float) -> float:
-    """Euclidean distance from a point to a rectangle, metres; 0 inside."""
+    """Euclidean distance from a point to a rectangle, meters; 0 inside."""
     local_x, local_y = rectangle.to_local(x, y)
     return math.hypot(
         max(abs(local_x) - rectangle.half_x, 0.0), max(abs(local_y) - rectangle.half_y, 0.0)
@@ -90,11 +90,11 @@ def distance_to(rectangle: Rectangle, x: float, y: float) -> float:
 
 def _axis_separates(first: Rectangle, second: Rectangle) -> bool:
     """Whether an axis of `first` separates the two (separating-axis test)."""
-    centre_x, centre_y = first.to_local(second.x, second.y)
+    center_x, center_y = first.to_local(second.x, second.y)
     cos, sin = abs(math.cos(second.yaw - first.yaw)), abs(math.sin(second.yaw - first.yaw))
     reach_x = cos * second.half_x + sin * second.half_y
     reach_y = sin * second.half_x + cos * second.half_y
-    return abs(centre_x) > first.half_x + reach_x or abs(centre_y) > first.half_y + reach_y
+    return abs(center_x) > first.half_x + reach_x or abs(center_y) > first.half_y + reach_y
 
 
 def place(

@@ -12,8 +12,8 @@ import numpy as np
 from roboirg.core import object_sizes
 from roboirg.core.conditions import Condition, Fact
 from roboirg.core.episode import (
-    COLOURS,
-    Colour,
+    COLORS,
+    Color,
     Goal,
     Primitive,
     Scene,
@@ -52,7 +52,7 @@ def draw_containers_in(
     gap: float,
     obstacles: Sequence[Footprint] = (),
 ) -> list[SceneObject]:
-    """A container in each region, `gap` metres free around it; ends at the first that fits nowhere.
+    """A container in each region, `gap` meters free around it; ends at the first that fits nowhere.
 
     As in RoboMME the gap counts on both sides: around the new container and around those placed.
     """
@@ -83,36 +83,36 @@ def hide_cubes(
     Raises:
         SceneRejectedError: there are fewer than three containers.
     """
-    if len(containers) < len(COLOURS):
+    if len(containers) < len(COLORS):
         raise SceneRejectedError("fewer than three containers fit")
-    order = rng.permutation(len(COLOURS))
+    order = rng.permutation(len(COLORS))
     return tuple(
-        _hidden_cube(COLOURS[index], container)
+        _hidden_cube(COLORS[index], container)
         for index, container in zip(order, containers, strict=False)
     )
 
 
-def _hidden_cube(colour: Colour, container: SceneObject) -> SceneObject:
+def _hidden_cube(color: Color, container: SceneObject) -> SceneObject:
     x, y, _ = container.position
     position = Point(x, y, object_sizes.HIDDEN_CUBE_HALF)
-    return SceneObject(f"cube_{colour}", "hidden_cube", position, 0.0, colour, container.name)
+    return SceneObject(f"cube_{color}", "hidden_cube", position, 0.0, color, container.name)
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
     """Any hidden cube, or any two of them in order."""
-    hidden = [str(cube.colour) for cube in scene.of_kind("hidden_cube")]
-    single = [(colour,) for colour in hidden]
+    hidden = [str(cube.color) for cube in scene.of_kind("hidden_cube")]
+    single = [(color,) for color in hidden]
     pairs = list(itertools.permutations(hidden, 2))
-    return tuple(Goal.of(colours=colours) for colours in (*single, *pairs))
+    return tuple(Goal.of(colors=colors) for colors in (*single, *pairs))
 
 
 def pick_stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     """Lift the container over each named cube in turn, putting it down in between."""
-    covers = {cube.colour: cube.inside for cube in scene.of_kind("hidden_cube")}
+    covers = {cube.color: cube.inside for cube in scene.of_kind("hidden_cube")}
     containers = tuple(item.name for item in scene.of_kind("container"))
     plan: list[Stage] = []
-    for colour in goal.texts("colours"):
-        target = next(str(cover) for hidden, cover in covers.items() if hidden == colour)
+    for color in goal.texts("colors"):
+        target = next(str(cover) for hidden, cover in covers.items() if hidden == color)
         wrong = tuple(Fact("lifted", other) for other in containers if other != target)
         if plan:
             plan.append(_put_down(plan[-1].primitive.subject, containers))
@@ -120,7 +120,7 @@ def pick_stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
             expects=Fact("lifted", target),
             forbids=wrong,
             primitive=Primitive("pick_container", target),
-            subgoal=f"pick up the container {{at}} that hides the {colour} cube",
+            subgoal=f"pick up the container {{at}} that hides the {color} cube",
             points_at=target,
         )
         plan.append(lift)
@@ -162,8 +162,8 @@ def commands(*wordings: Wording) -> Commands:
     """The commands of an Unmask task: what its sentences tell is the container over a cube."""
     return Commands(
         thing="container",
-        by_colour="the container that hides {cube}",
+        by_color="the container that hides {cube}",
         by_place="the container {place}",
-        patterns=("colour exclusion",),
+        patterns=("color exclusion",),
         wordings=wordings,
     )

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from roboirg.core.episode import COLOURS, Difficulty, Goal, Scene, SceneObject
+from roboirg.core.episode import COLORS, Difficulty, Goal, Scene, SceneObject
 from roboirg.core.motions import Away, Motion
 from roboirg.tasks.shared.fixtures import draw_number
 from roboirg.tasks.shared.placement import Footprint, Region
@@ -48,7 +48,7 @@ def sample(
     Raises:
         SceneRejectedError: there are fewer than three containers.
     """
-    order = rng.permutation(len(COLOURS))
+    order = rng.permutation(len(COLORS))
     cubes = hide_cubes(rng, [containers[index] for index in order if index < len(containers)])
     swaps = plan_swaps(
         containers,
@@ -61,8 +61,8 @@ def sample(
     # The cubes come last: when they return, their containers have arrived.
     motions: tuple[Motion, ...] = (*appearing(containers), *swaps, *away)
     picks = draw_number(rng, PICKS[difficulty])
-    colours = tuple(str(cube.colour) for cube in cubes[:picks])
-    return Scene((*buttons, *containers, *cubes), motions), Goal.of(colours=colours)
+    colors = tuple(str(cube.color) for cube in cubes[:picks])
+    return Scene((*buttons, *containers, *cubes), motions), Goal.of(colors=colors)
 
 
 def _initiators(
@@ -71,7 +71,7 @@ def _initiators(
     """Who begins an exchange: first two different ones with a cube, then any other container."""
     number = draw_number(rng, SWAPS[difficulty])
     names = [container.name for container in containers]
-    first, second = (names[index] for index in rng.permutation(len(COLOURS))[:2])
+    first, second = (names[index] for index in rng.permutation(len(COLORS))[:2])
     others = [name for name in names if name not in (first, second)]
     third = others[int(rng.integers(len(others)))]
     return (first, second, third)[:number]

@@ -21,7 +21,7 @@ from roboirg.tasks.shared.fixtures import (
     button_keep_out,
     cube_footprint,
     draw_button,
-    draw_coloured_cubes,
+    draw_colored_cubes,
     draw_target,
 )
 from roboirg.tasks.shared.placement import Circle, Footprint, Region
@@ -42,11 +42,11 @@ HOLD_STEPS = 60
 def draw_table(
     rng: np.random.Generator, cubes: int, discs: int, site_radius: float
 ) -> tuple[SceneObject, ...]:
-    """Site, button, cubes of different colours and target discs.
+    """Site, button, cubes of different colors and target discs.
 
     Args:
         rng: of the episode.
-        cubes: how many, one of a colour.
+        cubes: how many, one of a color.
         discs: how many, ``target_0`` first.
         site_radius: of the round place for the cube at the end of the video, m.
 
@@ -58,9 +58,9 @@ def draw_table(
     site = SceneObject("site", "site", Point(x, y, object_sizes.TARGET_HEIGHT), radius=site_radius)
     button = draw_button(rng, BUTTON_REGION)
     obstacles: list[Footprint] = [Circle(x, y, site_radius), button_keep_out(button)]
-    coloured = draw_coloured_cubes(rng, cubes, WORK_REGION, GAP, obstacles)
-    obstacles += [cube_footprint(cube) for cube in coloured]
-    things: list[SceneObject] = [site, button, *coloured]
+    colored = draw_colored_cubes(rng, cubes, WORK_REGION, GAP, obstacles)
+    obstacles += [cube_footprint(cube) for cube in colored]
+    things: list[SceneObject] = [site, button, *colored]
     for number in range(discs):
         disc = draw_target(rng, f"target_{number}", TARGET_RADIUS, WORK_REGION, GAP, obstacles)
         things.append(disc)
@@ -129,9 +129,9 @@ def _show_press(pressed: Fact) -> Stage:
     )
 
 
-def place_stages(scene: Scene, colour: str, answer: str) -> tuple[Stage, ...]:
-    """Pick the cube of a colour and place it on one disc, and on no other."""
-    cube = f"cube_{colour}"
+def place_stages(scene: Scene, color: str, answer: str) -> tuple[Stage, ...]:
+    """Pick the cube of a color and place it on one disc, and on no other."""
+    cube = f"cube_{color}"
     cubes = (item.name for item in scene.of_kind("cube"))
     discs = (item.name for item in scene.of_kind("target"))
     pick = Stage(
@@ -151,6 +151,6 @@ def place_stages(scene: Scene, colour: str, answer: str) -> tuple[Stage, ...]:
     return pick, put
 
 
-def colours_of(scene: Scene) -> tuple[str, ...]:
-    """The colours of the cubes on the table."""
-    return tuple(str(cube.colour) for cube in scene.of_kind("cube"))
+def colors_of(scene: Scene) -> tuple[str, ...]:
+    """The colors of the cubes on the table."""
+    return tuple(str(cube.color) for cube in scene.of_kind("cube"))

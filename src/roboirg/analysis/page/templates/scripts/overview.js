@@ -133,7 +133,7 @@ const makeControls = () => {
       h("select", { name: "level", id: "level" }, matrix.levels.map((level, place) =>
         h("option", { value: place }, level.difficulty || "all")))));
   }
-  controls.append(h("fieldset", { class: "switch" }, h("legend", {}, "colour by"),
+  controls.append(h("fieldset", { class: "switch" }, h("legend", {}, "color by"),
     Object.entries(MEASURES).map(([value, label]) => h("label", {},
       h("input", { type: "radio", name: "measure", value, checked: value === "rate" }), h("span", {}, label)))));
   controls.addEventListener("input", drawMaps);
