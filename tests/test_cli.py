@@ -10,7 +10,7 @@ import pytest
 
 from roboirg.cli import app as cli
 from roboirg.evaluation.plan import read_plan
-from roboirg.evaluation.rollout_result import Course, describe
+from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.records.record import Job
 from roboirg.records.store import RecordStore
 
@@ -42,19 +42,19 @@ def roboirg(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
 class CannedPlayer:
     """Stands in for `Player`: no simulator, and the outcome that the test asks for."""
 
-    course = Course("success", cause=None, steps=7)
+    course = RolloutResult("success", cause=None, steps=7)
 
     def __init__(self, folder: Path, video: str, **_options: object) -> None:
         del folder, video
 
     def __call__(self, job: Job):
-        return describe(job, self.course, started_at="now")
+        return make_record(job, self.course, started_at="now")
 
 
 @pytest.fixture
 def canned(monkeypatch: pytest.MonkeyPatch) -> type[CannedPlayer]:
-    monkeypatch.setattr("roboirg.evaluation.rollout.Player", CannedPlayer)
-    monkeypatch.setattr(CannedPlayer, "course", Course("success", cause=None, steps=7))
+    monkeypatch.setattr("roboirg.evaluation.rollout.EpisodeRunner", CannedPlayer)
+    monkeypatch.setattr(CannedPlayer, "course", RolloutResult("success", cause=None, steps=7))
     return CannedPlayer
 
 
@@ -149,7 +149,7 @@ def test_lost_films_are_told_once(
     roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, canned: type[CannedPlayer]
 ) -> None:
     def play(_self: CannedPlayer, job: Job):
-        return describe(job, canned.course, started_at="now", film_lost="OSError: disk full")
+        return make_record(job, canned.course, started_at="now", film_lost="OSError: disk full")
 
     monkeypatch.setattr(CannedPlayer, "__call__", play)
     words = (*RUN, "--episodes", "2", "--workers", "0", "--video", "all", "--out", tmp_path)
@@ -192,7 +192,7 @@ def test_run_then_report(roboirg, tmp_path: Path) -> None:
 def test_errors_are_told_and_are_exit_code_2(
     roboirg, tmp_path: Path, canned: type[CannedPlayer]
 ) -> None:
-    canned.course = Course(
+    canned.course = RolloutResult(
         "error", "invalid_action", "invalid action: Action value 3 is nan", steps=2
     )
     command = (*RUN, "--episodes", "1", "--workers", "0", "--out", tmp_path)
@@ -200,7 +200,7 @@ def test_errors_are_told_and_are_exit_code_2(
     assert said.code == 2
     assert "5 of 5 episodes ended in an error" in said.err
     assert "Action value 3 is nan" in said.err
-    canned.course = Course("success", cause=None)
+    canned.course = RolloutResult("success", cause=None)
     assert roboirg(*command).code == 0
 
 
@@ -212,7 +212,7 @@ def test_missing_graphics_are_one_sentence(
     def fail(_self: CannedPlayer, _job: Job) -> None:
         raise RenderDeviceError("No Vulkan device can render; install Mesa.")
 
-    monkeypatch.setattr("roboirg.evaluation.rollout.Player", CannedPlayer)
+    monkeypatch.setattr("roboirg.evaluation.rollout.EpisodeRunner", CannedPlayer)
     monkeypatch.setattr(CannedPlayer, "__call__", fail)
     said = roboirg(*RUN, "--workers", "0", "--out", tmp_path)
     assert (said.code, said.err) == (2, "roboirg: No Vulkan device can render; install Mesa.\n")
@@ -243,7 +243,7 @@ def test_instructions_are_printed(roboirg) -> None:
 def test_failures_are_named_below_the_table(
     roboirg, tmp_path: Path, canned: type[CannedPlayer]
 ) -> None:
-    canned.course = Course("failure", cause="pressed the button too early")
+    canned.course = RolloutResult("failure", cause="pressed the button too early")
     said = roboirg(*RUN, "--episodes", "3", "--workers", "0", "--out", tmp_path)
     assert said.code == 0
     assert "random: 15 episodes without success" in said.out
@@ -255,25 +255,25 @@ def test_failures_are_named_below_the_table(
 def test_splits_are_built_anew_for_what_is_named(
     roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from roboirg.episodes.splits import shipped, splits_text
+    from roboirg.episodes.splits import shipped_splits, splits_text
     from roboirg.evaluation import seed_selection
 
     def find(slots, workers):
         assert workers == 0
         # Backwards: no order of ending may matter.
         return (
-            seed_selection.find_seed(slot, seed_selection.judge_words) for slot in reversed(slots)
+            seed_selection.find_seed(slot, seed_selection.check_words) for slot in reversed(slots)
         )
 
     monkeypatch.setattr(seed_selection, "find_seeds", find)
     words = ("build-splits", "--tasks", "VideoUnmask,PickXtimes", "--split", "val", "--workers", 0)
     said = roboirg(*words)
-    assert (said.code, said.out) == (0, splits_text(shipped()))
+    assert (said.code, said.out) == (0, splits_text(shipped_splits()))
     assert "VideoUnmask: 2 × not expressible: spatial (first: VideoUnmask/val/15" in said.err
     assert "[100/100]" in said.err
     said = roboirg(*words, "--out", tmp_path / "splits.json")
     assert (said.code, said.out) == (0, "")
-    assert (tmp_path / "splits.json").read_text() == splits_text(shipped())
+    assert (tmp_path / "splits.json").read_text() == splits_text(shipped_splits())
 
 
 @pytest.mark.parametrize(

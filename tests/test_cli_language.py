@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from roboirg.cli import app as cli
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.language import card
-from roboirg.language.validation import Evidence, Failure
+from roboirg.language.validation import RuleViolation, ValidationResults
 
 HEAVY = ("sapien", "torch", "gymnasium", "toppra", "mani_skill", "cv2", "av")
 
@@ -128,10 +128,12 @@ def test_prove_prints_what_was_read_and_the_exceptions():
 
 
 def test_a_broken_rule_is_told_and_ends_with_a_sentence(monkeypatch: pytest.MonkeyPatch):
-    failure = Failure("no leak", "PickXtimes", "direct", "PickXtimes/test/0", 7, "[red]ly")
-    found = Evidence(failures=[failure])
+    failure = RuleViolation("no leak", "PickXtimes", "direct", "PickXtimes/test/0", 7, "[red]ly")
+    found = ValidationResults(failures=[failure])
     found.texts["PickXtimes", "direct"] = 1
-    monkeypatch.setattr("roboirg.language.validation.validation_run.work_on", lambda _batch: found)
+    monkeypatch.setattr(
+        "roboirg.language.validation.validation_run.validate_batch", lambda _batch: found
+    )
     words = ("--tasks", "PickXtimes", "--split", "none", "--seeds", "1", "--workers", "0")
     result = CliRunner().invoke(cli.app, ["language", "prove", *words])
     assert isinstance(result.exception, RoboIRGError)

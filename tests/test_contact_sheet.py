@@ -9,9 +9,9 @@ from roboirg.core.episode import Scene
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.motions import Away, Glow, Point, Shuttle, Swap, Vanish
 from roboirg.episodes.splits import get_episode
-from roboirg.visualization.contact_sheet import Moment, compose_sheet, thinned, write_png
+from roboirg.visualization.contact_sheet import SheetPanel, compose_sheet, evenly_spaced, write_png
 from roboirg.visualization.episode_text import fact_words, motion_lines, video_lines
-from roboirg.visualization.key_events import Happenings
+from roboirg.visualization.key_events import KeyEvents
 from roboirg.visualization.playthrough import FEWEST, MOST, choose, play_through
 
 
@@ -21,7 +21,7 @@ def picture(value):
 
 def moments(count, caption="done"):
     return [
-        Moment(number, caption, (picture(10 + number), picture(100 + number)), number == 0)
+        SheetPanel(number, caption, (picture(10 + number), picture(100 + number)), number == 0)
         for number in range(count)
     ]
 
@@ -56,7 +56,7 @@ def test_captions_are_drawn_and_long_ones_stay_in_their_column():
 
 
 def test_moments_of_the_video_have_another_color():
-    one = Moment(3, "", (picture(0),))
+    one = SheetPanel(3, "", (picture(0),))
     assert (compose_sheet("", "", [one]) == (9, 105, 218)).all(axis=-1).any()
     assert not (compose_sheet("", "", [one]) == (255, 176, 32)).all(axis=-1).any()
     assert (compose_sheet("", "", moments(1)) == (255, 176, 32)).all(axis=-1).any()
@@ -74,13 +74,13 @@ def test_pictures_are_written_in_their_colors(tmp_path):
 
 
 def test_thinning_keeps_the_ends():
-    assert thinned(3, 5) == (0, 1, 2)
-    assert thinned(10, 4) == (0, 3, 6, 9)
-    assert thinned(10, 1) == (9,)
-    assert thinned(10, 0) == ()
+    assert evenly_spaced(3, 5) == (0, 1, 2)
+    assert evenly_spaced(10, 4) == (0, 3, 6, 9)
+    assert evenly_spaced(10, 1) == (9,)
+    assert evenly_spaced(10, 0) == ()
     for count in range(30):
         for most in range(15):
-            kept = thinned(count, most)
+            kept = evenly_spaced(count, most)
             assert len(set(kept)) == len(kept) == min(count, most)
 
 
@@ -151,12 +151,12 @@ def test_a_playthrough_shows_the_start_each_stage_and_the_end():
 
 def test_what_moves_by_itself_is_remarkable_while_it_does():
     episode = get_episode("ButtonUnmaskSwap", "test", 3)
-    happenings = Happenings(episode.scene.motions)
+    happenings = KeyEvents(episode.scene.motions)
     told = {step: happenings.at(step, 0) for step in range(300)}
     assert str(told[33]).endswith("container 3 appear")
     swaps = [step for step, words in told.items() if words and "change places" in words]
     count = sum(isinstance(motion, Swap) for motion in episode.scene.motions)
     assert swaps == [90, 140, 190][:count]
 
-    late = Happenings([Swap("a", "b", 50, 50, 0.1, stage=2)])
+    late = KeyEvents([Swap("a", "b", 50, 50, 0.1, stage=2)])
     assert [step for step in range(200) if late.at(step, 2 if step >= 80 else 0)] == [156]

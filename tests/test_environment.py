@@ -17,9 +17,9 @@ from roboirg.core.actions import ACTION_SPACES
 from roboirg.core.errors import InvalidActionError, InvalidValueError, UnknownNameError
 from roboirg.envs.registration import environment_id
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.rollout import Needs, make_env
+from roboirg.evaluation.rollout import EnvRequirements, make_env
 from roboirg.policies import make_policy, play
-from roboirg.policies.builtin.scripted import HandedPolicy
+from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.records.record import Job
 from roboirg.simulation.physics_settings import HOME_ACTION
 from roboirg.simulation.rendering.cameras import Cameras
@@ -30,7 +30,7 @@ pytestmark = pytest.mark.sim
 TASKS = tuple(every_task())
 
 
-class Wrong(HandedPolicy):
+class Wrong(ScriptedPolicy):
     """Does another goal of the scene than the one that is meant."""
 
     def __init__(self, goal):
@@ -158,7 +158,7 @@ def test_an_environment_of_another_action_space_is_refused():
 def test_runs_give_policies_their_action_space():
     job = Job(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
     for space in ACTION_SPACES.values():
-        env = make_env(job, Needs((), space))
+        env = make_env(job, EnvRequirements((), space))
         assert env.actions == space.name
         assert np.array_equal(env.action_space.low, space.low)
 
@@ -338,7 +338,7 @@ def test_policies_are_shown_what_they_ask_for():
     job = Job(
         policy=f"{__name__}:Choosy", task="PickXtimes", split="test", episode=2, setting="direct"
     )
-    env = make_env(job, Needs((), ACTION_SPACES["joint_angle"], "none", 5))
+    env = make_env(job, EnvRequirements((), ACTION_SPACES["joint_angle"], "none", 5))
     env.max_steps = 20
     play(env, policy)
     assert policy.seen == [3, 0, 1, 1]

@@ -18,7 +18,7 @@ from roboirg.episodes.splits import (
     base_seed,
     fingerprint_of,
     get_episode,
-    shipped,
+    shipped_splits,
     splits_text,
 )
 from roboirg.tasks import every_task, get_task
@@ -32,16 +32,18 @@ def episodes(task):
 
 
 def test_every_task_s_splits_are_shipped():
-    assert tuple(shipped()) == TASKS
+    assert tuple(shipped_splits()) == TASKS
 
 
 @each_task
 def test_no_task_s_episodes_have_drifted(task):
-    assert fingerprint_of(task, shipped()[task].passed_over) == shipped()[task].sha256, (
+    assert (
+        fingerprint_of(task, shipped_splits()[task].passed_over) == shipped_splits()[task].sha256
+    ), (
         f"The episodes of {task} are not those for which the splits were built; if that is wanted, "
         f"run: roboirg build-splits --tasks {task} --out src/roboirg/splits.json"
     )
-    assert fingerprint(episodes(task)) == shipped()[task].sha256
+    assert fingerprint(episodes(task)) == shipped_splits()[task].sha256
 
 
 @each_task
@@ -49,7 +51,7 @@ def test_difficulties_follow_the_cycle_and_seeds_the_rule(task):
     for episode in episodes(task):
         assert episode.difficulty == ("easy", "easy", "medium", "hard")[episode.index % 4]
         first = base_seed(get_task(task), episode.split) + 100 * episode.index
-        passed_over = shipped()[task].passed_over.get(f"{episode.split}/{episode.index}", 0)
+        passed_over = shipped_splits()[task].passed_over.get(f"{episode.split}/{episode.index}", 0)
         assert episode.seed == first + passed_over
     counts = Counter(episode.difficulty for episode in episodes(task) if episode.split == "test")
     assert counts == {"easy": 26, "medium": 12, "hard": 12}
@@ -58,8 +60,8 @@ def test_difficulties_follow_the_cycle_and_seeds_the_rule(task):
 @each_task
 def test_counts_are_of_episodes_that_exist_and_stay_below_the_next_one_s_seeds(task):
     keys = {f"{split}/{index}" for split in SPLITS for index in range(SIZES[split])}
-    assert set(shipped()[task].passed_over) <= keys
-    assert all(0 < count <= MAX_REJECTED for count in shipped()[task].passed_over.values())
+    assert set(shipped_splits()[task].passed_over) <= keys
+    assert all(0 < count <= MAX_REJECTED for count in shipped_splits()[task].passed_over.values())
     assert MAX_REJECTED < SEED_STRIDE
 
 

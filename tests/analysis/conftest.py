@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from roboirg.analysis.published import TRIALS, published_rows
-from roboirg.analysis.stats.success_rates import Variant
+from roboirg.analysis.stats.success_rates import SettingColumn
 from roboirg.records.record import Result
 
 MakeResult = Callable[..., Result]
@@ -38,7 +38,7 @@ def with_rate(
     episodes: int,
     seeds: int,
     rng: np.random.Generator,
-    variant: Variant,
+    variant: SettingColumn,
     **fields: object,
 ) -> Iterable[Result]:
     """A cell with exactly so many successes, on trials drawn by a generator."""

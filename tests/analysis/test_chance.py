@@ -10,7 +10,7 @@ import pytest
 
 from roboirg.analysis.stats.chance import chance_level, chance_of
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.plan import say
+from roboirg.evaluation.plan import instruct_job
 from roboirg.language.variants import all_variants
 from roboirg.policies.builtin.listeners import ForgetfulPolicy
 from roboirg.records.record import Job
@@ -50,7 +50,7 @@ def test_it_is_what_the_forgetful_listener_comes_to(task: str, setting: str) -> 
     """Its own decisions, with 400 seeds in one episode; only its hands are left out."""
     told = job(task, setting)
     episode = get_episode(task, "test", told.episode)
-    env = SimpleNamespace(episode=episode, instruction=say(told))
+    env = SimpleNamespace(episode=episode, instruction=instruct_job(told))
     wanted = get_task(task).stages(episode.scene, episode.goal)
     right = [
         get_task(task).stages(episode.scene, ForgetfulPolicy(seed=seed).decide(env, "")) == wanted  # type: ignore[arg-type]

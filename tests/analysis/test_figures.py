@@ -9,16 +9,16 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from roboirg.analysis.figures import FIGURES, Content, write_figures
+from roboirg.analysis.figures import FIGURES, FigureData, write_figures
 from roboirg.analysis.figures.failures import COLORS, UNKNOWN, draw_failures
 from roboirg.analysis.figures.forms import PARTS, draw_forms
 from roboirg.analysis.published import published_rows
 from roboirg.analysis.stats.run_summary import ALL
-from roboirg.analysis.stats.success_rates import Variant
+from roboirg.analysis.stats.success_rates import SettingColumn
 from roboirg.cli.report_commands import figures
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.plan import Plan
-from roboirg.evaluation.rollout_result import Course, describe
+from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 from roboirg.records.record import Attribution, Result
 from roboirg.records.store import RecordStore
@@ -44,13 +44,15 @@ def results() -> list[Result]:
         kind = "execution" if number % 2 else "grounding"
         failure = (EXECUTION if number % 2 else GROUNDING)[number % 5]
         attribution = Attribution(kind=kind, failure=failure, step=9, sentence="So.")
-        record = describe(job, Course("failure" if lost else "success", cause=None), started_at="n")
+        record = make_record(
+            job, RolloutResult("failure" if lost else "success", cause=None), started_at="n"
+        )
         found.append(record.model_copy(update={"attribution": attribution if lost else None}))
     return found
 
 
-def content(found: list[Result] | None = None, **options: object) -> Content:
-    return Content.of([("run", results() if found is None else found)], **options)  # type: ignore[arg-type]
+def content(found: list[Result] | None = None, **options: object) -> FigureData:
+    return FigureData.of([("run", results() if found is None else found)], **options)  # type: ignore[arg-type]
 
 
 def texts(path: Path) -> str:
@@ -168,7 +170,7 @@ def test_every_failure_has_a_color_of_its_own() -> None:
 
 
 def test_runs_that_hold_the_same_episodes_stand_apart(tmp_path: Path) -> None:
-    both = Content.of([("one", results()), ("two", results())])
+    both = FigureData.of([("one", results()), ("two", results())])
     assert set(both.names.values()) == {
         "listener, one", "listener, two", "forgetful, one", "forgetful, two",
     }  # fmt: skip
@@ -201,4 +203,4 @@ def test_the_command_draws_what_it_is_asked_for(tmp_path: Path) -> None:
     assert sorted(path.stem for path in out.iterdir()) == ["averages"] * 3 + ["failures"] * 3
     assert str(out / "averages.pdf") in done.output
     assert set(FIGURES) >= {"averages", "failures"}
-    assert Variant("explicit") in {variant for _, _, variant in content().samples}
+    assert SettingColumn("explicit") in {variant for _, _, variant in content().samples}

@@ -17,7 +17,13 @@ from roboirg.analysis.stats.intervals import (
     without_spread,
 )
 from roboirg.analysis.stats.paired_tests import Pairs, measure_gap, sign_flip_test
-from roboirg.analysis.stats.samples import Sample, Trial, clustered_interval, shown_interval, wilson
+from roboirg.analysis.stats.samples import (
+    CellResults,
+    Trial,
+    clustered_interval,
+    shown_interval,
+    wilson,
+)
 
 LONG = "ROBOIRG_LONG_TESTS" in os.environ
 """Ten times as many simulated runs."""
@@ -28,9 +34,9 @@ SLACK = 2.6 * np.sqrt(0.05 * 0.95 / RUNS)
 """What chance alone does to a simulated share, in 99 of 100 cases."""
 
 
-def sample(won: np.ndarray) -> Sample:
+def sample(won: np.ndarray) -> CellResults:
     """Of an array (episodes, seeds)."""
-    return Sample(
+    return CellResults(
         {
             Trial(episode, seed): bool(value)
             for episode, row in enumerate(won)
@@ -133,8 +139,8 @@ def test_with_several_seeds_the_clustered_interval_is_shown() -> None:
     assert shown_interval(thrice, np.random.default_rng(0)) == clustered_interval(
         [thrice], np.random.default_rng(0)
     )
-    assert shown_interval(Sample(), rng) is None
-    assert clustered_interval([once, Sample()], rng) is None
+    assert shown_interval(CellResults(), rng) is None
+    assert clustered_interval([once, CellResults()], rng) is None
     assert clustered_interval([sample(np.ones((1, 3), dtype=bool))], rng) is None
 
 

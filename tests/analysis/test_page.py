@@ -18,8 +18,8 @@ from roboirg.analysis.page.entries import Run
 from roboirg.analysis.page.page_server import PageServer
 from roboirg.analysis.page.report import make_view, render, render_runs
 from roboirg.evaluation.plan import Plan
-from roboirg.evaluation.rollout_result import Course, describe
-from roboirg.evaluation.video_writer import Film
+from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.video_writer import VideoWriter
 from roboirg.records.record import Attribution, EventRecord, Record
 from roboirg.records.store import RecordStore
 
@@ -43,7 +43,7 @@ def records() -> list[Record]:
     """The listener succeeds, the forgetful fails where it has to remember; one error."""
     found = []
     for index, job in enumerate(PLAN.jobs()):
-        told = describe(job, Course("success", cause=None), started_at="now")
+        told = make_record(job, RolloutResult("success", cause=None), started_at="now")
         subject = f"cube_{told.goal.get('color', 'red')}"
         events = [
             EventRecord(step=-20, kind="still", subject="robot"),
@@ -51,12 +51,16 @@ def records() -> list[Record]:
             EventRecord(step=40, kind="picked", subject=subject),
             EventRecord(step=60, kind="picked", subject=subject, holds=False),
         ]
-        course = Course("success", cause=None, steps=80, demonstration_steps=20, events=events)
+        course = RolloutResult(
+            "success", cause=None, steps=80, demonstration_steps=20, events=events
+        )
         if job.policy == "forgetful" and job.form == "implicit" and job.setting != "explicit":
             course.outcome, course.cause = "failure", "picked up the wrong cube"
         if index == len(PLAN.jobs()) - 1:
-            course = Course("error", error="policy", cause="policy: broke", details=TRACEBACK)
-        record = describe(job, course, started_at="2026-01-02T03:04:05+00:00")
+            course = RolloutResult(
+                "error", error="policy", cause="policy: broke", details=TRACEBACK
+            )
+        record = make_record(job, course, started_at="2026-01-02T03:04:05+00:00")
         wrong = Attribution(
             kind="execution" if index % 4 == 0 else "grounding",
             failure="dropped" if index % 4 == 0 else "wrong_object",
@@ -84,7 +88,7 @@ class Blank:
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with records and one real film: 100 steps, every 8th of them, and the end."""
     folder = tmp_path_factory.mktemp("run")
-    film = Film(folder / "videos" / "x.mp4")
+    film = VideoWriter(folder / "videos" / "x.mp4")
     film.caption = "Do it."
     world = Blank()
     for step in range(0, 101, 8):

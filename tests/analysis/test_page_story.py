@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from roboirg.analysis.figures import Content, write_figures
+from roboirg.analysis.figures import FigureData, write_figures
 from roboirg.analysis.page.report import write_report
 from roboirg.analysis.stats.chance import chance_of
 from roboirg.analysis.stats.comparison import compare
 from roboirg.analysis.stats.run_summary import ALL
-from roboirg.analysis.stats.success_rates import Variant
+from roboirg.analysis.stats.success_rates import SettingColumn
 from roboirg.evaluation.executors.executor import choose_executor
 from roboirg.evaluation.plan import make_plan
-from roboirg.evaluation.rollout import Player
+from roboirg.evaluation.rollout import EpisodeRunner
 from roboirg.evaluation.runner import run_plan
 from roboirg.records.record import Record
 from roboirg.records.store import read_records
@@ -37,7 +37,7 @@ MOST_DEVIATIONS = 4
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("story")
-    summary = run_plan(PLAN, folder, Player(folder), choose_executor(None))
+    summary = run_plan(PLAN, folder, EpisodeRunner(folder), choose_executor(None))
     assert not summary.errors
     assert not summary.missing
     return folder
@@ -76,10 +76,10 @@ def test_elsewhere_it_guesses_and_every_miss_is_one_of_grounding(run: Path) -> N
 
 
 def test_the_whole_report_follows(run: Path, tmp_path: Path) -> None:
-    content = Content.of([("story", read_records(run))], PLAN.jobs())
+    content = FigureData.of([("story", read_records(run))], PLAN.jobs())
     listener, forgetful = content.names
     assert (listener.policy, forgetful.policy) == ("listener", "forgetful")
-    told = content.summaries[forgetful, ALL, Variant("direct")]
+    told = content.summaries[forgetful, ALL, SettingColumn("direct")]
     assert told.form_gap is not None
     assert told.form_gap.value < -0.3
     assert told.form_gap.overlap.only_first == told.form_gap.overlap.neither == 0
@@ -89,8 +89,8 @@ def test_the_whole_report_follows(run: Path, tmp_path: Path) -> None:
         np.random.default_rng(0),
     )  # fmt: skip
     verdicts = {finding.where.variant: finding.gap.value for finding in found.averages}
-    assert verdicts[Variant("explicit")] == verdicts[Variant("direct", "resolved")] == 0
-    assert verdicts[Variant("direct")] > 0
+    assert verdicts[SettingColumn("explicit")] == verdicts[SettingColumn("direct", "resolved")] == 0
+    assert verdicts[SettingColumn("direct")] > 0
     paths = write_figures(content, tmp_path)
     assert {path.stem for path in paths} == {"averages", "forms", "expressions", "failures"}
     assert "ended in an error (" not in write_report(run, planned=PLAN.jobs()).read_text()

@@ -18,12 +18,12 @@ from roboirg.analysis.stats.paired_tests import (
     measure_gap,
     sign_flip_test,
 )
-from roboirg.analysis.stats.samples import Sample, Trial
+from roboirg.analysis.stats.samples import CellResults, Trial
 
 
-def sample(*won: str) -> Sample:
+def sample(*won: str) -> CellResults:
     """A word for each episode, a letter for each seed: 1 won, 0 lost, anything else unplayed."""
-    return Sample(
+    return CellResults(
         {
             Trial(episode, seed): letter == "1"
             for episode, letters in enumerate(won)
@@ -33,7 +33,7 @@ def sample(*won: str) -> Sample:
     )
 
 
-def gap_of(first: Sample, second: Sample):
+def gap_of(first: CellResults, second: CellResults):
     return measure_gap([Pairs.of(first, second)], np.random.default_rng(0))
 
 

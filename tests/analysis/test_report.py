@@ -19,8 +19,8 @@ from roboirg.analysis.page.entries import Run
 from roboirg.analysis.page.report import make_view, render, render_runs, write_report
 from roboirg.cli.report_commands import report
 from roboirg.evaluation.plan import Plan, write_plan
-from roboirg.evaluation.rollout_result import Course, describe
-from roboirg.records.record import Attribution, EventRecord, MentionSpan, Record, Turn
+from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.records.record import Attribution, EventRecord, MentionSpan, Record, UtteranceRecord
 from roboirg.records.store import RecordStore, StoreError
 
 pytest.importorskip("jinja2")
@@ -90,14 +90,16 @@ def records(plan: Plan = PLAN) -> list[Record]:
     found = []
     for index, job in enumerate(plan.jobs()):
         events = [EventRecord(step=40, kind="picked", subject="cube_red")]
-        course = Course("success", cause=None, steps=80, events=events)
+        course = RolloutResult("success", cause=None, steps=80, events=events)
         if index % 3 == 1:
-            course = Course("failure", cause="picked the wrong cube", steps=50, events=events)
+            course = RolloutResult(
+                "failure", cause="picked the wrong cube", steps=50, events=events
+            )
         if index % 7 == 6:
-            course = Course(
+            course = RolloutResult(
                 "error", error="policy", cause="policy: ValueError: </script><b>&", details="T <x>"
             )
-        record = describe(job, course, started_at="2026-01-02T03:04:05+00:00")
+        record = make_record(job, course, started_at="2026-01-02T03:04:05+00:00")
         if record.outcome == "failure" and index % 2:
             record = record.model_copy(update={"attribution": WRONG})
         elif record.outcome == "failure":
@@ -210,12 +212,14 @@ def test_stages_are_found_again_from_the_events() -> None:
         policies=("listener",), tasks=("PickXtimes",), episodes=(0,), settings=("explicit",)
     )
     (job,) = plan.jobs()
-    color = describe(job, Course(), started_at="now").goal["color"]
+    color = make_record(job, RolloutResult(), started_at="now").goal["color"]
     events = [
         EventRecord(step=-1, kind="still", subject="robot"),
         EventRecord(step=30, kind="picked", subject=f"cube_{color}"),
     ]
-    record = describe(job, Course("failure", cause="x", steps=50, events=events), started_at="now")
+    record = make_record(
+        job, RolloutResult("failure", cause="x", steps=50, events=events), started_at="now"
+    )
     (details,) = Page(text := render([record])).details
     steps = [step for _, step in details["stages"]]
     assert steps[0] == 30
@@ -265,7 +269,7 @@ def test_cells_say_how_sure_they_are_and_each_difficulty_has_its_own() -> None:
     assert "95 % interval" in note
     assert "points to explicit on" in note
     lost = [
-        describe(job, Course("failure", cause="it fell"), started_at="now")
+        make_record(job, RolloutResult("failure", cause="it fell"), started_at="now")
         for job in PLAN.jobs()
         if job.setting in {"explicit", "direct"}
     ]
@@ -391,7 +395,7 @@ def test_the_head_says_which_run_it_was(tmp_path: Path) -> None:
 
 
 def test_an_unknown_task_is_shown_too() -> None:
-    turn = Turn(stage="command", text="Do it.")
+    turn = UtteranceRecord(stage="command", text="Do it.")
     mention = MentionSpan(
         utterance=0, start=3, end=5, role="anaphor", expression="it", slot="x", value=1
     )

@@ -7,14 +7,14 @@ import pytest
 from roboirg.analysis.stats.success_rates import (
     EXPLICIT,
     Cell,
-    Variant,
+    SettingColumn,
     make_panels,
     wilson_interval,
 )
-from roboirg.evaluation.rollout_result import Course, describe
+from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.records.record import Job, Record
 
-DIRECT = Variant("direct")
+DIRECT = SettingColumn("direct")
 
 
 def record(outcome: str, episode: int = 0, setting: str = "explicit", **fields: object) -> Record:
@@ -29,7 +29,7 @@ def record(outcome: str, episode: int = 0, setting: str = "explicit", **fields: 
         }
     )
     cause = None if outcome == "success" else "because"
-    return describe(job, Course(outcome, cause=cause), started_at="now")  # type: ignore[arg-type]
+    return make_record(job, RolloutResult(outcome, cause=cause), started_at="now")  # type: ignore[arg-type]
 
 
 # By hand, z = 1.96: 8 of 10 is 0.8 with weight 0.38415, center 0.99207 / 1.38415 = 0.71674,

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from roboirg.analysis.stats.run_summary import ALL, Scope, summarize
-from roboirg.analysis.stats.samples import Sample, Trial, gather, labels, wilson
-from roboirg.analysis.stats.success_rates import EXPLICIT, Variant
+from roboirg.analysis.stats.samples import CellResults, Trial, gather, labels, wilson
+from roboirg.analysis.stats.success_rates import EXPLICIT, SettingColumn
 
-DIRECT = Variant("direct")
+DIRECT = SettingColumn("direct")
 
 
 def figures(results, planned=()):
@@ -25,9 +25,9 @@ def test_errors_and_what_is_missing_are_in_no_rate(result) -> None:
     planned = [result("success", episode).identity for episode in range(5)]
     ((key, sample),) = gather([("run", results)], planned).items()
     assert (key[1], key[2]) == ("PickXtimes", EXPLICIT)
-    assert sample == Sample({Trial(0, 0): True, Trial(1, 0): False}, errors=1, missing=2)
+    assert sample == CellResults({Trial(0, 0): True, Trial(1, 0): False}, errors=1, missing=2)
     assert (sample.rate, sample.is_complete) == (Fraction(1, 2), False)
-    assert wilson(Sample(errors=3)) is None
+    assert wilson(CellResults(errors=3)) is None
 
 
 @pytest.mark.parametrize(
@@ -101,7 +101,7 @@ def test_gaps_are_paired_and_corrected_and_forms_compared(result) -> None:
     assert cell.p_holm == pytest.approx(3 * 2 / 2**20)
     assert cell.form_gap.value == -0.75
     assert cell.form_gap.overlap == (0, 0, 15, 5)
-    reasoning = found["listener", Scope(task="PickXtimes"), Variant("reasoning")]
+    reasoning = found["listener", Scope(task="PickXtimes"), SettingColumn("reasoning")]
     assert (reasoning.gap.p_value, reasoning.p_holm) == (1.0, 1.0)
     assert reasoning.gap.retention == 0.95
     explicit = found["listener", Scope(task="PickXtimes"), EXPLICIT]

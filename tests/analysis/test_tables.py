@@ -4,7 +4,7 @@ import io
 
 from rich.console import Console
 
-from roboirg.analysis.stats.success_rates import EXPLICIT, Cell, Condition, Panel, Variant
+from roboirg.analysis.stats.success_rates import EXPLICIT, Cell, Condition, Panel, SettingColumn
 from roboirg.analysis.tables.run_tables import (
     NO_GAP,
     gap_text,
@@ -12,7 +12,7 @@ from roboirg.analysis.tables.run_tables import (
     print_failures,
     print_tables,
 )
-from roboirg.evaluation.rollout_result import Course, describe
+from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.records.record import Job, Record
 
 
@@ -21,7 +21,7 @@ def record(
 ):
     told = {"setting": "direct", **told}
     job = Job(policy=policy, task="PickXtimes", split="test", episode=episode, **told)
-    return describe(job, Course(outcome, cause=cause), started_at="now")
+    return make_record(job, RolloutResult(outcome, cause=cause), started_at="now")
 
 
 def failures_text(records: list[Record], most: int = 10) -> str:
@@ -57,7 +57,7 @@ def test_many_failures_are_counted_and_none_is_not_told() -> None:
 
 
 def test_the_table_says_rates_gaps_and_what_is_amiss() -> None:
-    direct, spatial = Variant("direct"), Variant("spatial")
+    direct, spatial = SettingColumn("direct"), SettingColumn("spatial")
     panel = Panel(
         "listener",
         Condition("listener", "test", 1300),
@@ -113,10 +113,10 @@ def test_the_floor_has_no_gap() -> None:
         "random",
         Condition("random", "test", 1300),
         ("PickXtimes", "VideoUnmask"),
-        (EXPLICIT, Variant("direct")),
+        (EXPLICIT, SettingColumn("direct")),
         {
             ("PickXtimes", EXPLICIT): Cell(0, 4, pairs=4, gap=0.0, explicit=0.0),
-            ("PickXtimes", Variant("direct")): Cell(0, 4, pairs=4, gap=0.0, explicit=0.0),
+            ("PickXtimes", SettingColumn("direct")): Cell(0, 4, pairs=4, gap=0.0, explicit=0.0),
             (None, EXPLICIT): Cell(0, 4, pairs=4, gap=0.0, explicit=0.0),
         },
     )

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from roboirg.cli.report_commands import compare, tables
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.plan import make_plan, write_plan
-from roboirg.evaluation.rollout_result import Course, describe
+from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.records.store import RecordStore, StoreError
 
 app = typer.Typer()
@@ -28,8 +28,8 @@ def write_run(folder: Path, policies: tuple[str, ...], leave_out: int = 0) -> No
         jobs = plan.jobs()
         for job in jobs[: len(jobs) - leave_out]:
             won = job.policy == "listener" or job.setting == "explicit"
-            course = Course("success" if won else "failure", cause=None if won else "wrong")
-            store.append(describe(job, course, started_at="now"))
+            course = RolloutResult("success" if won else "failure", cause=None if won else "wrong")
+            store.append(make_record(job, course, started_at="now"))
     write_plan(plan, folder)
 
 

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from roboirg.analysis.page.page_server import PageServer, Range, parse_range
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.plan import make_plan
-from roboirg.evaluation.rollout_result import Course, describe
+from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.records.record import Record
 from roboirg.records.store import RecordStore
 
@@ -30,7 +30,7 @@ FILM = bytes(range(256)) * 1000
 def record(episode: int) -> Record:
     plan = make_plan(("listener",), tasks="PickXtimes", settings="explicit", episodes="4")
     job = plan.jobs()[episode]
-    return describe(job, Course("success", cause=None, steps=9), started_at="now")
+    return make_record(job, RolloutResult("success", cause=None, steps=9), started_at="now")
 
 
 @pytest.fixture

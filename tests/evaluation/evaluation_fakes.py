@@ -13,7 +13,7 @@ from pathlib import Path
 from roboirg.core.errors import RenderDeviceError
 from roboirg.evaluation.executors.executor import LocalProcesses
 from roboirg.evaluation.plan import Plan
-from roboirg.evaluation.rollout_result import Course, describe
+from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.runner import run_plan
 from roboirg.records.record import EventRecord, Job, Record
 
@@ -46,7 +46,7 @@ class FakePlay:
         if job.episode == self.deadly and self._dies(job):
             os.kill(os.getpid(), signal.SIGKILL)
         time.sleep(self.seconds)
-        return describe(job, fake_course(job), started_at=started_at, duration_s=self.seconds)
+        return make_record(job, fake_course(job), started_at=started_at, duration_s=self.seconds)
 
     def _dies(self, job: Job) -> bool:
         return self.folder is None or len(starts(self.folder, job)) <= self.deaths
@@ -71,12 +71,12 @@ class FakePlayer:
         return record.model_copy(update={"video": f"videos/{film.name}"})
 
 
-def fake_course(job: Job) -> Course:
+def fake_course(job: Job) -> RolloutResult:
     luck = hashlib.sha256(job.slug.encode()).digest()[0]
     events = [EventRecord(step=luck, kind="picked", subject="cube_red")]
     if luck % 2 or job.setting == "explicit":
-        return Course("success", cause=None, steps=luck, events=events)
-    return Course("failure", cause="picked the wrong cube", steps=luck, events=events)
+        return RolloutResult("success", cause=None, steps=luck, events=events)
+    return RolloutResult("failure", cause="picked the wrong cube", steps=luck, events=events)
 
 
 def starts(folder: Path, job: Job | None = None) -> list[str]:

@@ -9,20 +9,20 @@ from rich.console import Console
 
 from roboirg.core.episode import SPLITS
 from roboirg.core.errors import InvalidValueError, RoboIRGError, SceneRejectedError
-from roboirg.episodes.splits import SIZES, TaskSplits, get_episode, shipped, slot_seed
+from roboirg.episodes.splits import SIZES, TaskSplits, get_episode, shipped_splits, slot_seed
 from roboirg.evaluation.seed_selection import (
-    Found,
+    EpisodeSlot,
     Rejection,
-    Slot,
+    SelectedSeed,
     check_kept,
+    check_seed,
+    check_words,
+    episode_slots,
     find_seed,
     find_seeds,
-    judge_seed,
-    judge_words,
     merged,
-    slots_of,
 )
-from roboirg.evaluation.seed_summary import cause_lines, followed, print_summary
+from roboirg.evaluation.seed_summary import cause_lines, follow_progress, print_summary
 from roboirg.language import expressible
 from roboirg.tasks import every_task, get_task
 
@@ -31,7 +31,7 @@ each_task = pytest.mark.parametrize("task", TASKS)
 
 
 def passed_over(slot):
-    return shipped()[slot.task].passed_over.get(f"{slot.split}/{slot.index}", 0)
+    return shipped_splits()[slot.task].passed_over.get(f"{slot.split}/{slot.index}", 0)
 
 
 def first_seed(slot):
@@ -47,19 +47,19 @@ def test_every_setting_of_every_episode_can_be_expressed(task):
 
 @each_task
 def test_scene_and_words_allow_the_shipped_seeds_and_rule_out_no_more_than_were_passed_over(task):
-    for slot in slots_of([task]):
-        ruled_out = len(find_seed(slot, judge_words).rejections)
+    for slot in episode_slots([task]):
+        ruled_out = len(find_seed(slot, check_words).rejections)
         assert ruled_out <= passed_over(slot)
-        assert judge_words(slot, first_seed(slot) + passed_over(slot)) is None
+        assert check_words(slot, first_seed(slot) + passed_over(slot)) is None
 
 
 @pytest.mark.sim
 @each_task
 def test_the_rule_gives_the_shipped_seeds(task):
     """For a plain episode, and for one for which seeds were passed over."""
-    refused = [slot for slot in slots_of([task]) if passed_over(slot)]
-    for slot in (Slot(task, "test", 1), *refused[-1:]):
-        assert len(find_seed(slot, judge_seed).rejections) == passed_over(slot), slot.key
+    refused = [slot for slot in episode_slots([task]) if passed_over(slot)]
+    for slot in (EpisodeSlot(task, "test", 1), *refused[-1:]):
+        assert len(find_seed(slot, check_seed).rejections) == passed_over(slot), slot.key
 
 
 @pytest.mark.sim
@@ -68,46 +68,46 @@ def test_seeds_passed_over_for_the_oracle_s_sake_had_to_be(task):
     """A seed that scene and words allow was only passed over if the oracle fails there."""
     allowed = [
         (slot, seed)
-        for slot in slots_of([task])
+        for slot in episode_slots([task])
         for seed in range(first_seed(slot), first_seed(slot) + passed_over(slot))
-        if judge_words(slot, seed) is None
+        if check_words(slot, seed) is None
     ]
     for slot, seed in allowed[:2]:
-        rejection = judge_seed(slot, seed)
+        rejection = check_seed(slot, seed)
         assert rejection is not None, (slot.key, seed)
         assert rejection.reason == "oracle failed"
 
 
 def test_the_first_seed_that_can_be_taken_is_found_with_what_was_amiss_before():
-    found = find_seed(Slot("PickXtimes", "val", 4), take_the_third)
+    found = find_seed(EpisodeSlot("PickXtimes", "val", 4), take_the_third)
     assert [one.seed for one in found.rejections] == [1_010_400, 1_010_401]
     with pytest.raises(
         SceneRejectedError, match=r"1010400 to 1010499 .* PickXtimes/val/4.*timeout"
     ):
-        find_seed(Slot("PickXtimes", "val", 4), refuse)
+        find_seed(EpisodeSlot("PickXtimes", "val", 4), refuse)
 
 
 def test_reasons_are_told_apart():
-    assert judge_words(Slot("VideoUnmask", "val", 15), 1_061_500) == Rejection(
+    assert check_words(EpisodeSlot("VideoUnmask", "val", 15), 1_061_500) == Rejection(
         1_061_500, "not expressible", "spatial"
     )
-    rejections = find_seed(Slot("VideoPlaceOrder", "train", 3), judge_words).rejections
+    rejections = find_seed(EpisodeSlot("VideoPlaceOrder", "train", 3), check_words).rejections
     assert {one.reason for one in rejections} == {"no room"}
     assert all("no place for" in one.cause for one in rejections)
 
 
 def test_processes_find_what_one_finds():
-    slots = slots_of(["VideoPlaceButton"], ["val"])
-    alone = list(find_seeds(slots, 0, judge_words))
+    slots = episode_slots(["VideoPlaceButton"], ["val"])
+    alone = list(find_seeds(slots, 0, check_words))
     assert [one.slot for one in alone] == list(slots)
     assert any(one.rejections for one in alone)
     console = Console(file=io.StringIO(), width=100)
-    assert list(followed(find_seeds(slots, 2, judge_words), slots, console)) == alone
+    assert list(follow_progress(find_seeds(slots, 2, check_words), slots, console)) == alone
     assert "[50/50]" in console.file.getvalue()
 
 
 def test_what_ends_a_search_is_named():
-    slots = slots_of(["PickXtimes"], ["val"])[:3]
+    slots = episode_slots(["PickXtimes"], ["val"])[:3]
     with pytest.raises(SceneRejectedError, match="PickXtimes/val/0"):
         list(find_seeds(slots[:1], 1, refuse))
     with pytest.raises(RoboIRGError, match="process at work died"):
@@ -117,20 +117,23 @@ def test_what_ends_a_search_is_named():
 
 
 def test_what_was_not_built_again_stays():
-    slots = slots_of(["VideoUnmask"], ["test"])
-    built = [Found(slot, ()) for slot in slots]
-    now = merged(built, shipped())
-    assert now == dict(shipped())
+    slots = episode_slots(["VideoUnmask"], ["test"])
+    built = [SelectedSeed(slot, ()) for slot in slots]
+    now = merged(built, shipped_splits())
+    assert now == dict(shipped_splits())
     assert list(now) == list(TASKS)
     three = (Rejection(0, "no room", "no place"),) * 3
-    now = merged([Found(slots[7], three), *built[:7], *built[8:]], shipped())
-    assert now["VideoUnmask"].passed_over == {**shipped()["VideoUnmask"].passed_over, "test/7": 3}
-    assert now["VideoUnmask"].sha256 != shipped()["VideoUnmask"].sha256
-    assert now["PickXtimes"] == shipped()["PickXtimes"]
+    now = merged([SelectedSeed(slots[7], three), *built[:7], *built[8:]], shipped_splits())
+    assert now["VideoUnmask"].passed_over == {
+        **shipped_splits()["VideoUnmask"].passed_over,
+        "test/7": 3,
+    }
+    assert now["VideoUnmask"].sha256 != shipped_splits()["VideoUnmask"].sha256
+    assert now["PickXtimes"] == shipped_splits()["PickXtimes"]
 
 
 def test_only_what_is_valid_can_stay():
-    check_kept(["VideoUnmask"], ["test"], shipped())
+    check_kept(["VideoUnmask"], ["test"], shipped_splits())
     check_kept(["VideoUnmask"], SPLITS, {})
     with pytest.raises(
         InvalidValueError, match=r"VideoUnmask/train/0 .* all splits of VideoUnmask"
@@ -141,10 +144,10 @@ def test_only_what_is_valid_can_stay():
 
 
 def test_the_summary_tells_how_many_and_why():
-    easy, hard = Slot("PickXtimes", "val", 0), Slot("PickXtimes", "val", 3)
+    easy, hard = EpisodeSlot("PickXtimes", "val", 0), EpisodeSlot("PickXtimes", "val", 3)
     found = [
-        Found(easy, (Rejection(5, "no room", "no place for cube_red"),)),
-        Found(
+        SelectedSeed(easy, (Rejection(5, "no room", "no place for cube_red"),)),
+        SelectedSeed(
             hard,
             (
                 Rejection(7, "not expressible", "spatial"),

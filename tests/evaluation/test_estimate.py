@@ -4,7 +4,7 @@ from pathlib import Path
 
 from evaluation_fakes import FakePlay, small_plan
 
-from roboirg.evaluation.estimate import cell_sizes, estimate, in_words
+from roboirg.evaluation.estimate import cell_sizes, estimate, estimate_text
 from roboirg.evaluation.plan import make_plan
 from roboirg.records.store import RecordStore, read_index
 
@@ -31,9 +31,9 @@ def test_what_was_measured_replaces_what_is_assumed(tmp_path: Path) -> None:
     known = estimate(jobs, read_index(tmp_path).values(), 2)
     assert (guess.episodes, guess.most_steps, guess.is_measured) == (8, 8 * 1300, False)
     assert (known.seconds, known.is_measured) == (8 * 30.0 / 2, True)
-    assert "about 2 min on 2 workers" in in_words(known, 10, 2)[1]
-    assert in_words(known, 10, 2)[0] == "10 episodes, 2 of them are there already."
+    assert "about 2 min on 2 workers" in estimate_text(known, 10, 2)[1]
+    assert estimate_text(known, 10, 2)[0] == "10 episodes, 2 of them are there already."
 
 
 def test_nothing_left_is_said_so() -> None:
-    assert in_words(estimate((), (), 1), 5, 1) == ("5 episodes, 5 of them are there already.",)
+    assert estimate_text(estimate((), (), 1), 5, 1) == ("5 episodes, 5 of them are there already.",)

@@ -15,12 +15,12 @@ import pytest
 from evaluation_fakes import FakePlay, small_plan
 
 from roboirg.core.errors import RoboIRGError
-from roboirg.evaluation.episode_errors import Fault, blame
+from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
 from roboirg.evaluation.executors.executor import LocalProcesses
 from roboirg.evaluation.executors.workers import Worker
 from roboirg.evaluation.plan import Plan
-from roboirg.evaluation.rollout import Player, load_policy
-from roboirg.evaluation.runner import UNREACHABLE_AFTER, Summary, run_plan
+from roboirg.evaluation.rollout import EpisodeRunner, load_policy
+from roboirg.evaluation.runner import UNREACHABLE_AFTER, RunSummary, run_plan
 from roboirg.records.record import Job, Record
 from roboirg.records.store import read_records
 
@@ -54,8 +54,8 @@ def plan_of_chaos() -> Plan:
     return Chosen(**dict(plan))
 
 
-def play(plan: Plan, folder: Path) -> tuple[Summary, dict[Job, Record]]:
-    player = Player(folder, policy_timeout_s=plan.policy_timeout_s)
+def play(plan: Plan, folder: Path) -> tuple[RunSummary, dict[Job, Record]]:
+    player = EpisodeRunner(folder, policy_timeout_s=plan.policy_timeout_s)
     summary = run_plan(plan, folder, player, LocalProcesses(2, episode_timeout_s=600))
     return summary, {record.identity: record for record in read_records(folder)}
 
@@ -182,7 +182,7 @@ def test_a_worker_is_gone_after_it_was_overdue() -> None:
     ],
 )
 def test_whose_fault_it_is(whom: str, error: Exception, kind: str) -> None:
-    with pytest.raises(Fault) as caught, blame(whom):  # type: ignore[arg-type]
+    with pytest.raises(EpisodeError) as caught, attribute_errors(whom):  # type: ignore[arg-type]
         raise error
     assert caught.value.kind == kind
 

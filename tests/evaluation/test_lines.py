@@ -14,7 +14,7 @@ from evaluation_fakes import FakePlay, small_plan
 from roboirg.evaluation.executors.executor import InProcess
 from roboirg.evaluation.runner import run_plan
 from roboirg.records.record import ERROR_KINDS, Job, Record, Result
-from roboirg.records.record_codec import key_of
+from roboirg.records.record_codec import identity_key
 from roboirg.records.store import (
     RECORDS_FILE,
     RecordStore,
@@ -60,9 +60,9 @@ def test_records_of_the_first_schema_are_read(tmp_path: Path) -> None:
     (read,) = read_records(tmp_path)
     assert read.identity == record.identity
     assert (read.outcome, read.events, read.schema_version) == (record.outcome, record.events, 2)
-    assert list(read_index(tmp_path)) == [key_of(record)]
+    assert list(read_index(tmp_path)) == [identity_key(record)]
     with RecordStore(tmp_path) as store:
-        assert list(store.stored) == [key_of(record)]
+        assert list(store.stored) == [identity_key(record)]
 
 
 @pytest.mark.parametrize(
@@ -102,11 +102,11 @@ def test_results_are_records_without_the_course(tmp_path: Path) -> None:
 
 def test_the_index_knows_a_job_by_all_its_fields() -> None:
     job = small_plan().jobs()[0]
-    assert len(key_of(job)) == len(Job.model_fields) - 1
+    assert len(identity_key(job)) == len(Job.model_fields) - 1
     others = {"stages": (1, 5), "demonstration_frames": 4, "actions": "ee_pose", "meshes": "light"}
     for name, value in others.items():
-        assert key_of(job.model_copy(update={name: value})) != key_of(job)
-    assert key_of(job.model_copy(update={"spec": "openpi://elsewhere"})) == key_of(job)
+        assert identity_key(job.model_copy(update={name: value})) != identity_key(job)
+    assert identity_key(job.model_copy(update={"spec": "openpi://elsewhere"})) == identity_key(job)
 
 
 MANY = 100_000

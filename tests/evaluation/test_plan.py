@@ -15,7 +15,7 @@ from roboirg.evaluation.plan_parsing import (
 )
 from roboirg.language import expressible
 from roboirg.records.record import Job
-from roboirg.records.record_codec import key_of
+from roboirg.records.record_codec import identity_key
 from roboirg.tasks import all_tasks
 
 
@@ -162,7 +162,7 @@ def test_a_policy_may_have_a_name_of_its_own() -> None:
     assert (here.policy, here.policy_spec) == ("pi0.5", address)
     there = make_plan(["pi0.5=mme-vla://elsewhere:9000"], tasks="StopCube", episodes="1").jobs()[0]
     # The server is not who it is.
-    assert key_of(here) == key_of(there)
+    assert identity_key(here) == identity_key(there)
     assert here.slug == there.slug
     with pytest.raises(InvalidValueError, match="Two policies are named 'a': oracle and random"):
         make_plan(["a=oracle", "a=random"])

@@ -6,7 +6,7 @@ import pytest
 from evaluation_fakes import FakePlay, small_plan
 from rich.console import Console
 
-from roboirg.evaluation.progress import ConsoleReporter, Score
+from roboirg.evaluation.progress import ConsoleReporter, ProgressCounter
 
 RECORDS = [FakePlay()(job) for job in small_plan(2).jobs()]
 
@@ -43,10 +43,10 @@ def test_a_notice_is_said_at_once_on_stderr(capsys: pytest.CaptureFixture[str]) 
 
 
 def test_errors_are_in_the_score_but_in_no_rate() -> None:
-    score = Score()
+    score = ProgressCounter()
     for record in RECORDS[:1]:
         score.add(record)
         score.add(record.model_copy(update={"outcome": "error"}))
     assert score.line() == "explicit 1/1 · errors 1"
     assert score.time_left(0) == "0:00"
-    assert Score().time_left(5) == "-:--"
+    assert ProgressCounter().time_left(5) == "-:--"

@@ -19,9 +19,9 @@ from roboirg.core.errors import (
 )
 from roboirg.evaluation import rollout
 from roboirg.evaluation.episode_errors import one_line
-from roboirg.evaluation.rollout import Player, load_policy, play_episode
-from roboirg.evaluation.rollout_result import Course
-from roboirg.evaluation.video_writer import Film, VideoOptions
+from roboirg.evaluation.rollout import EpisodeRunner, load_policy, play_episode
+from roboirg.evaluation.rollout_result import RolloutResult
+from roboirg.evaluation.video_writer import VideoOptions, VideoWriter
 from roboirg.records.record import Job
 
 JOB = Job(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
@@ -105,7 +105,7 @@ class PaperInsider(PaperPolicy):
 
 @pytest.fixture
 def stage(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
-    def play(world: PaperWorld, policy: Any) -> Course:
+    def play(world: PaperWorld, policy: Any) -> RolloutResult:
         monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: world)
         monkeypatch.setattr(rollout, "load_policy", lambda _job: policy)
         return play_episode(JOB)
@@ -113,7 +113,7 @@ def stage(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
     return play
 
 
-def test_all_rows_are_played_until_the_end(stage: Callable[..., Course]) -> None:
+def test_all_rows_are_played_until_the_end(stage: Callable[..., RolloutResult]) -> None:
     policy, world = PaperPolicy(), PaperWorld(length=5)
     course = stage(world, policy)
     assert (course.outcome, course.cause, course.steps) == ("success", None, 5)
@@ -124,11 +124,11 @@ def test_all_rows_are_played_until_the_end(stage: Callable[..., Course]) -> None
     assert world.closed
 
 
-def test_one_row_is_a_chunk_of_one(stage: Callable[..., Course]) -> None:
+def test_one_row_is_a_chunk_of_one(stage: Callable[..., RolloutResult]) -> None:
     assert stage(PaperWorld(2), PaperPolicy(np.zeros(8))).steps == 2
 
 
-def test_an_insider_is_attached_before_reset(stage: Callable[..., Course]) -> None:
+def test_an_insider_is_attached_before_reset(stage: Callable[..., RolloutResult]) -> None:
     policy = PaperInsider()
     stage(PaperWorld(), policy)
     assert policy.heard == ["PaperWorld", "do it", 3]
@@ -142,7 +142,7 @@ def test_an_insider_is_attached_before_reset(stage: Callable[..., Course]) -> No
     ],
 )
 def test_the_judge_decides(
-    stage: Callable[..., Course],
+    stage: Callable[..., RolloutResult],
     status: str,
     given: str | None,
     outcome: str,
@@ -165,7 +165,7 @@ def test_the_judge_decides(
     ],
 )
 def test_a_fault_of_the_policy_is_an_error_not_a_failure(
-    stage: Callable[..., Course], answer: Any, cause: str
+    stage: Callable[..., RolloutResult], answer: Any, cause: str
 ) -> None:
     world = PaperWorld()
     course = stage(world, PaperPolicy(answer))
@@ -183,7 +183,7 @@ def test_a_fault_of_the_policy_is_an_error_not_a_failure(
     ],
 )
 def test_a_fault_of_the_world_is_an_error(
-    stage: Callable[..., Course], trouble: Exception, cause: str
+    stage: Callable[..., RolloutResult], trouble: Exception, cause: str
 ) -> None:
     world = PaperWorld()
     world.trouble = trouble
@@ -194,13 +194,13 @@ def test_a_fault_of_the_world_is_an_error(
 
 @pytest.mark.parametrize("error", [RenderDeviceError("no"), MissingDependencyError("no")])
 def test_what_ends_every_episode_ends_the_run(
-    stage: Callable[..., Course], error: Exception
+    stage: Callable[..., RolloutResult], error: Exception
 ) -> None:
     with pytest.raises(type(error)):
         stage(PaperWorld(), PaperPolicy(error))
 
 
-def test_ctrl_c_is_nobodys_fault(stage: Callable[..., Course]) -> None:
+def test_ctrl_c_is_nobodys_fault(stage: Callable[..., RolloutResult]) -> None:
     policy = PaperPolicy()
     policy.act = lambda _observation: (_ for _ in ()).throw(KeyboardInterrupt)  # type: ignore[method-assign]
     with pytest.raises(KeyboardInterrupt):
@@ -231,7 +231,7 @@ def test_films_are_kept_as_asked(
 ) -> None:
     monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: PaperWorld(5, status))
     monkeypatch.setattr(rollout, "load_policy", lambda _job: PaperPolicy())
-    record = Player(tmp_path, mode, VideoOptions(cameras=("front",)))(JOB)
+    record = EpisodeRunner(tmp_path, mode, VideoOptions(cameras=("front",)))(JOB)
     assert (record.video is not None) == filmed
     files = sorted(path.suffix for path in tmp_path.rglob("*") if path.is_file())
     assert files == ([".jpg", ".mp4"] if filmed else [])
@@ -253,20 +253,20 @@ class Broken:
 def test_a_film_that_cannot_be_written_does_not_touch_the_verdict(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, after: int
 ) -> None:
-    real, count = Film._add, 0
+    real, count = VideoWriter._add, 0
 
-    def add(film: Film, frame: np.ndarray) -> None:
+    def add(film: VideoWriter, frame: np.ndarray) -> None:
         nonlocal count
         if count == after:
             film._container = Broken()  # type: ignore[assignment]
         count += 1
         real(film, frame)
 
-    monkeypatch.setattr(Film, "_add", add)
+    monkeypatch.setattr(VideoWriter, "_add", add)
     monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: PaperWorld(5))
     monkeypatch.setattr(rollout, "load_policy", lambda _job: PaperPolicy())
     film = VideoOptions(cameras=("front",))
-    record = Player(tmp_path, "all", film)(JOB)
+    record = EpisodeRunner(tmp_path, "all", film)(JOB)
     assert (record.outcome, record.steps, record.video) == ("success", 5, None)
     assert "No space left on device" in str(record.film_lost)
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
@@ -278,14 +278,14 @@ def test_a_folder_of_films_that_is_a_file_does_not_touch_the_verdict(
     (tmp_path / "videos").touch()
     monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: PaperWorld(5))
     monkeypatch.setattr(rollout, "load_policy", lambda _job: PaperPolicy())
-    record = Player(tmp_path, "all", VideoOptions(cameras=("front",)))(JOB)
+    record = EpisodeRunner(tmp_path, "all", VideoOptions(cameras=("front",)))(JOB)
     assert (record.outcome, record.video) == ("success", None)
     assert "FileExistsError" in str(record.film_lost)
     assert "film_lost" not in record.comparable()
 
 
 def test_wrong_cameras_of_an_object_are_the_policys_fault(
-    stage: Callable[..., Course],
+    stage: Callable[..., RolloutResult],
 ) -> None:
     policy = PaperPolicy()
     policy.cameras = "front"  # type: ignore[assignment]
@@ -295,9 +295,9 @@ def test_wrong_cameras_of_an_object_are_the_policys_fault(
 
 def test_a_record_says_what_is_in_the_words_and_who_cheats() -> None:
     job = JOB.model_copy(update={"setting": "reasoning", "policy": "oracle"})
-    record = rollout.describe(job, Course("success", None), started_at="now")
+    record = rollout.describe(job, RolloutResult("success", None), started_at="now")
     assert record.metadata["pattern"]
     assert record.metadata["templates"]
     assert record.privileged
-    assert not rollout.describe(JOB, Course(), started_at="now").privileged
+    assert not rollout.describe(JOB, RolloutResult(), started_at="now").privileged
     assert type(record).model_validate_json(record.model_dump_json()) == record

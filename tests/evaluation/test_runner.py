@@ -16,8 +16,8 @@ from evaluation_fakes import FakePlay, is_alive, small_plan, starts, worker_pids
 from roboirg.core.errors import InvalidValueError, RenderDeviceError
 from roboirg.evaluation.executors.executor import InProcess, LocalProcesses, choose_executor
 from roboirg.evaluation.plan import read_plan
-from roboirg.evaluation.progress import Silent
-from roboirg.evaluation.runner import Summary, run_plan
+from roboirg.evaluation.progress import SilentReporter
+from roboirg.evaluation.runner import RunSummary, run_plan
 from roboirg.records.record import Job, Record
 from roboirg.records.store import RECORDS_FILE, RecordStore, StoreError, read_records
 
@@ -47,7 +47,7 @@ def begin(folder: Path) -> subprocess.Popen[bytes]:
     return child
 
 
-def finish(folder: Path) -> Summary:
+def finish(folder: Path) -> RunSummary:
     return run_plan(small_plan(8), folder, FakePlay(), LocalProcesses(2))
 
 
@@ -182,7 +182,7 @@ def test_worlds_of_two_versions_are_not_mixed(
     assert read_plan(tmp_path) is None
 
 
-class Ears(Silent):
+class Ears(SilentReporter):
     """Hears notices, and how many episodes had been played before the last one."""
 
     def __init__(self) -> None:

@@ -12,9 +12,9 @@ from evaluation_fakes import fake_course, small_plan
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roboirg.evaluation.rollout_result import describe
+from roboirg.evaluation.rollout_result import make_record
 from roboirg.records.record import EventRecord, Record
-from roboirg.records.record_codec import key_of
+from roboirg.records.record_codec import identity_key
 from roboirg.records.store import (
     RECORDS_FILE,
     TORN_FILE,
@@ -28,7 +28,9 @@ from roboirg.records.store import (
 
 @functools.cache
 def some_records() -> tuple[Record, ...]:
-    return tuple(describe(job, fake_course(job), started_at="now") for job in small_plan().jobs())
+    return tuple(
+        make_record(job, fake_course(job), started_at="now") for job in small_plan().jobs()
+    )
 
 
 def fill(folder: Path, records: tuple[Record, ...]) -> bytes:
@@ -81,7 +83,7 @@ def test_a_file_cut_anywhere_loses_only_the_line_that_was_cut(data: st.DataObjec
 
         assert read_contents(folder / RECORDS_FILE).records == some_records()[: len(complete)]
         with RecordStore(folder) as store:
-            kept_keys = [key_of(record) for record in some_records()[: len(complete)]]
+            kept_keys = [identity_key(record) for record in some_records()[: len(complete)]]
             assert list(store.stored) == kept_keys
             torn = store.torn
             store.append(some_records()[-1])

@@ -5,7 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from roboirg.evaluation.video_writer import DEMONSTRATION_COLOR, GAP, Film, VideoOptions, compose
+from roboirg.evaluation.video_writer import (
+    DEMONSTRATION_COLOR,
+    GAP,
+    VideoOptions,
+    VideoWriter,
+    compose,
+)
 
 av = pytest.importorskip("av")
 
@@ -16,7 +22,7 @@ class Grey:
 
 
 def test_a_film_is_small_playable_and_appears_when_complete(tmp_path: Path) -> None:
-    film = Film(tmp_path / "videos" / "x.mp4")
+    film = VideoWriter(tmp_path / "videos" / "x.mp4")
     film.shoot(Grey(), True)
     for _ in range(20):
         film.shoot(Grey())
@@ -37,7 +43,7 @@ def test_a_film_is_small_playable_and_appears_when_complete(tmp_path: Path) -> N
 
 
 def test_a_film_thrown_away_leaves_nothing(tmp_path: Path) -> None:
-    film = Film(tmp_path / "x.mp4", VideoOptions(cameras=("front",)))
+    film = VideoWriter(tmp_path / "x.mp4", VideoOptions(cameras=("front",)))
     film.shoot(Grey())
     film.discard()
     assert not film.finish()
@@ -50,7 +56,7 @@ class Broken:
 
 
 def test_throwing_away_never_raises(tmp_path: Path) -> None:
-    film = Film(tmp_path / "x.mp4", VideoOptions(cameras=("front",)))
+    film = VideoWriter(tmp_path / "x.mp4", VideoOptions(cameras=("front",)))
     film._container = Broken()  # type: ignore[assignment]
     film.partial.mkdir()  # cannot be unlinked
     film.discard()

@@ -9,7 +9,7 @@ from __future__ import annotations
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Episode, Stage
 from roboirg.core.motions import Shuttle
-from roboirg.judging import Event, Finding, Judge, Status, attribute, changes
+from roboirg.judging import Event, FailureAttribution, Judge, Status, attribute_failure, changes
 
 NEAR_SHARE = 0.07
 """Of a pass, before and after its middle, in which the shuttle is near its target."""
@@ -167,10 +167,12 @@ class Staged:
             self.do(stage)
         return self
 
-    def finding(self, *, timed_out: bool = True, cause: str | None = None) -> Finding | None:
+    def finding(
+        self, *, timed_out: bool = True, cause: str | None = None
+    ) -> FailureAttribution | None:
         """What is said of it if time is up now, unless there is a verdict."""
         ongoing = self.judge.status is Status.ONGOING
-        return attribute(
+        return attribute_failure(
             self.episode,
             self.events,
             timed_out=ongoing and timed_out,

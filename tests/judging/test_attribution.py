@@ -16,7 +16,7 @@ from roboirg.core.conditions import ExecutionFailure, Fact, GroundingFailure, Ru
 from roboirg.core.episode import Episode
 from roboirg.episodes.fingerprint import NOT_COUNTED, fingerprint, plain
 from roboirg.episodes.splits import get_episode
-from roboirg.judging import EXECUTION, GROUNDING, Finding, Status, attribute
+from roboirg.judging import EXECUTION, GROUNDING, FailureAttribution, Status, attribute_failure
 from roboirg.tasks import every_task
 
 DOCUMENT = (Path(__file__).parents[2] / "docs" / "attribution.md").read_text()
@@ -52,7 +52,7 @@ def test_each_way_to_fail_is_told(task: str, one: Case) -> None:
         check(staged, found)
 
 
-def check(staged: Staged, found: Finding) -> None:
+def check(staged: Staged, found: FailureAttribution) -> None:
     """What holds of every finding."""
     assert found.kind == ("grounding" if found.failure in GROUNDING else "execution")
     assert found.failure in (*GROUNDING, *EXECUTION)
@@ -85,7 +85,7 @@ def test_every_failure_is_defined_once_in_the_document() -> None:
 def test_a_pose_that_cannot_be_reached_and_what_came_before(task: str) -> None:
     staged = Staged(get_episode(task, "test", 3)).tick(5)
     found = staged.finding(timed_out=False, cause="no way to (9, 9, 9)")
-    assert found == Finding(
+    assert found == FailureAttribution(
         "execution", "unreachable", None, 5, "A pose could not be reached: no way to (9, 9, 9)."
     )
     assert staged.finding(timed_out=False) is None
@@ -113,7 +113,7 @@ def test_whoever_does_only_what_is_meant_fails_by_execution(episode: Episode, sh
     staged = Staged(episode).play(episode.stages)
     end = staged.turn + int(share * (staged.step - staged.turn))
     events = [event for event in staged.events if event.step <= end]
-    found = attribute(episode, events, timed_out=True, turn=staged.turn, elapsed=end)
+    found = attribute_failure(episode, events, timed_out=True, turn=staged.turn, elapsed=end)
     assert found is not None
     assert found.kind == "execution"
     assert found.step <= end - staged.turn

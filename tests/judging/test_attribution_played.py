@@ -14,10 +14,10 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import Goal, Primitive
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.episodes.splits import get_episode
-from roboirg.judging import Finding, attribute
+from roboirg.judging import FailureAttribution, attribute_failure
 from roboirg.policies import make_policy, play
-from roboirg.policies.builtin.scripted import HandedPolicy
-from roboirg.simulation.expert.primitives import Hands
+from roboirg.policies.builtin.scripted import ScriptedPolicy
+from roboirg.simulation.expert.primitives import MotionPrimitives
 from roboirg.tasks import all_tasks, get_task
 
 pytestmark = pytest.mark.sim
@@ -25,8 +25,8 @@ pytestmark = pytest.mark.sim
 OPEN = 1.0
 
 
-def finding(env: RoboIRGEnv, info: dict[str, Any]) -> Finding | None:
-    return attribute(
+def finding(env: RoboIRGEnv, info: dict[str, Any]) -> FailureAttribution | None:
+    return attribute_failure(
         env.episode,
         env.events,
         timed_out=env.status == "timeout",
@@ -36,7 +36,7 @@ def finding(env: RoboIRGEnv, info: dict[str, Any]) -> Finding | None:
     )
 
 
-class Mistaken(HandedPolicy):
+class Mistaken(ScriptedPolicy):
     """The oracle's hands with another goal in mind."""
 
     def __init__(self, goal: Goal) -> None:
@@ -80,23 +80,23 @@ def test_the_forgetful_listener(task: str, episode: int, failure: str, subject: 
 Pieces = Iterator[NDArray[np.float64]]
 
 
-def picked_up(hands: Hands, cube: str) -> Pieces:
+def picked_up(hands: MotionPrimitives, cube: str) -> Pieces:
     yield from hands.perform(Primitive("pick_cube", cube))
 
 
-def dropping(hands: Hands, cube: str) -> Pieces:
+def dropping(hands: MotionPrimitives, cube: str) -> Pieces:
     for piece in picked_up(hands, cube):
         last = piece
         yield piece
     yield opened(np.repeat(last[-1:], 10, axis=0))
 
 
-def setting_down(hands: Hands, cube: str) -> Pieces:
+def setting_down(hands: MotionPrimitives, cube: str) -> Pieces:
     yield from picked_up(hands, cube)
     yield from hands.perform(Primitive("put_down", cube, height=0.02))
 
 
-def missing(hands: Hands, cube: str) -> Pieces:
+def missing(hands: MotionPrimitives, cube: str) -> Pieces:
     for piece in picked_up(hands, cube):
         yield opened(piece)
 
@@ -117,11 +117,13 @@ def opened(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     ],
 )
 @pytest.mark.parametrize("task", ["PickXtimes", "VideoPlaceButton"])
-def test_what_the_hand_does(task: str, work: Callable[[Hands, str], Pieces], failure: str) -> None:
+def test_what_the_hand_does(
+    task: str, work: Callable[[MotionPrimitives, str], Pieces], failure: str
+) -> None:
     env = roboirg.make(task, episode=3, cameras=(), max_steps=400)
     _, info = env.reset()
     cube = env.episode.stages[0].primitive.subject
-    for piece in work(Hands(env.session.world), cube):
+    for piece in work(MotionPrimitives(env.session.world), cube):
         *_, info = env.step_chunk(piece)
     resting = np.append(env.session.world.robot.arm_positions, piece[-1, -1])
     *_, info = env.step_chunk(np.repeat(resting[None], 400, axis=0))

@@ -5,8 +5,8 @@ import itertools
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboirg.core.conditions import All, Began, Count, Elapsed, Fact, absent
-from roboirg.judging.fact_history import History
+from roboirg.core.conditions import All, Elapsed, Fact, FactCount, OccurrenceCount, absent
+from roboirg.judging.fact_history import FactHistory
 
 A, B, C = Fact("picked", "a"), Fact("picked", "b"), Fact("pressed", "button")
 courses = st.lists(st.frozensets(st.sampled_from([A, B, C])), min_size=1, max_size=15)
@@ -14,7 +14,7 @@ bounds = st.integers(0, 4)
 
 
 def followed(course):
-    history = History()
+    history = FactHistory()
     for step, facts in enumerate(course):
         history.follow(step, facts)
     return history
@@ -24,7 +24,7 @@ def followed(course):
 def test_counts_are_of_now(course, least, most):
     now = sum(fact in course[-1] for fact in (A, B))
     wanted = now >= least and (most is None or now <= most)
-    assert followed(course).holds(Count((A, B), least, most)) == wanted
+    assert followed(course).holds(FactCount((A, B), least, most)) == wanted
 
 
 @given(courses, st.integers(1, 4), st.none() | st.integers(0, 15))
@@ -35,7 +35,7 @@ def test_beginnings_are_counted_as_they_happen(course, least, until):
         for before, now in itertools.pairwise(kept)
         for fact in (A, C)
     )
-    assert followed(course).holds(Began((A, C), least, until)) == (begun >= least)
+    assert followed(course).holds(OccurrenceCount((A, C), least, until)) == (begun >= least)
 
 
 @given(courses)
@@ -47,7 +47,7 @@ def test_a_fact_and_its_absence_exclude_each_other(course):
 
 
 def test_time_is_counted_from_reset_or_from_a_timer_that_starts_once():
-    history = History()
+    history = FactHistory()
     assert not history.holds(Elapsed(0, timer="pick"))
     for step in range(10):
         history.follow(step, frozenset())

@@ -9,7 +9,7 @@ from language_variants import SPATIAL_TASKS, random_episodes
 
 from roboirg.core.episode import COLORS, Point, Scene, SceneObject
 from roboirg.core.motions import Away
-from roboirg.language import FORMS, expressible, instruct, resolve
+from roboirg.language import FORMS, expressible, instruct, interpret
 from roboirg.language.interpreter.places import find, read_places
 from roboirg.language.interpreter.tokens import split_sentences
 from roboirg.language.landmarks import MARGIN, landmarks, selectors
@@ -168,7 +168,7 @@ def test_the_reader_reports_near_ties(words, places):
 def test_a_place_of_two_things_makes_two_goals():
     scene = cubes([(0.1, 0.1), (-0.1, 0.105), (0.0, 0.0)])
     text = "Take the cube at the far left and place it on the target once."
-    goals = resolve(text, scene, "PickXtimes").goals
+    goals = interpret(text, scene, "PickXtimes").goals
     assert {goal.text("color") for goal in goals} == {"red", "green"}
 
 

@@ -9,8 +9,15 @@ from rich.console import Console
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.episodes.splits import get_episode, slot_seed
-from roboirg.language import Utterance, expressible, instruct, resolve
-from roboirg.language.validation import Evidence, Failure, batches, examine, pairing, prove
+from roboirg.language import Utterance, expressible, instruct, interpret
+from roboirg.language.validation import (
+    RuleViolation,
+    ValidationResults,
+    batches,
+    check_episode,
+    pairing,
+    validate,
+)
 from roboirg.language.validation.episode_checks import (
     leaking,
     not_needed,
@@ -18,14 +25,14 @@ from roboirg.language.validation.episode_checks import (
     not_self_contained,
 )
 from roboirg.language.validation.validation_run import RANDOM_BASE, random_episode
-from roboirg.language.validation.validation_tables import proof_tables
+from roboirg.language.validation.validation_tables import validation_tables
 from roboirg.tasks import every_task, get_task
 
 EPISODE = get_episode("PickXtimes", "test", 3)
 
 
 def read(text):
-    return resolve(text, EPISODE.scene, EPISODE.task)
+    return interpret(text, EPISODE.scene, EPISODE.task)
 
 
 def commanding(instruction, command):
@@ -126,10 +133,10 @@ def test_scenes_without_landmark_are_counted_and_fail_only_in_splits():
         for episode in random_episodes("VideoUnmask", 1000)
         if "spatial" not in expressible(episode)
     )
-    found = examine(lacking)
+    found = check_episode(lacking)
     assert not found.failures
     assert found.unplaced["VideoUnmask", lacking.difficulty, "robot"] == 1
-    strict = examine(lacking, must_be_expressible=True)
+    strict = check_episode(lacking, must_be_expressible=True)
     assert [failure.rule for failure in strict.failures] == ["expressible"]
 
 
@@ -145,8 +152,8 @@ def test_processes_find_what_one_finds():
     work = batches(("StopCube", "VideoUnmask"), (), 4)
     found = []
     for workers in (0, 2):
-        total = Evidence()
-        for _, evidence in prove(work, workers):
+        total = ValidationResults()
+        for _, evidence in validate(work, workers):
             total.add(evidence)
         found.append(total)
     assert found[0] == found[1]
@@ -162,16 +169,18 @@ def test_batches_cover_everything_once():
         with pytest.raises(InvalidValueError):
             batches(("PickXtimes",), (), seeds)
     with pytest.raises(InvalidValueError, match="workers"):
-        list(prove(work, -1))
+        list(validate(work, -1))
 
 
 def test_the_tables_count_what_failed():
-    found = Evidence()
+    found = ValidationResults()
     for task in SPATIAL_TASKS[:2]:
-        found.add(examine(get_episode(task, "test", 0)))
-    found.failures.append(Failure("no leak", "PickXtimes", "direct", "PickXtimes/test/0", 1, "one"))
+        found.add(check_episode(get_episode(task, "test", 0)))
+    found.failures.append(
+        RuleViolation("no leak", "PickXtimes", "direct", "PickXtimes/test/0", 1, "one")
+    )
     console = Console(width=150, file=io.StringIO())
-    for table in proof_tables(found):
+    for table in validation_tables(found):
         console.print(table)
     text = console.file.getvalue()
     assert "2 (1 broken)" in text

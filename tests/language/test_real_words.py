@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from language_variants import random_episodes
 
 from roboirg.core.episode import ALL_COLORS, Goal, Point, Scene, SceneObject
-from roboirg.language import expressible, instruct, resolve
+from roboirg.language import expressible, instruct, interpret
 from roboirg.language.interpreter.places import Towards, read_places
 from roboirg.language.interpreter.tokens import split_sentences
 from roboirg.language.landmarks import MARGIN, landmarks
@@ -40,7 +40,7 @@ TAPES = Scene((YELLOW, GRAY, TARGET))
     ],
 )
 def test_other_people_name_a_box(text, colors):
-    goals = resolve(text, BOXES, "PutInBox").goals
+    goals = interpret(text, BOXES, "PutInBox").goals
     assert {goal.text("color") for goal in goals} == colors
 
 
@@ -58,7 +58,7 @@ def test_other_people_name_a_box(text, colors):
     ],
 )  # fmt: skip
 def test_other_people_name_a_tape_and_a_number(text, color, repeats):
-    assert resolve(text, TAPES, "PickByCount").goals == (Goal.of(color=color, repeats=repeats),)
+    assert interpret(text, TAPES, "PickByCount").goals == (Goal.of(color=color, repeats=repeats),)
 
 
 GRID = st.integers(-20, 20).map(lambda step: step / 100)

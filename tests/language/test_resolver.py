@@ -12,7 +12,7 @@ from language_variants import first_episodes
 from roboirg.core.episode import COLORS, Goal, Point, Scene, SceneObject
 from roboirg.core.errors import UnknownNameError
 from roboirg.episodes.splits import get_episode
-from roboirg.language import expressible, instruct, interpreter, resolve
+from roboirg.language import expressible, instruct, interpret, interpreter
 from roboirg.language.interpreter.places import Beside, Towards, read_places
 from roboirg.language.interpreter.tokens import split_sentences
 from roboirg.tasks import every_task, get_task
@@ -70,7 +70,7 @@ WORDS = (
 )
 def test_arbitrary_text_never_raises(text):
     for task, (_, _, _, episode, *_) in EPISODES.items():
-        found = resolve(text, episode.scene, task)
+        found = interpret(text, episode.scene, task)
         assert set(found.goals) <= set(get_task(task).goals(episode.scene))
 
 
@@ -83,19 +83,19 @@ def test_endless_places_are_given_up():
     assert depth == 4
     assert place == Towards("left", 0)
     goals = get_task("PickXtimes").goals(PICK)
-    assert len(resolve(text, PICK, "PickXtimes").goals) < len(goals)
+    assert len(interpret(text, PICK, "PickXtimes").goals) < len(goals)
 
 
 def test_nothing_said_leaves_everything_open():
     for task, (episode, *_) in EPISODES.items():
-        found = resolve("", episode.scene, task)
+        found = interpret("", episode.scene, task)
         assert found.goals == get_task(task).goals(episode.scene)
         assert found.not_understood
 
 
 def test_unknown_task():
     with pytest.raises(UnknownNameError):
-        resolve("Lift it.", PICK, "PickYtimes")
+        interpret("Lift it.", PICK, "PickYtimes")
 
 
 SCENE = Scene(
@@ -132,12 +132,12 @@ SCENE = Scene(
     ],
 )  # fmt: skip
 def test_sentences_of_other_people(text, color, repeats):
-    assert resolve(text, SCENE, "PickXtimes").goals == (Goal.of(color=color, repeats=repeats),)
+    assert interpret(text, SCENE, "PickXtimes").goals == (Goal.of(color=color, repeats=repeats),)
 
 
 def test_what_is_left_open_by_commands_alone():
     def count(text):
-        return len(resolve(text, SCENE, "PickXtimes").goals)
+        return len(interpret(text, SCENE, "PickXtimes").goals)
 
     assert count("Take it and place it on the target that many times.") == 15
     assert count("Take the cube there and place it on the target four times.") == 3
@@ -147,10 +147,10 @@ def test_what_is_left_open_by_commands_alone():
 
 
 def test_picks_tell_how_many_colors_a_goal_has():
-    one = resolve("Lift the container that hides it.", UNMASK, "VideoUnmask").goals
+    one = interpret("Lift the container that hides it.", UNMASK, "VideoUnmask").goals
     assert {len(goal.texts("colors")) for goal in one} == {1}
     text = "Lift the container over the former, put it down, then lift the one over the latter."
-    two = resolve(text, UNMASK, "VideoUnmask").goals
+    two = interpret(text, UNMASK, "VideoUnmask").goals
     assert {len(goal.texts("colors")) for goal in two} == {2}
     assert len(two) == 6
 
@@ -158,17 +158,19 @@ def test_picks_tell_how_many_colors_a_goal_has():
 def test_waved_aside_values_do_not_count():
     lift = "Lift the container that hides it."
     text = f"Blue is nice. My neighbor prefers red, but that does not matter here. {lift}"
-    assert resolve(text, UNMASK, "VideoUnmask").goals == (Goal.of(colors=("blue",)),)
+    assert interpret(text, UNMASK, "VideoUnmask").goals == (Goal.of(colors=("blue",)),)
 
 
 def test_rivals_that_are_not_waved_aside_make_a_text_ambiguous():
     take = "Take it and place it on the target that many times."
-    goals = resolve(f"I like red. I also like blue. Three! {take}", SCENE, "PickXtimes").goals
+    goals = interpret(f"I like red. I also like blue. Three! {take}", SCENE, "PickXtimes").goals
     assert {goal.text("color") for goal in goals} == {"red", "blue"}
-    goals = resolve(f"Five. I like red. My cat has four kittens. {take}", SCENE, "PickXtimes").goals
+    goals = interpret(
+        f"Five. I like red. My cat has four kittens. {take}", SCENE, "PickXtimes"
+    ).goals
     assert {goal.number("repeats") for goal in goals} == {4, 5}
     text = "Look at the cube at the far left. I see the cube closest to you. Take the cube there."
-    goals = resolve(text, SCENE, "PickXtimes").goals
+    goals = interpret(text, SCENE, "PickXtimes").goals
     assert {goal.text("color") for goal in goals} == {"red", "green"}
 
 
@@ -185,7 +187,7 @@ def test_case_spaces_digits_and_spelling_do_not_matter(task):
         british = text.replace("color", "color").replace("neighbor", "neighbor")
         short = british.replace("did not", "didn’t").replace("does not", "doesn't")
         for other in (text.upper(), text.replace(" ", "  \t"), digits, british, short, text + "\n"):
-            assert resolve(other, episode.scene, task).goals == (episode.goal,), other
+            assert interpret(other, episode.scene, task).goals == (episode.goal,), other
 
 
 def test_an_empty_container_holds_no_goal():
@@ -193,7 +195,7 @@ def test_an_empty_container_holds_no_goal():
     empties = [item for item in hard.of_kind("container") if hard.hidden_in(item.name) is None]
     assert empties
     lone = Scene((empties[0], *hard.of_kind("hidden_cube")))
-    found = resolve("Lift the container closest to you.", lone, "VideoUnmask")
+    found = interpret("Lift the container closest to you.", lone, "VideoUnmask")
     assert not found.goals
     assert found.not_understood
     assert set(COLORS) == {cube.color for cube in hard.of_kind("hidden_cube")}

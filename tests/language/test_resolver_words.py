@@ -10,7 +10,7 @@ from language_variants import first_episodes
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import COLORS, Goal, Point, Scene, SceneObject
 from roboirg.core.motions import Away, Swap
-from roboirg.language import resolve
+from roboirg.language import interpret
 
 
 def cube(name, x, y):
@@ -94,11 +94,11 @@ def test_amounts_in_other_words(text, counts):
     if "to you" in text or "from you" in text:
         scene = Scene((*FILL.objects, cube("cube_red_5", -0.17, 0), cube("cube_green_5", 0.17, 0)),
                       FILL.motions)  # fmt: skip
-    assert resolve(text, scene, "BinFill").goals == (filled(**counts),)
+    assert interpret(text, scene, "BinFill").goals == (filled(**counts),)
 
 
 def left_over(text, scene=FILL, task="BinFill"):
-    return set(resolve(text, scene, task).goals)
+    return set(interpret(text, scene, task).goals)
 
 
 def test_amounts_that_are_left_open():
@@ -159,7 +159,7 @@ STOP = next(first_episodes("StopCube", "train", 1)).scene
     ],
 )  # fmt: skip
 def test_visits_in_other_words(text, visit):
-    assert resolve(text, STOP, "StopCube").goals == (Goal.of(visit=visit),)
+    assert interpret(text, STOP, "StopCube").goals == (Goal.of(visit=visit),)
 
 
 def test_visits_that_are_left_open():
@@ -191,7 +191,7 @@ def test_visits_that_are_left_open():
 )  # fmt: skip
 def test_placements_in_other_words(text, color, placement):
     goal = Goal.of(color=color, placement=placement)
-    assert resolve(text, ORDERED, "VideoPlaceOrder").goals == (goal,)
+    assert interpret(text, ORDERED, "VideoPlaceOrder").goals == (goal,)
 
 
 @pytest.mark.parametrize(
@@ -218,7 +218,7 @@ def test_placements_in_other_words(text, color, placement):
 )  # fmt: skip
 def test_moments_in_other_words(text, relation):
     goal = Goal.of(color="red", relation=relation)
-    assert resolve(text, AROUND, "VideoPlaceButton").goals == (goal,)
+    assert interpret(text, AROUND, "VideoPlaceButton").goals == (goal,)
 
 
 def test_moments_that_are_left_open():
@@ -250,7 +250,7 @@ def test_repeats_in_other_words():
     swing = "Swing the blue cube to the right and left targets two times fewer than five."
     *_, episode = first_episodes("SwingXtimes", "train", 4)
     goal = Goal.of(color="blue", repeats=3)
-    assert resolve(swing, episode.scene, "SwingXtimes").goals == (goal,)
+    assert interpret(swing, episode.scene, "SwingXtimes").goals == (goal,)
 
 
 def test_places_of_things_that_move_depend_on_when():

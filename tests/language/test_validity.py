@@ -9,8 +9,8 @@ import pytest
 from language_variants import SPATIAL_TASKS, TASKS, random_episodes
 
 from roboirg.episodes.splits import SIZES
-from roboirg.language import expressible, instruct, resolve
-from roboirg.language.validation import Batch, Evidence, random_episode, work_on
+from roboirg.language import expressible, instruct, interpret
+from roboirg.language.validation import Batch, ValidationResults, random_episode, validate_batch
 from roboirg.tasks import get_task
 
 RANDOM_SCENES = 24
@@ -18,9 +18,9 @@ RANDOM_SCENES = 24
 
 
 @functools.cache
-def evidence(task: str, split: str | None) -> Evidence:
+def evidence(task: str, split: str | None) -> ValidationResults:
     """What the test split (or, for None, random scenes) of a task proves."""
-    return work_on(Batch(task, split, 0, RANDOM_SCENES if split is None else SIZES[split]))
+    return validate_batch(Batch(task, split, 0, RANDOM_SCENES if split is None else SIZES[split]))
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -50,13 +50,13 @@ def test_long_contexts_are_read_back(task, distractor, distractors):
     options = {"distractor": distractor, "distractors": distractors}
     for episode in random_episodes(task, 4):
         said = instruct(episode, "contextual", **options)
-        found = resolve(said.text, episode.scene, task)
+        found = interpret(said.text, episode.scene, task)
         assert (found.goals, found.not_understood) == ((episode.goal,), ()), said.text
 
 
 def exceptions(task):
     """Groups of scenes that leave one candidate, with their share."""
-    total = Evidence()
+    total = ValidationResults()
     for split in ("test", None):
         total.add(evidence(task, split))
     return {

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from roboirg.cli.policy_commands import check_policy as command
 from roboirg.core.observations import CAMERAS
 from roboirg.policies.policy_check import FAIL, NOTE, PASS, check_policy
-from roboirg.policies.synthetic_episodes import Studio
+from roboirg.policies.synthetic_episodes import SyntheticEpisodes
 
 
 class Sound:
@@ -183,7 +183,7 @@ def test_what_cannot_be_tried_is_told(spec, words):
 @pytest.mark.parametrize("frames", ["all", "none", 4])
 @pytest.mark.parametrize("every", [None, 1, 4])
 def test_made_up_episodes_are_what_was_asked_for(cameras, frames, every):
-    studio = Studio(cameras, frames, every)
+    studio = SyntheticEpisodes(cameras, frames, every)
     for size in (0, 10):
         episode = studio.episode("Go.", size)
         pictures = {f"{camera}_rgb" for camera in cameras}

@@ -35,9 +35,9 @@ from roboirg.core.errors import (
     PolicyTimeoutError,
 )
 from roboirg.episodes.splits import SIZES, get_episode
-from roboirg.language import instruct, resolve
+from roboirg.language import instruct, interpret
 from roboirg.policies import play
-from roboirg.policies.planning.goal_schema import full_answer, slots_of
+from roboirg.policies.planning.goal_schema import full_answer, goal_schema
 from roboirg.policies.planning.models import ModelOptions
 from roboirg.policies.planning.vlm_listener import NotUnderstood
 from roboirg.policies.planning.vlm_query import UnparsableReply
@@ -56,15 +56,15 @@ def hearing(episode):
     """Answers as the resolver understands the words of the request."""
 
     def answer(body):
-        (goal,) = resolve(heard(body), episode.scene, episode.task).goals
-        return json.dumps(full_answer(goal, slots_of(episode.task)))
+        (goal,) = interpret(heard(body), episode.scene, episode.task).goals
+        return json.dumps(full_answer(goal, goal_schema(episode.task)))
 
     return answer
 
 
 @pytest.mark.parametrize("task", every_task())
 def test_every_goal_of_every_split_can_be_answered_and_nothing_else(task):
-    slots = slots_of(task)
+    slots = goal_schema(task)
     seen = {
         goal
         for split in SPLITS
@@ -78,7 +78,7 @@ def test_every_goal_of_every_split_can_be_answered_and_nothing_else(task):
 
 @pytest.mark.parametrize("task", every_task())
 def test_the_schema_allows_every_answer(task):
-    slots = slots_of(task)
+    slots = goal_schema(task)
     properties = slots.schema()["properties"]
     for goal in slots.goals.values():
         for name, value in full_answer(goal, slots).items():
@@ -106,7 +106,7 @@ def test_the_schema_allows_every_answer(task):
 )
 def test_any_reply_is_a_goal_or_unparsable(reply):
     for task in every_task():
-        slots = slots_of(task)
+        slots = goal_schema(task)
         with contextlib.suppress(UnparsableReply):
             assert slots.read(json.dumps(reply)) in slots.goals.values()
 
@@ -124,7 +124,7 @@ def test_any_reply_is_a_goal_or_unparsable(reply):
 )
 def test_wrong_replies_are_explained(reply, words):
     with pytest.raises(UnparsableReply, match=words):
-        slots_of("PickXtimes").read(reply)
+        goal_schema("PickXtimes").read(reply)
 
 
 def test_values_that_do_not_go_together_are_no_goal():
@@ -133,11 +133,11 @@ def test_values_that_do_not_go_together_are_no_goal():
         ("VideoUnmask", {"colors": ["red", "red"]}),
     ]:
         with pytest.raises(UnparsableReply, match="meant together"):
-            slots_of(task).read(json.dumps(reply))
+            goal_schema(task).read(json.dumps(reply))
 
 
 def test_fences_words_and_capitals_around_an_answer_do_no_harm():
-    goal = slots_of("PickXtimes").read(
+    goal = goal_schema("PickXtimes").read(
         'Let {me} think.\n```json\n{"why": "x", "color": " Red", "repeats": 2}\n```'
     )
     assert dict(goal.as_mapping()) == {"color": "red", "repeats": 2}
@@ -167,7 +167,7 @@ def test_random_answers_reach_the_chance_level():
     with fake_vlm(["{}"]) as server:
         policy = make_listener(server)
         for task in every_task():
-            slots = slots_of(task)
+            slots = goal_schema(task)
             goals = list(slots.goals.values())
 
             def guess(_body, goals=goals, slots=slots):
@@ -203,7 +203,7 @@ def test_a_listener_tells_what_a_policy_may_know_and_nothing_of_the_scene():
 def test_unparsable_replies_are_retried_once_then_counted():
     env = stand_in(get_episode("PickXtimes", "test", 0))
     goal = env.episode.goal
-    good = json.dumps(full_answer(goal, slots_of("PickXtimes")))
+    good = json.dumps(full_answer(goal, goal_schema("PickXtimes")))
     with fake_vlm(["no idea", good]) as server:
         policy = make_listener(server)
         assert policy.decide(env, "Do it.") == goal

@@ -16,7 +16,7 @@ from roboirg.episodes.splits import get_episode
 from roboirg.policies.planning.keyframes import NEAR, merged
 from roboirg.policies.planning.model_content import Clip, Picture, evenly, mp4, png, summary
 from roboirg.policies.planning.observation_merging import (
-    Excerpt,
+    DemonstrationSubset,
     both_cameras,
     both_frames,
     both_histories,
@@ -215,7 +215,7 @@ def test_each_sees_the_pictures_of_the_video_that_it_asked_for(
     if drawn != "none":
         shown["front_rgb"] = np.arange(steps)[::every]
     for wish in (one, other):
-        excerpt = Excerpt(shown, drawn, wish)
+        excerpt = DemonstrationSubset(shown, drawn, wish)
         assert len(excerpt["joint_positions"]) == steps
         if wish == "none":
             assert set(excerpt) == {"joint_positions"}

@@ -13,7 +13,7 @@ import roboirg
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies import Policy, PrivilegedPolicy, play
 from roboirg.policies.builtin.oracle_policy import OraclePolicy
-from roboirg.policies.planning.hierarchical_policy import PlannedPolicy, put_in_front
+from roboirg.policies.planning.hierarchical_policy import HierarchicalPolicy, with_planner
 from roboirg.policies.planning.planners.gemini import GeminiOptions, GeminiPlanner
 from roboirg.policies.planning.planners.memer import MemerOptions, MemerPlanner
 from roboirg.policies.planning.planners.oracle_planner import OracleOptions, OraclePlanner
@@ -94,7 +94,7 @@ NO_VIDEO = {"front_rgb": np.zeros((0, 256, 256, 3), np.uint8), "joint_positions"
 
 def drive(planner, steps, chunk=CHUNK, demonstration=NO_VIDEO, instruction="Do it."):
     """An episode of so many steps; the subgoal at each chunk's first step."""
-    policy = PlannedPolicy(planner, Follower(chunk))
+    policy = HierarchicalPolicy(planner, Follower(chunk))
     policy.reset(instruction, demonstration)
     every = policy.observe_every
     for step in range(0, steps + 1, chunk):
@@ -362,7 +362,7 @@ def test_together_they_are_a_policy_and_costs_add_up(monkeypatch):
 def test_two_policies_do_not_mix():
     with fake_vlm([GO]) as one, fake_vlm(["put it down"]) as two:
         first, second = make_planner("qwen", one), make_planner("qwen", two)
-        here, there = PlannedPolicy(first, Follower()), PlannedPolicy(second, Follower())
+        here, there = HierarchicalPolicy(first, Follower()), HierarchicalPolicy(second, Follower())
         for policy, words in ((here, "One."), (there, "Two.")):
             policy.reset(words, NO_VIDEO)
         for step in (0, 16, 32):
@@ -384,7 +384,7 @@ def test_who_cannot_follow_cannot_be_led():
         def act(self, observation): ...
 
     with pytest.raises(InvalidValueError, match=r"Headstrong has no method follow"):
-        put_in_front(OraclePlanner(), Headstrong())
+        with_planner(OraclePlanner(), Headstrong())
 
 
 class Wishful(Follower):
@@ -395,23 +395,23 @@ class Wishful(Follower):
 
 def test_wishes_of_both_are_met():
     with fake_vlm(["x"]) as server:
-        together = PlannedPolicy(make_planner("gemini", server, observe_every=4), Wishful())
+        together = HierarchicalPolicy(make_planner("gemini", server, observe_every=4), Wishful())
         assert together.cameras == ("front", "wrist")
         assert together.actions == "waypoint"
         assert together.demonstration_frames == 2
         assert together.observe_every == 4
         assert together.grounded is False
         # Only what is seen tells how long a way point takes.
-        assert PlannedPolicy(make_planner("qwen", server), Wishful()).observe_every == 1
-        assert PlannedPolicy(OraclePlanner(), Follower()).grounded is True
+        assert HierarchicalPolicy(make_planner("qwen", server), Wishful()).observe_every == 1
+        assert HierarchicalPolicy(OraclePlanner(), Follower()).grounded is True
         assert (
-            PlannedPolicy(OraclePlanner(OracleOptions(subgoals="simple")), Follower()).grounded
+            HierarchicalPolicy(OraclePlanner(OracleOptions(subgoals="simple")), Follower()).grounded
             is False
         )
 
 
 def test_the_oracle_needs_an_environment_that_names_pixels():
-    policy = put_in_front(OraclePlanner(), Follower())
+    policy = with_planner(OraclePlanner(), Follower())
     assert isinstance(policy, PrivilegedPolicy)
     with pytest.raises(InvalidValueError, match="grounded=True"):
         policy.attach(roboirg.make("PickXtimes", cameras=()))
@@ -420,7 +420,7 @@ def test_the_oracle_needs_an_environment_that_names_pixels():
 @pytest.mark.sim
 def test_the_oracles_subgoals_are_those_of_the_episode():
     env = roboirg.make("PickXtimes", cameras=(), grounded=True, demonstration_frames="none")
-    policy = put_in_front(OraclePlanner(), Fingers())
+    policy = with_planner(OraclePlanner(), Fingers())
     policy.policy.demonstration_frames = policy.demonstration_frames = "none"
     assert play(env, policy)["status"] == "success"
     told = list(dict.fromkeys(policy.policy.told))
@@ -434,7 +434,7 @@ def test_the_oracles_subgoals_are_those_of_the_episode():
 def test_planners_play_whole_episodes(kind):
     with fake_vlm([ANSWERS[kind]]) as server:
         more = {"observe_every": 8} if kind == "gemini" else {}
-        policy = put_in_front(make_planner(kind, server, **more), Fingers())
+        policy = with_planner(make_planner(kind, server, **more), Fingers())
         env = roboirg.make(
             "PickXtimes",
             cameras=policy.cameras,

@@ -15,7 +15,7 @@ from roboirg.episodes.splits import get_episode
 from roboirg.policies import Policy, PrivilegedPolicy, load_policy_class, make_policy, play
 from roboirg.policies.loading import is_privileged, policy_version
 from roboirg.policies.planning import policy_specs
-from roboirg.policies.planning.hierarchical_policy import PlannedPolicy
+from roboirg.policies.planning.hierarchical_policy import HierarchicalPolicy
 from roboirg.policies.planning.systems import all_systems, find_system, load_system
 from roboirg.policies.planning.vlm_listener import VLMListener
 from roboirg.policies.requirements import (
@@ -54,7 +54,7 @@ def test_a_system_is_a_policy_offline(name):
     policy = load_system(name)
     assert isinstance(policy, Policy)
     assert isinstance(policy, PrivilegedPolicy) == (name == "GroundSG-oracle")
-    assert isinstance(policy, PlannedPolicy) == (name in PLANNERS)
+    assert isinstance(policy, HierarchicalPolicy) == (name in PLANNERS)
     if name in PLANNERS:
         assert policy.metadata["planner"]["kind"] == PLANNERS[name]
         assert policy.grounded == (name == "GroundSG-oracle")
@@ -156,7 +156,7 @@ def test_wrong_specs_are_explained(spec, error, words):
 
 def test_other_specs_are_not_ours():
     for spec in ("oracle", "package.module:Class", "mme-vla://localhost:8001", "x"):
-        assert policy_specs.find(spec) is None
+        assert policy_specs.find_policy_factory(spec) is None
 
 
 def test_own_systems_are_files(tmp_path):

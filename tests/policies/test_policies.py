@@ -112,7 +112,7 @@ def test_own_policies_are_named_by_import_path():
         ),
         (f"{__name__}:Numb", InvalidValueError, "act of class Numb is no method"),
         (
-            "roboirg.policies.builtin.scripted:HandedPolicy",
+            "roboirg.policies.builtin.scripted:ScriptedPolicy",
             InvalidValueError,
             "is abstract; it lacks decide",
         ),

@@ -13,14 +13,14 @@ from wire_servers import MmeVlaServer, WireServer
 from roboirg.core.errors import PolicyConnectionError, PolicyTimeoutError
 from roboirg.policies import make_policy
 from roboirg.policies.remote.endpoints import Endpoint
-from roboirg.policies.remote.server_lock import take
+from roboirg.policies.remote.server_lock import lock_server
 
 SPAWN = multiprocessing.get_context("spawn")
 ONE, TWO = Endpoint("h", 8001), Endpoint("h", 8002)
 
 
 def hold(folder, endpoint, ready, seconds):
-    lease = take([endpoint], wait=5, folder=folder)
+    lease = lock_server([endpoint], wait=5, folder=folder)
     ready.set()
     time.sleep(seconds)
     lease.release()
@@ -41,31 +41,31 @@ def holder(tmp_path):
 def test_another_process_waits_takes_another_server_or_inherits(holder, tmp_path):
     start = time.monotonic()
     with pytest.raises(PolicyTimeoutError, match=r"h:8001 was used by other .* for 0\.2 s"):
-        take([ONE], wait=0.2, folder=tmp_path)
+        lock_server([ONE], wait=0.2, folder=tmp_path)
     assert 0.2 <= time.monotonic() - start < 30
-    lease = take([ONE, TWO], wait=0, folder=tmp_path)
+    lease = lock_server([ONE, TWO], wait=0, folder=tmp_path)
     assert lease.endpoint == TWO
     with pytest.raises(PolicyTimeoutError, match="h:8001, h:8002 were"):
-        take([ONE, TWO], wait=0, folder=tmp_path, shared=True)
+        lock_server([ONE, TWO], wait=0, folder=tmp_path, shared=True)
     os.kill(holder.pid, signal.SIGKILL)
-    assert take([ONE, TWO], wait=10, folder=tmp_path).endpoint == ONE
+    assert lock_server([ONE, TWO], wait=10, folder=tmp_path).endpoint == ONE
     lease.release()
 
 
 def test_those_who_share_do_not_exclude_each_other(tmp_path):
-    leases = [take([ONE], wait=0, folder=tmp_path, shared=True) for _ in range(3)]
+    leases = [lock_server([ONE], wait=0, folder=tmp_path, shared=True) for _ in range(3)]
     with pytest.raises(PolicyTimeoutError):
-        take([ONE], wait=0, folder=tmp_path)
+        lock_server([ONE], wait=0, folder=tmp_path)
     for lease in leases:
         lease.release()
         lease.release()
-    take([ONE], wait=0, folder=tmp_path).release()
+    lock_server([ONE], wait=0, folder=tmp_path).release()
 
 
 def test_names_of_this_computer_are_one_server(tmp_path):
-    lease = take([Endpoint("localhost", 1)], wait=0, folder=tmp_path)
+    lease = lock_server([Endpoint("localhost", 1)], wait=0, folder=tmp_path)
     with pytest.raises(PolicyConnectionError):
-        take([Endpoint("127.0.0.1", 1)], wait=0, folder=tmp_path)
+        lock_server([Endpoint("127.0.0.1", 1)], wait=0, folder=tmp_path)
     lease.release()
 
 

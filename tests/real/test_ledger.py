@@ -6,20 +6,20 @@ from roboirg.analysis.page.report import render
 from roboirg.analysis.stats.samples import gather
 from roboirg.analysis.tables.paper_tables import make_table
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.rollout_result import Course, describe
+from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.real.study.failure_choices import failure_choices
-from roboirg.real.study.trial_log import UNSCORED, VOID, WITHDRAWN, Ledger, said_of
+from roboirg.real.study.trial_log import UNSCORED, VOID, WITHDRAWN, TrialLog, said_of
 from roboirg.records.record import Record
 from roboirg.records.store import RecordStore, read_records, read_results
 
 
 def fresh(plan, folder):
-    return Ledger.read(plan, folder)
+    return TrialLog.read(plan, folder)
 
 
 def played(trial):
-    course = Course(outcome="error", error="infrastructure", cause=UNSCORED, steps=321)
-    return describe(trial.job, course, started_at="2026-01-01T00:00:00+00:00", duration_s=16.0)
+    course = RolloutResult(outcome="error", error="infrastructure", cause=UNSCORED, steps=321)
+    return make_record(trial.job, course, started_at="2026-01-01T00:00:00+00:00", duration_s=16.0)
 
 
 def test_a_score_is_a_record_like_any_other(small):

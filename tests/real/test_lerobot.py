@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.real.control.lerobot_arm import LeRobotArm, LeRobotOptions, make_arm, squared
+from roboirg.real.control.lerobot_arm import LeRobotArm, LeRobotArmOptions, make_arm, squared
 from roboirg.real.control.limits import Limits
 from roboirg.real.control.robot import JudgingRobot
 from roboirg.real.control.robot_specs import check_scorer, make_robot
 from roboirg.real.study.study_plan import make_study
 from roboirg.real.study.study_run import Study
-from roboirg.real.study.trial_log import Ledger
+from roboirg.real.study.trial_log import TrialLog
 
 WATCHING, STILL = "faulty_policies:Watcher", "faulty_policies:Still"
 # A busy machine is slow: what is tested here is not how quick it is.
@@ -24,7 +24,7 @@ def study_of(tmp_path, policies, arm, **options):
         max_steps=30,
     )  # fmt: skip
     arranged = []
-    robot = LeRobotArm(arm, LeRobotOptions(**options), arranged.append)
+    robot = LeRobotArm(arm, LeRobotArmOptions(**options), arranged.append)
     return plan, Study(plan, tmp_path, robot, PATIENT), arranged
 
 
@@ -33,7 +33,7 @@ def test_a_trial_waits_for_its_operator_and_the_arm_holds(tmp_path):
     plan, study, arranged = study_of(tmp_path, (WATCHING,), arm)
     (record,) = study.run()
     assert arranged == [plan.trials[0].job]
-    assert Ledger.read(plan, tmp_path).state(plan.trials[0].name) == "waiting"
+    assert TrialLog.read(plan, tmp_path).state(plan.trials[0].name) == "waiting"
     assert (record.steps, record.outcome) == (30, "error")
     assert not arm.is_connected
     # The policy asked for joint 1 to go on by 0.01 in each step of a chunk.
@@ -51,7 +51,7 @@ def test_units_and_names_are_options(tmp_path):
             self.joints = turned | {"hand": 80.0}
 
     arm = InDegrees()
-    options = LeRobotOptions(
+    options = LeRobotArmOptions(
         joint="j{}", gripper="hand", gripper_open=80.0, gripper_closed=2.0, degrees=True
     )
     robot = LeRobotArm(arm, options, lambda job: None)

@@ -19,7 +19,7 @@ from roboirg.real.control.robot import COMMAND_RATE
 from roboirg.real.control.twin import Twin
 from roboirg.real.study.study_plan import make_study
 from roboirg.real.study.study_run import Study
-from roboirg.real.study.trial_log import Ledger
+from roboirg.real.study.trial_log import TrialLog
 from roboirg.records.record import Job
 
 pytestmark = pytest.mark.sim
@@ -248,7 +248,7 @@ def test_a_trial_that_goes_wrong_does_not_end_the_study(tmp_path):
     assert {name: one.error for name, one in found.items()} == {
         "Still": None, "Jumps": "invalid_action", "Late": "timeout", "Leaves": "policy",
     }  # fmt: skip
-    ledger = Ledger.read(plan, tmp_path)
+    ledger = TrialLog.read(plan, tmp_path)
     states = {trial.job.policy: ledger.state(trial.name) for trial in plan.trials}
     assert sorted(states.values()) == ["error", "error", "error", "scored"]
     # Errors are tried again, what has a verdict is not; or nothing is.
@@ -283,4 +283,4 @@ def test_a_policy_may_have_a_name_and_be_made_in_another_way_later(tmp_path):
     (record,) = study.run(["mine=faulty_policies:Still"])
     assert (record.policy, record.spec) == ("mine", "faulty_policies:Still")
     assert record.outcome == "failure"
-    assert Ledger.read(plan, tmp_path).state(plan.trials[0].name) == "scored"
+    assert TrialLog.read(plan, tmp_path).state(plan.trials[0].name) == "scored"

@@ -15,7 +15,7 @@ from real_start import start
 from roboirg.real.pages.score_server import ScoreServer
 from roboirg.real.study.failure_choices import failure_choices
 from roboirg.real.study.study_plan import make_study, write_study
-from roboirg.real.study.trial_log import Ledger, said_of
+from roboirg.real.study.trial_log import TrialLog, said_of
 from roboirg.records.store import read_records
 
 CHROMIUM = shutil.which("chromium") or ""
@@ -208,7 +208,7 @@ def test_a_study_is_scored_by_keyboard_alone_and_survives_a_kill(browser, tmp_pa
         process.send_signal(signal.SIGKILL)
         process.wait(timeout=30)
         page.close()
-    ledger = Ledger.read(plan, tmp_path)
+    ledger = TrialLog.read(plan, tmp_path)
     for trial in plan.trials:
         record = ledger.newest(trial.name)
         choice = wanted[trial.name]

@@ -15,7 +15,7 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.real.pages.arrangement_drawing import Shape, corners, shapes_of
 from roboirg.real.pages.arrangement_svg import draw_svg
 from roboirg.real.pages.trial_sheet import _pages, write_sheet
-from roboirg.real.study.counterbalancing import Arrangement, balanced_order, tallies
+from roboirg.real.study.counterbalancing import Arrangement, arrangement_counts, balanced_order
 from roboirg.real.study.failure_choices import failure_choices
 from roboirg.real.study.plan_csv import demonstrations_csv, trials_csv
 from roboirg.real.study.study_plan import StudyPlan, make_study, read_study, write_study
@@ -39,7 +39,7 @@ def spread(counts, everything):
 
 
 def check_balance(task, episodes):
-    found = tallies(episodes)
+    found = arrangement_counts(episodes)
     orders = balanced_order(task)
     assert spread(found["arrangement"], orders) <= 1
     for respect in ("color", "left", "repeats"):
@@ -124,8 +124,8 @@ def test_the_paper_s_study_is_the_default():
     assert len(plan.trials) == 2 * 5 * 10 * 2
     assert len(plan.demonstrations) == 2 * 50
     picks = [t.episode for t in plan.trials if t.job.task == "PickByCount"]
-    assert set(tallies(picks)["color"].values()) == {50}
-    assert set(tallies(picks)["repeats"].values()) == {50}
+    assert set(arrangement_counts(picks)["color"].values()) == {50}
+    assert set(arrangement_counts(picks)["repeats"].values()) == {50}
 
 
 @pytest.mark.parametrize("task", TASKS)

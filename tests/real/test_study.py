@@ -14,7 +14,7 @@ from roboirg.analysis.tables.paper_tables import make_table
 from roboirg.real.pages.study_figure import series_of, write_figure
 from roboirg.real.study.failure_choices import failure_choices
 from roboirg.real.study.study_plan import read_study
-from roboirg.real.study.trial_log import Ledger, said_of
+from roboirg.real.study.trial_log import TrialLog, said_of
 from roboirg.records.store import read_records, read_results
 
 pytestmark = pytest.mark.sim
@@ -62,7 +62,7 @@ def study(tmp_path_factory):
 
 def test_every_trial_was_played_once_and_waits(study):
     plan = read_study(study)
-    ledger = Ledger.read(plan, study)
+    ledger = TrialLog.read(plan, study)
     assert len(read_records(study)) == len(plan.trials) == 12
     assert len((study / "records.jsonl").read_text().splitlines()) == 12
     assert {ledger.state(trial.name) for trial in plan.trials} == {"waiting"}
@@ -78,7 +78,7 @@ def test_scored_in_a_browser_it_is_the_table_that_the_judge_would_have_given(stu
         pytest.skip("no chromium on this machine")
     driver = pytest.importorskip("playwright.sync_api")
     plan = read_study(study)
-    before = Ledger.read(plan, study)
+    before = TrialLog.read(plan, study)
     judged = {t.name: said_of(before.newest(t.name))["judge"] for t in plan.trials}
     process = start("score", study, "--operator", "ann")
     with driver.sync_playwright() as playwright:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from roboirg.evaluation.rollout import Player
+from roboirg.evaluation.rollout import EpisodeRunner
 from roboirg.real.control.clock import VirtualClock
 from roboirg.real.control.kinematics import end_effector, tool_in_base
 from roboirg.real.control.limits import Limits
@@ -11,7 +11,7 @@ from roboirg.real.control.robot import CAMERA_RATE, JudgingRobot
 from roboirg.real.control.twin import Twin
 from roboirg.real.study.study_plan import make_study
 from roboirg.real.study.study_run import Study
-from roboirg.records.record import INCIDENTALS
+from roboirg.records.record import NON_DETERMINISTIC_FIELDS
 
 pytestmark = pytest.mark.sim
 
@@ -24,8 +24,8 @@ def test_a_trial_on_the_twin_is_the_episode_of_simulation(task, tmp_path):
     played = Study(plan, tmp_path, Twin(), scorer="judge").run()
     assert len(played) == 2
     for record in played:
-        simulated = Player(tmp_path)(record.identity)
-        apart = {"policy_metadata", *INCIDENTALS}
+        simulated = EpisodeRunner(tmp_path)(record.identity)
+        apart = {"policy_metadata", *NON_DETERMINISTIC_FIELDS}
         ours, theirs = (one.model_dump(exclude=apart) for one in (record, simulated))
         assert ours == theirs
         assert record.outcome in ("success", "failure")

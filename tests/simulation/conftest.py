@@ -2,18 +2,18 @@
 
 import pytest
 
-from roboirg.simulation.rendering.culling import Bodies
+from roboirg.simulation.rendering.culling import CullableBodies
 
 
 @pytest.fixture
 def takes(monkeypatch):
     """All pictures that are taken: the camera's name and the bodies that it draws, as a list."""
-    taken, take = [], Bodies.take
+    taken, take = [], CullableBodies.take
 
     def noted(self, camera, visible):
         drawn = [body for body, seen in zip(self._bodies, visible, strict=True) if seen]
         taken.append((camera.name, drawn))
         take(self, camera, visible)
 
-    monkeypatch.setattr(Bodies, "take", noted)
+    monkeypatch.setattr(CullableBodies, "take", noted)
     return taken

@@ -11,13 +11,13 @@ import pytest
 
 import roboirg
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.rollout import Player
+from roboirg.evaluation.rollout import EpisodeRunner
 from roboirg.records.record import Job
 from roboirg.simulation.demonstration import demonstration_cache
 from roboirg.simulation.demonstration import demonstration_frames as frames_module
 from roboirg.simulation.demonstration.recording import Move, Recording
-from roboirg.simulation.episode_session import Session
-from roboirg.simulation.expert.primitives import Hands
+from roboirg.simulation.episode_session import EpisodeSession
+from roboirg.simulation.expert.primitives import MotionPrimitives
 from roboirg.simulation.physics_settings import HOME_ACTION
 from roboirg.simulation.rendering.cameras import Cameras
 from roboirg.simulation.rendering.render_mode import FAITHFUL
@@ -40,7 +40,7 @@ def unplanned(monkeypatch):
     """Makes planning a mistake."""
 
     def forbid():
-        monkeypatch.setattr(Hands, "perform", None)
+        monkeypatch.setattr(MotionPrimitives, "perform", None)
 
     return forbid
 
@@ -79,7 +79,7 @@ def test_five_tasks_have_a_video():
 @pytest.mark.parametrize("task", VIDEO_TASKS)
 def test_a_replay_is_the_demonstration_to_the_last_bit(task, visible):
     planned, replayed = (
-        Session(get_episode(task, "test", 3), visible=shown) for shown in (False, visible)
+        EpisodeSession(get_episode(task, "test", 3), visible=shown) for shown in (False, visible)
     )
     first, second = [], []
     made = planned.play_demonstration(lambda _: first.append(planned.state_hash()))
@@ -151,13 +151,13 @@ def test_nothing_is_drawn_before_it_is_read(drawn):
 
 
 def test_all_pictures_are_drawn_in_one_replay(drawn, monkeypatch):
-    replays, play = [], Session.play_demonstration
+    replays, play = [], EpisodeSession.play_demonstration
     options = {"cameras": ("front", "wrist"), "depth": True, "demonstration_frames": 5}
     _, _, info = reset(**options)
     alone = dict(reset(**options)[2]["demonstration"])
     drawn.clear()
     monkeypatch.setattr(
-        Session,
+        EpisodeSession,
         "play_demonstration",
         lambda self, *args: (replays.append(self), play(self, *args))[1],
     )
@@ -194,7 +194,7 @@ def story(task=SHORT):
     """All that an environment and a run tell."""
     _, observation, info = reset(task, cameras=("front", "wrist"), depth=True, grounded=True)
     job = Job(policy=f"{__name__}:Viewer", task=task, split="test", episode=1, setting="direct")
-    record = Player(None)(job).model_dump(
+    record = EpisodeRunner(None)(job).model_dump(
         exclude={"started_at", "duration_s", "timings", "details"}
     )
     video = dict(info.pop("demonstration"))

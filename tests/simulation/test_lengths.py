@@ -8,8 +8,8 @@ import pytest
 
 from roboirg.core.errors import SceneRejectedError
 from roboirg.episodes.splits import make_episode
-from roboirg.simulation.episode_session import Session
-from roboirg.simulation.expert.primitives import Hands
+from roboirg.simulation.episode_session import EpisodeSession
+from roboirg.simulation.expert.primitives import MotionPrimitives
 
 pytestmark = pytest.mark.sim
 
@@ -58,7 +58,7 @@ def test_videos_are_as_long_as_the_known_ones_within_a_tenth(task, difficulty):
     low, high = VIDEOS[task, difficulty]
     for episode in first_scenes(task, difficulty, 2):
         frames = []
-        Session(episode, visible=False).play_demonstration(frames.append)
+        EpisodeSession(episode, visible=False).play_demonstration(frames.append)
         assert 0.9 * low <= len(frames) <= 1.1 * high, episode.seed
 
 
@@ -66,8 +66,8 @@ def test_primitives_take_as_long_as_the_known_ones_within_fifteen_percent():
     steps = defaultdict(list)
     for task in ("VideoRepick", "VideoPlaceButton"):
         for episode in first_scenes(task, "medium", 3):
-            session = Session(episode, visible=False)
-            hands = Hands(session.world)
+            session = EpisodeSession(episode, visible=False)
+            hands = MotionPrimitives(session.world)
             for stage in episode.demonstration:
                 begin = session.world.elapsed
                 for action in itertools.chain.from_iterable(hands.perform(stage.primitive)):

@@ -15,7 +15,7 @@ from hypothesis.extra.numpy import array_shapes, arrays, scalar_dtypes
 
 from roboirg.simulation.model_files import find_model_files
 from roboirg.simulation.rendering import mesh_cache, robot_meshes, table_mesh
-from roboirg.simulation.rendering.mesh_cache import kept_arrays, packed, unpacked
+from roboirg.simulation.rendering.mesh_cache import cached_arrays, packed, unpacked
 from roboirg.util.cache import open_cache
 
 DERIVED = 13
@@ -49,7 +49,7 @@ def test_what_was_derived_is_not_derived_again(cache):
         return {"corners": np.arange(6.0).reshape(2, 3)}
 
     for sources in (b"first", b"first", b"second"):
-        ((name, array),) = kept_arrays("thing", sources, make).items()
+        ((name, array),) = cached_arrays("thing", sources, make).items()
         assert (name, array.tolist()) == ("corners", [[0, 1, 2], [3, 4, 5]])
     assert len(made) == len(complete(cache)) == 2
 
@@ -57,7 +57,7 @@ def test_what_was_derived_is_not_derived_again(cache):
 def test_meshes_have_a_share_of_the_cache(cache, monkeypatch):
     monkeypatch.setenv("ROBOIRG_CACHE_GIB", str(16 * 10_000 / 2**30))
     for number in range(20):
-        kept_arrays("thing", bytes([number]), lambda: {"zeros": np.zeros(200)})
+        cached_arrays("thing", bytes([number]), lambda: {"zeros": np.zeros(200)})
         assert sum(path.stat().st_size for path in cache.iterdir()) <= 10_000
     assert 1 < len(complete(cache)) < 20
     open_cache("actions").write("a1", bytes(5000))
@@ -180,8 +180,8 @@ def test_the_table_is_the_installed_one():
 
 
 def test_code_that_derives_is_part_of_the_key(cache, monkeypatch):
-    kept_arrays("thing", b"", dict)
+    cached_arrays("thing", b"", dict)
     monkeypatch.setattr(mesh_cache, "code_of", lambda *_: b"other code")
-    kept_arrays("thing", b"", dict)
+    cached_arrays("thing", b"", dict)
     assert len(complete(cache)) == 2
-    assert robot_meshes.code_of("meshes") != mesh_cache.code_of("meshes")
+    assert robot_meshes.code_of("meshes") != mesh_cache.source_code("meshes")

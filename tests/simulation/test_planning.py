@@ -7,12 +7,12 @@ from scipy.spatial.transform import Rotation
 from roboirg.core.actions import JOINT_HIGH, JOINT_LOW
 from roboirg.core.errors import MotionPlanningError
 from roboirg.episodes.splits import get_episode
-from roboirg.simulation.expert.motion_planning import Planner, ToolPose
-from roboirg.simulation.expert.primitives import Hands
+from roboirg.simulation.expert.motion_planning import MotionPlanner, ToolPose
+from roboirg.simulation.expert.primitives import MotionPrimitives
 from roboirg.simulation.expert.trajectory_timing import (
     JOINT_ACCELERATION_LIMIT,
     JOINT_SPEED_LIMIT,
-    timed,
+    time_parameterize,
 )
 from roboirg.simulation.physics_settings import CONTROL_PERIOD, HOME, HOME_ACTION
 from roboirg.simulation.world import World
@@ -24,8 +24,8 @@ DOWN = Rotation.from_quat([1.0, 0.0, 0.0, 0.0])
 
 
 @pytest.fixture(scope="module")
-def planner() -> Planner:
-    return Planner(World(get_episode("PickXtimes", "test", 0).scene, visible=False).robot)
+def planner() -> MotionPlanner:
+    return MotionPlanner(World(get_episode("PickXtimes", "test", 0).scene, visible=False).robot)
 
 
 def random_goals(count: int):
@@ -120,7 +120,7 @@ def test_what_no_straight_line_reaches_is_reached_by_way_of_home(planner):
 
 
 def test_a_move_to_where_one_is_takes_no_time():
-    assert timed(np.stack([HOME, HOME])).shape == (1, 7)
+    assert time_parameterize(np.stack([HOME, HOME])).shape == (1, 7)
 
 
 @pytest.mark.parametrize(
@@ -150,7 +150,7 @@ def test_first_picks_take_as_long_as_robomme_s(task, primitive, low, high):
         while world.elapsed < APPEAR_STEP + 8:  # containers have to be there and at rest
             world.step(HOME_ACTION)
         begun = world.elapsed
-        for piece in Hands(world).perform(stage.primitive):
+        for piece in MotionPrimitives(world).perform(stage.primitive):
             for action in piece:
                 world.step(action)
         assert low <= world.elapsed - begun <= high

@@ -13,7 +13,7 @@ from roboirg.core.motions import Away, Glow, subjects_of
 from roboirg.core.observations import CAMERAS
 from roboirg.episodes.splits import get_episode, make_episode
 from roboirg.policies import make_policy, play
-from roboirg.policies.builtin.scripted import HandedPolicy
+from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.simulation import physics_settings
 from roboirg.simulation.world import World
 from roboirg.tasks import every_task, get_task
@@ -26,7 +26,7 @@ HIDDEN_KINDS = {"hidden_cube", "site", "marker"}
 """What the front camera need not see, because a container, nothing or a light shows it."""
 
 
-class Mistaken(HandedPolicy):
+class Mistaken(ScriptedPolicy):
     """The oracle's hands with another goal in mind."""
 
     def __init__(self, goal: Goal) -> None:

@@ -12,9 +12,9 @@ from roboirg.core.episode import Goal, Primitive, Scene, SceneObject
 from roboirg.core.motions import Point
 from roboirg.episodes.splits import get_episode
 from roboirg.policies import play
-from roboirg.policies.builtin.scripted import HandedPolicy
+from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.simulation import physics_settings
-from roboirg.simulation.expert.primitives import Hands
+from roboirg.simulation.expert.primitives import MotionPrimitives
 from roboirg.simulation.world import World
 
 pytestmark = pytest.mark.sim
@@ -25,7 +25,7 @@ HALF_OPEN = -0.1
 """A gripper action at which each finger is 0.0125 from the middle: one fits into the hole."""
 
 
-class Mistaken(HandedPolicy):
+class Mistaken(ScriptedPolicy):
     """The oracle's hands with another goal in mind."""
 
     def __init__(self, goal):
@@ -65,7 +65,7 @@ def test_a_roll_weighs_about_as_much_as_a_cube_and_lies_still():
 
 def test_a_roll_is_picked_from_outside():
     world = World(Scene((TAPE,)), visible=False)
-    execute(world, Hands(world).perform(Primitive("pick_cube", "tape")))
+    execute(world, MotionPrimitives(world).perform(Primitive("pick_cube", "tape")))
     assert Fact("picked", "tape") in world.facts
     assert Fact("held", "tape") in world.facts
 
@@ -73,7 +73,7 @@ def test_a_roll_is_picked_from_outside():
 def test_a_roll_is_picked_by_its_wall():
     """A finger fits into the hole; the wall is what is held then."""
     world = World(Scene((TAPE,)), visible=False)
-    hands = Hands(world)
+    hands = MotionPrimitives(world)
     rotation = hands._rotation()  # closes along y
     middle = (object_sizes.TAPE_RADIUS + object_sizes.TAPE_HOLE_RADIUS) / 2
     above, at = (Point(0.0, middle, z) for z in (0.15, object_sizes.TAPE_HALF))
@@ -109,7 +109,7 @@ def test_beside_a_box_is_not_inside():
 def test_what_is_held_over_a_box_is_not_inside():
     episode = get_episode("PutInBox", "test", 0)
     world = World(episode.scene, visible=False)
-    hands, box = Hands(world), f"box_{episode.goal.text('color')}"
+    hands, box = MotionPrimitives(world), f"box_{episode.goal.text('color')}"
     execute(world, hands.perform(Primitive("pick_cube", "tape")))
     into = hands.perform(Primitive("put_into", "tape", box))
     inside = Fact("binned", "tape", box)

@@ -15,7 +15,7 @@ from roboirg.core.observations import CAMERAS
 from roboirg.episodes.splits import get_episode
 from roboirg.policies import make_policy, play
 from roboirg.simulation import bodies, physics_settings
-from roboirg.simulation.panda import BASE_LINK, CAMERA_LINK, FINGERS, Robot
+from roboirg.simulation.panda import BASE_LINK, CAMERA_LINK, FINGERS, Panda
 from roboirg.simulation.rendering import culling, robot_meshes, shaders
 from roboirg.simulation.rendering.cameras import Cameras
 from roboirg.simulation.rendering.render_device import render_system
@@ -44,7 +44,7 @@ class Stage:
         physics_settings.apply_physics_settings()
         physics_settings.apply_render_settings()
         self.scene = sapien.Scene([sapien.physx.PhysxCpuSystem(), render_system()])
-        self.robot = Robot(self.scene, visible=True, rendering=rendering)
+        self.robot = Panda(self.scene, visible=True, rendering=rendering)
         add_scenery(self.scene, visible=True, rendering=rendering)
         self.bodies = [bodies.build(self.scene, item, visible=True) for item in scene.objects]
         physics_settings.add_lights(self.scene)

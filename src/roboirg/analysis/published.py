@@ -10,7 +10,7 @@ from importlib import resources
 from typing import Literal, NamedTuple, get_args
 
 from roboirg.analysis.stats.rates import DIGITS
-from roboirg.analysis.stats.success_rates import EXPLICIT, Variant
+from roboirg.analysis.stats.success_rates import EXPLICIT, SettingColumn
 from roboirg.core.errors import UnknownNameError
 
 RateTable = Literal["main", "planner", "context", "real"]
@@ -42,7 +42,7 @@ class PublishedRow(NamedTuple):
     """
 
     model: str
-    variant: Variant
+    variant: SettingColumn
     rates: Mapping[str, Decimal | None]
     average: Decimal
 
@@ -70,7 +70,7 @@ def published_rows(table: str) -> tuple[PublishedRow, ...]:
     """
     if table not in RATE_TABLES:
         raise UnknownNameError("published table", table, RATE_TABLES)
-    grouped: dict[tuple[str, Variant], dict[str, Decimal | None]] = {}
+    grouped: dict[tuple[str, SettingColumn], dict[str, Decimal | None]] = {}
     for line in _lines(_FILES[table]):
         model = next(line[column] for column in _MODEL_COLUMNS if column in line)
         text = line["success_rate_percent"]
@@ -100,10 +100,10 @@ def published_coverage() -> tuple[CoverageRow, ...]:
     return tuple(rows)
 
 
-def _variant(line: Mapping[str, str]) -> Variant:
+def _variant(line: Mapping[str, str]) -> SettingColumn:
     if "stages" in line:
         stages = tuple(map(int, line["stages"].split(",")))
-        return Variant("contextual", stages=stages)
+        return SettingColumn("contextual", stages=stages)
     return EXPLICIT._replace(setting=line["setting"])
 
 

@@ -129,22 +129,22 @@ def build_splits(
     from roboirg.episodes import splits
     from roboirg.evaluation.executors.executor import core_count
     from roboirg.evaluation.plan_parsing import parse_names, says_all
-    from roboirg.evaluation.seed_selection import check_kept, find_seeds, merged, slots_of
-    from roboirg.evaluation.seed_summary import followed, print_summary
+    from roboirg.evaluation.seed_selection import check_kept, episode_slots, find_seeds, merged
+    from roboirg.evaluation.seed_summary import follow_progress, print_summary
     from roboirg.records.store import write_atomically
     from roboirg.tasks import find_tasks
 
     names = find_tasks(parse_names("task", tasks))
     wanted = SPLITS if says_all(split) else (splits.check_split(split),)
-    check_kept(names, wanted, splits.shipped())
+    check_kept(names, wanted, splits.shipped_splits())
     if out is not None and not Path(out).parent.is_dir():
         raise InvalidValueError(f"There is no folder for {out!r}; make it first.")
-    slots = slots_of(names, wanted)
+    slots = episode_slots(names, wanted)
     console = Console(stderr=True)
     count = core_count() if workers is None else workers
-    found = followed(find_seeds(slots, count), slots, console)
+    found = follow_progress(find_seeds(slots, count), slots, console)
     print_summary(found, console)
-    text = splits.splits_text(merged(found, splits.shipped()))
+    text = splits.splits_text(merged(found, splits.shipped_splits()))
     if out is None:
         typer.echo(text, nl=False)
     else:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from roboirg.core.episode import Split
-    from roboirg.language.validation import Batch, Evidence
+    from roboirg.language.validation import Batch, ValidationResults
 
 # Everything heavy is imported inside the commands, so that --help answers at once.
 
@@ -129,18 +129,18 @@ def prove(
 ) -> None:
     """Read all words back: one goal, none without context, no leak, paired; exit code 2 if not."""
     from roboirg.evaluation.executors.executor import core_count
-    from roboirg.language.validation import Evidence, batches
-    from roboirg.language.validation import prove as examine_all
-    from roboirg.language.validation.validation_tables import proof_tables
+    from roboirg.language.validation import ValidationResults, batches
+    from roboirg.language.validation import validate as examine_all
+    from roboirg.language.validation.validation_tables import validation_tables
 
     names = _tasks(tasks)
     work = batches(names, () if split.strip().lower() == "none" else _splits(split), seeds)
     count = core_count() if workers is None else workers
-    found = Evidence()
+    found = ValidationResults()
     for evidence in _followed(examine_all(work, count), work):
         found.add(evidence)
     console = _console()
-    for table in proof_tables(found):
+    for table in validation_tables(found):
         console.print(table)
     for failure in found.failures[:MOST_FAILURES]:
         where = f"{failure.episode}, seed {failure.seed}, {failure.setting}"
@@ -164,7 +164,9 @@ def card(
         write_atomically(out, language_card())
 
 
-def _followed(found: Iterable[tuple[Batch, Evidence]], work: Sequence[Batch]) -> Iterable[Evidence]:
+def _followed(
+    found: Iterable[tuple[Batch, ValidationResults]], work: Sequence[Batch]
+) -> Iterable[ValidationResults]:
     """What is found; meanwhile a bar, or a line now and then, tells how far it is."""
     from rich.console import Console
     from rich.progress import Progress

@@ -56,12 +56,12 @@ def check_policy(
     """Check that a policy keeps the contract, on made-up observations; needs no simulator."""
     from rich.console import Console
 
-    from roboirg.policies.policy_check import FAIL, print_findings
+    from roboirg.policies.policy_check import FAIL, print_check_results
     from roboirg.policies.policy_check import check_policy as check
 
     see_working_directory()
     findings = check(policy, seed=seed)
-    print_findings(findings, Console())
+    print_check_results(findings, Console())
     if any(finding.verdict == FAIL for finding in findings):
         raise typer.Exit(FAILED)
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from roboirg.real.pages.operator_console import Console
+    from roboirg.real.pages.operator_console import OperatorConsole
     from roboirg.real.study.study_plan import StudyPlan
     from roboirg.real.study.study_run import Study
 
@@ -119,13 +119,13 @@ def run(
     """Play the trials of a plan on a robot or its twin, in order."""
     from roboirg.real.control.limits import read_limits
     from roboirg.real.control.robot_specs import check_scorer, make_robot
-    from roboirg.real.pages.operator_console import Console
+    from roboirg.real.pages.operator_console import OperatorConsole
     from roboirg.real.study.study_plan import read_study
     from roboirg.real.study.study_run import Study
 
     path = Path(folder)
     made = read_study(path)
-    console = Console(made)
+    console = OperatorConsole(made)
     device = make_robot(robot, real_time=real_time, arrange=console.arrange)
     study = Study(
         made,
@@ -179,7 +179,7 @@ def figure(
         typer.echo(path)
 
 
-def _play(study: Study, console: Console, policies: list[str], *, retry: bool) -> None:
+def _play(study: Study, console: OperatorConsole, policies: list[str], *, retry: bool) -> None:
     """Play a study and say how it went; an error among the trials is an exit code."""
     # Whoever ends the command ends it with the arm at rest.
     signal.signal(signal.SIGTERM, signal.default_int_handler)

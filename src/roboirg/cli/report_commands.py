@@ -85,12 +85,12 @@ def figures(
     published: Annotated[bool, typer.Option(help="Put the paper's own values in.")] = False,
 ) -> None:
     """Draw the paper's figures of one or several runs, as PNG, SVG and PDF."""
-    from roboirg.analysis.figures import FIGURES, Content, write_figures
+    from roboirg.analysis.figures import FIGURES, FigureData, write_figures
     from roboirg.analysis.figures.figure_style import check_figure_support
 
     check_figure_support()
     names = FIGURES if which == _ALL else tuple(word.strip() for word in which.split(","))
-    content = Content.of(*_runs(runs))
+    content = FigureData.of(*_runs(runs))
     for path in write_figures(content, out, names, published=published):
         typer.echo(path)
 

@@ -16,7 +16,7 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 if TYPE_CHECKING:
     from roboirg.evaluation.executors.executor import Executor
     from roboirg.evaluation.plan import Plan
-    from roboirg.evaluation.runner import Summary
+    from roboirg.evaluation.runner import RunSummary
     from roboirg.records.record import Job
 
 # Everything heavy is imported inside the commands, so that --help answers at once.
@@ -152,18 +152,20 @@ def folder_of(text: str) -> Path:
     return Path(text)
 
 
-def play(plan: Plan, out: Path, executor: Executor, *, retry: bool) -> Summary:
+def play(plan: Plan, out: Path, executor: Executor, *, retry: bool) -> RunSummary:
     """Play a plan with a progress bar; ends the process when it is interrupted."""
     from rich.console import Console
 
     from roboirg.evaluation.progress import ConsoleReporter
-    from roboirg.evaluation.rollout import Player
+    from roboirg.evaluation.rollout import EpisodeRunner
     from roboirg.evaluation.runner import Terminated, run_plan
     from roboirg.evaluation.video_writer import check_video_support
 
     if plan.video != "off":
         check_video_support()
-    player = Player(out, plan.video, policy_timeout_s=plan.policy_timeout_s, plan=plan.fingerprint)
+    player = EpisodeRunner(
+        out, plan.video, policy_timeout_s=plan.policy_timeout_s, plan=plan.fingerprint
+    )
     try:
         with ConsoleReporter(Console()) as reporter:
             return run_plan(plan, out, player, executor, retry_errors=retry, reporter=reporter)
@@ -194,7 +196,7 @@ def planned_jobs(folder: Path) -> tuple[Job, ...]:
     return plan.jobs() if plan else ()
 
 
-def complain(summary: Summary, folder: Path) -> None:
+def complain(summary: RunSummary, folder: Path) -> None:
     """Say on stderr what is lacking in a run; a run that lacks something exits with 2."""
     if summary.unfilmed:
         typer.echo(
@@ -264,9 +266,9 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from roboirg.evaluation.estimate import cell_sizes, estimate, in_words
+    from roboirg.evaluation.estimate import cell_sizes, estimate, estimate_text
     from roboirg.evaluation.executors.executor import core_count
-    from roboirg.records.record_codec import key_of
+    from roboirg.records.record_codec import identity_key
     from roboirg.records.store import read_index
 
     jobs, console = plan.jobs(), Console()
@@ -285,7 +287,7 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
     table.caption = "episodes: implicit" + (" + resolved" if "resolved" in plan.forms else "")
     console.print(table)
     played = read_index(folder)
-    todo = [job for job in jobs if key_of(job) not in played]
+    todo = [job for job in jobs if identity_key(job) not in played]
     count = core_count() if workers is None else max(workers, 1)
-    for line in in_words(estimate(todo, played.values(), count), len(jobs), count):
+    for line in estimate_text(estimate(todo, played.values(), count), len(jobs), count):
         console.print(line, highlight=False)

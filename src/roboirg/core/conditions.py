@@ -72,7 +72,7 @@ released within 0.05 (xy), z <= 0.035, fingers more than 0.02 open, the hand mor
     place: str | None = None
 
 
-class Count(NamedTuple):
+class FactCount(NamedTuple):
     """So many of the facts hold now: at least `least`, and at most `most` if that is given."""
 
     facts: tuple[Fact, ...]
@@ -80,7 +80,7 @@ class Count(NamedTuple):
     most: int | None = None
 
 
-class Began(NamedTuple):
+class OccurrenceCount(NamedTuple):
     """The facts, taken together, have begun to hold at least so often.
 
     Attributes:
@@ -112,10 +112,10 @@ class Elapsed(NamedTuple):
 class All(NamedTuple):
     """Every one of several conditions."""
 
-    of: tuple[Fact | Count | Began | Elapsed, ...]
+    of: tuple[Fact | FactCount | OccurrenceCount | Elapsed, ...]
 
 
-Condition = Fact | Count | Began | Elapsed | All
+Condition = Fact | FactCount | OccurrenceCount | Elapsed | All
 
 
 class Rule(NamedTuple):
@@ -133,9 +133,9 @@ class Rule(NamedTuple):
     failure: GroundingFailure | ExecutionFailure | None = None
 
 
-def absent(fact: Fact) -> Count:
+def absent(fact: Fact) -> FactCount:
     """The condition that a fact does not hold."""
-    return Count((fact,), least=0, most=0)
+    return FactCount((fact,), least=0, most=0)
 
 
 def facts_of(condition: Condition | Rule) -> tuple[Fact, ...]:
@@ -145,7 +145,7 @@ def facts_of(condition: Condition | Rule) -> tuple[Fact, ...]:
             return (condition,)
         case Rule():
             return facts_of(condition.condition)
-        case Count() | Began():
+        case FactCount() | OccurrenceCount():
             return condition.facts
         case All():
             return tuple(fact for part in condition.of for fact in facts_of(part))

@@ -18,13 +18,18 @@ from roboirg.episodes.splits import get_episode
 from roboirg.judging import Event, Status, plain_subgoal
 from roboirg.language import instruct
 from roboirg.simulation.controllers import make_controller
-from roboirg.simulation.demonstration.demonstration_cache import perform
+from roboirg.simulation.demonstration.demonstration_cache import replay_or_plan
 from roboirg.simulation.demonstration.demonstration_video import make_video
 from roboirg.simulation.demonstration.recording import Recording
-from roboirg.simulation.episode_session import Session
-from roboirg.simulation.episode_state import Play
-from roboirg.simulation.observation_builder import Senses, Wishes, recalled_space, sensed_space
-from roboirg.simulation.rendering.pixel_grounding import Grounding
+from roboirg.simulation.episode_session import EpisodeSession
+from roboirg.simulation.episode_state import EpisodeState
+from roboirg.simulation.observation_builder import (
+    ObservationBuilder,
+    ObservationSpec,
+    history_space,
+    observation_space,
+)
+from roboirg.simulation.rendering.pixel_grounding import PixelGrounding
 from roboirg.simulation.rendering.render_device import describe, find_render_device
 from roboirg.simulation.rendering.render_mode import find_rendering
 
@@ -134,7 +139,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         )
         self._space = find_action_space(actions)
         self.actions = self._space.name
-        self._wishes = Wishes(
+        self._wishes = ObservationSpec(
             cameras,
             depth,
             calibration,
@@ -157,12 +162,12 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         self.observation_space = self._make_observation_space()
         self.action_space = spaces.Box(self._space.low, self._space.high, dtype=np.float64)
         self.grounded = grounded
-        self._play: Play | None = None
+        self._play: EpisodeState | None = None
         self._frame_hook: FrameHook | None = None
         self._hook_period = 1
 
     @property
-    def session(self) -> Session:
+    def session(self) -> EpisodeSession:
         """The episode being played.
 
         Raises:
@@ -201,7 +206,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Begin the episode anew; it is the same each time, whatever the seed."""
         super().reset(seed=seed, options=options)
-        recording = perform(self.episode, self._show, watched=self._frame_hook is not None)
+        recording = replay_or_plan(self.episode, self._show, watched=self._frame_hook is not None)
         self._follow(self.session.judge.published)
         play = self._playing
         shown = {
@@ -277,16 +282,16 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         return drawn or self._frame_hook is not None
 
     @property
-    def _playing(self) -> Play:
+    def _playing(self) -> EpisodeState:
         if self._play is None:
             raise gymnasium.error.ResetNeeded("Call reset() before anything else.")
         return self._play
 
     def _make_observation_space(self) -> spaces.Dict:
         said = {"instruction": spaces.Text(LONGEST_INSTRUCTION, charset=PRINTABLE)}
-        fields = {**sensed_space(self._wishes), **said}
+        fields = {**observation_space(self._wishes), **said}
         if self.observe_every is not None:
-            recalled = spaces.Dict({**recalled_space(self._wishes), **said})
+            recalled = spaces.Dict({**history_space(self._wishes), **said})
             fields["history"] = spaces.Sequence(recalled)
         return spaces.Dict(fields)
 
@@ -301,14 +306,16 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
 
         return play.session.play_demonstration(follow, recording)
 
-    def _begin(self) -> Play:
-        session = Session(self.episode, visible=self._visible, rendering=self._wishes.rendering)
+    def _begin(self) -> EpisodeState:
+        session = EpisodeSession(
+            self.episode, visible=self._visible, rendering=self._wishes.rendering
+        )
         world = session.world
-        return Play(
+        return EpisodeState(
             session,
-            Senses(world, self._wishes),
+            ObservationBuilder(world, self._wishes),
             make_controller(self._space, world.robot),
-            Grounding(world.bodies, world.cameras) if self.grounded else None,
+            PixelGrounding(world.bodies, world.cameras) if self.grounded else None,
         )
 
     def _execute(self, action: NDArray[np.float64]) -> None:

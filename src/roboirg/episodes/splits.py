@@ -107,7 +107,7 @@ def make_episode(
 
 
 @functools.cache
-def shipped() -> Mapping[str, TaskSplits]:
+def shipped_splits() -> Mapping[str, TaskSplits]:
     """What is shipped about the splits, by task."""
     text = resources.files("roboirg.episodes").joinpath(SPLITS_FILE).read_text(encoding="utf-8")
     return {task: TaskSplits(**entry) for task, entry in json.loads(text).items()}
@@ -160,7 +160,7 @@ def _check_index(split: Split, index: SupportsIndex) -> int:
 
 @functools.lru_cache(maxsize=4096)
 def _episode(task: str, split: Split, index: int) -> Episode:
-    entry = shipped().get(task)
+    entry = shipped_splits().get(task)
     passed_over = entry.passed_over.get(slot_key(split, index), 0) if entry else 0
     return _slot_episode(task, split, index, passed_over)
 

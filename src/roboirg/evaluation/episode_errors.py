@@ -16,12 +16,12 @@ from roboirg.core.errors import (
 )
 from roboirg.records.record import ErrorKind
 
-Blamed = Literal["policy", "environment"]
+ErrorSource = Literal["policy", "environment"]
 
 LONGEST_CAUSE = 400
 
 
-class Fault(Exception):  # noqa: N818 - caught where an episode is played, never seen by a user
+class EpisodeError(Exception):
     """Something other than the policy's skill ended the episode.
 
     Attributes:
@@ -33,17 +33,17 @@ class Fault(Exception):  # noqa: N818 - caught where an episode is played, never
     def __init__(self, kind: ErrorKind, what: str, details: str) -> None:
         super().__init__(what)
         self.kind = kind
-        self.cause = cause(kind, what)
+        self.cause = format_cause(kind, what)
         self.details = details
 
 
-def cause(kind: ErrorKind, what: str) -> str:
+def format_cause(kind: ErrorKind, what: str) -> str:
     """A record's cause: who is to blame, and for what."""
     return f"{kind.replace('_', ' ')}: {what}"
 
 
 @contextmanager
-def blame(whom: Blamed) -> Iterator[None]:
+def attribute_errors(whom: ErrorSource) -> Iterator[None]:
     """Turn what is raised inside into a fault.
 
     Raises:
@@ -53,13 +53,13 @@ def blame(whom: Blamed) -> Iterator[None]:
     """
     try:
         yield
-    except (RenderDeviceError, MissingDependencyError, Fault):
+    except (RenderDeviceError, MissingDependencyError, EpisodeError):
         raise
     except (Exception, SystemExit) as error:  # the boundary: anything is possible in there
-        raise Fault(_kind(whom, error), one_line(error), traceback.format_exc()) from error
+        raise EpisodeError(_kind(whom, error), one_line(error), traceback.format_exc()) from error
 
 
-def _kind(whom: Blamed, error: BaseException) -> ErrorKind:
+def _kind(whom: ErrorSource, error: BaseException) -> ErrorKind:
     if isinstance(error, InvalidActionError):
         return "invalid_action"
     if whom == "policy":

@@ -8,7 +8,7 @@ from statistics import fmean
 from typing import NamedTuple
 
 from roboirg.records.record import Job
-from roboirg.records.record_codec import Stored
+from roboirg.records.record_codec import RecordIndexEntry
 
 ASSUMED_STEPS = 450
 """Control steps of an episode if nothing is known: the oracle's mean over the test split, 236,
@@ -44,7 +44,7 @@ def cell_sizes(jobs: Iterable[Job]) -> Mapping[tuple[str, str], Mapping[str, Cou
     return sizes
 
 
-def estimate(jobs: Iterable[Job], played: Iterable[Stored], workers: int) -> Estimate:
+def estimate(jobs: Iterable[Job], played: Iterable[RecordIndexEntry], workers: int) -> Estimate:
     """How long jobs take.
 
     Args:
@@ -63,7 +63,7 @@ def estimate(jobs: Iterable[Job], played: Iterable[Stored], workers: int) -> Est
     return Estimate(count, total / max(workers, 1), steps, known and count > 0)
 
 
-def in_words(found: Estimate, planned: int, workers: int) -> tuple[str, ...]:
+def estimate_text(found: Estimate, planned: int, workers: int) -> tuple[str, ...]:
     """An estimate as lines to read."""
     lines = [f"{planned} episodes, {planned - found.episodes} of them are there already."]
     if found.episodes:
@@ -90,7 +90,7 @@ def _clock(seconds: float) -> str:
 class _Durations:
     """Mean durations of episodes that have been played."""
 
-    def __init__(self, played: Iterable[Stored]) -> None:
+    def __init__(self, played: Iterable[RecordIndexEntry]) -> None:
         self._known: defaultdict[tuple[str, str | None], list[float]] = defaultdict(list)
         for one in played:
             if one.outcome != "error":

@@ -49,7 +49,7 @@ VIDEO_MODES: tuple[VideoMode, ...] = get_args(VideoMode)
 
 MESHES = ("faithful", "light")
 
-PASSING: tuple[ErrorKind, ...] = ("connection", "environment", "infrastructure")
+RETRYABLE: tuple[ErrorKind, ...] = ("connection", "environment", "infrastructure")
 """Errors that may be gone when the episode is tried again."""
 
 FINGERPRINT_LENGTH = 12
@@ -106,7 +106,7 @@ class Plan(BaseModel):
     policy_timeout_s: float = 600.0
     episode_timeout_s: float = 7200.0
     tries: int = 2
-    retry_on: tuple[ErrorKind, ...] = PASSING
+    retry_on: tuple[ErrorKind, ...] = RETRYABLE
 
     @property
     def specs(self) -> dict[str, str]:
@@ -144,7 +144,7 @@ class Plan(BaseModel):
             self._check_settings(task)
         for said in self._distinct_words():
             # Whether it can be said so is the language's to judge.
-            say(said)
+            instruct_job(said)
         return self
 
     def jobs(self) -> tuple[Job, ...]:
@@ -243,7 +243,7 @@ def make_plan(
     episodes: str = "4",
     policy_seeds: str = "0",
     stages: str = "1-5",
-    retry_on: str = ",".join(PASSING),
+    retry_on: str = ",".join(RETRYABLE),
     **options: object,
 ) -> Plan:
     """A checked plan from words as they are typed.
@@ -298,7 +298,7 @@ def read_plan(folder: Path) -> Plan | None:
         return None
 
 
-def say(job: Job) -> Instruction:
+def instruct_job(job: Job) -> Instruction:
     """The instruction of a job.
 
     Raises:

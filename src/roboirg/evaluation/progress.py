@@ -31,7 +31,7 @@ class Reporter(Protocol):
         """A sentence that a person should read now."""
 
 
-class Silent:
+class SilentReporter:
     """Says nothing."""
 
     def begin(self, total: int, done: int) -> None:
@@ -44,7 +44,7 @@ class Silent:
         """Nothing."""
 
 
-class Score:
+class ProgressCounter:
     """Episodes so far: successes and valid episodes per setting, errors, pace."""
 
     def __init__(self) -> None:
@@ -87,7 +87,7 @@ class ConsoleReporter:
 
     def __init__(self, console: Console) -> None:
         self._console = console
-        self._score = Score()
+        self._score = ProgressCounter()
         self._bar = Progress(
             TextColumn("[bold]{task.description}"),
             BarColumn(),
@@ -103,7 +103,7 @@ class ConsoleReporter:
 
     def begin(self, total: int, done: int) -> None:
         """Start counting; the pace is that of this run alone."""
-        self._score = Score()
+        self._score = ProgressCounter()
         self._total, self._done = total, done
         self._bar.update(self._task, total=total, completed=done)
         if done:

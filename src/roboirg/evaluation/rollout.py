@@ -31,11 +31,11 @@ from roboirg.core.actions import ActionSpace, check_chunk
 from roboirg.core.errors import InvalidActionError, InvalidValueError
 from roboirg.core.observations import DemonstrationFrames, Observation
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.episode_errors import Fault, blame, one_line
+from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors, one_line
 from roboirg.evaluation.executors.watchdog import Phase, watched
 from roboirg.evaluation.plan import VideoMode
-from roboirg.evaluation.rollout_result import Course, describe, utc_now
-from roboirg.evaluation.video_writer import Film, VideoOptions
+from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
+from roboirg.evaluation.video_writer import VideoOptions, VideoWriter
 from roboirg.policies.base import Policy, PrivilegedPolicy
 from roboirg.policies.requirements import (
     wanted_actions,
@@ -49,7 +49,7 @@ from roboirg.records.record import Job, Record
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
-Play = Callable[[Job], Record]
+PlayJob = Callable[[Job], Record]
 """Plays one job. Executors send it to other processes, so it must pickle."""
 
 VIDEO_FOLDER = "videos"
@@ -62,7 +62,7 @@ MOST_METADATA = 65_536
 
 
 @dataclass(frozen=True, slots=True)
-class Player:
+class EpisodeRunner:
     """Plays jobs with the real environment and policies.
 
     Attributes:
@@ -79,7 +79,7 @@ class Player:
     policy_timeout_s: float | None = None
     plan: str | None = None
 
-    def in_folder(self, folder: Path) -> Player:
+    def in_folder(self, folder: Path) -> EpisodeRunner:
         """The same, for another folder."""
         return replace(self, folder=folder)
 
@@ -93,11 +93,11 @@ class Player:
         started_at, start = utc_now(), time.monotonic()
         film = None
         if self.video != "off":
-            film = Film(self.folder / VIDEO_FOLDER / f"{job.slug}.mp4", self.options)
+            film = VideoWriter(self.folder / VIDEO_FOLDER / f"{job.slug}.mp4", self.options)
         course = play_episode(job, film, self.policy_timeout_s)
         video = self._keep(film, course)
         lost = None if film is None or film.trouble is None else one_line(film.trouble)
-        return describe(
+        return make_record(
             job,
             course,
             video=video,
@@ -107,7 +107,7 @@ class Player:
             plan=self.plan,
         )
 
-    def _keep(self, film: Film | None, course: Course) -> str | None:
+    def _keep(self, film: VideoWriter | None, course: RolloutResult) -> str | None:
         if film is None:
             return None
         wanted = self.video == "all" or course.outcome != "success"
@@ -117,7 +117,7 @@ class Player:
         return None
 
 
-class Needs(NamedTuple):
+class EnvRequirements(NamedTuple):
     """What a policy needs of its environment.
 
     Attributes:
@@ -140,18 +140,18 @@ class Needs(NamedTuple):
 class _Phases:
     """Calls of policy and world: blamed, watched and timed."""
 
-    def __init__(self, course: Course, policy_timeout_s: float | None) -> None:
+    def __init__(self, course: RolloutResult, policy_timeout_s: float | None) -> None:
         self._timings = course.timings
         self._limit_s = policy_timeout_s
 
     @contextlib.contextmanager
     def policy(self, phase: Phase, name: str) -> Iterator[None]:
-        with blame("policy"), watched(phase, self._limit_s), self._timed(name):
+        with attribute_errors("policy"), watched(phase, self._limit_s), self._timed(name):
             yield
 
     @contextlib.contextmanager
     def world(self, name: str) -> Iterator[None]:
-        with blame("environment"), watched("world"), self._timed(name):
+        with attribute_errors("environment"), watched("world"), self._timed(name):
             yield
 
     @contextlib.contextmanager
@@ -165,25 +165,25 @@ class _Phases:
 
 
 def play_episode(
-    job: Job, film: Film | None = None, policy_timeout_s: float | None = None
-) -> Course:
+    job: Job, film: VideoWriter | None = None, policy_timeout_s: float | None = None
+) -> RolloutResult:
     """Play one job and say how it went; every fault of policy or world ends up in the cause.
 
     Raises:
         RenderDeviceError: no Vulkan device can render.
         MissingDependencyError: something has to be installed first.
     """
-    course = Course()
+    course = RolloutResult()
     phases = _Phases(course, policy_timeout_s)
     policy, env = None, None
     try:
         with phases.policy("policy's constructor", "policy_load"):
             policy = load_policy(job)
-            needs = needs_of(policy, job)
+            needs = env_requirements(policy, job)
         with phases.world("env_reset"):
             env = make_env(job, needs)
         _play(job, env, policy, needs.actions, film, course, phases)
-    except Fault as fault:
+    except EpisodeError as fault:
         course.fail(fault.kind, fault.cause, fault.details)
     finally:
         if policy is not None:
@@ -193,7 +193,7 @@ def play_episode(
     return course
 
 
-def needs_of(policy: Policy, job: Job) -> Needs:
+def env_requirements(policy: Policy, job: Job) -> EnvRequirements:
     """What a policy needs, where the job prescribes nothing else.
 
     Raises:
@@ -205,7 +205,7 @@ def needs_of(policy: Policy, job: Job) -> Needs:
             f"the policy acts in {actions.name!r}, but {job.actions!r} is prescribed."
         )
     frames, every = job.demonstration_frames, job.observe_every
-    return Needs(
+    return EnvRequirements(
         wanted_cameras(policy),
         actions,
         wanted_demonstration_frames(policy) if frames is None else frames,
@@ -215,7 +215,7 @@ def needs_of(policy: Policy, job: Job) -> Needs:
     )
 
 
-def make_env(job: Job, needs: Needs) -> RoboIRGEnv:
+def make_env(job: Job, needs: EnvRequirements) -> RoboIRGEnv:
     """The environment of a job, for a policy that needs it so."""
     import roboirg
 
@@ -256,8 +256,8 @@ def _play(
     env: RoboIRGEnv,
     policy: Policy,
     actions: ActionSpace,
-    film: Film | None,
-    course: Course,
+    film: VideoWriter | None,
+    course: RolloutResult,
     phases: _Phases,
 ) -> None:
     with phases.world("env_reset"):
@@ -316,7 +316,7 @@ def _metadata_of(policy: Policy) -> dict[str, JsonValue]:
     return cast("dict[str, JsonValue]", json.loads(text))
 
 
-def _say_goodbye(policy: Policy, course: Course, phases: _Phases) -> None:
+def _say_goodbye(policy: Policy, course: RolloutResult, phases: _Phases) -> None:
     """Ask what it cost and close it; trouble with that leaves the verdict as it is."""
     try:
         with phases.policy("policy's close()", "policy_close"):
@@ -325,5 +325,5 @@ def _say_goodbye(policy: Policy, course: Course, phases: _Phases) -> None:
                 course.usage = {name: cost for name, cost in usage.items() if math.isfinite(cost)}
             if hasattr(policy, "close"):
                 policy.close()
-    except Fault as fault:
+    except EpisodeError as fault:
         course.details = course.details or fault.details

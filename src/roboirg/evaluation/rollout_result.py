@@ -16,9 +16,9 @@ from roboirg.core.conditions import Fact, FactKind
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.code_fingerprint import code_fingerprint
-from roboirg.evaluation.plan import say
+from roboirg.evaluation.plan import instruct_job
 from roboirg.judging import Event
-from roboirg.judging.attribution import attribute
+from roboirg.judging.attribution import attribute_failure
 from roboirg.policies.loading import is_privileged, policy_version
 from roboirg.records.record import (
     Attribution,
@@ -28,12 +28,12 @@ from roboirg.records.record import (
     MentionSpan,
     Outcome,
     Record,
-    Turn,
+    UtteranceRecord,
 )
 
 
 @dataclass
-class Course:
+class RolloutResult:
     """How an episode went; filled while it goes, so that an error leaves what was before it.
 
     Attributes:
@@ -101,9 +101,9 @@ class Course:
             )
 
 
-def describe(
+def make_record(
     job: Job,
-    course: Course,
+    course: RolloutResult,
     *,
     started_at: str,
     duration_s: float = 0.0,
@@ -113,7 +113,7 @@ def describe(
 ) -> Record:
     """The record of a job that went so. Needs no simulator."""
     episode = get_episode(job.task, job.split, job.episode)
-    instruction, plain = say(job), language.instruct(episode, "explicit")
+    instruction, plain = instruct_job(job), language.instruct(episode, "explicit")
     return Record(
         **dict(job),
         seed=episode.seed,
@@ -124,7 +124,9 @@ def describe(
         attribution=_attribution(episode, course),
         steps=course.steps,
         demonstration_steps=course.demonstration_steps,
-        instruction=tuple(Turn(stage=u.stage, text=u.text) for u in instruction.utterances),
+        instruction=tuple(
+            UtteranceRecord(stage=u.stage, text=u.text) for u in instruction.utterances
+        ),
         mentions=tuple(
             MentionSpan(
                 utterance=mention.utterance,
@@ -161,11 +163,11 @@ def describe(
     )
 
 
-def _attribution(episode: Episode, course: Course) -> Attribution | None:
+def _attribution(episode: Episode, course: RolloutResult) -> Attribution | None:
     """Why the episode failed, if it did."""
     if course.outcome != "failure":
         return None
-    found = attribute(
+    found = attribute_failure(
         episode,
         [
             # The kinds are those that the world reported.

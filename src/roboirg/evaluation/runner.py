@@ -16,12 +16,12 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.executors.executor import Executor
 from roboirg.evaluation.plan import Plan, write_plan
-from roboirg.evaluation.progress import Reporter, Silent
-from roboirg.evaluation.rollout import Play
+from roboirg.evaluation.progress import Reporter, SilentReporter
+from roboirg.evaluation.rollout import PlayJob
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.policies.loading import policy_version
 from roboirg.records.record import Job, Record
-from roboirg.records.record_codec import Stored, key_of
+from roboirg.records.record_codec import RecordIndexEntry, identity_key
 from roboirg.records.store import TORN_FILE, RecordStore, StoreError
 
 UNREACHABLE_AFTER = 20
@@ -32,7 +32,7 @@ class Terminated(KeyboardInterrupt):
     """The process was asked to go (SIGTERM); handled like Ctrl-C."""
 
 
-class Summary(NamedTuple):
+class RunSummary(NamedTuple):
     """What a run found and did.
 
     Attributes:
@@ -47,7 +47,7 @@ class Summary(NamedTuple):
 
     total: int
     played: int
-    errors: tuple[Stored, ...]
+    errors: tuple[RecordIndexEntry, ...]
     missing: int
     torn_bytes: int
     unfilmed: tuple[str, ...]
@@ -57,12 +57,12 @@ class Summary(NamedTuple):
 def run_plan(
     plan: Plan,
     folder: Path,
-    play: Play,
+    play: PlayJob,
     executor: Executor,
     *,
     retry_errors: bool = True,
     reporter: Reporter | None = None,
-) -> Summary:
+) -> RunSummary:
     """Play what the plan has and the folder lacks; store each record the moment it arrives.
 
     An episode that ends in an error of one of the kinds `Plan.retry_on` is tried again after all
@@ -82,14 +82,14 @@ def run_plan(
         RoboIRGError: what would end every episode (no Vulkan device, …).
         KeyboardInterrupt: Ctrl-C, or SIGTERM as `Terminated`; all that ended is stored.
     """
-    listener = reporter or Silent()
+    listener = reporter or SilentReporter()
     jobs = plan.jobs()
     with _sigterm_interrupts(), RecordStore(folder) as store:
         _tell_damage(store, listener)
         _check_versions(store.stored.values(), folder)
         _check_policies(plan, store.stored.values(), folder)
         write_plan(plan, folder)
-        keys = [key_of(job) for job in jobs]
+        keys = [identity_key(job) for job in jobs]
         todo = [
             job
             for job, key in zip(jobs, keys, strict=True)
@@ -99,7 +99,7 @@ def run_plan(
         course = _Run(plan, store, listener)
         course.play(todo, play, executor)
         found = [store.stored.get(key) for key in keys]
-        return Summary(
+        return RunSummary(
             total=len(jobs),
             played=len(course.tries),
             errors=tuple(one for one in found if one is not None and one.outcome == "error"),
@@ -126,17 +126,17 @@ class _Run:
         self.unfilmed: list[str] = []
         self.unreachable: list[str] = []
 
-    def play(self, todo: Sequence[Job], play: Play, executor: Executor) -> None:
+    def play(self, todo: Sequence[Job], play: PlayJob, executor: Executor) -> None:
         """Play jobs, and once more what ended in an error that may pass."""
         while todo:
             todo = self._play_once(todo, play, executor)
 
-    def _play_once(self, todo: Sequence[Job], play: Play, executor: Executor) -> list[Job]:
+    def _play_once(self, todo: Sequence[Job], play: PlayJob, executor: Executor) -> list[Job]:
         """Play jobs; those that are to be played afterwards."""
-        open_jobs, again = {key_of(job): job for job in todo}, []
+        open_jobs, again = {identity_key(job): job for job in todo}, []
         with contextlib.closing(_iterate(executor, todo, play)) as records:
             for record in records:
-                job = open_jobs.pop(key_of(record))
+                job = open_jobs.pop(identity_key(record))
                 self._keep(job, record)
                 if self._is_to_be_tried_again(job, record):
                     again.append(job)
@@ -148,7 +148,7 @@ class _Run:
         return [job for job in again if job.policy not in self.unreachable]
 
     def _keep(self, job: Job, record: Record) -> None:
-        before = self._store.stored.get(key_of(job))
+        before = self._store.stored.get(identity_key(job))
         if before is not None:
             record = record.model_copy(update={"attempt": before.attempt + 1})
         self._store.append(record)
@@ -175,7 +175,7 @@ class _Run:
         )
 
 
-def _is_due(stored: Stored | None, *, retry_errors: bool) -> bool:
+def _is_due(stored: RecordIndexEntry | None, *, retry_errors: bool) -> bool:
     return stored is None or (retry_errors and stored.outcome == "error")
 
 
@@ -192,7 +192,7 @@ def _tell_damage(store: RecordStore, listener: Reporter) -> None:
         )
 
 
-def _check_versions(records: Iterable[Stored], folder: Path) -> None:
+def _check_versions(records: Iterable[RecordIndexEntry], folder: Path) -> None:
     """Refuse to mix words or worlds of two versions: rates of different things are no rate."""
     records = tuple(records)
     for language in {record.language_version for record in records} - {LANGUAGE_VERSION}:
@@ -216,7 +216,7 @@ def _check_versions(records: Iterable[Stored], folder: Path) -> None:
             )
 
 
-def _check_policies(plan: Plan, records: Iterable[Stored], folder: Path) -> None:
+def _check_policies(plan: Plan, records: Iterable[RecordIndexEntry], folder: Path) -> None:
     """Refuse to mix what two policies of the same name did."""
     versions = {name: policy_version(spec) for name, spec in plan.specs.items()}
     for policy, version in {(record.policy, record.policy_version) for record in records}:
@@ -236,7 +236,9 @@ def _seed(task: str, split: str, episode: int) -> str | int:
         return "no such episode"
 
 
-def _iterate(executor: Executor, jobs: Sequence[Job], play: Play) -> Generator[Record, None, None]:
+def _iterate(
+    executor: Executor, jobs: Sequence[Job], play: PlayJob
+) -> Generator[Record, None, None]:
     yield from executor.run(jobs, play)
 
 

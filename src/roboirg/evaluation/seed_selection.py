@@ -27,7 +27,7 @@ from roboirg.episodes.splits import (
 from roboirg.language import expressible
 from roboirg.policies import make_policy, play
 from roboirg.tasks import every_task, get_task
-from roboirg.util.parallel_map import spread
+from roboirg.util.parallel_map import parallel_map
 
 Reason = Literal["no room", "not expressible", "oracle failed"]
 REASONS: tuple[Reason, ...] = ("no room", "not expressible", "oracle failed")
@@ -48,7 +48,7 @@ class Rejection(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Slot:
+class EpisodeSlot:
     """An episode whose seed is looked for."""
 
     task: str
@@ -66,28 +66,30 @@ class Slot:
         return episode_key(self.task, self.split, self.index)
 
 
-class Found(NamedTuple):
+class SelectedSeed(NamedTuple):
     """A slot and the seeds that had to be passed over for it, in order."""
 
-    slot: Slot
+    slot: EpisodeSlot
     rejections: tuple[Rejection, ...]
 
 
-Judge = Callable[[Slot, int], Rejection | None]
+Judge = Callable[[EpisodeSlot, int], Rejection | None]
 """Says why a seed cannot be taken for a slot; None if it can."""
 
 
-def slots_of(tasks: Sequence[str], splits: Sequence[Split] = SPLITS) -> tuple[Slot, ...]:
+def episode_slots(
+    tasks: Sequence[str], splits: Sequence[Split] = SPLITS
+) -> tuple[EpisodeSlot, ...]:
     """Every episode of the splits of the tasks, in order."""
     return tuple(
-        Slot(task, split, index)
+        EpisodeSlot(task, split, index)
         for task in tasks
         for split in splits
         for index in range(SIZES[split])
     )
 
 
-def judge_words(slot: Slot, seed: int) -> Rejection | None:
+def check_words(slot: EpisodeSlot, seed: int) -> Rejection | None:
     """Why scene or words rule a seed out; needs no simulator."""
     try:
         episode = _episode(slot, seed)
@@ -98,9 +100,9 @@ def judge_words(slot: Slot, seed: int) -> Rejection | None:
     return Rejection(seed, "not expressible", ", ".join(unsaid)) if unsaid else None
 
 
-def judge_seed(slot: Slot, seed: int) -> Rejection | None:
+def check_seed(slot: EpisodeSlot, seed: int) -> Rejection | None:
     """Why scene, words or oracle rule a seed out; the oracle plays without pictures."""
-    rejection = judge_words(slot, seed)
+    rejection = check_words(slot, seed)
     if rejection is None:
         failure = oracle_failure(_episode(slot, seed))
         rejection = None if failure is None else Rejection(seed, "oracle failed", failure)
@@ -117,7 +119,7 @@ def oracle_failure(episode: Episode) -> str | None:
     return None if info["status"] == "success" else str(info["cause"] or info["status"])
 
 
-def find_seed(slot: Slot, judge: Judge = judge_seed) -> Found:
+def find_seed(slot: EpisodeSlot, judge: Judge = check_seed) -> SelectedSeed:
     """The first seed of a slot that can be taken.
 
     Raises:
@@ -128,7 +130,7 @@ def find_seed(slot: Slot, judge: Judge = judge_seed) -> Found:
     for seed in range(first, first + MAX_REJECTED + 1):
         rejection = judge(slot, seed)
         if rejection is None:
-            return Found(slot, tuple(rejections))
+            return SelectedSeed(slot, tuple(rejections))
         rejections.append(rejection)
     raise SceneRejectedError(
         f"No seed from {first} to {first + MAX_REJECTED} gives episode {slot.key}; "
@@ -136,7 +138,9 @@ def find_seed(slot: Slot, judge: Judge = judge_seed) -> Found:
     )
 
 
-def find_seeds(slots: Sequence[Slot], workers: int, judge: Judge = judge_seed) -> Iterator[Found]:
+def find_seeds(
+    slots: Sequence[EpisodeSlot], workers: int, judge: Judge = check_seed
+) -> Iterator[SelectedSeed]:
     """`find_seed` for every slot, as they end, in so many processes; 0 for this one.
 
     Raises:
@@ -144,7 +148,7 @@ def find_seeds(slots: Sequence[Slot], workers: int, judge: Judge = judge_seed) -
         SceneRejectedError: an episode has no seed.
         RoboIRGError: a process died.
     """
-    found = spread(functools.partial(find_seed, judge=judge), slots, workers)
+    found = parallel_map(functools.partial(find_seed, judge=judge), slots, workers)
     yield from (outcome for _, outcome in found)
 
 
@@ -157,24 +161,24 @@ def check_kept(
         InvalidValueError: they were never built, or their scenes have changed since.
     """
     kept = [split for split in SPLITS if split not in splits]
-    for slot in slots_of(tasks, kept):
+    for slot in episode_slots(tasks, kept):
         entry = known.get(slot.task)
         passed_over = entry.passed_over.get(slot_key(slot.split, slot.index), 0) if entry else 0
         first = slot_seed(get_task(slot.task), slot.split, slot.index)
-        if entry is None or judge_words(slot, first + passed_over) is not None:
+        if entry is None or check_words(slot, first + passed_over) is not None:
             raise InvalidValueError(
                 f"There is no valid episode {slot.key} to keep; build all splits of {slot.task}."
             )
 
 
-def merged(found: Sequence[Found], known: Mapping[str, TaskSplits]) -> dict[str, TaskSplits]:
+def merged(found: Sequence[SelectedSeed], known: Mapping[str, TaskSplits]) -> dict[str, TaskSplits]:
     """What is to be shipped: what was found, and what is known about everything else."""
     splits = {task: known[task] for task in every_task() if task in known}
     for task in dict.fromkeys(one.slot.task for one in found):
         old = known[task].passed_over if task in known else {}
         new = {one.slot: len(one.rejections) for one in found}
         counts: dict[str, int] = {}
-        for slot in slots_of([task]):
+        for slot in episode_slots([task]):
             key = slot_key(slot.split, slot.index)
             counts[key] = new.get(slot, old.get(key, 0))
         passed_over = {key: count for key, count in counts.items() if count}
@@ -182,5 +186,5 @@ def merged(found: Sequence[Found], known: Mapping[str, TaskSplits]) -> dict[str,
     return {task: splits[task] for task in every_task() if task in splits}
 
 
-def _episode(slot: Slot, seed: int) -> Episode:
+def _episode(slot: EpisodeSlot, seed: int) -> Episode:
     return make_episode(slot.task, seed, slot.difficulty, slot.split, slot.index)

@@ -11,7 +11,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from roboirg.core.episode import DIFFICULTIES
-from roboirg.evaluation.seed_selection import REASONS, Found, Slot
+from roboirg.evaluation.seed_selection import REASONS, EpisodeSlot, SelectedSeed
 
 MINIMUM_WIDTH = 120
 """Columns to use where the output is not a terminal."""
@@ -20,7 +20,9 @@ _LINE_EVERY = 50
 """Where there is no terminal, a line is printed after so many episodes."""
 
 
-def followed(found: Iterable[Found], slots: Sequence[Slot], console: Console) -> tuple[Found, ...]:
+def follow_progress(
+    found: Iterable[SelectedSeed], slots: Sequence[EpisodeSlot], console: Console
+) -> tuple[SelectedSeed, ...]:
     """All that is found, in the order of the slots, however it comes.
 
     Meanwhile a bar or, without a terminal, a line now and then tells how far it is.
@@ -36,7 +38,7 @@ def followed(found: Iterable[Found], slots: Sequence[Slot], console: Console) ->
         transient=True,
         disable=not console.is_terminal,
     )
-    collected: dict[Slot, Found] = {}
+    collected: dict[EpisodeSlot, SelectedSeed] = {}
     with bar:
         task = bar.add_task("episodes", total=total, last="")
         for one in found:
@@ -47,7 +49,7 @@ def followed(found: Iterable[Found], slots: Sequence[Slot], console: Console) ->
     return tuple(collected[slot] for slot in slots)
 
 
-def summary_table(found: Sequence[Found]) -> Table:
+def summary_table(found: Sequence[SelectedSeed]) -> Table:
     """By task and difficulty: episodes, seeds tried, and how many were passed over and why."""
     table = Table(title="Seeds passed over", title_justify="left", title_style="bold")
     table.add_column("task")
@@ -68,7 +70,7 @@ def summary_table(found: Sequence[Found]) -> Table:
     return table
 
 
-def cause_lines(found: Sequence[Found]) -> list[str]:
+def cause_lines(found: Sequence[SelectedSeed]) -> list[str]:
     """The exact causes by task, for all but want of room, each with a seed that shows it."""
     counts: Counter[tuple[str, str, str]] = Counter()
     examples: dict[tuple[str, str, str], str] = {}
@@ -84,7 +86,7 @@ def cause_lines(found: Sequence[Found]) -> list[str]:
     ]
 
 
-def print_summary(found: Sequence[Found], console: Console) -> None:
+def print_summary(found: Sequence[SelectedSeed], console: Console) -> None:
     """The table and, below, the exact causes."""
     if not console.is_terminal:
         console.width = max(console.width, MINIMUM_WIDTH)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.errors import MissingDependencyError, RenderDeviceError
-from roboirg.util.text_overlay import wrapped, write_text
+from roboirg.util.text_overlay import draw_text, wrap_text
 
 if TYPE_CHECKING:
     from av.container import OutputContainer
@@ -55,7 +55,7 @@ class VideoOptions:
     quality: int = 28
 
 
-class Pictured(Protocol):
+class PictureSource(Protocol):
     """Whatever draws a picture on request, as the environment does."""
 
     def picture(self, camera: str) -> Frame:
@@ -100,16 +100,16 @@ def compose(
 @functools.lru_cache(maxsize=8)
 def _bar(caption: str, width: int) -> Frame:
     """A caption on paper; its height is even, as H.264 wants it."""
-    lines = wrapped(caption, width - 2 * _TEXT_MARGIN, _TEXT_SCALE)[:_MOST_LINES]
+    lines = wrap_text(caption, width - 2 * _TEXT_MARGIN, _TEXT_SCALE)[:_MOST_LINES]
     height = len(lines) * _TEXT_LINE + 2 * _TEXT_MARGIN
     bar: Frame = np.full((height, width, 3), _PAPER, np.uint8)
     for number, text in enumerate(lines, start=1):
-        write_text(bar, text, _TEXT_MARGIN, number * _TEXT_LINE, _TEXT_SCALE, _INK)
+        draw_text(bar, text, _TEXT_MARGIN, number * _TEXT_LINE, _TEXT_SCALE, _INK)
     return bar
 
 
 @dataclass
-class Film:
+class VideoWriter:
     """A film in the making. Nothing exists under `path` until `finish`.
 
     A film that cannot be written is given up, whatever FFmpeg or the disk does: what is filmed
@@ -137,7 +137,7 @@ class Film:
         """Where the film grows; a later film of the same name overwrites what a kill left."""
         return self.path.with_name(f".{self.path.name}.part")
 
-    def shoot(self, world: Pictured, is_demonstration: bool = False) -> None:
+    def shoot(self, world: PictureSource, is_demonstration: bool = False) -> None:
         """Add the world as it looks now.
 
         Raises:

@@ -1,4 +1,4 @@
-"""Why an episode failed, from its events alone: `attribute`; docs/attribution.md has the meaning.
+"""Attribute a failed episode to a cause, from its events alone (docs/attribution.md).
 
 Two kinds. A grounding failure: something else was done than what was meant. An execution failure:
 what was meant was not brought off. The first thing that could not be made good any more decides;
@@ -13,23 +13,23 @@ from typing import NamedTuple
 from roboirg.core.conditions import (
     LASTING_KINDS,
     All,
-    Began,
     Condition,
-    Count,
     Elapsed,
     Fact,
+    FactCount,
+    OccurrenceCount,
     Rule,
     facts_of,
 )
 from roboirg.core.episode import Episode
-from roboirg.judging.end_state import ending
-from roboirg.judging.episode_replay import Spell, Trace, retrace
+from roboirg.judging.end_state import describe_end_state
+from roboirg.judging.episode_replay import EpisodeReplay, FactInterval, rejudge
 from roboirg.judging.events import Event
-from roboirg.judging.fact_history import History
-from roboirg.judging.failure_attribution import FailureName, Finding
-from roboirg.judging.grounding_errors import mistake
+from roboirg.judging.fact_history import FactHistory
+from roboirg.judging.failure_attribution import FailureAttribution, FailureName
+from roboirg.judging.grounding_errors import classify_grounding_error
 from roboirg.judging.judge import Status, describe_violation
-from roboirg.judging.release_errors import excuse
+from roboirg.judging.release_errors import find_excusing_release
 
 
 class _Deviation(NamedTuple):
@@ -46,7 +46,7 @@ class _Deviation(NamedTuple):
     fact: Fact | None
 
 
-def attribute(
+def attribute_failure(
     episode: Episode,
     events: Sequence[Event],
     *,
@@ -54,7 +54,7 @@ def attribute(
     turn: int,
     elapsed: int,
     cause: str | None = None,
-) -> Finding | None:
+) -> FailureAttribution | None:
     """Say why an episode failed.
 
     Args:
@@ -69,7 +69,7 @@ def attribute(
     Returns:
         None if it did not fail.
     """
-    trace = retrace(episode, events, turn, elapsed)
+    trace = rejudge(episode, events, turn, elapsed)
     over = timed_out or cause is not None
     if trace.judge.status is Status.SUCCESS or not (trace.judge.broken or over):
         return None
@@ -77,32 +77,34 @@ def attribute(
     if first is not None and first.fact is not None:
         found = _of_act(trace, first, first.fact)
     elif first is None and not timed_out:
-        found = Finding.of("unreachable", None, trace.end, f"a pose could not be reached: {cause}")
+        found = FailureAttribution.of(
+            "unreachable", None, trace.end, f"a pose could not be reached: {cause}"
+        )
     else:
-        found = ending(trace)
+        found = describe_end_state(trace)
         if first is not None and found.failure == "out_of_time":
             found = _of_time(trace, first)
     return found._replace(step=found.step - turn)
 
 
-def _of_act(trace: Trace, deviation: _Deviation, fact: Fact) -> Finding:
+def _of_act(trace: EpisodeReplay, deviation: _Deviation, fact: Fact) -> FailureAttribution:
     """What it means that something was done that must not be."""
     failure, due = _failure_of(deviation.broken), max(trace.dues[deviation.step], 0)
     if failure is None:
-        slip = excuse(trace, fact) if deviation.step == trace.end else None
+        slip = find_excusing_release(trace, fact) if deviation.step == trace.end else None
         if slip is not None:
             return slip
-        failure = mistake(fact, trace.stages, due)
-    return Finding.of(failure, fact.subject, deviation.step, _words(trace, deviation))
+        failure = classify_grounding_error(fact, trace.stages, due)
+    return FailureAttribution.of(failure, fact.subject, deviation.step, _words(trace, deviation))
 
 
-def _of_time(trace: Trace, deviation: _Deviation) -> Finding:
+def _of_time(trace: EpisodeReplay, deviation: _Deviation) -> FailureAttribution:
     """What it means that something was not done in time, and nothing else was wrong."""
     failure = _failure_of(deviation.broken) or "out_of_time"
-    return Finding.of(failure, None, deviation.step, _words(trace, deviation))
+    return FailureAttribution.of(failure, None, deviation.step, _words(trace, deviation))
 
 
-def _deviations(trace: Trace) -> Iterator[_Deviation]:
+def _deviations(trace: EpisodeReplay) -> Iterator[_Deviation]:
     """What was going to be broken, and what was; where it is the same step, the former."""
     yield from _lasting(trace)
     for rule in _rules(trace):
@@ -112,9 +114,9 @@ def _deviations(trace: Trace) -> Iterator[_Deviation]:
         yield _Deviation(trace.end, broken, _act(trace, broken, trace.end))
 
 
-def _lasting(trace: Trace) -> Iterator[_Deviation]:
+def _lasting(trace: EpisodeReplay) -> Iterator[_Deviation]:
     """Rules of what is due, or will be, that have come to hold for good."""
-    history, last = History(), _rules(trace)
+    history, last = FactHistory(), _rules(trace)
     for step, facts in enumerate(trace.facts):
         fresh = facts is not history.facts
         history.follow(step, facts)
@@ -126,9 +128,9 @@ def _lasting(trace: Trace) -> Iterator[_Deviation]:
                 yield _Deviation(step, rule, _act(trace, rule, step))
 
 
-def _wasted(trace: Trace, rule: Rule) -> Iterator[_Deviation]:
+def _wasted(trace: EpisodeReplay, rule: Rule) -> Iterator[_Deviation]:
     """A beginning that counts towards a limit, when all that the limit leaves are still needed."""
-    if not isinstance(rule.condition, Began) or rule.condition.until is not None:
+    if not isinstance(rule.condition, OccurrenceCount) or rule.condition.until is not None:
         return
     counted = rule.condition.facts
     needed = sum(stage.expects in counted for stage in trace.stages)
@@ -139,14 +141,14 @@ def _wasted(trace: Trace, rule: Rule) -> Iterator[_Deviation]:
         yield _Deviation(wasted[spare].begin, rule, wasted[spare].fact)
 
 
-def _used(trace: Trace, spell: Spell) -> bool:
+def _used(trace: EpisodeReplay, spell: FactInterval) -> bool:
     """Whether a stage was completed by it."""
     end = trace.end + 1 if spell.end is None else spell.end
     completed = map(trace.completed, range(spell.begin, end))
     return any(stage is not None and stage.expects == spell.fact for stage in completed)
 
 
-def _rules(trace: Trace) -> dict[Rule, int]:
+def _rules(trace: EpisodeReplay) -> dict[Rule, int]:
     """All rules, each with the last stage in which it is in force."""
     return {
         one: index
@@ -161,9 +163,9 @@ def _lasts(condition: Condition) -> bool:
     match condition:
         case Fact():
             return condition.kind in LASTING_KINDS
-        case Count(facts, _, most):
+        case FactCount(facts, _, most):
             return most is None and all(map(_lasts, facts))
-        case Began():
+        case OccurrenceCount():
             return True
         case All(of):
             return all(map(_lasts, of))
@@ -171,7 +173,7 @@ def _lasts(condition: Condition) -> bool:
             return False
 
 
-def _act(trace: Trace, broken: Fact | Rule, step: int) -> Fact | None:
+def _act(trace: EpisodeReplay, broken: Fact | Rule, step: int) -> Fact | None:
     """What was done last of that by which something is broken; None if nothing was done."""
     facts = facts_of(broken)
     begun = [s for s in trace.spells if s.fact in facts and s.begin <= step]
@@ -183,6 +185,6 @@ def _failure_of(broken: Fact | Rule) -> FailureName | None:
     return broken.failure if isinstance(broken, Rule) else None
 
 
-def _words(trace: Trace, deviation: _Deviation) -> str:
+def _words(trace: EpisodeReplay, deviation: _Deviation) -> str:
     due = trace.stages[max(trace.dues[deviation.step], 0)]
     return describe_violation(deviation.broken, due, trace.episode.scene)

@@ -9,14 +9,14 @@ from typing import NamedTuple
 from roboirg.core.conditions import All, Condition, Fact, facts_of
 from roboirg.core.episode import Episode, Stage
 from roboirg.judging.events import Event
-from roboirg.judging.fact_history import History
+from roboirg.judging.fact_history import FactHistory
 from roboirg.judging.judge import Judge
 
 GRIPS = ("picked", "lifted", "held")
 """Facts of something that is in the hand."""
 
 
-class Spell(NamedTuple):
+class FactInterval(NamedTuple):
     """A fact held from one evaluation to another.
 
     Attributes:
@@ -31,7 +31,7 @@ class Spell(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Trace:
+class EpisodeReplay:
     """One episode, step by step. Steps count since the world began.
 
     Attributes:
@@ -48,7 +48,7 @@ class Trace:
     turn: int
     dues: tuple[int, ...]
     facts: tuple[frozenset[Fact], ...]
-    spells: tuple[Spell, ...]
+    spells: tuple[FactInterval, ...]
     judge: Judge
 
     @property
@@ -77,13 +77,13 @@ class Trace:
         after = self.dues[step + 1] if step < self.end else self.due
         return self.stages[due] if 0 <= due < after else None
 
-    def begun(self, *kinds: str, after: int) -> Iterator[Spell]:
+    def begun(self, *kinds: str, after: int) -> Iterator[FactInterval]:
         """What began later than a step, of some kinds."""
         return (s for s in self.spells if s.begin > after and s.fact.kind in kinds)
 
     def unmet(self) -> tuple[Fact, ...]:
         """The facts of all parts of what is due that are not met at the end."""
-        history = History()
+        history = FactHistory()
         for step, facts in enumerate(self.facts):
             history.follow(step, facts)
         expects = self.stages[self.due].expects
@@ -91,7 +91,7 @@ class Trace:
         return tuple(f for part in parts if not history.holds(part) for f in facts_of(part))
 
 
-def retrace(episode: Episode, events: Sequence[Event], turn: int, elapsed: int) -> Trace:
+def rejudge(episode: Episode, events: Sequence[Event], turn: int, elapsed: int) -> EpisodeReplay:
     """Judge an episode again.
 
     Args:
@@ -106,7 +106,7 @@ def retrace(episode: Episode, events: Sequence[Event], turn: int, elapsed: int) 
     for step, now in enumerate(facts):
         dues.append(judge.index - len(episode.demonstration))
         judge.update(step, now)
-    return Trace(episode, turn, tuple(dues), facts, _spells(events), judge)
+    return EpisodeReplay(episode, turn, tuple(dues), facts, _spells(events), judge)
 
 
 def facts_by_step(events: Sequence[Event], elapsed: int) -> tuple[frozenset[Fact], ...]:
@@ -123,13 +123,13 @@ def facts_by_step(events: Sequence[Event], elapsed: int) -> tuple[frozenset[Fact
     return tuple(course)
 
 
-def _spells(events: Sequence[Event]) -> tuple[Spell, ...]:
+def _spells(events: Sequence[Event]) -> tuple[FactInterval, ...]:
     open_: dict[Fact, int] = {}
-    spells: list[Spell] = []
+    spells: list[FactInterval] = []
     for event in events:
         if event.holds:
             open_[event.fact] = event.step
         else:
-            spells.append(Spell(event.fact, open_.pop(event.fact), event.step))
-    spells += [Spell(fact, begin, None) for fact, begin in open_.items()]
+            spells.append(FactInterval(event.fact, open_.pop(event.fact), event.step))
+    spells += [FactInterval(fact, begin, None) for fact, begin in open_.items()]
     return tuple(sorted(spells, key=lambda spell: (spell.begin, spell.fact.kind)))

@@ -5,10 +5,10 @@ from __future__ import annotations
 import bisect
 from collections.abc import Set as AbstractSet
 
-from roboirg.core.conditions import All, Began, Condition, Count, Elapsed, Fact
+from roboirg.core.conditions import All, Condition, Elapsed, Fact, FactCount, OccurrenceCount
 
 
-class History:
+class FactHistory:
     """Follows the facts from evaluation to evaluation and answers conditions.
 
     Attributes:
@@ -38,9 +38,9 @@ class History:
         match condition:
             case Fact():
                 return condition in self.facts
-            case Count(facts, least, most):
+            case FactCount(facts, least, most):
                 return _within(sum(fact in self.facts for fact in facts), least, most)
-            case Began(facts, least, until):
+            case OccurrenceCount(facts, least, until):
                 return sum(self._beginnings(fact, until) for fact in facts) >= least
             case Elapsed(least, most, timer):
                 start = 0 if timer is None else self._timers.get(timer)

@@ -12,7 +12,7 @@ GROUNDING: tuple[GroundingFailure, ...] = get_args(GroundingFailure)
 EXECUTION: tuple[ExecutionFailure, ...] = get_args(ExecutionFailure)
 
 
-class Finding(NamedTuple):
+class FailureAttribution(NamedTuple):
     """Why an episode failed.
 
     Attributes:
@@ -31,7 +31,9 @@ class Finding(NamedTuple):
     sentence: str
 
     @classmethod
-    def of(cls, failure: FailureName, subject: str | None, step: int, words: str) -> Finding:
+    def of(
+        cls, failure: FailureName, subject: str | None, step: int, words: str
+    ) -> FailureAttribution:
         """A finding of the kind to which the failure belongs; its words become a sentence."""
         kind: Literal["grounding", "execution"] = (
             "grounding" if failure in GROUNDING else "execution"

@@ -13,7 +13,7 @@ CLOSING: FactKind = "pressed"
 """The act that says that all has been done."""
 
 
-def mistake(fact: Fact, stages: Sequence[Stage], due: int) -> GroundingFailure:
+def classify_grounding_error(fact: Fact, stages: Sequence[Stage], due: int) -> GroundingFailure:
     """What it means that something was done while something else was due.
 
     | the act | is |

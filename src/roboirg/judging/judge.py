@@ -13,7 +13,7 @@ from enum import StrEnum
 
 from roboirg.core.conditions import Fact, Rule
 from roboirg.core.episode import Scene, Stage
-from roboirg.judging.fact_history import History
+from roboirg.judging.fact_history import FactHistory
 
 
 class Status(StrEnum):
@@ -48,7 +48,7 @@ class Judge:
         self.published = self.current
         self.cause: str | None = None
         self.broken: Fact | Rule | None = None
-        self._history = History()
+        self._history = FactHistory()
         self._held_since: int | None = None
 
     @property

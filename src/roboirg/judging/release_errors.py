@@ -12,14 +12,14 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from roboirg.core.conditions import LASTING_KINDS, Fact, facts_of
-from roboirg.judging.episode_replay import Spell, Trace
-from roboirg.judging.failure_attribution import Finding
+from roboirg.judging.episode_replay import EpisodeReplay, FactInterval
+from roboirg.judging.failure_attribution import FailureAttribution
 from roboirg.judging.judge import Judge, Status, describe_object, plain_subgoal
 
 PLACINGS = ("placed", "binned")
 
 
-class Slip(NamedTuple):
+class MisplacedRelease(NamedTuple):
     """Something that was picked came to lie elsewhere than where it was due.
 
     Attributes:
@@ -30,12 +30,12 @@ class Slip(NamedTuple):
     """
 
     missing: Fact
-    grip: Spell
+    grip: FactInterval
     begin: int
     until: int | None
 
 
-def excuse(trace: Trace, act: Fact) -> Finding | None:
+def find_excusing_release(trace: EpisodeReplay, act: Fact) -> FailureAttribution | None:
     """The failed execution without which an act would not have come too early, if there is one."""
     due = trace.due
     later = [
@@ -47,14 +47,16 @@ def excuse(trace: Trace, act: Fact) -> Finding | None:
         return None
     slips = list(_slips(trace))
     if slips and _allowed(trace, slips):
-        return released(trace, slips[0].grip, slips[0].begin)
+        return describe_release(trace, slips[0].grip, slips[0].begin)
     expects = trace.stages[due].expects
     if [stage.expects for stage in trace.stages[due : later[0]]].count(expects) == 1:
-        return missed(trace, facts_of(expects))
+        return describe_missed_grasp(trace, facts_of(expects))
     return None
 
 
-def missed(trace: Trace, wanted: tuple[Fact, ...]) -> Finding | None:
+def describe_missed_grasp(
+    trace: EpisodeReplay, wanted: tuple[Fact, ...]
+) -> FailureAttribution | None:
     """The last attempt to take hold of something since the present stage is due."""
     subjects = {fact.subject for fact in wanted if fact.kind in ("picked", "lifted")}
     tries = trace.begun("reached", "held", after=trace.due_since)
@@ -67,10 +69,12 @@ def missed(trace: Trace, wanted: tuple[Fact, ...]) -> Finding | None:
         return None
     name = spell.fact.subject
     words = f"reached {describe_object(name, trace.episode.scene)} without lifting it"
-    return Finding.of("missed_grasp", name, spell.begin, f"{words} {while_due(trace)}")
+    return FailureAttribution.of(
+        "missed_grasp", name, spell.begin, f"{words} {expected_action(trace)}"
+    )
 
 
-def released(trace: Trace, grip: Spell, step: int) -> Finding:
+def describe_release(trace: EpisodeReplay, grip: FactInterval, step: int) -> FailureAttribution:
     """What was picked has been let go elsewhere than where it was due.
 
     Args:
@@ -80,19 +84,21 @@ def released(trace: Trace, grip: Spell, step: int) -> Finding:
     """
     name = grip.fact.subject
     thing = describe_object(name, trace.episode.scene)
-    due = while_due(trace, trace.dues[step])
+    due = expected_action(trace, trace.dues[step])
     if grip.end is not None and Fact("held", name) in trace.facts[grip.end]:
-        return Finding.of("misplaced", name, step, f"put {thing} down outside its place {due}")
-    return Finding.of("dropped", name, step, f"dropped {thing} {due}")
+        return FailureAttribution.of(
+            "misplaced", name, step, f"put {thing} down outside its place {due}"
+        )
+    return FailureAttribution.of("dropped", name, step, f"dropped {thing} {due}")
 
 
-def while_due(trace: Trace, due: int | None = None) -> str:
+def expected_action(trace: EpisodeReplay, due: int | None = None) -> str:
     """What was due, in words."""
     stage = trace.stages[max(trace.due if due is None else due, 0)]
     return f"while due: {plain_subgoal(stage)}"
 
 
-def _slips(trace: Trace) -> Iterator[Slip]:
+def _slips(trace: EpisodeReplay) -> Iterator[MisplacedRelease]:
     picks = list(trace.begun("picked", after=trace.turn))
     for spell in trace.begun("lying", after=trace.turn):
         name, begin = spell.fact.subject, spell.begin
@@ -101,21 +107,21 @@ def _slips(trace: Trace) -> Iterator[Slip]:
         again = min((pick.begin for pick in own if pick.begin > begin), default=None)
         missing = _missing(trace, name, begin)
         if grips and missing is not None and not _came(trace, missing, begin, again):
-            yield Slip(missing, max(grips, key=lambda pick: pick.begin), begin, again)
+            yield MisplacedRelease(missing, max(grips, key=lambda pick: pick.begin), begin, again)
 
 
-def _missing(trace: Trace, name: str, step: int) -> Fact | None:
+def _missing(trace: EpisodeReplay, name: str, step: int) -> Fact | None:
     """Where a thing was due at a step, if it was."""
     due = facts_of(trace.stages[max(trace.dues[step], 0)].expects)
     return next((f for f in due if f.kind in PLACINGS and f.subject == name), None)
 
 
-def _came(trace: Trace, fact: Fact, begin: int, until: int | None) -> bool:
+def _came(trace: EpisodeReplay, fact: Fact, begin: int, until: int | None) -> bool:
     """Whether a fact held at any step from one to another."""
     return any(fact in facts for facts in trace.facts[begin:until])
 
 
-def _allowed(trace: Trace, slips: list[Slip]) -> bool:
+def _allowed(trace: EpisodeReplay, slips: list[MisplacedRelease]) -> bool:
     """Whether no rule is broken if each release was where it was due."""
     judge = Judge((*trace.episode.demonstration, *trace.stages), trace.episode.scene)
     for step, facts in enumerate(trace.facts):
@@ -124,6 +130,6 @@ def _allowed(trace: Trace, slips: list[Slip]) -> bool:
     return judge.status is not Status.FAILURE
 
 
-def _holds(slip: Slip, step: int) -> bool:
+def _holds(slip: MisplacedRelease, step: int) -> bool:
     lasts = slip.until is None or slip.missing.kind in LASTING_KINDS
     return slip.begin <= step and (lasts or step < (slip.until or 0))

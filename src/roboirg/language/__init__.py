@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from roboirg.language.generator import STAGE_SETS, expressible, instruct
 from roboirg.language.instruction import FORMS, SETTINGS, Instruction, Mention, Utterance
-from roboirg.language.interpreter import Resolution, resolve
+from roboirg.language.interpreter import Interpretation, interpret
 from roboirg.language.templates import LANGUAGE_VERSION
 
 __all__ = [
@@ -13,10 +13,10 @@ __all__ = [
     "SETTINGS",
     "STAGE_SETS",
     "Instruction",
+    "Interpretation",
     "Mention",
-    "Resolution",
     "Utterance",
     "expressible",
     "instruct",
-    "resolve",
+    "interpret",
 ]

@@ -7,12 +7,12 @@ from typing import TypeVar
 
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.language.instruction import FORMS, Instruction, Mention, Setting, Utterance
+from roboirg.language.instruction import FORMS, Instruction, Mention, SettingName, Utterance
 from roboirg.language.landmarks import FRAMES
 from roboirg.language.phrases import speak
-from roboirg.language.request import DISTRACTORS, Draft, Request
+from roboirg.language.request import DISTRACTORS, InstructionRequest, InstructionSpec
 from roboirg.language.settings import all_settings, get_setting
-from roboirg.language.template_sampler import Chooser
+from roboirg.language.template_sampler import TemplateSampler
 from roboirg.language.templates import LANGUAGE_VERSION
 from roboirg.tasks import get_task
 
@@ -93,14 +93,14 @@ def _request(
     distractor: str,
     distractors: int,
     frame: str,
-) -> Request:
+) -> InstructionRequest:
     if tuple(stages) not in STAGE_SETS:
         sets = ", ".join(str(one) for one in STAGE_SETS)
         raise InvalidValueError(f"The stages {tuple(stages)} are none of the four sets: {sets}.")
     if isinstance(distractors, bool) or not isinstance(distractors, int) or distractors < 1:
         raise InvalidValueError(f"distractors is {distractors!r}; it must be a number from 1 on.")
     task = get_task(episode.task)
-    return Request(
+    return InstructionRequest(
         episode=episode,
         task=task,
         form=_one_of("form", form, FORMS),
@@ -108,11 +108,13 @@ def _request(
         distractor=_one_of("distractor", distractor, DISTRACTORS),
         distractors=distractors,
         frame=_one_of("frame", frame, FRAMES),
-        chooser=Chooser(f"{LANGUAGE_VERSION}|{task.name}|{episode.seed}"),
+        chooser=TemplateSampler(f"{LANGUAGE_VERSION}|{task.name}|{episode.seed}"),
     )
 
 
-def _instruction(request: Request, setting: Setting, draft: Draft) -> Instruction:
+def _instruction(
+    request: InstructionRequest, setting: SettingName, draft: InstructionSpec
+) -> Instruction:
     utterances, mentions = _spoken(draft)
     return Instruction(
         task=request.task.name,
@@ -137,7 +139,7 @@ def _one_of(kind: str, name: str, known: Sequence[Name]) -> Name:
     raise UnknownNameError(kind, name, known)
 
 
-def _spoken(draft: Draft) -> tuple[tuple[Utterance, ...], tuple[Mention, ...]]:
+def _spoken(draft: InstructionSpec) -> tuple[tuple[Utterance, ...], tuple[Mention, ...]]:
     utterances: list[Utterance] = []
     mentions: list[Mention] = []
     for index, (stage, phrase) in enumerate(draft.said):

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
-Setting = Literal["explicit", "direct", "reasoning", "contextual", "spatial"]
+SettingName = Literal["explicit", "direct", "reasoning", "contextual", "spatial"]
 Form = Literal["implicit", "resolved"]
 UtteranceStage = Literal["introduction", "reinforcement", "distractor", "cue", "command"]
 Role = Literal["antecedent", "anaphor"]
@@ -15,7 +15,7 @@ Expression = Literal[
     "that", "then", "there", "pair", "other", "before", "after",
 ]  # fmt: skip
 
-SETTINGS: tuple[Setting, ...] = get_args(Setting)
+SETTINGS: tuple[SettingName, ...] = get_args(SettingName)
 FORMS: tuple[Form, ...] = get_args(Form)
 
 
@@ -70,7 +70,7 @@ class Instruction:
 
     task: str
     episode: str
-    setting: Setting
+    setting: SettingName
     form: Form
     utterances: tuple[Utterance, ...]
     mentions: tuple[Mention, ...] = ()

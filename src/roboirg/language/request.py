@@ -9,17 +9,17 @@ from typing import Literal, NamedTuple
 
 from roboirg.core.episode import Color, Episode, Goal, Scene, SceneObject
 from roboirg.core.errors import InvalidValueError
-from roboirg.language.instruction import Form, Setting, UtteranceStage
+from roboirg.language.instruction import Form, SettingName, UtteranceStage
 from roboirg.language.landmarks import Frame
 from roboirg.language.phrases import Phrase, fill
-from roboirg.language.template_sampler import Chooser
+from roboirg.language.template_sampler import TemplateSampler
 from roboirg.tasks import Task, get_task
 
 Distractor = Literal["neutral", "competing"]
 DISTRACTORS: tuple[Distractor, ...] = ("neutral", "competing")
 
-PartKind = Literal["number", "visit", "placement", "relation", "color", "amount"]
-PART_KINDS: Mapping[str, PartKind] = {
+SlotTypeName = Literal["number", "visit", "placement", "relation", "color", "amount"]
+SLOT_TYPE_NAMES: Mapping[str, SlotTypeName] = {
     "color": "color",
     "colors": "color",
     "counts": "amount",
@@ -32,7 +32,7 @@ PART_KINDS: Mapping[str, PartKind] = {
 COLOR_SLOTS = ("color", "colors")
 
 
-class Part(NamedTuple):
+class GoalValue(NamedTuple):
     """One value of the goal that an instruction has to convey.
 
     Attributes:
@@ -44,7 +44,7 @@ class Part(NamedTuple):
 
     field: str
     slot: str
-    kind: PartKind
+    kind: SlotTypeName
     value: str | int
 
     @property
@@ -59,7 +59,7 @@ class Part(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class InstructionRequest:
     """What is to be put into words, and how; see `instruct` for the options."""
 
     episode: Episode
@@ -69,7 +69,7 @@ class Request:
     distractor: Distractor
     distractors: int
     frame: Frame
-    chooser: Chooser
+    chooser: TemplateSampler
 
     @property
     def resolved(self) -> bool:
@@ -77,20 +77,20 @@ class Request:
         return self.form == "resolved"
 
     @property
-    def parts(self) -> tuple[Part, ...]:
+    def parts(self) -> tuple[GoalValue, ...]:
         """The values of the goal, in the order of its slots."""
         return _parts(self.episode.goal)
 
-    def parts_of(self, kind: PartKind) -> tuple[Part, ...]:
+    def parts_of(self, kind: SlotTypeName) -> tuple[GoalValue, ...]:
         """The parts of one kind."""
         return tuple(part for part in self.parts if part.kind == kind)
 
     @property
-    def colored(self) -> tuple[Part, ...]:
+    def colored(self) -> tuple[GoalValue, ...]:
         """The parts that are colors, counted or not."""
         return tuple(part for part in self.parts if part.slot in COLOR_SLOTS)
 
-    def count_of(self, color: Part) -> int:
+    def count_of(self, color: GoalValue) -> int:
         """How many things of a color are wanted; one unless the goal counts them."""
         _, _, index = color.field.partition(".")
         counts = {part.field: part for part in self.parts if part.slot == "counts"}
@@ -117,7 +117,7 @@ class Request:
         """The thing to handle, told by its place."""
         return fill(self.task.commands.by_place, {"place": place}, plural=plural)
 
-    def targets(self, part: Part) -> tuple[SceneObject, ...]:
+    def targets(self, part: GoalValue) -> tuple[SceneObject, ...]:
         """The objects that a color part may want handled: cubes, or the container over one."""
         scene = self.episode.scene
         cubes = [item for item in scene.objects if item.color == part.value]
@@ -130,7 +130,7 @@ class Request:
         return fill(self.chooser.pick(f"command-{handled}", wordings).text, fields)
 
 
-class Said(NamedTuple):
+class UtteranceSpec(NamedTuple):
     """One utterance to be."""
 
     stage: UtteranceStage
@@ -138,15 +138,15 @@ class Said(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Draft:
+class InstructionSpec:
     """What a setting says, in order, and what it wants noted in the metadata."""
 
-    said: tuple[Said, ...]
+    said: tuple[UtteranceSpec, ...]
     notes: Mapping[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
-class SettingRule:
+class Setting:
     """One setting of the language.
 
     Attributes:
@@ -155,26 +155,27 @@ class SettingRule:
         can_say: whether there are any.
     """
 
-    name: Setting
-    say: Callable[[Request], Draft]
-    can_say: Callable[[Request], bool] = lambda _request: True
+    name: SettingName
+    say: Callable[[InstructionRequest], InstructionSpec]
+    can_say: Callable[[InstructionRequest], bool] = lambda _request: True
 
 
 # Kept, because the settings and forms of an episode ask the same.
 @functools.lru_cache(maxsize=256)
-def _parts(goal: Goal) -> tuple[Part, ...]:
-    parts: list[Part] = []
+def _parts(goal: Goal) -> tuple[GoalValue, ...]:
+    parts: list[GoalValue] = []
     counted = "counts" in dict(goal.slots)
     for slot, value in goal.slots:
-        kind = "amount" if counted and slot in COLOR_SLOTS else PART_KINDS[slot]
+        kind = "amount" if counted and slot in COLOR_SLOTS else SLOT_TYPE_NAMES[slot]
         if isinstance(value, tuple):
             several: tuple[str | int, ...] = value
             fields = (f"{slot}.{index}" for index in range(len(several)))
             parts += [
-                Part(field, slot, kind, one) for field, one in zip(fields, several, strict=True)
+                GoalValue(field, slot, kind, one)
+                for field, one in zip(fields, several, strict=True)
             ]
         else:
-            parts.append(Part(slot, slot, kind, value))
+            parts.append(GoalValue(slot, slot, kind, value))
     return tuple(parts)
 
 

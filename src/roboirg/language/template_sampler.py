@@ -15,7 +15,7 @@ Option = TypeVar("Option")
 
 
 @dataclass(frozen=True, slots=True)
-class Chooser:
+class TemplateSampler:
     """Draws for one episode; every purpose has its own stream of random numbers.
 
     A draw depends on the key and the purpose only, never on which draws were made before: this

@@ -9,13 +9,13 @@ from typing import Any, NamedTuple
 from roboirg.core.episode import Episode, Split
 from roboirg.episodes.splits import SIZES, get_episode
 from roboirg.language.generator import STAGE_SETS, expressible, instruct
-from roboirg.language.instruction import FORMS, Form, Instruction, Setting
+from roboirg.language.instruction import FORMS, Form, Instruction, SettingName
 from roboirg.language.landmarks import FRAMES
 from roboirg.language.request import DISTRACTORS
 from roboirg.language.settings import all_settings
 from roboirg.tasks import all_tasks
 
-EXPLICIT: Setting = "explicit"
+EXPLICIT: SettingName = "explicit"
 """The setting that every other one is compared with; it is no variant."""
 
 

@@ -11,9 +11,9 @@ from pathlib import Path
 
 from roboirg.evaluation.executors.executor import LocalProcesses
 from roboirg.evaluation.plan import Plan, make_plan
-from roboirg.evaluation.progress import Silent
-from roboirg.evaluation.rollout import Player
-from roboirg.evaluation.rollout_result import Course, describe, utc_now
+from roboirg.evaluation.progress import SilentReporter
+from roboirg.evaluation.rollout import EpisodeRunner
+from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.runner import run_plan
 from roboirg.records.record import EventRecord, Job, Record
 from roboirg.records.store import RECORDS_FILE, RecordStore
@@ -40,7 +40,7 @@ def episode() -> float:
     jobs = plan.jobs()
     with tempfile.TemporaryDirectory() as folder:
         for job in jobs:
-            Player(Path(folder))(job)
+            EpisodeRunner(Path(folder))(job)
     return (time.perf_counter() - start) / len(jobs)
 
 
@@ -55,7 +55,7 @@ def resume() -> float:
     return time.perf_counter() - start
 
 
-class _Clock(Silent):
+class _Clock(SilentReporter):
     """Notes when records arrive."""
 
     def __init__(self) -> None:
@@ -69,8 +69,8 @@ class _Clock(Silent):
 
 def _nothing(job: Job) -> Record:
     event = EventRecord(step=1, kind="picked", subject="cube_red")
-    course = Course("success", cause=None, events=[event] * _EVENTS)
-    return describe(job, course, started_at=utc_now())
+    course = RolloutResult("success", cause=None, events=[event] * _EVENTS)
+    return make_record(job, course, started_at=utc_now())
 
 
 @functools.cache

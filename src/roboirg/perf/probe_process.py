@@ -21,10 +21,10 @@ def observe(path: Path, index: int) -> None:
         return
     from roboirg.core.observations import CAMERAS
     from roboirg.episodes.splits import get_episode
-    from roboirg.simulation.episode_session import Session
+    from roboirg.simulation.episode_session import EpisodeSession
     from roboirg.simulation.rendering.render_mode import STOCK
 
-    session = Session(get_episode(TASK, "test", index), visible=True, rendering=STOCK)
+    session = EpisodeSession(get_episode(TASK, "test", index), visible=True, rendering=STOCK)
     session.play_demonstration()
     session.world.cameras.pictures(CAMERAS)
     for camera in CAMERAS:

@@ -12,7 +12,7 @@ import roboirg
 from roboirg.core.episode import Episode
 from roboirg.core.observations import CAMERAS
 from roboirg.episodes.splits import get_episode
-from roboirg.simulation.episode_session import Session
+from roboirg.simulation.episode_session import EpisodeSession
 from roboirg.simulation.rendering.render_mode import STOCK
 from roboirg.util.cache import FOLDER_VARIABLE, OFF
 
@@ -25,7 +25,7 @@ def shown_episode() -> Episode:
 def stock(episode: Episode) -> float:
     """What RoboMME does: planned and drawn at every reset, color and segmentation fetched."""
     start = time.perf_counter()
-    session = Session(episode, visible=True, rendering=STOCK)
+    session = EpisodeSession(episode, visible=True, rendering=STOCK)
     cameras = session.world.cameras
 
     def draw(_stage: object) -> None:

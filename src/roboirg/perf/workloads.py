@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from roboirg.core.episode import Episode
 from roboirg.episodes.splits import get_episode
-from roboirg.simulation.episode_session import Session
-from roboirg.simulation.expert.primitives import Hands
+from roboirg.simulation.episode_session import EpisodeSession
+from roboirg.simulation.expert.primitives import MotionPrimitives
 from roboirg.simulation.rendering.render_mode import FAITHFUL, Rendering
 
 STEPS = 48
@@ -33,9 +33,9 @@ class Workload:
     before: NDArray[np.float64]
     actions: NDArray[np.float64]
 
-    def begun(self, *, visible: bool = True, rendering: Rendering = FAITHFUL) -> Session:
+    def begun(self, *, visible: bool = True, rendering: Rendering = FAITHFUL) -> EpisodeSession:
         """The episode, played up to the stretch."""
-        session = Session(self.episode, visible=visible, rendering=rendering)
+        session = EpisodeSession(self.episode, visible=visible, rendering=rendering)
         for action in self.before:
             session.step(action)
         return session
@@ -55,8 +55,8 @@ def as_in_demonstrations() -> Workload:
 def _stretch(task: str, index: int, first: int) -> Workload:
     """The oracle's first stages of an episode, whoever they are for; cut to a stretch."""
     episode = get_episode(task, "test", index)
-    session = Session(episode, visible=False)
-    hands, actions = Hands(session.world), []
+    session = EpisodeSession(episode, visible=False)
+    hands, actions = MotionPrimitives(session.world), []
     stages = (*episode.demonstration, *episode.stages)
     for piece in itertools.chain.from_iterable(hands.perform(s.primitive) for s in stages):
         for action in piece:

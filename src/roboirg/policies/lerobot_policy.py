@@ -25,7 +25,7 @@ STATE = "observation.state"
 _BRIGHTEST = 255.0
 
 
-class LeRobotOptions(UrlOptions):
+class LeRobotPolicyOptions(UrlOptions):
     """Options of lerobot://.
 
     Attributes:
@@ -70,7 +70,7 @@ class LeRobotPolicy:
 
     def __init__(self, url: str, seed: int = 0) -> None:
         parts = split_url(url)
-        self.options = read_options(parts, LeRobotOptions)
+        self.options = read_options(parts, LeRobotPolicyOptions)
         self._place, self._seed = parts.place, seed
         self._instruction = ""
 

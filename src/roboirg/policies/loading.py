@@ -28,7 +28,7 @@ def load_policy_class(spec: str) -> type[Any]:
         InvalidValueError: the module or the class cannot be imported, or is not a policy; or
             the URL is malformed.
     """
-    factory = policy_specs.find(spec) if ":" in spec else None
+    factory = policy_specs.find_policy_factory(spec) if ":" in spec else None
     # A factory has all that is asked of a class here.
     return find_class(spec) if factory is None else cast("type[Any]", factory)
 

@@ -20,7 +20,7 @@ from roboirg.policies.requirements import (
     wanted_demonstration_frames,
     wanted_history,
 )
-from roboirg.policies.synthetic_episodes import MadeUpEpisode, Studio
+from roboirg.policies.synthetic_episodes import SyntheticEpisode, SyntheticEpisodes
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -37,7 +37,7 @@ _FIRST, _SECOND = "Put the red cube on the target.", "Press the second button fr
 _LONGEST_WORDS = 300
 
 
-class Finding(NamedTuple):
+class CheckResult(NamedTuple):
     """One thing that was looked at.
 
     Attributes:
@@ -63,7 +63,7 @@ class _Course(NamedTuple):
     dtype: str
 
 
-def check_policy(policy: str | Policy, *, seed: int = 0) -> list[Finding]:
+def check_policy(policy: str | Policy, *, seed: int = 0) -> list[CheckResult]:
     """Try a policy on made-up episodes.
 
     Args:
@@ -77,15 +77,15 @@ def check_policy(policy: str | Policy, *, seed: int = 0) -> list[Finding]:
     Raises:
         MissingDependencyError: something has to be installed first.
     """
-    findings: list[Finding] = []
+    findings: list[CheckResult] = []
     try:
         _Check(policy, seed, findings).run()
     except _Broken as broken:
-        findings.append(Finding(*broken.args))
+        findings.append(CheckResult(*broken.args))
     return findings
 
 
-def print_findings(findings: list[Finding], console: Console) -> None:
+def print_check_results(findings: list[CheckResult], console: Console) -> None:
     """A table of what was found, and how many failed."""
     from rich.table import Table
 
@@ -105,7 +105,7 @@ def print_findings(findings: list[Finding], console: Console) -> None:
 class _Check:
     """One run of all checks."""
 
-    def __init__(self, policy: str | Policy, seed: int, findings: list[Finding]) -> None:
+    def __init__(self, policy: str | Policy, seed: int, findings: list[CheckResult]) -> None:
         self._given, self._seed, self._findings = policy, seed, findings
         self._open: Policy | None = None
 
@@ -127,7 +127,7 @@ class _Check:
             self._close()
 
     def _note(self, what: str, verdict: Verdict, sentence: str) -> None:
-        self._findings.append(Finding(what, verdict, sentence))
+        self._findings.append(CheckResult(what, verdict, sentence))
 
     def _load(self) -> Policy:
         try:
@@ -153,7 +153,9 @@ class _Check:
             every = wanted_history(policy)
         except RoboIRGError as error:
             raise _Broken("asks for", FAIL, str(error)) from error
-        self._studio: Callable[[], Studio] = lambda: Studio(cameras, frames, every, self._seed)
+        self._studio: Callable[[], SyntheticEpisodes] = lambda: SyntheticEpisodes(
+            cameras, frames, every, self._seed
+        )
         self._note(
             "asks for",
             PASS,
@@ -161,7 +163,7 @@ class _Check:
             f"frames {frames}, observations every {every or 'chunk'}.",
         )
 
-    def _chunks(self, when: str, episode: MadeUpEpisode) -> _Course:
+    def _chunks(self, when: str, episode: SyntheticEpisode) -> _Course:
         course = self._play(f"acts {when}", episode)
         sizes = [len(chunk) for chunk in course.chunks]
         outside = sum(
@@ -189,7 +191,7 @@ class _Check:
             f"ms; {1000 * sum(course.seconds) / steps:.2f} ms per action.",
         )
 
-    def _inputs(self, episode: MadeUpEpisode) -> None:
+    def _inputs(self, episode: SyntheticEpisode) -> None:
         given = copy.deepcopy(episode)
         self._play_as_it_is("leaves its inputs alone", given)
         changed = _difference(
@@ -200,7 +202,7 @@ class _Check:
         else:
             self._note("leaves its inputs alone", PASS, "What it was given is as before.")
 
-    def _same(self, policy: Policy, episode: MadeUpEpisode, before: _Course) -> None:
+    def _same(self, policy: Policy, episode: SyntheticEpisode, before: _Course) -> None:
         what = "is the same with the same seed"
         again = self._play(what, episode)
         if _equal(before, again):
@@ -216,7 +218,7 @@ class _Check:
             self._note(what, NOTE, "Equal episodes differ, as it says of itself.")
 
     def _forgets(
-        self, policy: Policy, other: MadeUpEpisode, episode: MadeUpEpisode, before: _Course
+        self, policy: Policy, other: SyntheticEpisode, episode: SyntheticEpisode, before: _Course
     ) -> None:
         what = "reset forgets"
         if not getattr(policy, "deterministic", True):
@@ -234,7 +236,7 @@ class _Check:
                 f"{_apart(before, after)} from a first one.",
             )
 
-    def _garbage(self, episode: MadeUpEpisode) -> None:
+    def _garbage(self, episode: SyntheticEpisode) -> None:
         what, studio = "broken sensors", self._studio()
         policy = self._begin(what, episode)
         try:
@@ -246,14 +248,16 @@ class _Check:
         self._play(what, episode)
         self._note(what, PASS, f"{sentence.rstrip('.')}; the next episode works.")
 
-    def _episode(self, instruction: str, size: int) -> MadeUpEpisode:
+    def _episode(self, instruction: str, size: int) -> SyntheticEpisode:
         return self._studio().episode(instruction, size)
 
-    def _play(self, what: str, episode: MadeUpEpisode, *, fresh: bool = True) -> _Course:
+    def _play(self, what: str, episode: SyntheticEpisode, *, fresh: bool = True) -> _Course:
         """An episode of a few calls, on a copy that a policy may spoil."""
         return self._play_as_it_is(what, copy.deepcopy(episode), fresh=fresh)
 
-    def _play_as_it_is(self, what: str, episode: MadeUpEpisode, *, fresh: bool = True) -> _Course:
+    def _play_as_it_is(
+        self, what: str, episode: SyntheticEpisode, *, fresh: bool = True
+    ) -> _Course:
         """An episode of a few calls; what is seen in them depends on the seed alone."""
         policy = self._begin(what, episode, fresh=fresh)
         studio, observation = self._studio(), episode.first
@@ -273,7 +277,7 @@ class _Check:
             observation = studio.after(episode, len(chunk))
         return course
 
-    def _begin(self, what: str, episode: MadeUpEpisode, *, fresh: bool = True) -> Policy:
+    def _begin(self, what: str, episode: SyntheticEpisode, *, fresh: bool = True) -> Policy:
         try:
             policy = self._fresh() if fresh or self._open is None else self._open
             self._open = policy

@@ -14,7 +14,7 @@ _FINGER_RANGE = 0.04
 """Meters."""
 
 
-class MadeUpEpisode(NamedTuple):
+class SyntheticEpisode(NamedTuple):
     """What a policy is given in an episode, twice asked.
 
     Attributes:
@@ -30,7 +30,7 @@ class MadeUpEpisode(NamedTuple):
     size: int
 
 
-class Studio:
+class SyntheticEpisodes:
     """Makes up what a policy that asks for this is shown.
 
     Args:
@@ -52,7 +52,7 @@ class Studio:
         self._every = observe_every
         self._rng = np.random.default_rng(seed)
 
-    def episode(self, instruction: str, size: int) -> MadeUpEpisode:
+    def episode(self, instruction: str, size: int) -> SyntheticEpisode:
         """An episode with a video of so many control steps, 0 for none."""
         moments = [self._moment(instruction) for _ in range(max(size, 1))]
         video: dict[str, Any] = {}
@@ -64,9 +64,9 @@ class Studio:
         first = self._moment(instruction)
         if self._every is not None:
             first["history"] = ()
-        return MadeUpEpisode(instruction, video, cast("Observation", first), size)
+        return SyntheticEpisode(instruction, video, cast("Observation", first), size)
 
-    def after(self, episode: MadeUpEpisode, steps: int) -> Observation:
+    def after(self, episode: SyntheticEpisode, steps: int) -> Observation:
         """An observation that many control steps later."""
         last = self._moment(episode.instruction)
         if self._every is not None:
@@ -77,7 +77,7 @@ class Studio:
                 last["history"] = (*last["history"][:-1], now)
         return cast("Observation", last)
 
-    def garbage(self, episode: MadeUpEpisode) -> Observation:
+    def garbage(self, episode: SyntheticEpisode) -> Observation:
         """An observation as from broken sensors: NaN everywhere, pictures of noise."""
         broken = self._moment(episode.instruction)
         for field, held in broken.items():

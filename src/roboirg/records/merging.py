@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.records.record import Record
-from roboirg.records.record_codec import Key, StoreError, key_of
+from roboirg.records.record_codec import Key, StoreError, identity_key
 from roboirg.records.store import RecordStore, read_records
 
 
@@ -52,10 +52,10 @@ def merge_runs(folders: Sequence[Path], out: Path) -> Merged:
         if store.stored:
             runs_so_far = read_records(out)
             _check_versions([(out, runs_so_far), *runs])
-            kept = {key_of(record): record for record in runs_so_far}
+            kept = {identity_key(record): record for record in runs_so_far}
         for folder, records in runs:
             for record in records:
-                before = kept.get(key_of(record))
+                before = kept.get(identity_key(record))
                 if before is not None:
                     doubled += 1
                     if before.outcome != "error":
@@ -65,7 +65,7 @@ def merge_runs(folders: Sequence[Path], out: Path) -> Merged:
                     if record.outcome == "error":
                         continue
                 store.append(_with_film(record, folder, out))
-                kept[key_of(record)] = record
+                kept[identity_key(record)] = record
                 added += before is None
     return Merged(added, doubled, tuple(disputed))
 

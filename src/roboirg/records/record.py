@@ -2,7 +2,7 @@
 
 A record is one JSON object. It says everything that the report and the statistics need, so that
 they never open the simulator. It depends on its job alone: not on the worker, the order, or what
-ran before; `INCIDENTALS` names the fields that are exempt.
+ran before; `NON_DETERMINISTIC_FIELDS` names the fields that are exempt.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ DEFAULT_FRAME = "robot"
 DEFAULT_MAX_STEPS = 1300
 DEFAULT_MESHES = "faithful"
 
-INCIDENTALS = frozenset(
+NON_DETERMINISTIC_FIELDS = frozenset(
     {
         "attempt",
         "code",
@@ -55,11 +55,11 @@ INCIDENTALS = frozenset(
 is run twice."""
 
 
-class _Data(BaseModel):
+class _RecordModel(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class Job(_Data):
+class Job(_RecordModel):
     """One episode to play. All fields but `spec` are the identity of its record.
 
     Attributes:
@@ -120,14 +120,14 @@ IDENTITY = tuple(name for name in Job.model_fields if name != "spec")
 """The fields that tell one job from another."""
 
 
-class Turn(_Data):
+class UtteranceRecord(_RecordModel):
     """One utterance and its stage in the discourse."""
 
     stage: str
     text: str
 
 
-class MentionSpan(_Data):
+class MentionSpan(_RecordModel):
     """A span of an utterance that introduces a slot value or points back at one.
 
     Attributes:
@@ -149,7 +149,7 @@ class MentionSpan(_Data):
     value: str | int
 
 
-class EventRecord(_Data):
+class EventRecord(_RecordModel):
     """A fact that became true, or ceased to be, in the world.
 
     Attributes:
@@ -167,7 +167,7 @@ class EventRecord(_Data):
     holds: bool = True
 
 
-class Attribution(_Data):
+class Attribution(_RecordModel):
     """Why an episode failed, concluded from its events.
 
     Attributes:
@@ -259,7 +259,7 @@ class Record(Result):
     """
 
     schema_version: Literal[2] = SCHEMA_VERSION
-    instruction: tuple[Turn, ...]
+    instruction: tuple[UtteranceRecord, ...]
     mentions: tuple[MentionSpan, ...] = ()
     command: str
     goal: dict[str, str | int | tuple[str, ...] | tuple[int, ...]]
@@ -276,5 +276,5 @@ class Record(Result):
     duration_s: float
 
     def comparable(self) -> dict[str, object]:
-        """All fields that depend on the job alone: everything but `INCIDENTALS`."""
-        return self.model_dump(mode="json", exclude=set(INCIDENTALS))
+        """All fields that depend on the job alone: everything but `NON_DETERMINISTIC_FIELDS`."""
+        return self.model_dump(mode="json", exclude=set(NON_DETERMINISTIC_FIELDS))

@@ -38,7 +38,7 @@ class DamagedLineError(StoreError):
     """A line is not JSON: cut short, or overwritten."""
 
 
-class Stored(msgspec.Struct, frozen=True, gc=False):
+class RecordIndexEntry(msgspec.Struct, frozen=True, gc=False):
     """The identity of a record, how it ended, and what it must not be mixed with.
 
     The first fields are those of a `Job`. Read instead of whole records where there are very many
@@ -80,17 +80,17 @@ Key = tuple[object, ...]
 """A job's identity: the values of its fields."""
 
 _identity = operator.attrgetter(*IDENTITY)
-_decoder = msgspec.json.Decoder(Stored)
+_decoder = msgspec.json.Decoder(RecordIndexEntry)
 _version_decoder = msgspec.json.Decoder(_Version)
 
 
-def key_of(one: Job | Stored) -> Key:
+def identity_key(one: Job | RecordIndexEntry) -> Key:
     """The identity of a job, a record, or what is read of one."""
     key: Key = _identity(one)
     return key
 
 
-def read_stored(line: bytes, path: Path, number: int) -> Stored:
+def read_index_entry(line: bytes, path: Path, number: int) -> RecordIndexEntry:
     """What the runner has to know of a line.
 
     Args:

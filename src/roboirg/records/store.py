@@ -29,14 +29,21 @@ from roboirg.records.record import Record, Result
 from roboirg.records.record_codec import (
     DamagedLineError,
     Key,
-    Stored,
+    RecordIndexEntry,
     StoreError,
-    key_of,
+    identity_key,
+    read_index_entry,
     read_line,
-    read_stored,
 )
 
-__all__ = ["Contents", "RecordStore", "StoreError", "read_contents", "read_records", "read_results"]
+__all__ = [
+    "RecordStore",
+    "StoreContents",
+    "StoreError",
+    "read_contents",
+    "read_records",
+    "read_results",
+]
 
 RECORDS_FILE = "records.jsonl"
 TORN_FILE = "records.torn"
@@ -49,7 +56,7 @@ Kind = TypeVar("Kind", bound=Result)
 Parsed = TypeVar("Parsed")
 
 
-class Contents(NamedTuple):
+class StoreContents(NamedTuple):
     """What a file of records holds.
 
     Attributes:
@@ -66,7 +73,7 @@ class Contents(NamedTuple):
 class RecordStore:
     """The records of one output folder, open for appending by this process alone.
 
-    Use as a context manager. Whole records are not kept in memory, only what `Stored` has.
+    Use as a context manager. It keeps a `RecordIndexEntry` of each record in memory, not the record.
 
     Args:
         folder: made if it does not exist.
@@ -90,8 +97,8 @@ class RecordStore:
                 undo.callback(os.close, self._lock)
                 self._take_lock()
                 lines = _Lines(self.path)
-                self.stored: dict[Key, Stored] = {
-                    key_of(one): one for one in lines.parsed(read_stored)
+                self.stored: dict[Key, RecordIndexEntry] = {
+                    identity_key(one): one for one in lines.parsed(read_index_entry)
                 }
                 self.torn, self.damaged = lines.torn, tuple(lines.damaged)
                 self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
@@ -116,7 +123,7 @@ class RecordStore:
         except OSError as error:
             os.ftruncate(self._file, size)
             raise StoreError(f"Cannot write to {self.path}: {error.strerror}.") from error
-        self.stored[key_of(record)] = read_stored(line, self.path, 0)
+        self.stored[identity_key(record)] = read_index_entry(line, self.path, 0)
 
     def close(self) -> None:
         """Let the next writer in."""
@@ -158,7 +165,7 @@ class RecordStore:
         os.fsync(self._file)
 
 
-def read_contents(path: Path) -> Contents:
+def read_contents(path: Path) -> StoreContents:
     """Everything in a file of records; takes no lock, so a run may be under way.
 
     Raises:
@@ -166,7 +173,7 @@ def read_contents(path: Path) -> Contents:
     """
     lines = _Lines(path)
     records = tuple(lines.parsed(partial(read_line, kind=Record)))
-    return Contents(records, lines.torn, tuple(lines.damaged))
+    return StoreContents(records, lines.torn, tuple(lines.damaged))
 
 
 def read_records(folder: Path) -> tuple[Record, ...]:
@@ -187,13 +194,15 @@ def read_results(folder: Path) -> tuple[Result, ...]:
     return _newest(folder, Result)
 
 
-def read_index(folder: Path) -> dict[Key, Stored]:
+def read_index(folder: Path) -> dict[Key, RecordIndexEntry]:
     """What is stored in a run's folder, the newest of each identity; empty if there is no run.
 
     Raises:
         StoreError: the file cannot be read, or a line is no record of a version that can be read.
     """
-    return {key_of(one): one for one in _Lines(folder / RECORDS_FILE).parsed(read_stored)}
+    return {
+        identity_key(one): one for one in _Lines(folder / RECORDS_FILE).parsed(read_index_entry)
+    }
 
 
 def write_atomically(path: Path, text: str) -> None:
@@ -264,7 +273,7 @@ def _newest(folder: Path, kind: type[Kind]) -> tuple[Kind, ...]:
     lines = _Lines(folder / RECORDS_FILE)
     newest: dict[Key, Kind] = {}
     for one in lines.parsed(partial(read_line, kind=kind)):
-        newest[key_of(one)] = one
+        newest[identity_key(one)] = one
     if not newest:
         raise StoreError(
             f"There are no records in {folder}; give the --out folder of a `roboirg run`."

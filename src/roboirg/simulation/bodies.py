@@ -19,7 +19,7 @@ from sapien.wrapper.articulation_builder import ArticulationBuilder
 from roboirg.core import object_sizes
 from roboirg.core.episode import SceneObject
 from roboirg.core.motions import Point
-from roboirg.simulation.rendering.tube_mesh import Rgba, ring
+from roboirg.simulation.rendering.tube_mesh import Rgba, tube
 
 Triple = tuple[float, float, float]
 Cuboid = tuple[Triple, Triple]
@@ -263,7 +263,7 @@ def _build_tape(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
     body = _finish(builder, scene, item, "dynamic")
     if visible:
         component = sapien.render.RenderBodyComponent()
-        component.attach(ring(outer, inner, object_sizes.TAPE_HALF, COLOR_RGBA[str(item.color)]))
+        component.attach(tube(outer, inner, object_sizes.TAPE_HALF, COLOR_RGBA[str(item.color)]))
         body.entity.add_component(component)
     return body
 

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from roboirg.core.actions import EE_POSE, JOINT_ANGLE, POSE_SIZE, WAYPOINT, ActionSpace
 from roboirg.core.errors import MotionPlanningError
-from roboirg.simulation.panda import Robot
+from roboirg.simulation.panda import Panda
 from roboirg.simulation.physics_settings import CLOSED, GRIPPER_STEPS, OPEN
 
 if TYPE_CHECKING:
-    from roboirg.simulation.expert.motion_planning import Planner, ToolPose
+    from roboirg.simulation.expert.motion_planning import MotionPlanner, ToolPose
 
 Piece = NDArray[np.float64]
 """Joint actions (n, 8), n >= 1: joint targets and the gripper."""
@@ -35,7 +35,7 @@ class Controller(Protocol):
         """
 
 
-def make_controller(space: ActionSpace, robot: Robot) -> Controller:
+def make_controller(space: ActionSpace, robot: Panda) -> Controller:
     """A controller for one episode.
 
     Args:
@@ -48,7 +48,7 @@ def make_controller(space: ActionSpace, robot: Robot) -> Controller:
 class JointAngles:
     """Joint targets, as they are."""
 
-    def __init__(self, _robot: Robot) -> None:
+    def __init__(self, _robot: Panda) -> None:
         pass
 
     def pieces(self, action: NDArray[np.float64]) -> Iterator[Piece]:
@@ -59,7 +59,7 @@ class JointAngles:
 class ToolPoses:
     """Poses of the tool, each by the nearest joint positions that have it."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Panda) -> None:
         self._robot = robot
         self._planner = _make_planner(robot)
 
@@ -79,7 +79,7 @@ class ToolPoses:
 class Waypoints:
     """Poses to which the tool moves in a straight line, with what the gripper does there."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Panda) -> None:
         self._robot = robot
         self._planner = _make_planner(robot)
         self._gripper = OPEN
@@ -118,18 +118,18 @@ def in_words(action: NDArray[np.float64]) -> str:
     return f"({x}, {y}, {z}) with roll {roll}, pitch {pitch}, yaw {yaw}"
 
 
-def _make_planner(robot: Robot) -> Planner:
+def _make_planner(robot: Panda) -> MotionPlanner:
     # It takes a third of a second to import, and who commands joints does not need it.
-    from roboirg.simulation.expert.motion_planning import Planner
+    from roboirg.simulation.expert.motion_planning import MotionPlanner
 
-    return Planner(robot)
+    return MotionPlanner(robot)
 
 
 def _short(number: float) -> str:
     return f"{number:.3f}" if abs(number) < 1e6 else f"{number:.3e}"  # noqa: PLR2004
 
 
-_CONTROLLERS: Mapping[str, Callable[[Robot], Controller]] = {
+_CONTROLLERS: Mapping[str, Callable[[Panda], Controller]] = {
     JOINT_ANGLE.name: JointAngles,
     EE_POSE.name: ToolPoses,
     WAYPOINT.name: Waypoints,

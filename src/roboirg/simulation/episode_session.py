@@ -26,7 +26,7 @@ def _look_away(stage: Stage) -> None:
     del stage
 
 
-class Session:
+class EpisodeSession:
     """Plays one episode from its first moment.
 
     Args:
@@ -109,9 +109,9 @@ class Session:
         if not self.episode.demonstration:
             return
         # What plans takes a third of a second to import; who only replays does not need it.
-        from roboirg.simulation.expert.primitives import Hands
+        from roboirg.simulation.expert.primitives import MotionPrimitives
 
-        hands = Hands(self.world)
+        hands = MotionPrimitives(self.world)
         for index, stage in enumerate(self.episode.demonstration):
             for piece in hands.perform(stage.primitive):
                 for action in piece:

@@ -9,13 +9,13 @@ from typing import Any
 from roboirg.core.episode import Stage
 from roboirg.judging import Event, plain_subgoal
 from roboirg.simulation.controllers import Controller
-from roboirg.simulation.episode_session import Session
-from roboirg.simulation.observation_builder import Senses
-from roboirg.simulation.rendering.pixel_grounding import Grounding
+from roboirg.simulation.episode_session import EpisodeSession
+from roboirg.simulation.observation_builder import ObservationBuilder
+from roboirg.simulation.rendering.pixel_grounding import PixelGrounding
 
 
 @dataclass
-class Play:
+class EpisodeState:
     """What lasts from one reset to the next.
 
     Attributes:
@@ -30,10 +30,10 @@ class Play:
         reported: how many events have been told.
     """
 
-    session: Session
-    senses: Senses
+    session: EpisodeSession
+    senses: ObservationBuilder
     controller: Controller
-    grounding: Grounding | None
+    grounding: PixelGrounding | None
     felt: list[dict[str, Any]] = field(default_factory=list)
     labels: list[str] = field(default_factory=list)
     history: list[dict[str, Any]] = field(default_factory=list)

@@ -12,7 +12,7 @@ import sapien.physx
 from roboirg.core.conditions import Fact
 from roboirg.core.motions import Point
 from roboirg.simulation.bodies import Body
-from roboirg.simulation.panda import Robot
+from roboirg.simulation.panda import Panda
 from roboirg.simulation.physics_settings import FINGER_OPEN, HOME
 
 PICKED_HEIGHT = 0.05
@@ -36,7 +36,7 @@ REACH = 0.12
 Contacts = list[sapien.physx.PhysxContact]
 
 
-class Detector:
+class FactDetector:
     """Finds the facts of one world.
 
     It remembers the last ones: some facts begin and cease at different thresholds, or stay.
@@ -46,7 +46,7 @@ class Detector:
         robot: the robot.
     """
 
-    def __init__(self, bodies: Mapping[str, Body], robot: Robot) -> None:
+    def __init__(self, bodies: Mapping[str, Body], robot: Panda) -> None:
         self._robot = robot
         self._bodies = tuple(bodies.values())
         self._targets = self._of_kind("target")

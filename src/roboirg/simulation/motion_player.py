@@ -21,7 +21,7 @@ _SPACING = 0.5
 """Meters between the spots of objects that are away, so that they do not touch."""
 
 
-class Moment(NamedTuple):
+class MotionContext(NamedTuple):
     """What a motion may depend on, before the physics of a control step.
 
     Attributes:
@@ -51,7 +51,7 @@ class MotionPlayer:
         # What comes back to another object's place has to find it there.
         self._players = sorted(players, key=lambda player: not isinstance(player, _SwapPlayer))
 
-    def before_step(self, moment: Moment) -> None:
+    def before_step(self, moment: MotionContext) -> None:
         """Put the objects where they have to be for the coming control step."""
         for player in self._players:
             player.before_step(moment)
@@ -85,7 +85,7 @@ class _Player(ABC):
         self.stopped = False
 
     @abstractmethod
-    def before_step(self, moment: Moment) -> None: ...
+    def before_step(self, moment: MotionContext) -> None: ...
 
     def after_step(self, facts: AbstractSet[Fact]) -> None:
         del facts
@@ -99,7 +99,7 @@ class _AwayPlayer(_Player):
         self._under = None if motion.under is None else bodies[motion.under]
         self.absent = motion.start == 0
 
-    def before_step(self, moment: Moment) -> None:
+    def before_step(self, moment: MotionContext) -> None:
         self.absent = self._motion.start <= moment.step < self._motion.end
         if self.absent:
             self._body.put(self._spot)
@@ -119,7 +119,7 @@ class _SwapPlayer(_Player):
         self._bodies = [bodies[name] for name in names]
         self._poses: list[sapien.Pose] = []
 
-    def before_step(self, moment: Moment) -> None:
+    def before_step(self, moment: MotionContext) -> None:
         begin = 0 if self._motion.stage is None else moment.stages.get(self._motion.stage)
         if begin is None:
             return
@@ -144,7 +144,7 @@ class _ShuttlePlayer(_Player):
         super().__init__(motion.subject)
         self._motion, self._body = motion, bodies[motion.subject]
 
-    def before_step(self, moment: Moment) -> None:
+    def before_step(self, moment: MotionContext) -> None:
         if self.stopped:
             return
         self._body.put(shuttle_position(self._motion, moment.step))
@@ -158,7 +158,7 @@ class _GlowPlayer(_Player):
         self._last: int | None = None
         self.absent = True
 
-    def before_step(self, moment: Moment) -> None:
+    def before_step(self, moment: MotionContext) -> None:
         if self._motion.during in moment.facts:
             self._last = moment.step
         self.absent = self._last is None or moment.step - self._last > self._motion.linger
@@ -170,7 +170,7 @@ class _VanishPlayer(_Player):
         super().__init__(motion.subject)
         self._motion, self._body, self._spot = motion, bodies[motion.subject], spot
 
-    def before_step(self, moment: Moment) -> None:
+    def before_step(self, moment: MotionContext) -> None:
         del moment
         if self.absent:
             self._body.put(self._spot)

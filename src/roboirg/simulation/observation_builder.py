@@ -26,7 +26,7 @@ _SLACK = 0.1
 """Radians by which joints may pass their limits while they are pushed."""
 
 
-class Wishes(NamedTuple):
+class ObservationSpec(NamedTuple):
     """Which fields observations have besides proprioception, and the video.
 
     Attributes:
@@ -48,12 +48,12 @@ class Wishes(NamedTuple):
     rendering: Rendering = FAITHFUL
 
     @property
-    def of_history(self) -> Wishes:
+    def of_history(self) -> ObservationSpec:
         """What the observations in ``history`` hold."""
         cameras = self.cameras if self.history_cameras is None else self.history_cameras
         return self._replace(cameras=cameras)
 
-    def checked(self) -> Wishes:
+    def checked(self) -> ObservationSpec:
         """These wishes, if they can be fulfilled.
 
         Raises:
@@ -79,7 +79,7 @@ class Wishes(NamedTuple):
         return self._replace(cameras=cameras)
 
 
-class Senses:
+class ObservationBuilder:
     """Reads one world.
 
     Args:
@@ -90,11 +90,11 @@ class Senses:
         proprioception: what the robot feels.
     """
 
-    def __init__(self, world: World, wishes: Wishes) -> None:
+    def __init__(self, world: World, wishes: ObservationSpec) -> None:
         self._world = world
         self._wishes = wishes
-        self._drawn = tuple(drawn_space(wishes))
-        self._drawn_before = tuple(drawn_space(wishes.of_history))
+        self._drawn = tuple(picture_space(wishes))
+        self._drawn_before = tuple(picture_space(wishes.of_history))
         self.proprioception = Proprioception(world.robot)
 
     def read(self) -> dict[str, Any]:
@@ -132,7 +132,7 @@ _DRAWN: Mapping[str, Callable[[World, str], NDArray[Any]]] = {
 }
 
 
-def drawn_space(wishes: Wishes) -> dict[str, spaces.Space[Any]]:
+def picture_space(wishes: ObservationSpec) -> dict[str, spaces.Space[Any]]:
     """The space of each field that has to be drawn."""
     fields: dict[str, spaces.Space[Any]] = {
         f"{camera}_rgb": spaces.Box(0, 255, (SIZE, SIZE, 3), np.uint8) for camera in wishes.cameras
@@ -145,8 +145,8 @@ def drawn_space(wishes: Wishes) -> dict[str, spaces.Space[Any]]:
     return fields
 
 
-def felt_space(wishes: Wishes) -> dict[str, spaces.Space[Any]]:
-    """The space of each field that `Senses.feel` gives."""
+def proprioception_space(wishes: ObservationSpec) -> dict[str, spaces.Space[Any]]:
+    """The space of each field that `ObservationBuilder.feel` gives."""
     fields: dict[str, spaces.Space[Any]] = {}
     for camera in wishes.cameras if wishes.calibration else ():
         fields[f"{camera}_extrinsic"] = spaces.Box(-np.inf, np.inf, (3, 4), np.float32)
@@ -160,21 +160,23 @@ def felt_space(wishes: Wishes) -> dict[str, spaces.Space[Any]]:
     }
 
 
-def sensed_space(wishes: Wishes) -> dict[str, spaces.Space[Any]]:
-    """The space of each field that `Senses.read` gives."""
-    return {**drawn_space(wishes), **felt_space(wishes)}
+def observation_space(wishes: ObservationSpec) -> dict[str, spaces.Space[Any]]:
+    """The space of each field that `ObservationBuilder.read` gives."""
+    return {**picture_space(wishes), **proprioception_space(wishes)}
 
 
-def recalled_space(wishes: Wishes) -> dict[str, spaces.Space[Any]]:
-    """The space of each field that `Senses.recall` gives."""
-    return {**drawn_space(wishes.of_history), **felt_space(wishes)}
+def history_space(wishes: ObservationSpec) -> dict[str, spaces.Space[Any]]:
+    """The space of each field that `ObservationBuilder.recall` gives."""
+    return {**picture_space(wishes.of_history), **proprioception_space(wishes)}
 
 
-def stack_felt(moments: Sequence[dict[str, Any]], wishes: Wishes) -> dict[str, NDArray[Any]]:
-    """What `Senses.feel` gave, as arrays with a leading axis T, which may be 0."""
+def stack_proprioception(
+    moments: Sequence[dict[str, Any]], wishes: ObservationSpec
+) -> dict[str, NDArray[Any]]:
+    """What `ObservationBuilder.feel` gave, as arrays with a leading axis T, which may be 0."""
     return {
         key: np.stack([moment[key] for moment in moments]) if moments else _empty(space)
-        for key, space in felt_space(wishes).items()
+        for key, space in proprioception_space(wishes).items()
     }
 
 

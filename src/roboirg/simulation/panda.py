@@ -20,7 +20,7 @@ from roboirg.core.episode import ROBOT_BASE
 from roboirg.core.observations import CAMERAS, FRONT
 from roboirg.simulation import physics_settings
 from roboirg.simulation.model_files import find_model_files
-from roboirg.simulation.rendering.culling import Drawable
+from roboirg.simulation.rendering.culling import CullableBody
 from roboirg.simulation.rendering.render_mode import FAITHFUL, Rendering
 from roboirg.simulation.rendering.robot_meshes import finish, link_hull, link_shapes
 
@@ -40,7 +40,7 @@ STILL_SPEED = 0.2
 """Joint speed, rad/s, up to which the robot counts as still."""
 
 
-class Robot:
+class Panda:
     """A Panda in a scene, fixed at its base, at home with an open gripper.
 
     Args:
@@ -71,7 +71,7 @@ class Robot:
             )
             joint.set_friction(0.0)
         self.links = {link.name: link for link in self.articulation.links}
-        self.drawables: dict[sapien.render.RenderBodyComponent, Drawable] = {}
+        self.drawables: dict[sapien.render.RenderBodyComponent, CullableBody] = {}
         self._add_meshes(loader.visuals, rendering)
         self.tool = self.links[TOOL_LINK]
         self._joints = list(self.articulation.active_joints)
@@ -117,7 +117,7 @@ class Robot:
             hulls.append(link_hull(path, rendering) @ matrix[:3, :3].T + matrix[:3, 3])
         self.links[link].entity.add_component(component)
         finish(component, rendering)
-        self.drawables[component] = Drawable(np.concatenate(hulls), cameras)
+        self.drawables[component] = CullableBody(np.concatenate(hulls), cameras)
 
     def reset(self) -> None:
         """Put the robot at home, at rest."""

@@ -9,13 +9,13 @@ import numpy as np
 import sapien
 from numpy.typing import NDArray
 
-from roboirg.simulation.panda import Robot
+from roboirg.simulation.panda import Panda
 
 LOCKED = 1e-7
 """Radians from straight up or down at which roll and yaw turn about one axis; yaw is 0 there."""
 
 
-class Feeling(TypedDict):
+class ProprioceptiveState(TypedDict):
     """Proprioception at one moment; shapes and units as in a policy's observation."""
 
     joint_positions: NDArray[np.float32]
@@ -30,7 +30,7 @@ class Proprioception:
         robot: to be followed from now on.
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Panda) -> None:
         self._robot = robot
         self._angles = self._principal_angles()
 
@@ -39,7 +39,7 @@ class Proprioception:
         pairs = zip(self._angles.tolist(), self._principal_angles().tolist(), strict=True)
         self._angles = np.array([unwrapped(before, now) for before, now in pairs])
 
-    def read(self) -> Feeling:
+    def read(self) -> ProprioceptiveState:
         """The robot's state at the last step that was followed."""
         position = np.asarray(self._robot.tool_pose.p, dtype=np.float64)
         return {

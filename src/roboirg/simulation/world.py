@@ -14,9 +14,9 @@ from roboirg.core.episode import Scene
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.observations import CAMERAS
 from roboirg.simulation import bodies, physics_settings
-from roboirg.simulation.fact_detection import Detector
-from roboirg.simulation.motion_player import Moment, MotionPlayer
-from roboirg.simulation.panda import Robot
+from roboirg.simulation.fact_detection import FactDetector
+from roboirg.simulation.motion_player import MotionContext, MotionPlayer
+from roboirg.simulation.panda import Panda
 from roboirg.simulation.rendering.cameras import Cameras
 from roboirg.simulation.rendering.render_device import render_system
 from roboirg.simulation.rendering.render_mode import FAITHFUL, Rendering
@@ -48,13 +48,13 @@ class World:
         self._scene = sapien.Scene(systems)
         self._physics = systems[0]
         self._physics.timestep = 1.0 / physics_settings.PHYSICS_RATE
-        self.robot = Robot(self._scene, visible=visible, rendering=rendering)
+        self.robot = Panda(self._scene, visible=visible, rendering=rendering)
         add_scenery(self._scene, visible=visible, rendering=rendering)
         self.bodies = {
             item.name: bodies.build(self._scene, item, visible=visible) for item in scene.objects
         }
         self._motions = MotionPlayer(scene.motions, self.bodies)
-        self._detector = Detector(self.bodies, self.robot)
+        self._detector = FactDetector(self.bodies, self.robot)
         self._stages: dict[int, int] = {}
         self._cameras: Cameras | None = None
         if visible:
@@ -72,7 +72,7 @@ class World:
         Returns:
             The facts that hold afterwards.
         """
-        self._motions.before_step(Moment(self.elapsed, self.facts, self._stages))
+        self._motions.before_step(MotionContext(self.elapsed, self.facts, self._stages))
         self.advance(action)
         self.elapsed += 1
         self.facts = self._detector.detect(

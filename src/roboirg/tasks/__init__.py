@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping
 from roboirg.core.episode import BENCHMARK_SUITES, SUITES, Suite
 from roboirg.core.errors import UnknownNameError
 from roboirg.tasks.task import Task
-from roboirg.util.discovery import offered
+from roboirg.util.discovery import discover
 
 __all__ = ["Task", "all_tasks", "every_task", "find_tasks", "get_task"]
 
@@ -25,7 +25,7 @@ ALL = "all"
 @functools.cache
 def all_tasks(suites: tuple[Suite, ...] = BENCHMARK_SUITES) -> Mapping[str, Task]:
     """The tasks of some suites, by default of the benchmark, by name and in the order of codes."""
-    tasks: list[Task] = offered(sys.modules[__name__], "TASK")
+    tasks: list[Task] = discover(sys.modules[__name__], "TASK")
     chosen = (task for task in tasks if task.suite in suites)
     return {task.name: task for task in sorted(chosen, key=lambda task: task.code)}
 

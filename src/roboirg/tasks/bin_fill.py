@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from roboirg.core.conditions import Count, Fact, Rule
+from roboirg.core.conditions import Fact, FactCount, Rule
 from roboirg.core.episode import (
     COLORS,
     Color,
@@ -161,14 +161,14 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     plan: list[Stage] = []
     for drops, (color, ordinal, cube) in enumerate(_wanted(scene, goal), start=1):
         pick = Stage(
-            expects=Count(picked),
+            expects=FactCount(picked),
             forbids=(pressed,),
             primitive=Primitive("pick_cube", cube),
             subgoal=f"pick up the {ordinal} {color} cube {{at}}",
             points_at=cube,
         )
         put_in = Stage(
-            expects=Count(binned, least=drops),
+            expects=FactCount(binned, least=drops),
             forbids=(pressed,),
             primitive=Primitive("drop_into", cube, "bin"),
             subgoal="put it into the bin {at}",
@@ -202,10 +202,10 @@ def _wrong_counts(scene: Scene, goal: Goal) -> Iterator[Rule]:
             continue
         things = f"{count} {color} cube{'' if count == 1 else 's'} in the bin"
         if count == 0:
-            yield Rule(Count(binned), f"a {color} cube in the bin", "wrong_object")
+            yield Rule(FactCount(binned), f"a {color} cube in the bin", "wrong_object")
         else:
-            yield Rule(Count(binned, least=count + 1), f"more than {things}", "wrong_count")
-            fewer = Count(binned, least=0, most=count - 1)
+            yield Rule(FactCount(binned, least=count + 1), f"more than {things}", "wrong_count")
+            fewer = FactCount(binned, least=0, most=count - 1)
             yield Rule(fewer, f"fewer than {things}", "wrong_count")
 
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from roboirg.core.conditions import All, Began, Count, Fact
+from roboirg.core.conditions import All, Fact, FactCount, OccurrenceCount
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
 from roboirg.tasks.shared import unmask, unmask_swap
 from roboirg.tasks.shared.fixtures import button_keep_out, draw_button
@@ -53,9 +53,9 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     """Press both buttons, in any order, then lift the containers."""
     right, left = Fact("pressed", RIGHT), Fact("pressed", LEFT)
-    both = All((Began((left,)), Began((right,))))
+    both = All((OccurrenceCount((left,)), OccurrenceCount((right,))))
     return (
-        unmask.press_stage(Count((left, right)), LEFT, "first button"),
+        unmask.press_stage(FactCount((left, right)), LEFT, "first button"),
         unmask.press_stage(both, RIGHT, "second button"),
         *unmask.pick_stages(scene, goal),
     )

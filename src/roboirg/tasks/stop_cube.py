@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from roboirg.core.conditions import All, Began, Elapsed, Fact, Rule, absent
+from roboirg.core.conditions import All, Elapsed, Fact, OccurrenceCount, Rule, absent
 from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, SceneObject, Stage
 from roboirg.core.motions import Point, Shuttle
 from roboirg.tasks.shared.fixtures import ORDINALS, draw_button
@@ -91,7 +91,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
         for checkpoint in checkpoints(interval, visit)
     ]
     too_early = Rule(
-        Began((stopped,), least=1, until=interval * (visit - 1) - 1),
+        OccurrenceCount((stopped,), least=1, until=interval * (visit - 1) - 1),
         "stopped the cube on an earlier visit",
         "wrong_time",
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboirg.core.conditions import Began, Fact, Rule
+from roboirg.core.conditions import Fact, OccurrenceCount, Rule
 from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, SceneObject, Stage
 from roboirg.core.motions import Glow
 from roboirg.tasks.shared.fixtures import (
@@ -84,7 +84,9 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     pressed = Fact("pressed", "button")
     visits = tuple(Fact("over", cube, f"target_{side}") for side in SIDES)
     # Visits in a wrong order complete nothing and still count, so they end here, too.
-    too_often = Rule(Began(visits, least=2 * repeats + 1), "passed over the targets once too often")
+    too_often = Rule(
+        OccurrenceCount(visits, least=2 * repeats + 1), "passed over the targets once too often"
+    )
     wrong_cubes = [Fact("picked", item.name) for item in scene.of_kind("cube") if item.name != cube]
     wrong: tuple[Fact | Rule, ...] = (*wrong_cubes, pressed, too_often)
     pick = Stage(

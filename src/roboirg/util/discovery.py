@@ -8,7 +8,7 @@ from types import ModuleType
 from typing import Any
 
 
-def offered(package: ModuleType, name: str) -> list[Any]:
+def discover(package: ModuleType, name: str) -> list[Any]:
     """What the modules of a package call `name`, in the order of the files' names."""
     modules = (
         importlib.import_module(f"{package.__name__}.{found.name}")

@@ -16,7 +16,7 @@ Item = TypeVar("Item")
 Outcome = TypeVar("Outcome")
 
 
-def spread(
+def parallel_map(
     work: Callable[[Item], Outcome], items: Sequence[Item], workers: int
 ) -> Iterator[tuple[Item, Outcome]]:
     """Every item with what the work on it gives, as they end.

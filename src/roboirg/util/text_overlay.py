@@ -12,7 +12,7 @@ Color = tuple[int, int, int]
 _FONT = 0  # cv2.FONT_HERSHEY_SIMPLEX; importing OpenCV takes a while
 
 
-def write_text(
+def draw_text(
     image: Frame, text: str, x: int, y: int, scale: float, color: Color, thickness: int = 1
 ) -> None:
     """Put a line of text into a picture, with its base line at y; what is not ASCII becomes "?".
@@ -32,7 +32,7 @@ def write_text(
     cv2.putText(image, ascii_text, (x, y), _FONT, scale, color, thickness, cv2.LINE_AA)
 
 
-def wrapped(text: str, width: int, scale: float) -> list[str]:
+def wrap_text(text: str, width: int, scale: float) -> list[str]:
     """The text in lines of at most so many pixels; a word that is longer has its own line."""
     import cv2
 

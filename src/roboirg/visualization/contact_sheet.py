@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.util.text_overlay import Color, Frame, wrapped, write_text
+from roboirg.util.text_overlay import Color, Frame, draw_text, wrap_text
 
 PER_BAND = 6
 """Moments side by side; further ones go below."""
@@ -32,7 +32,7 @@ _TURN: Color = (9, 105, 218)
 
 
 @dataclass(frozen=True, eq=False)
-class Moment:
+class SheetPanel:
     """What is shown of one moment.
 
     Attributes:
@@ -48,7 +48,7 @@ class Moment:
     is_demonstration: bool = False
 
 
-def compose_sheet(title: str, subtitle: str, moments: Sequence[Moment]) -> Frame:
+def compose_sheet(title: str, subtitle: str, moments: Sequence[SheetPanel]) -> Frame:
     """All moments in their order, under a title.
 
     Args:
@@ -63,12 +63,12 @@ def compose_sheet(title: str, subtitle: str, moments: Sequence[Moment]) -> Frame
     columns = math.ceil(len(moments) / math.ceil(len(moments) / PER_BAND))
     # A single narrow column would break the title.
     width = 2 * _MARGIN + max(columns, 3) * (_PICTURE + _GAP) - _GAP
-    lines = wrapped(subtitle, width - 2 * _MARGIN, _TEXT_SCALE)
+    lines = wrap_text(subtitle, width - 2 * _MARGIN, _TEXT_SCALE)
     head = _strip(width, _MARGIN + _TITLE_LINE + (len(lines) + 1) * _TEXT_LINE)
     y = _MARGIN + _TITLE_LINE // 2
-    write_text(head, title, _MARGIN, y, _TITLE_SCALE, _INK, thickness=2)
+    draw_text(head, title, _MARGIN, y, _TITLE_SCALE, _INK, thickness=2)
     for number, line in enumerate(lines):
-        write_text(head, line, _MARGIN, y + _TITLE_LINE + number * _TEXT_LINE, _TEXT_SCALE, _PALE)
+        draw_text(head, line, _MARGIN, y + _TITLE_LINE + number * _TEXT_LINE, _TEXT_SCALE, _PALE)
     bands = [
         _band(moments[start : start + columns], width) for start in range(0, len(moments), columns)
     ]
@@ -92,7 +92,7 @@ def write_png(image: Frame, path: Path) -> None:
         raise InvalidValueError(f"The picture {path} cannot be written: {error}.") from error
 
 
-def thinned(count: int, most: int) -> tuple[int, ...]:
+def evenly_spaced(count: int, most: int) -> tuple[int, ...]:
     """Positions of at most `most` of `count` things, evenly spaced, both ends among them."""
     if count <= most:
         return tuple(range(count))
@@ -101,9 +101,9 @@ def thinned(count: int, most: int) -> tuple[int, ...]:
     return tuple(round(number * (count - 1) / (most - 1)) for number in range(most))
 
 
-def _band(moments: Sequence[Moment], width: int) -> Frame:
+def _band(moments: Sequence[SheetPanel], width: int) -> Frame:
     """Moments side by side: a bar, the caption, the pictures."""
-    captions = [wrapped(moment.caption, _PICTURE, _TEXT_SCALE) for moment in moments]
+    captions = [wrap_text(moment.caption, _PICTURE, _TEXT_SCALE) for moment in moments]
     longest = min(_CAPTION_LINES, max(map(len, captions)))
     caption_height = _BAR + _PAD + (1 + longest) * _TEXT_LINE + _PAD
     heights = max(len(moment.pictures) for moment in moments)
@@ -114,9 +114,9 @@ def _band(moments: Sequence[Moment], width: int) -> Frame:
         band[:_BAR, x : x + _PICTURE] = np.array(color, np.uint8)
         y = _BAR + _PAD + _TEXT_LINE - 4
         when = f"step {moment.step}" + (" (video)" if moment.is_demonstration else "")
-        write_text(band, when, x, y, _TEXT_SCALE, _PALE)
+        draw_text(band, when, x, y, _TEXT_SCALE, _PALE)
         for number, line in enumerate(captions[column][:longest], start=1):
-            write_text(band, line, x, y + number * _TEXT_LINE, _TEXT_SCALE, _INK)
+            draw_text(band, line, x, y + number * _TEXT_LINE, _TEXT_SCALE, _INK)
         for row, picture in enumerate(moment.pictures):
             top = caption_height + row * (_PICTURE + _GAP)
             band[top : top + _PICTURE, x : x + _PICTURE] = picture

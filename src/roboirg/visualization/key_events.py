@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from roboirg.core.motions import Away, Motion, Swap
 
 
-class Happenings:
+class KeyEvents:
     """Tells, step by step, what is moving by itself.
 
     Args:

@@ -14,8 +14,8 @@ from roboirg.core.observations import CAMERAS
 from roboirg.judging import Status, plain_subgoal
 from roboirg.language import instruct
 from roboirg.policies import make_policy, play
-from roboirg.visualization.contact_sheet import Moment, compose_sheet, thinned, write_png
-from roboirg.visualization.key_events import Happenings
+from roboirg.visualization.contact_sheet import SheetPanel, compose_sheet, evenly_spaced, write_png
+from roboirg.visualization.key_events import KeyEvents
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -40,7 +40,7 @@ class Playthrough:
 
     verdict: str
     steps: int
-    moments: tuple[Moment, ...]
+    moments: tuple[SheetPanel, ...]
 
 
 def play_through(episode: Episode) -> Playthrough:
@@ -51,7 +51,7 @@ def play_through(episode: Episode) -> Playthrough:
         MissingDependencyError: the simulator is not installed.
     """
     env = roboirg.make(episode, cameras=())
-    watch = _Watch(Happenings(episode.scene.motions))
+    watch = _MomentRecorder(KeyEvents(episode.scene.motions))
     env.set_frame_hook(watch)
     try:
         info = play(env, make_policy("oracle", 0))
@@ -80,7 +80,7 @@ def draw_sheet(episode: Episode, path: Path) -> str:
 
 
 @dataclass
-class _Watch:
+class _MomentRecorder:
     """Looks at the world after each control step and photographs what is remarkable.
 
     Attributes:
@@ -88,8 +88,8 @@ class _Watch:
         seen: moments with their rank; one moment for each step, the newest.
     """
 
-    happenings: Happenings
-    seen: dict[int, tuple[int, Moment]] = field(default_factory=dict)
+    happenings: KeyEvents
+    seen: dict[int, tuple[int, SheetPanel]] = field(default_factory=dict)
     _completed: int = 0
     _is_demonstration: bool | None = None
 
@@ -116,10 +116,10 @@ class _Watch:
         """Keep how the world looks now."""
         step = env.session.world.elapsed
         pictures = tuple(env.picture(camera).copy() for camera in CAMERAS)
-        moment = Moment(step, caption, pictures, bool(self._is_demonstration))
+        moment = SheetPanel(step, caption, pictures, bool(self._is_demonstration))
         self.seen[step] = (rank, moment)
 
-    def chosen(self) -> tuple[Moment, ...]:
+    def chosen(self) -> tuple[SheetPanel, ...]:
         """The most remarkable moments, in order of time."""
         ranked = [self.seen[step] for step in sorted(self.seen)]
         kept = choose([rank for rank, _ in ranked])
@@ -136,5 +136,5 @@ def choose(ranks: Sequence[int]) -> tuple[int, ...]:
     for rank in (_ESSENTIAL, _STAGE, _HAPPENING, _SHOWN_STAGE, _FILLER):
         candidates = [position for position, one in enumerate(ranks) if one == rank]
         room = max(0, (FEWEST if rank == _FILLER else MOST) - len(kept))
-        kept += [candidates[number] for number in thinned(len(candidates), room)]
+        kept += [candidates[number] for number in evenly_spaced(len(candidates), room)]
     return tuple(sorted(kept))

@@ -6,17 +6,17 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from roboirg.analysis.figures.figure_data import Content
+from roboirg.analysis.figures.figure_data import FigureData
 from roboirg.analysis.figures.figure_style import save
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 
-__all__ = ["FIGURES", "Content", "write_figures"]
+__all__ = ["FIGURES", "FigureData", "write_figures"]
 
 FIGURES = ("averages", "forms", "expressions", "context", "failures")
 
 
 def write_figures(
-    content: Content, folder: Path, which: Sequence[str] = FIGURES, *, published: bool = False
+    content: FigureData, folder: Path, which: Sequence[str] = FIGURES, *, published: bool = False
 ) -> tuple[Path, ...]:
     """Draw figures as PNG, SVG and PDF; the expressions as PNG and SVG.
 
@@ -48,7 +48,7 @@ def write_figures(
     return tuple(paths)
 
 
-def _written(name: str, content: Content, folder: Path, *, published: bool) -> tuple[Path, ...]:
+def _written(name: str, content: FigureData, folder: Path, *, published: bool) -> tuple[Path, ...]:
     from roboirg.analysis.figures.averages import draw_averages
     from roboirg.analysis.figures.context import draw_context
     from roboirg.analysis.figures.expressions import write_expressions

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from roboirg.analysis.figures.figure_data import Content
+from roboirg.analysis.figures.figure_data import FigureData
 from roboirg.analysis.figures.figure_style import (
     GHOST,
     draw_ghost,
@@ -14,7 +14,7 @@ from roboirg.analysis.figures.figure_style import (
 )
 from roboirg.analysis.published import published_rows
 from roboirg.analysis.stats.run_summary import ALL
-from roboirg.analysis.stats.success_rates import SETTING_ORDER, Variant
+from roboirg.analysis.stats.success_rates import SETTING_ORDER, SettingColumn
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,12 +26,12 @@ SPREAD = 0.62
 GHOST_PLACE = 0.42
 
 
-def draw_averages(content: Content, *, published: bool = False) -> Figure | None:
+def draw_averages(content: FigureData, *, published: bool = False) -> Figure | None:
     """Draw the unweighted means over tasks with their intervals; None without any."""
     settings = [
         setting
         for setting in SETTING_ORDER
-        if any((who, ALL, Variant(setting)) in content.summaries for who in content.names)
+        if any((who, ALL, SettingColumn(setting)) in content.summaries for who in content.names)
     ]
     if not settings:
         return None
@@ -40,7 +40,7 @@ def draw_averages(content: Content, *, published: bool = False) -> Figure | None
     figure, axes = rates_figure(HEIGHT_INCHES, len(content.names) + len(models))
     for number, who in enumerate(content.names):
         for place, setting in enumerate(settings):
-            one = content.summaries.get((who, ALL, Variant(setting)))
+            one = content.summaries.get((who, ALL, SettingColumn(setting)))
             if one is not None and one.rate is not None:
                 at = place + _offset(number, len(content.names))
                 draw_point(axes, at, float(one.rate), one.interval, number, content.name(who))
@@ -54,19 +54,19 @@ def draw_averages(content: Content, *, published: bool = False) -> Figure | None
     return figure
 
 
-def _set_axes(axes: Axes, content: Content, settings: list[str], room: float) -> None:
+def _set_axes(axes: Axes, content: FigureData, settings: list[str], room: float) -> None:
     axes.set_xticks(range(len(settings)), [_label(content, setting) for setting in settings])
     axes.set_xlim(-0.5, len(settings) - 0.5 + (0.1 if room else 0))
     for edge in range(1, len(settings)):
         axes.axvline(edge - 0.5 + (0.05 if room else 0), color=GHOST, linewidth=0.3, alpha=0.5)
 
 
-def _label(content: Content, setting: str) -> str:
+def _label(content: FigureData, setting: str) -> str:
     """The setting and over how many tasks it is a mean."""
     counts = {
         len(one.tasks)
         for (_, scope, told), one in content.summaries.items()
-        if scope == ALL and told == Variant(setting) and one.rate is not None
+        if scope == ALL and told == SettingColumn(setting) and one.rate is not None
     }
     words = "–".join(map(str, sorted({min(counts, default=0), max(counts, default=0)})))
     return f"{setting}\n({words} task{'' if words == '1' else 's'})"

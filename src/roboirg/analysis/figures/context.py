@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from roboirg.analysis.figures.figure_data import Content, by_key
+from roboirg.analysis.figures.figure_data import FigureData, by_key
 from roboirg.analysis.figures.figure_style import (
     COLORS,
     GHOST,
@@ -15,8 +15,8 @@ from roboirg.analysis.figures.figure_style import (
 )
 from roboirg.analysis.published import published_rows
 from roboirg.analysis.stats.run_summary import ALL
-from roboirg.analysis.stats.samples import Contestant, Samples
-from roboirg.analysis.stats.success_rates import Variant
+from roboirg.analysis.stats.samples import PolicyRun, Samples
+from roboirg.analysis.stats.success_rates import SettingColumn
 from roboirg.language import STAGE_SETS
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ HEIGHT_INCHES = 2.4
 SHIFT = 0.08
 
 
-def draw_context(content: Content, *, published: bool = False) -> Figure | None:
+def draw_context(content: FigureData, *, published: bool = False) -> Figure | None:
     """Draw the means over the tasks that were played with every set; None with one set or none."""
     sets = [
         stages
@@ -45,7 +45,7 @@ def draw_context(content: Content, *, published: bool = False) -> Figure | None:
     for number, who in enumerate(names):
         course = []
         for place, stages in enumerate(sets):
-            one = found.get((who, ALL, Variant("contextual", stages=stages)))
+            one = found.get((who, ALL, SettingColumn("contextual", stages=stages)))
             if one is not None and one.rate is not None:
                 at = place + SHIFT * (number - (len(names) - 1) / 2)
                 course.append((at, 100 * float(one.rate)))
@@ -68,24 +68,24 @@ def _set_axes(axes: Axes, sets: list[tuple[int, ...]], tasks: list[str]) -> None
     axes.set_xlabel(f"stages that are spoken; mean over {', '.join(tasks)}", wrap=True)
 
 
-def _courses(samples: Samples) -> dict[Contestant, set[Variant]]:
+def _courses(samples: Samples) -> dict[PolicyRun, set[SettingColumn]]:
     """The sets that each contestant was told, of those who were told several."""
-    usual = {Variant("contextual", stages=stages) for stages in STAGE_SETS}
-    told: dict[Contestant, set[Variant]] = {}
+    usual = {SettingColumn("contextual", stages=stages) for stages in STAGE_SETS}
+    told: dict[PolicyRun, set[SettingColumn]] = {}
     for (who, _, variant), sample in samples.items():
         if variant in usual and sample.trials:
             told.setdefault(who, set()).add(variant)
     return {who: own for who, own in told.items() if len(own) > 1}
 
 
-def _is(told: set[Variant], stages: tuple[int, ...]) -> bool:
-    return Variant("contextual", stages=stages) in told
+def _is(told: set[SettingColumn], stages: tuple[int, ...]) -> bool:
+    return SettingColumn("contextual", stages=stages) in told
 
 
 def _shared(samples: Samples, sets: list[tuple[int, ...]]) -> tuple[Samples, list[str]]:
     """Of those who were told several sets: the tasks that all of them played with every set."""
     names = _courses(samples)
-    wanted = {Variant("contextual", stages=stages) for stages in sets}
+    wanted = {SettingColumn("contextual", stages=stages) for stages in sets}
     kept = {
         key: sample
         for key, sample in samples.items()

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from roboirg import language
-from roboirg.analysis.figures.figure_data import Content
+from roboirg.analysis.figures.figure_data import FigureData
 from roboirg.core.errors import RoboIRGError
-from roboirg.evaluation.plan import say
+from roboirg.evaluation.plan import instruct_job
 from roboirg.language.expression_figure import write_figure
 from roboirg.language.instruction import Instruction
 from roboirg.records.record import Job
@@ -15,7 +15,7 @@ from roboirg.records.record import Job
 TITLE = "Referring expressions that were said"
 
 
-def write_expressions(content: Content, folder: Path, name: str) -> tuple[Path, ...]:
+def write_expressions(content: FigureData, folder: Path, name: str) -> tuple[Path, ...]:
     """Draw what the instructions of the runs consist of; nothing without implicit ones.
 
     Results do not hold the words. They are said again, which only the version of the language
@@ -37,6 +37,6 @@ def write_expressions(content: Content, folder: Path, name: str) -> tuple[Path, 
 
 def _say(job: Job) -> Instruction | None:
     try:
-        return say(job)
+        return instruct_job(job)
     except RoboIRGError:
         return None  # a task that is no longer installed

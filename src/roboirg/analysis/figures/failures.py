@@ -6,7 +6,7 @@ from collections import Counter, defaultdict
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from roboirg.analysis.figures.figure_data import Content
+from roboirg.analysis.figures.figure_data import FigureData
 from roboirg.analysis.figures.figure_style import (
     COLUMN_INCHES,
     LEGEND_LINE_INCHES,
@@ -14,8 +14,8 @@ from roboirg.analysis.figures.figure_style import (
     clear_axes,
     new_figure,
 )
-from roboirg.analysis.stats.samples import Contestant
-from roboirg.analysis.stats.success_rates import Variant
+from roboirg.analysis.stats.samples import PolicyRun
+from roboirg.analysis.stats.success_rates import SettingColumn
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 from roboirg.records.record import Result
 
@@ -43,16 +43,16 @@ WIDE_ENOUGH = 6.0
 """Percent from which on a part has room for its number."""
 _DARK = frozenset((*GROUNDING[:2], *EXECUTION[:3]))
 
-Counts = Mapping[tuple[Contestant, Variant], Counter[str]]
+Counts = Mapping[tuple[PolicyRun, SettingColumn], Counter[str]]
 
 
-def draw_failures(content: Content) -> Figure | None:
+def draw_failures(content: FigureData) -> Figure | None:
     """Draw the shares of episodes that failed in each way; None if none did."""
     counts, played = _counts(content)
     if not any(counts.values()):
         return None
     names = [who for who in content.names if any(own == who for own, _ in played)]
-    told = sorted({variant for _, variant in played}, key=Variant.sort_key)
+    told = sorted({variant for _, variant in played}, key=SettingColumn.sort_key)
     across = min(MOST_PANELS, len(names))
     down = -(-len(names) // across)
     kinds = [kind for kind in COLORS if any(own[kind] for own in counts.values())]
@@ -84,14 +84,14 @@ def failure_name(result: Result) -> str:
     return UNKNOWN if result.attribution is None else result.attribution.failure
 
 
-def _counts(content: Content) -> tuple[Counts, Counter[tuple[Contestant, Variant]]]:
-    counts: dict[tuple[Contestant, Variant], Counter[str]] = defaultdict(Counter)
-    played: Counter[tuple[Contestant, Variant]] = Counter()
+def _counts(content: FigureData) -> tuple[Counts, Counter[tuple[PolicyRun, SettingColumn]]]:
+    counts: dict[tuple[PolicyRun, SettingColumn], Counter[str]] = defaultdict(Counter)
+    played: Counter[tuple[PolicyRun, SettingColumn]] = Counter()
     for (who, _, variant), sample in content.samples.items():
         played[who, variant] += sample.trials
     for who, result in content.results:
         if result.outcome == "failure":
-            counts[who, Variant.of(result)][failure_name(result)] += 1
+            counts[who, SettingColumn.of(result)][failure_name(result)] += 1
     return counts, played
 
 

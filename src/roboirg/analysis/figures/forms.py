@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from roboirg.analysis.figures.figure_data import Content
+from roboirg.analysis.figures.figure_data import FigureData
 from roboirg.analysis.figures.figure_style import COLUMN_INCHES, PAGE_INCHES, clear_axes, new_figure
 from roboirg.analysis.stats.paired_tests import Gap
 from roboirg.analysis.stats.run_summary import ALL, Scope
-from roboirg.analysis.stats.samples import Contestant
-from roboirg.analysis.stats.success_rates import SETTING_ORDER, Variant
+from roboirg.analysis.stats.samples import PolicyRun
+from roboirg.analysis.stats.success_rates import SETTING_ORDER, SettingColumn
 from roboirg.analysis.tables.run_tables import ALL_TASKS, points
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ MOST_PANELS = 2
 """Side by side."""
 
 
-class Row(NamedTuple):
+class FormRow(NamedTuple):
     """A bar: where, and what came of the two forms there."""
 
     scope: str
@@ -39,7 +39,7 @@ class Row(NamedTuple):
     gap: Gap
 
 
-def draw_forms(content: Content) -> Figure | None:
+def draw_forms(content: FigureData) -> Figure | None:
     """Draw the overlap of the two forms and their difference; None if not both were played."""
     panels = {who: rows for who in content.names if (rows := _rows(content, who))}
     if not panels:
@@ -65,7 +65,7 @@ def draw_forms(content: Content) -> Figure | None:
     return figure
 
 
-def _rows(content: Content, who: Contestant) -> list[Row]:
+def _rows(content: FigureData, who: PolicyRun) -> list[FormRow]:
     suites = dict.fromkeys(
         scope.suite for _, scope, _ in content.summaries if scope.suite is not None
     )
@@ -73,15 +73,15 @@ def _rows(content: Content, who: Contestant) -> list[Row]:
     if len(scopes) > 1:
         scopes.append((ALL_TASKS, ALL))
     return [
-        Row(name, setting, one.form_gap)
+        FormRow(name, setting, one.form_gap)
         for name, scope in scopes
         for setting in SETTING_ORDER
-        if (one := content.summaries.get((who, scope, Variant(setting)))) is not None
+        if (one := content.summaries.get((who, scope, SettingColumn(setting)))) is not None
         if one.form_gap is not None
     ]
 
 
-def _draw_panel(axes: Axes, rows: list[Row]) -> None:
+def _draw_panel(axes: Axes, rows: list[FormRow]) -> None:
     places: list[float] = []
     for number, row in enumerate(rows):
         begins = number == 0 or row.scope != rows[number - 1].scope

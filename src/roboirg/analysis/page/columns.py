@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 from typing import NamedTuple, get_args
 
 from roboirg.analysis.page.details import Strings, details_of, words_of
-from roboirg.analysis.page.entries import Entries, Entry, task_order
-from roboirg.analysis.page.films import Film, Films
-from roboirg.analysis.stats.success_rates import Variant
+from roboirg.analysis.page.entries import EpisodeEntries, EpisodeEntry, task_order
+from roboirg.analysis.page.films import EpisodeVideo, EpisodeVideos
+from roboirg.analysis.stats.success_rates import SettingColumn
 from roboirg.core.episode import DIFFICULTIES
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 from roboirg.records.record import ERROR_KINDS, FailureKind, Outcome
@@ -28,7 +28,7 @@ ERROR = "error"
 Row = dict[str, int | str]
 
 
-class Choice(NamedTuple):
+class FilterOption(NamedTuple):
     """A filter: its name in the columns, what it is called, and what it offers.
 
     Attributes:
@@ -55,15 +55,15 @@ class Columns:
         films: that are part of the page, by the episode's key.
     """
 
-    choices: tuple[Choice, ...]
+    choices: tuple[FilterOption, ...]
     columns: dict[str, list[int | str]] = field(default_factory=dict)
     strings: Strings = field(default_factory=Strings)
     words: list[list[int]] = field(default_factory=list)
     details: list[str] = field(default_factory=list)
-    films: dict[str, Film] = field(default_factory=dict)
+    films: dict[str, EpisodeVideo] = field(default_factory=dict)
 
 
-def make_columns(entries: Entries, films: Films) -> Columns:
+def make_columns(entries: EpisodeEntries, films: EpisodeVideos) -> Columns:
     """Take the episodes apart."""
     found = Columns(_choices(entries))
     index = {
@@ -86,7 +86,7 @@ def make_columns(entries: Entries, films: Films) -> Columns:
     return found
 
 
-def failure_of(entry: Entry) -> tuple[str, str] | None:
+def failure_of(entry: EpisodeEntry) -> tuple[str, str] | None:
     """Of what kind an episode's failure or error is, and which; None for a success."""
     record = entry.record
     if record.outcome == "success":
@@ -98,26 +98,32 @@ def failure_of(entry: Entry) -> tuple[str, str] | None:
     return record.attribution.kind, record.attribution.failure
 
 
-def _choices(entries: Entries) -> tuple[Choice, ...]:
+def _choices(entries: EpisodeEntries) -> tuple[FilterOption, ...]:
     records = [entry.record for entry in entries.all]
-    told = sorted({entry.told for entry in entries.all}, key=Variant.sort_key)
+    told = sorted({entry.told for entry in entries.all}, key=SettingColumn.sort_key)
     settings = tuple(dict.fromkeys(one._replace(form="implicit").label for one in told))
     failures = _failures(entries.all)
     tasks = tuple(task_order({record.task for record in records}))
     return (
-        Choice("policy", "policy", tuple(entries.names.values())),
-        Choice("task", "task", tasks, tuple(map(_suite, tasks))),
-        Choice("setting", "setting", settings),
-        Choice("form", "form", tuple(dict.fromkeys(one.form for one in told))),
-        Choice("difficulty", "difficulty", _present(DIFFICULTIES, (r.difficulty for r in records))),
-        Choice("outcome", "outcome", _present(get_args(Outcome), (r.outcome for r in records))),
-        Choice(
+        FilterOption("policy", "policy", tuple(entries.names.values())),
+        FilterOption("task", "task", tasks, tuple(map(_suite, tasks))),
+        FilterOption("setting", "setting", settings),
+        FilterOption("form", "form", tuple(dict.fromkeys(one.form for one in told))),
+        FilterOption(
+            "difficulty", "difficulty", _present(DIFFICULTIES, (r.difficulty for r in records))
+        ),
+        FilterOption(
+            "outcome", "outcome", _present(get_args(Outcome), (r.outcome for r in records))
+        ),
+        FilterOption(
             "failure",
             "why it failed",
             tuple(name for _, name in failures),
             tuple(kind for kind, _ in failures),
         ),
-        Choice("seed", "policy seed", tuple(map(str, sorted({r.policy_seed for r in records})))),
+        FilterOption(
+            "seed", "policy seed", tuple(map(str, sorted({r.policy_seed for r in records})))
+        ),
     )
 
 
@@ -126,7 +132,7 @@ def _suite(task: str) -> str:
     return known.suite if known else "other tasks"
 
 
-def _failures(entries: Iterable[Entry]) -> list[tuple[str, str]]:
+def _failures(entries: Iterable[EpisodeEntry]) -> list[tuple[str, str]]:
     grounding, execution = get_args(FailureKind)
     order = [
         *((grounding, name) for name in GROUNDING),
@@ -144,8 +150,8 @@ def _present(order: Sequence[str], values: Iterable[str]) -> tuple[str, ...]:
 
 
 def _row(
-    entry: Entry,
-    entries: Entries,
+    entry: EpisodeEntry,
+    entries: EpisodeEntries,
     index: dict[str, dict[str, int]],
     same: dict[tuple[object, ...], int],
 ) -> Row:
@@ -170,7 +176,7 @@ def _row(
     }
 
 
-def _scene_and_words(entry: Entry) -> tuple[object, ...]:
+def _scene_and_words(entry: EpisodeEntry) -> tuple[object, ...]:
     record = entry.record
     return (
         record.task,
@@ -182,7 +188,7 @@ def _scene_and_words(entry: Entry) -> tuple[object, ...]:
     )
 
 
-def _resolved_texts(entries: Iterable[Entry]) -> dict[tuple[object, ...], str]:
+def _resolved_texts(entries: Iterable[EpisodeEntry]) -> dict[tuple[object, ...], str]:
     """What was said in the resolved form, where that was played."""
     return {
         _scene_and_words(entry): " ".join(turn.text for turn in entry.record.instruction)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from roboirg.analysis.page.films import Film
+from roboirg.analysis.page.films import EpisodeVideo
 from roboirg.analysis.page.reconstruction import resolved_form, stages_of
 from roboirg.records.record import EventRecord, Record
 
@@ -43,7 +43,12 @@ def words_of(record: Record, strings: Strings) -> list[int]:
 
 
 def details_of(
-    record: Record, strings: Strings, film: Film | None, resolved: str | None, *, embeds: bool
+    record: Record,
+    strings: Strings,
+    film: EpisodeVideo | None,
+    resolved: str | None,
+    *,
+    embeds: bool,
 ) -> Details:
     """An episode, with texts as indices; what is empty is left out.
 

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from roboirg.analysis.stats.samples import (
-    Contestant,
-    Rules,
-    Sample,
+    CellResults,
+    EvalConditions,
+    PolicyRun,
     Samples,
     Versions,
     gather,
     labels,
 )
-from roboirg.analysis.stats.success_rates import Variant
+from roboirg.analysis.stats.success_rates import SettingColumn
 from roboirg.records.record import Job, Record
 from roboirg.tasks import all_tasks
 
@@ -40,7 +40,7 @@ class Run:
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class EpisodeEntry:
     """One episode of the page.
 
     Attributes:
@@ -53,13 +53,13 @@ class Entry:
 
     key: str
     record: Record
-    who: Contestant
-    told: Variant
+    who: PolicyRun
+    told: SettingColumn
     run: Run
 
 
 @dataclass(frozen=True, slots=True)
-class Entries:
+class EpisodeEntries:
     """All episodes, and the samples they make.
 
     Attributes:
@@ -68,32 +68,34 @@ class Entries:
         names: of the contestants, in the order of the page.
     """
 
-    all: tuple[Entry, ...]
+    all: tuple[EpisodeEntry, ...]
     samples: Samples
-    names: Mapping[Contestant, str]
+    names: Mapping[PolicyRun, str]
 
 
-def make_entries(runs: Sequence[Run]) -> Entries:
+def make_entries(runs: Sequence[Run]) -> EpisodeEntries:
     """Sort the episodes of one run, or of two that are to be compared."""
     apart = len(runs) > 1
-    samples: dict[tuple[Contestant, str, Variant], Sample] = {}
-    entries: list[Entry] = []
+    samples: dict[tuple[PolicyRun, str, SettingColumn], CellResults] = {}
+    entries: list[EpisodeEntry] = []
     for number, run in enumerate(runs):
         name = run.name if apart else ""
         for (who, task, told), sample in gather([(name, run.records)], run.planned).items():
             samples[who._replace(run=name), task, told] = sample
         for record in run.records:
-            who = Contestant(record.policy, Rules.of(record), Versions.of(record), name)
+            who = PolicyRun(record.policy, EvalConditions.of(record), Versions.of(record), name)
             key = record.slug.rpartition("-")[2] + ("" if number == 0 else f"-{number + 1}")
-            entries.append(Entry(key, record, who, Variant.of(record), run))
+            entries.append(EpisodeEntry(key, record, who, SettingColumn.of(record), run))
     return _sorted(entries, samples, runs)
 
 
-def _sorted(entries: Sequence[Entry], samples: Samples, runs: Sequence[Run]) -> Entries:
+def _sorted(
+    entries: Sequence[EpisodeEntry], samples: Samples, runs: Sequence[Run]
+) -> EpisodeEntries:
     policies, privileged = _planned_order(runs), _privileged(entries)
     order = [run.name for run in runs]
 
-    def place(who: Contestant) -> tuple[object, ...]:
+    def place(who: PolicyRun) -> tuple[object, ...]:
         run = order.index(who.run) if who.run else 0
         return (run, policies.index(who.policy), repr(who.rules), repr(who.versions))
 
@@ -114,10 +116,10 @@ def _sorted(entries: Sequence[Entry], samples: Samples, runs: Sequence[Run]) -> 
             one.record.policy_seed,
         ),
     )
-    return Entries(tuple(ordered), in_order(samples, list(marked)), marked)
+    return EpisodeEntries(tuple(ordered), in_order(samples, list(marked)), marked)
 
 
-def in_order(samples: Samples, contestants: Sequence[Contestant]) -> Samples:
+def in_order(samples: Samples, contestants: Sequence[PolicyRun]) -> Samples:
     """The same samples, by contestant, task and telling.
 
     The bootstrap takes them one after the other, and episodes end in any order.
@@ -143,5 +145,5 @@ def _planned_order(runs: Sequence[Run]) -> list[str]:
     return list(dict.fromkeys(job.policy for job in jobs))
 
 
-def _privileged(entries: Iterable[Entry]) -> set[str]:
+def _privileged(entries: Iterable[EpisodeEntry]) -> set[str]:
     return {one.record.policy for one in entries if one.record.privileged}

@@ -9,14 +9,14 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 from urllib.parse import quote
 
-from roboirg.analysis.page.entries import Entry
+from roboirg.analysis.page.entries import EpisodeEntry
 
 MOST_FILM_BYTES = 60_000_000
 """Films that weigh more together stay beside the page."""
 POSTER_SUFFIX = ".jpg"
 
 
-class Film(NamedTuple):
+class EpisodeVideo(NamedTuple):
     """A film and its last picture, as data URIs or as paths from the page."""
 
     source: str
@@ -24,7 +24,7 @@ class Film(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Films:
+class EpisodeVideos:
     """Which films there are.
 
     Attributes:
@@ -36,7 +36,7 @@ class Films:
     count: int
 
     @classmethod
-    def of(cls, entries: Iterable[Entry], *, embed: bool = True) -> Films:
+    def of(cls, entries: Iterable[EpisodeEntry], *, embed: bool = True) -> EpisodeVideos:
         """Into the page, if that is wanted and they are not too much together."""
         weights = [
             path.stat().st_size
@@ -46,16 +46,16 @@ class Films:
         ]
         return cls(embed and sum(weights) <= MOST_FILM_BYTES, len(weights))
 
-    def film(self, entry: Entry) -> Film | None:
+    def film(self, entry: EpisodeEntry) -> EpisodeVideo | None:
         """The film of an episode; None without one."""
         name = entry.record.video
         source = None if name is None else self._link(entry, name, "video/mp4")
         if name is None or source is None:
             return None
         poster = str(PurePosixPath(name).with_suffix(POSTER_SUFFIX))
-        return Film(source, self._link(entry, poster, "image/jpeg"))
+        return EpisodeVideo(source, self._link(entry, poster, "image/jpeg"))
 
-    def _link(self, entry: Entry, name: str, kind: str) -> str | None:
+    def _link(self, entry: EpisodeEntry, name: str, kind: str) -> str | None:
         if entry.run.folder is None or not (path := entry.run.folder / name).is_file():
             return None
         if not self.embeds:

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from roboirg.analysis.page.entries import Entries, in_order, task_order
+from roboirg.analysis.page.entries import EpisodeEntries, in_order, task_order
 from roboirg.analysis.stats.intervals import Interval
-from roboirg.analysis.stats.run_summary import Scope, Summary, summarize
-from roboirg.analysis.stats.samples import Contestant, Samples, gather
-from roboirg.analysis.stats.success_rates import EXPLICIT, Variant
+from roboirg.analysis.stats.run_summary import Scope, SummaryRow, summarize
+from roboirg.analysis.stats.samples import PolicyRun, Samples, gather
+from roboirg.analysis.stats.success_rates import EXPLICIT, SettingColumn
 from roboirg.analysis.tables.run_tables import ALL_TASKS, percent, points
 from roboirg.core.episode import DIFFICULTIES
 from roboirg.tasks import all_tasks
@@ -30,13 +30,13 @@ class MatrixRow(NamedTuple):
     scope: Scope
 
 
-def make_matrix(entries: Entries) -> dict[str, Any]:
+def make_matrix(entries: EpisodeEntries) -> dict[str, Any]:
     """The heat maps as JSON values: columns, rows, and cells by policy, row and column.
 
     One set of cells for everything and, where there are several, one for each difficulty. What is
     planned and not played has no difficulty yet; it counts among everything.
     """
-    told = sorted({variant for _, _, variant in entries.samples}, key=Variant.sort_key)
+    told = sorted({variant for _, _, variant in entries.samples}, key=SettingColumn.sort_key)
     rows = _rows(entries.samples)
     levels = {"": entries.samples}
     found = {entry.record.difficulty for entry in entries.all}
@@ -72,9 +72,9 @@ def _rows(samples: Samples) -> list[MatrixRow]:
     return rows
 
 
-def _only(entries: Entries, difficulty: str) -> Samples:
+def _only(entries: EpisodeEntries, difficulty: str) -> Samples:
     """The samples of one difficulty, each policy of each run by itself."""
-    found: dict[tuple[Contestant, str, Variant], Any] = {}
+    found: dict[tuple[PolicyRun, str, SettingColumn], Any] = {}
     for run in dict.fromkeys(entry.who.run for entry in entries.all):
         records = [
             entry.record
@@ -88,9 +88,9 @@ def _only(entries: Entries, difficulty: str) -> Samples:
 
 def _cells(
     samples: Samples,
-    names: Mapping[Contestant, str],
+    names: Mapping[PolicyRun, str],
     rows: Sequence[MatrixRow],
-    told: Sequence[Variant],
+    told: Sequence[SettingColumn],
 ) -> list[dict[str, Any]]:
     places = {who: place for place, who in enumerate(names)}
     lines = {row.scope: line for line, row in enumerate(rows)}
@@ -104,7 +104,7 @@ def _cells(
     ]
 
 
-def _cell(one: Summary, where: str) -> dict[str, Any]:
+def _cell(one: SummaryRow, where: str) -> dict[str, Any]:
     cell: dict[str, Any] = {"note": notes(one, where)}
     if one.rate is not None:
         cell |= {"rate": round(float(one.rate), 4), "text": percent(float(one.rate))}
@@ -118,7 +118,7 @@ def _cell(one: Summary, where: str) -> dict[str, Any]:
     return cell
 
 
-def notes(one: Summary, where: str) -> list[str]:
+def notes(one: SummaryRow, where: str) -> list[str]:
     """A cell in words: first where it is, then what came of it."""
     lines = [f"{where}, {one.variant.label}"]
     if one.rate is None:
@@ -139,7 +139,7 @@ def notes(one: Summary, where: str) -> list[str]:
     return lines
 
 
-def _gap_notes(one: Summary) -> list[str]:
+def _gap_notes(one: SummaryRow) -> list[str]:
     lines: list[str] = []
     if one.gap is not None and one.variant != EXPLICIT:
         if one.gap.retention is None:

@@ -53,7 +53,7 @@ class PageServer(ThreadingHTTPServer):
         self._page: tuple[object, bytes] | None = None
         self._lock = threading.Lock()
         try:
-            super().__init__((LOOPBACK, port), _Handler)
+            super().__init__((LOOPBACK, port), _PageHandler)
         except (OSError, OverflowError) as error:
             raise InvalidValueError(
                 f"Port {port} cannot be had ({error}); leave it out for a free one."
@@ -109,7 +109,7 @@ def parse_range(header: str | None, size: int) -> Range | None:
     return Range(begin, end)
 
 
-class _Handler(BaseHTTPRequestHandler):
+class _PageHandler(BaseHTTPRequestHandler):
     server: PageServer
     protocol_version = "HTTP/1.1"
     server_version = "roboirg"

@@ -13,9 +13,9 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.plan import say
+from roboirg.evaluation.plan import instruct_job
 from roboirg.judging import Event
-from roboirg.judging.episode_replay import retrace
+from roboirg.judging.episode_replay import rejudge
 from roboirg.records.record import Record
 
 
@@ -36,7 +36,7 @@ def resolved_form(record: Record) -> str | None:
     if record.language_version != language.LANGUAGE_VERSION or not _is_of_this_world(record):
         return None
     try:
-        return say(record.identity.model_copy(update={"form": "resolved"})).text
+        return instruct_job(record.identity.model_copy(update={"form": "resolved"})).text
     except RoboIRGError:
         return None  # a task that is no longer installed
 
@@ -53,7 +53,7 @@ def stages_of(record: Record) -> tuple[StageMark, ...]:
     last = max(record.steps, *(event.step for event in record.events))
     try:
         episode = get_episode(record.task, record.split, record.episode)
-        trace = retrace(episode, events, turn, turn + last)
+        trace = rejudge(episode, events, turn, turn + last)
     except (RoboIRGError, KeyError):
         return ()  # a task that is no longer installed, or events that are not all there
     done = {

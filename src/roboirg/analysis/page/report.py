@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from roboirg.analysis.page.columns import Columns, make_columns
-from roboirg.analysis.page.entries import Entries, Run, make_entries
-from roboirg.analysis.page.films import Films
+from roboirg.analysis.page.entries import EpisodeEntries, Run, make_entries
+from roboirg.analysis.page.films import EpisodeVideos
 from roboirg.analysis.page.matrix import make_matrix
-from roboirg.analysis.page.run_warnings import comparisons, facts_of, notices_of
+from roboirg.analysis.page.run_warnings import comparisons, facts_of, run_warnings
 from roboirg.core.errors import MissingDependencyError
 from roboirg.evaluation.video_writer import LAST_FRAME_REPEATS, VideoOptions
 from roboirg.records.record import Job, Record
@@ -127,7 +127,7 @@ def render_runs(runs: Sequence[Run], *, embed: bool = True) -> str:
     """
     template = _environment().get_template(TEMPLATE)
     entries = make_entries(runs)
-    films = Films.of(entries.all, embed=embed)
+    films = EpisodeVideos.of(entries.all, embed=embed)
     columns = make_columns(entries, films)
     return template.render(
         styles=STYLES,
@@ -135,7 +135,7 @@ def render_runs(runs: Sequence[Run], *, embed: bool = True) -> str:
         name=" against ".join(run.name for run in runs),
         count=len(entries.all),
         facts=facts_of(runs),
-        notices=notices_of(entries),
+        notices=run_warnings(entries),
         films_are_beside=films.count > 0 and not films.embeds,
         films=columns.films,
         data=_json(_data(entries, columns)),
@@ -158,7 +158,7 @@ def check_report_support() -> None:
         ) from error
 
 
-def _data(entries: Entries, columns: Columns) -> dict[str, Any]:
+def _data(entries: EpisodeEntries, columns: Columns) -> dict[str, Any]:
     return {
         "choices": [choice._asdict() for choice in columns.choices],
         "columns": columns.columns,
@@ -171,7 +171,7 @@ def _data(entries: Entries, columns: Columns) -> dict[str, Any]:
     }
 
 
-def _sides(entries: Entries) -> list[int]:
+def _sides(entries: EpisodeEntries) -> list[int]:
     """Whom to hold against each other first: a policy and itself in the other run, or the next."""
     names = list(entries.names)
     twins = [place for place, who in enumerate(names) if place and who.policy == names[0].policy]

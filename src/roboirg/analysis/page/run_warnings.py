@@ -9,30 +9,30 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from roboirg.analysis.page.entries import Entries, Run
+from roboirg.analysis.page.entries import EpisodeEntries, Run
 from roboirg.analysis.page.matrix import SEED
 from roboirg.analysis.stats.comparison import compare
 from roboirg.analysis.stats.comparison_text import sentences
-from roboirg.analysis.stats.samples import Contestant, Versions
+from roboirg.analysis.stats.samples import PolicyRun, Versions
 from roboirg.core.errors import InvalidValueError
 
 MOST_PAIRS = 6
 """Of policies that are compared in words."""
 
 
-class Notice(NamedTuple):
+class RunWarning(NamedTuple):
     """A sentence above the figures; `kind` is warning or note."""
 
     kind: str
     text: str
 
 
-def notices_of(entries: Entries) -> list[Notice]:
+def run_warnings(entries: EpisodeEntries) -> list[RunWarning]:
     """What is incomplete, failed, mixed, or cannot be compared."""
     return [
-        *(Notice("warning", text) for text in _amiss(entries)),
-        *(Notice("warning", text) for text in _mixed(entries)),
-        *(Notice("note", text) for text in _alone(entries)),
+        *(RunWarning("warning", text) for text in _amiss(entries)),
+        *(RunWarning("warning", text) for text in _mixed(entries)),
+        *(RunWarning("note", text) for text in _alone(entries)),
     ]
 
 
@@ -58,7 +58,7 @@ def facts_of(runs: Sequence[Run]) -> list[tuple[str, str]]:
     return [(label, value.strip(", ")) for label, value in facts if value.strip(", ")]
 
 
-def comparisons(entries: Entries) -> list[dict[str, Any]]:
+def comparisons(entries: EpisodeEntries) -> list[dict[str, Any]]:
     """What can be said of each two policies, in words; the first few of them."""
     found = []
     names = list(entries.names)
@@ -68,7 +68,7 @@ def comparisons(entries: Entries) -> list[dict[str, Any]]:
     return found
 
 
-def _compared(entries: Entries, first: Contestant, second: Contestant) -> list[str]:
+def _compared(entries: EpisodeEntries, first: PolicyRun, second: PolicyRun) -> list[str]:
     ours, theirs = (
         {key: sample for key, sample in entries.samples.items() if key[0] == who}
         for who in (first, second)
@@ -80,7 +80,7 @@ def _compared(entries: Entries, first: Contestant, second: Contestant) -> list[s
     return list(sentences(comparison, entries.names[first], entries.names[second]))
 
 
-def _amiss(entries: Entries) -> Iterable[str]:
+def _amiss(entries: EpisodeEntries) -> Iterable[str]:
     missing = sum(sample.missing for sample in entries.samples.values())
     if missing:
         planned = missing + len(entries.all)
@@ -99,7 +99,7 @@ def _amiss(entries: Entries) -> Iterable[str]:
         )
 
 
-def _mixed(entries: Entries) -> Iterable[str]:
+def _mixed(entries: EpisodeEntries) -> Iterable[str]:
     for name in ("language", "environment"):
         found = {getattr(Versions.of(entry.record), name) for entry in entries.all}
         if len(found) > 1:
@@ -124,7 +124,7 @@ def _mixed(entries: Entries) -> Iterable[str]:
         yield f"Played with {len(codes)} different states of the package’s code."
 
 
-def _alone(entries: Entries) -> Iterable[str]:
+def _alone(entries: EpisodeEntries) -> Iterable[str]:
     if len(entries.names) == 1:
         yield (
             "One policy alone: without the forgetful listener’s figures beside it, a rate does not "

@@ -12,8 +12,8 @@ from collections.abc import Iterable
 from fractions import Fraction
 
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.plan import say
-from roboirg.language import resolve
+from roboirg.evaluation.plan import instruct_job
+from roboirg.language import interpret
 from roboirg.records.record import Job
 from roboirg.tasks import get_task
 
@@ -62,7 +62,7 @@ _WORDS = (
 def _chance(job: Job) -> Fraction:
     episode, task = get_episode(job.task, job.split, job.episode), get_task(job.task)
     scene = episode.scene
-    fitting = resolve(say(job).command, scene, job.task).goals
+    fitting = interpret(instruct_job(job).command, scene, job.task).goals
     choices = fitting or task.goals(scene)
     # Goals that come down to the same stages are one to the judge.
     wanted = task.stages(scene, episode.goal)

@@ -12,8 +12,8 @@ from roboirg.analysis.stats.intervals import ALPHA
 from roboirg.analysis.stats.multiple_testing import holm
 from roboirg.analysis.stats.paired_tests import Gap, Pairs, measure_gap
 from roboirg.analysis.stats.power import episodes_needed, smallest_gap
-from roboirg.analysis.stats.samples import Contestant, Sample, Samples
-from roboirg.analysis.stats.success_rates import Variant
+from roboirg.analysis.stats.samples import CellResults, PolicyRun, Samples
+from roboirg.analysis.stats.success_rates import SettingColumn
 from roboirg.core.errors import InvalidValueError
 
 Verdict = Literal["first", "second", "open"]
@@ -23,11 +23,11 @@ class Where(NamedTuple):
     """A telling, of one task or (None) of all that both played."""
 
     task: str | None
-    variant: Variant
+    variant: SettingColumn
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class ComparisonResult:
     """What can be said about one telling.
 
     Attributes:
@@ -80,10 +80,10 @@ class Comparison:
         cells: for each telling and task.
     """
 
-    first: Contestant
-    second: Contestant
-    averages: tuple[Finding, ...]
-    cells: tuple[Finding, ...]
+    first: PolicyRun
+    second: PolicyRun
+    averages: tuple[ComparisonResult, ...]
+    cells: tuple[ComparisonResult, ...]
 
 
 def compare(first: Samples, second: Samples, rng: np.random.Generator) -> Comparison:
@@ -103,7 +103,9 @@ def compare(first: Samples, second: Samples, rng: np.random.Generator) -> Compar
     here = {(task, told): sample for (_, task, told), sample in first.items()}
     there = {(task, told): sample for (_, task, told), sample in second.items()}
     cells, averages = [], []
-    for variant in sorted({told for _, told in here.keys() & there.keys()}, key=Variant.sort_key):
+    for variant in sorted(
+        {told for _, told in here.keys() & there.keys()}, key=SettingColumn.sort_key
+    ):
         tasks = [task for task, told in here if told == variant and (task, told) in there]
         cells += [_finding(Where(task, variant), [task], here, there, rng) for task in tasks]
         averages.append(_finding(Where(None, variant), tasks, here, there, rng))
@@ -119,17 +121,17 @@ def compare(first: Samples, second: Samples, rng: np.random.Generator) -> Compar
 def _finding(
     where: Where,
     tasks: Sequence[str],
-    here: Mapping[tuple[str, Variant], Sample],
-    there: Mapping[tuple[str, Variant], Sample],
+    here: Mapping[tuple[str, SettingColumn], CellResults],
+    there: Mapping[tuple[str, SettingColumn], CellResults],
     rng: np.random.Generator,
-) -> Finding | None:
+) -> ComparisonResult | None:
     both = [(here[task, where.variant], there[task, where.variant]) for task in tasks]
     pairs = [Pairs.of(ours, theirs) for ours, theirs in both]
     gap = measure_gap(pairs, rng)
     if gap is None:
         return None
     tried = sum(int(each.rows[:, 1::2].sum()) for each in pairs)
-    return Finding(
+    return ComparisonResult(
         where=where,
         tasks=tuple(task for task, each in zip(tasks, pairs, strict=True) if len(each.rows)),
         gap=gap,
@@ -139,7 +141,7 @@ def _finding(
     )
 
 
-def _corrected(findings: Sequence[Finding | None]) -> tuple[Finding, ...]:
+def _corrected(findings: Sequence[ComparisonResult | None]) -> tuple[ComparisonResult, ...]:
     found = [finding for finding in findings if finding is not None]
     adjusted = holm([finding.gap.p_value for finding in found])
     return tuple(
@@ -147,7 +149,7 @@ def _corrected(findings: Sequence[Finding | None]) -> tuple[Finding, ...]:
     )
 
 
-def _only(samples: Samples) -> Contestant:
+def _only(samples: Samples) -> PolicyRun:
     contestants = list(dict.fromkeys(who for who, _, _ in samples))
     names = list(dict.fromkeys(who.policy for who in contestants))
     if not names:
@@ -164,7 +166,7 @@ def _only(samples: Samples) -> Contestant:
     return contestants[0]
 
 
-def _check_fair(first: Contestant, second: Contestant) -> None:
+def _check_fair(first: PolicyRun, second: PolicyRun) -> None:
     if first.versions is None or second.versions is None:
         raise InvalidValueError("One of the two has played nothing yet.")
     for name in ("language", "environment"):

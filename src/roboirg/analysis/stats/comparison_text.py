@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from roboirg.analysis.stats.comparison import Comparison, Finding
+from roboirg.analysis.stats.comparison import Comparison, ComparisonResult
 from roboirg.analysis.stats.power import MOST_EPISODES, POWER
 
 _SMALLEST_P = 0.001
@@ -39,24 +39,24 @@ def sentences(comparison: Comparison, first: str, second: str) -> Iterator[str]:
     yield from _caveats(comparison)
 
 
-def _sentence(finding: Finding, names: tuple[str, str]) -> str:
+def _sentence(finding: ComparisonResult, names: tuple[str, str]) -> str:
     if finding.verdict == "open":
         return f"{_where(finding)}: cannot tell, {_figures(finding)}.{_more(finding)}"
     return f"{_where(finding)}: {_better(finding, names)}, {_figures(finding)}."
 
 
-def _where(finding: Finding) -> str:
+def _where(finding: ComparisonResult) -> str:
     task, variant = finding.where
     if task is not None:
         return f"{task}, {variant.label}"
     return variant.label
 
 
-def _better(finding: Finding, names: tuple[str, str]) -> str:
+def _better(finding: ComparisonResult, names: tuple[str, str]) -> str:
     return f"{names[finding.verdict == 'second']} is better"
 
 
-def _figures(finding: Finding) -> str:
+def _figures(finding: ComparisonResult) -> str:
     gap = finding.gap
     words = f"{_points(gap.value)} points"
     if gap.interval is not None:
@@ -65,7 +65,7 @@ def _figures(finding: Finding) -> str:
     return f"{words}, {_p(finding.p_holm)}, {_count(gap.episodes, 'episode')}{tasks}"
 
 
-def _more(finding: Finding) -> str:
+def _more(finding: ComparisonResult) -> str:
     """What it would take to tell."""
     least = finding.detectable
     can = "no gap" if least is None else f"gaps from {100 * least:.1f} points on"

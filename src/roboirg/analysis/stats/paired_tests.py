@@ -17,7 +17,7 @@ from roboirg.analysis.stats.intervals import (
     resampled_rates,
     without_spread,
 )
-from roboirg.analysis.stats.samples import Sample
+from roboirg.analysis.stats.samples import CellResults
 
 
 class Overlap(NamedTuple):
@@ -61,7 +61,7 @@ class Pairs:
     overlap: Overlap
 
     @classmethod
-    def of(cls, first: Sample, second: Sample) -> Pairs:
+    def of(cls, first: CellResults, second: CellResults) -> Pairs:
         """Pair two samples of the same task."""
         ours, theirs = first.by_episode(), second.by_episode()
         rows = []

@@ -13,14 +13,14 @@ from roboirg.analysis.stats.intervals import Interval
 from roboirg.analysis.stats.multiple_testing import holm
 from roboirg.analysis.stats.paired_tests import Gap, Pairs, measure_gap
 from roboirg.analysis.stats.samples import (
-    Contestant,
-    Sample,
+    CellResults,
+    PolicyRun,
     Samples,
     clustered_interval,
     shown_interval,
     wilson,
 )
-from roboirg.analysis.stats.success_rates import EXPLICIT, Variant
+from roboirg.analysis.stats.success_rates import EXPLICIT, SettingColumn
 from roboirg.tasks import all_tasks
 
 
@@ -35,7 +35,7 @@ ALL = Scope()
 
 
 @dataclass(frozen=True, slots=True)
-class Summary:
+class SummaryRow:
     """What one policy reached in one scope, told in one way.
 
     Attributes:
@@ -58,9 +58,9 @@ class Summary:
             variant that was played in both forms.
     """
 
-    contestant: Contestant
+    contestant: PolicyRun
     scope: Scope
-    variant: Variant
+    variant: SettingColumn
     tasks: tuple[str, ...]
     successes: int
     trials: int
@@ -80,7 +80,7 @@ class Summary:
         return self.trials > 0 and not self.errors and not self.missing
 
 
-def summarize(samples: Samples, rng: np.random.Generator) -> tuple[Summary, ...]:
+def summarize(samples: Samples, rng: np.random.Generator) -> tuple[SummaryRow, ...]:
     """All figures, in the order of the samples: tasks first, then suites, then everything."""
     found = [
         _summary(who, scope, variant, cells, samples, rng)
@@ -91,9 +91,13 @@ def summarize(samples: Samples, rng: np.random.Generator) -> tuple[Summary, ...]
 
 def _scopes(
     samples: Samples,
-) -> Mapping[tuple[Contestant, Scope, Variant], list[tuple[str, Sample]]]:
+) -> Mapping[tuple[PolicyRun, Scope, SettingColumn], list[tuple[str, CellResults]]]:
     suites = {task.name: task.suite for task in all_tasks().values()}
-    levels: list[dict[tuple[Contestant, Scope, Variant], list[tuple[str, Sample]]]] = [{}, {}, {}]
+    levels: list[dict[tuple[PolicyRun, Scope, SettingColumn], list[tuple[str, CellResults]]]] = [
+        {},
+        {},
+        {},
+    ]
     for (who, task, variant), sample in samples.items():
         scopes = (Scope(task=task), Scope(suite=suites.get(task, "")), ALL)
         for level, scope in zip(levels, scopes, strict=True):
@@ -103,19 +107,19 @@ def _scopes(
 
 
 def _summary(
-    who: Contestant,
+    who: PolicyRun,
     scope: Scope,
-    variant: Variant,
-    cells: Sequence[tuple[str, Sample]],
+    variant: SettingColumn,
+    cells: Sequence[tuple[str, CellResults]],
     samples: Samples,
     rng: np.random.Generator,
-) -> Summary:
+) -> SummaryRow:
     judged = [(task, sample) for task, sample in cells if sample.trials]
     each = [sample for _, sample in judged]
     rates = [sample.rate for sample in each if sample.rate is not None]
     single = each[0] if scope.task is not None and each else None
     resolved = variant._replace(form="resolved")
-    return Summary(
+    return SummaryRow(
         contestant=who,
         scope=scope,
         variant=variant,
@@ -135,9 +139,9 @@ def _summary(
 
 
 def _gap_to(
-    who: Contestant,
-    reference: Variant,
-    cells: Sequence[tuple[str, Sample]],
+    who: PolicyRun,
+    reference: SettingColumn,
+    cells: Sequence[tuple[str, CellResults]],
     samples: Samples,
     rng: np.random.Generator,
 ) -> Gap | None:
@@ -151,9 +155,9 @@ def _gap_to(
     )
 
 
-def _corrected(found: Sequence[Summary]) -> tuple[Summary, ...]:
+def _corrected(found: Sequence[SummaryRow]) -> tuple[SummaryRow, ...]:
     """With p-values corrected over what is read together: a policy's tasks, suites, averages."""
-    families: dict[tuple[Contestant, bool, bool], list[int]] = {}
+    families: dict[tuple[PolicyRun, bool, bool], list[int]] = {}
     for index, one in enumerate(found):
         if one.gap is not None:
             family = (one.contestant, one.scope.task is None, one.scope.suite is None)

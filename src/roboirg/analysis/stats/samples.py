@@ -23,7 +23,7 @@ from roboirg.analysis.stats.intervals import (
     wilson_interval,
     without_spread,
 )
-from roboirg.analysis.stats.success_rates import Variant
+from roboirg.analysis.stats.success_rates import SettingColumn
 from roboirg.core.observations import DemonstrationFrames
 from roboirg.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, Job, Result
 
@@ -35,7 +35,7 @@ class Trial(NamedTuple):
     policy_seed: int
 
 
-class Rules(NamedTuple):
+class EvalConditions(NamedTuple):
     """Under which rules a policy played."""
 
     split: str
@@ -46,7 +46,7 @@ class Rules(NamedTuple):
     meshes: str = DEFAULT_MESHES
 
     @classmethod
-    def of(cls, job: Job) -> Rules:
+    def of(cls, job: Job) -> EvalConditions:
         """The rules of a job."""
         return cls(**{name: getattr(job, name) for name in cls._fields})
 
@@ -64,7 +64,7 @@ class Versions(NamedTuple):
         return cls(result.policy_version, result.language_version, result.environment_version)
 
 
-class Contestant(NamedTuple):
+class PolicyRun(NamedTuple):
     """Whose results may be averaged: one policy, under the same rules, of the same versions.
 
     Attributes:
@@ -75,13 +75,13 @@ class Contestant(NamedTuple):
     """
 
     policy: str
-    rules: Rules
+    rules: EvalConditions
     versions: Versions | None
     run: str = ""
 
 
 @dataclass(frozen=True, slots=True)
-class Sample:
+class CellResults:
     """What came of one task told in one way.
 
     Attributes:
@@ -129,17 +129,17 @@ class Sample:
         return np.array(counts, dtype=np.int64).reshape(-1, 2)
 
 
-Samples = Mapping[tuple[Contestant, str, Variant], Sample]
+Samples = Mapping[tuple[PolicyRun, str, SettingColumn], CellResults]
 """By contestant, task and how it was told."""
 
 
-def wilson(sample: Sample) -> Interval | None:
+def wilson(sample: CellResults) -> Interval | None:
     """Wilson's interval on trials: the one to show with one policy seed."""
     return wilson_interval(sample.successes, sample.trials) if sample.trials else None
 
 
 def clustered_interval(
-    tasks: Sequence[Sample], rng: np.random.Generator, draws: int = DRAWS
+    tasks: Sequence[CellResults], rng: np.random.Generator, draws: int = DRAWS
 ) -> Interval | None:
     """The bootstrap interval, over episodes, of a success rate or its mean over tasks.
 
@@ -157,7 +157,7 @@ def clustered_interval(
     return interval
 
 
-def shown_interval(sample: Sample, rng: np.random.Generator) -> Interval | None:
+def shown_interval(sample: CellResults, rng: np.random.Generator) -> Interval | None:
     """The interval that stands beside a cell's rate: Wilson's, or clustered with several seeds."""
     several = any(len(seeds) > 1 for seeds in sample.by_episode().values())
     return clustered_interval([sample], rng) if several else wilson(sample)
@@ -173,45 +173,45 @@ def gather(runs: Sequence[tuple[str, Sequence[Result]]], planned: Iterable[Job] 
     """
     jobs = set(planned)
     apart = _played_twice(runs) if len(runs) > 1 else set()
-    verdicts: dict[tuple[Contestant, str, Variant], dict[Trial, bool]] = defaultdict(dict)
-    errors: dict[tuple[Contestant, str, Variant], int] = defaultdict(int)
-    missing: dict[tuple[Contestant, str, Variant], int] = defaultdict(int)
-    contestants: dict[tuple[str, Rules], Contestant] = {}
+    verdicts: dict[tuple[PolicyRun, str, SettingColumn], dict[Trial, bool]] = defaultdict(dict)
+    errors: dict[tuple[PolicyRun, str, SettingColumn], int] = defaultdict(int)
+    missing: dict[tuple[PolicyRun, str, SettingColumn], int] = defaultdict(int)
+    contestants: dict[tuple[str, EvalConditions], PolicyRun] = {}
     played: set[Job] = set()
     for name, results in runs:
         for result in results:
-            rules = Rules.of(result)
+            rules = EvalConditions.of(result)
             run = name if result.policy in apart else ""
-            who = Contestant(result.policy, rules, Versions.of(result), run)
+            who = PolicyRun(result.policy, rules, Versions.of(result), run)
             contestants.setdefault((result.policy, rules), who)
             if jobs:
                 played.add(result.identity)
-            key = (who, result.task, Variant.of(result))
+            key = (who, result.task, SettingColumn.of(result))
             if result.outcome == "error":
                 errors[key] += 1
             else:
                 trial = Trial(result.episode, result.policy_seed)
                 verdicts[key][trial] = result.outcome == "success"
     for job in sorted(jobs - played, key=lambda job: job.slug):
-        rules = Rules.of(job)
-        who = contestants.get((job.policy, rules), Contestant(job.policy, rules, None))
-        missing[who, job.task, Variant.of(job)] += 1
+        rules = EvalConditions.of(job)
+        who = contestants.get((job.policy, rules), PolicyRun(job.policy, rules, None))
+        missing[who, job.task, SettingColumn.of(job)] += 1
     keys = dict.fromkeys([*verdicts, *errors, *missing])
-    return {key: Sample(verdicts.get(key, {}), errors[key], missing[key]) for key in keys}
+    return {key: CellResults(verdicts.get(key, {}), errors[key], missing[key]) for key in keys}
 
 
-def labels(samples: Samples) -> dict[Contestant, str]:
+def labels(samples: Samples) -> dict[PolicyRun, str]:
     """A name for each contestant, with what tells those of the same policy apart."""
     contestants = list(dict.fromkeys(who for who, _, _ in samples))
     return {who: _label(who, contestants) for who in contestants}
 
 
-def _label(who: Contestant, contestants: Sequence[Contestant]) -> str:
+def _label(who: PolicyRun, contestants: Sequence[PolicyRun]) -> str:
     parts = [who.policy]
     twins = [other for other in contestants if other.policy == who.policy]
     parts += [
         f"{name.replace('_', ' ')} {getattr(who.rules, name)}"
-        for name in Rules._fields
+        for name in EvalConditions._fields
         if len({getattr(other.rules, name) for other in contestants}) > 1
     ]
     if who.versions is not None:

@@ -22,7 +22,7 @@ from roboirg.records.record import (
 SETTING_ORDER = ("explicit", "direct", "reasoning", "contextual", "spatial")
 
 
-class Variant(NamedTuple):
+class SettingColumn(NamedTuple):
     """A way of telling: a setting, its form, and what was not said in the usual way."""
 
     setting: str
@@ -33,7 +33,7 @@ class Variant(NamedTuple):
     distractors: int = DEFAULT_DISTRACTORS
 
     @classmethod
-    def of(cls, job: Job) -> Variant:
+    def of(cls, job: Job) -> SettingColumn:
         """How a job was told."""
         return cls(**{name: getattr(job, name) for name in cls._fields})
 
@@ -60,7 +60,7 @@ class Variant(NamedTuple):
         return (place, self.setting, self.form != "implicit", self.label)
 
 
-EXPLICIT = Variant("explicit")
+EXPLICIT = SettingColumn("explicit")
 
 
 class Condition(NamedTuple):
@@ -145,8 +145,8 @@ class Panel:
     label: str
     condition: Condition
     tasks: tuple[str, ...]
-    variants: tuple[Variant, ...]
-    cells: Mapping[tuple[str | None, Variant], Cell]
+    variants: tuple[SettingColumn, ...]
+    cells: Mapping[tuple[str | None, SettingColumn], Cell]
     privileged: bool = False
 
     @property
@@ -173,7 +173,9 @@ def make_panels(records: Sequence[Result], planned: Sequence[Job] = ()) -> tuple
     everything: list[Job] = [*records, *missing]
     conditions = list(dict.fromkeys(Condition.of(job) for job in [*planned, *everything]))
     tasks = tuple(dict.fromkeys(job.task for job in [*planned, *everything]))
-    variants = tuple(sorted({Variant.of(job) for job in everything}, key=Variant.sort_key))
+    variants = tuple(
+        sorted({SettingColumn.of(job) for job in everything}, key=SettingColumn.sort_key)
+    )
     privileged = {record.policy for record in records if record.privileged}
     return tuple(
         _make_panel(
@@ -197,21 +199,21 @@ def _make_panel(
     label: str,
     privileged: bool,
     tasks: tuple[str, ...],
-    variants: tuple[Variant, ...],
+    variants: tuple[SettingColumn, ...],
 ) -> Panel:
     explicit = {
         _pair_key(record): record.outcome == "success"
         for record in records
         if record.setting == "explicit" and record.outcome != "error"
     }
-    groups: dict[tuple[str | None, Variant], list[Result]] = defaultdict(list)
-    lacking: dict[tuple[str | None, Variant], int] = defaultdict(int)
+    groups: dict[tuple[str | None, SettingColumn], list[Result]] = defaultdict(list)
+    lacking: dict[tuple[str | None, SettingColumn], int] = defaultdict(int)
     for record in records:
         for row in (record.task, None):
-            groups[row, Variant.of(record)].append(record)
+            groups[row, SettingColumn.of(record)].append(record)
     for job in missing:
         for row in (job.task, None):
-            lacking[row, Variant.of(job)] += 1
+            lacking[row, SettingColumn.of(job)] += 1
     cells = {
         (row, variant): _make_cell(groups[row, variant], lacking[row, variant], explicit)
         for row in (*tasks, None)

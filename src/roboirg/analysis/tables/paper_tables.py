@@ -18,8 +18,8 @@ from roboirg.analysis.published import (
 )
 from roboirg.analysis.stats.chance import chance_level
 from roboirg.analysis.stats.rates import percent
-from roboirg.analysis.stats.samples import Contestant, Sample, Samples, labels, shown_interval
-from roboirg.analysis.stats.success_rates import EXPLICIT, SETTING_ORDER, Variant
+from roboirg.analysis.stats.samples import CellResults, PolicyRun, Samples, labels, shown_interval
+from roboirg.analysis.stats.success_rates import EXPLICIT, SETTING_ORDER, SettingColumn
 from roboirg.analysis.tables.table import (
     ERROR_MARK,
     MISSING_MARK,
@@ -62,7 +62,7 @@ class Place(NamedTuple):
 
     group: str
     name: str
-    variant: Variant
+    variant: SettingColumn
 
 
 def make_table(
@@ -143,7 +143,7 @@ def _columns(which: RateTable) -> tuple[Column, ...]:
     return (*columns, Column(OVERALL, averages=tasks))
 
 
-def _our_places(which: RateTable, samples: Samples) -> Iterator[tuple[Contestant, Place]]:
+def _our_places(which: RateTable, samples: Samples) -> Iterator[tuple[PolicyRun, Place]]:
     tasks = set(published_tasks(which))
     played = {(who, variant) for who, task, variant in samples if task in tasks}
     names = labels(samples)
@@ -153,24 +153,28 @@ def _our_places(which: RateTable, samples: Samples) -> Iterator[tuple[Contestant
                 yield who, _place(which, name, variant)
 
 
-def _variants(which: RateTable) -> list[Variant]:
+def _variants(which: RateTable) -> list[SettingColumn]:
     if which == "context":
-        return [Variant("contextual", stages=stages) for stages in STAGE_SETS]
+        return [SettingColumn("contextual", stages=stages) for stages in STAGE_SETS]
     return [EXPLICIT._replace(setting=setting) for setting in SETTING_ORDER]
 
 
-def _place(which: RateTable, policy: str, variant: Variant) -> Place:
+def _place(which: RateTable, policy: str, variant: SettingColumn) -> Place:
     if which == "context":
         return Place(policy, _stages(variant), variant)
     return Place(variant.setting, policy, variant)
 
 
-def _stages(variant: Variant) -> str:
+def _stages(variant: SettingColumn) -> str:
     return ",".join(map(str, variant.stages))
 
 
 def _our_entries(
-    which: RateTable, who: Contestant, variant: Variant, samples: Samples, rng: np.random.Generator
+    which: RateTable,
+    who: PolicyRun,
+    variant: SettingColumn,
+    samples: Samples,
+    rng: np.random.Generator,
 ) -> dict[str, Entry]:
     return {
         task: _entry(samples.get((who, task, variant)), _applies(task, variant), rng)
@@ -178,7 +182,7 @@ def _our_entries(
     }
 
 
-def _entry(sample: Sample | None, applies: bool, rng: np.random.Generator) -> Entry:
+def _entry(sample: CellResults | None, applies: bool, rng: np.random.Generator) -> Entry:
     if sample is None:
         return Entry(applies=applies)
     marks = (ERROR_MARK if sample.errors else "") + (MISSING_MARK if sample.missing else "")
@@ -196,7 +200,7 @@ def _entry(sample: Sample | None, applies: bool, rng: np.random.Generator) -> En
     )
 
 
-def _applies(task: str, variant: Variant) -> bool:
+def _applies(task: str, variant: SettingColumn) -> bool:
     known = all_tasks().get(task)
     return known is None or variant.setting in known.settings
 
@@ -216,7 +220,7 @@ def _chance_rows(which: RateTable, columns: Sequence[Column], samples: Samples) 
     return rows
 
 
-def _chance(task: str, variant: Variant, samples: Samples) -> Fraction | None:
+def _chance(task: str, variant: SettingColumn, samples: Samples) -> Fraction | None:
     if task not in all_tasks():
         return None
     return chance_level(

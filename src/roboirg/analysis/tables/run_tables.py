@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from roboirg.analysis.stats.success_rates import EXPLICIT, Cell, Panel, Variant
+from roboirg.analysis.stats.success_rates import EXPLICIT, Cell, Panel, SettingColumn
 from roboirg.records.record import Result
 
 MINIMUM_WIDTH = 100
@@ -92,7 +92,7 @@ def print_failures(records: Iterable[Result], console: Console, most: int = MOST
         console.print(Text.assemble((policy, "bold"), f": {title}"))
         # The same order, however many processes played.
         failures.sort(
-            key=lambda one: (one.task, one.split, one.episode, Variant.of(one).sort_key())
+            key=lambda one: (one.task, one.split, one.episode, SettingColumn.of(one).sort_key())
         )
         for record in failures[:most]:
             console.print(Text(f"  {failure_text(record)}"), highlight=False, soft_wrap=True)
@@ -103,7 +103,7 @@ def print_failures(records: Iterable[Result], console: Console, most: int = MOST
 def failure_text(record: Result) -> str:
     """Which episode it was, how it was told, and what went wrong."""
     mark = ERROR_MARK if record.outcome == "error" else ""
-    where = f"{record.task} {record.split}/{record.episode} {Variant.of(record).label}"
+    where = f"{record.task} {record.split}/{record.episode} {SettingColumn.of(record).label}"
     seed = f" (policy seed {record.policy_seed})" if record.policy_seed else ""
     return f"{where}{seed}: {record.cause or record.outcome}{mark and f' {mark}'}"
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from roboirg.analysis.published import TRIALS, RateTable
-from roboirg.analysis.stats.samples import Contestant, Sample, Samples
-from roboirg.analysis.stats.success_rates import SETTING_ORDER, Variant
+from roboirg.analysis.stats.samples import CellResults, PolicyRun, Samples
+from roboirg.analysis.stats.success_rates import SETTING_ORDER, SettingColumn
 from roboirg.analysis.tables.table import (
     ERROR_MARK,
     MISSING_MARK,
@@ -42,11 +42,11 @@ def notes_of(
     )
 
 
-def _told(which: RateTable, variant: Variant) -> bool:
+def _told(which: RateTable, variant: SettingColumn) -> bool:
     if which == "context":
         stages = variant.stages
-        return variant == Variant("contextual", stages=stages) and stages in STAGE_SETS
-    return variant == Variant(variant.setting) and variant.setting in SETTING_ORDER
+        return variant == SettingColumn("contextual", stages=stages) and stages in STAGE_SETS
+    return variant == SettingColumn(variant.setting) and variant.setting in SETTING_ORDER
 
 
 def _signs(which: RateTable, entries: Iterable[Entry]) -> list[str]:
@@ -66,7 +66,7 @@ def _signs(which: RateTable, entries: Iterable[Entry]) -> list[str]:
     return notes
 
 
-def _numbers(samples: Iterable[Sample]) -> list[str]:
+def _numbers(samples: Iterable[CellResults]) -> list[str]:
     judged = [sample for sample in samples if sample.trials]
     if not judged:
         return []
@@ -77,7 +77,7 @@ def _numbers(samples: Iterable[Sample]) -> list[str]:
     return [f"{episodes} episodes and {trials} trials per cell: several policy seeds."]
 
 
-def _amiss(samples: Iterable[Sample], entries: Iterable[Entry]) -> list[str]:
+def _amiss(samples: Iterable[CellResults], entries: Iterable[Entry]) -> list[str]:
     found = list(samples)
     notes = []
     errors, missing = sum(one.errors for one in found), sum(one.missing for one in found)
@@ -119,7 +119,7 @@ def _company(samples: Samples) -> list[str]:
     return notes
 
 
-def _versions(contestants: Iterable[Contestant], name: str) -> list[str]:
+def _versions(contestants: Iterable[PolicyRun], name: str) -> list[str]:
     return sorted({str(getattr(who.versions, name)) for who in contestants if who.versions})
 
 

@@ -16,8 +16,8 @@ from multiprocessing.connection import wait
 from typing import Protocol
 
 from roboirg.core.errors import InvalidValueError, RoboIRGError
-from roboirg.evaluation.executors.workers import MOST_STILLBORN, POLL_S, Worker
-from roboirg.evaluation.rollout import Play
+from roboirg.evaluation.executors.workers import MAX_FAILED_STARTS, POLL_S, Worker
+from roboirg.evaluation.rollout import PlayJob
 from roboirg.records.record import Job, Record
 
 NO_LIMIT_S = float("inf")
@@ -26,7 +26,7 @@ NO_LIMIT_S = float("inf")
 class Executor(Protocol):
     """Plays jobs somewhere."""
 
-    def run(self, jobs: Sequence[Job], play: Play) -> Iterator[Record]:
+    def run(self, jobs: Sequence[Job], play: PlayJob) -> Iterator[Record]:
         """Yield one record for each job, as they end; closing the iterator stops the rest.
 
         Raises:
@@ -41,7 +41,7 @@ class InProcess:
     Nobody supervises it: a crash takes all with it, and what hangs, hangs.
     """
 
-    def run(self, jobs: Sequence[Job], play: Play) -> Iterator[Record]:
+    def run(self, jobs: Sequence[Job], play: PlayJob) -> Iterator[Record]:
         """Yield one record for each job, in their order."""
         yield from map(play, jobs)
 
@@ -68,7 +68,7 @@ class LocalProcesses:
         if self.workers < 1:
             raise InvalidValueError(f"workers is {self.workers}; it must be at least 1.")
 
-    def run(self, jobs: Sequence[Job], play: Play) -> Iterator[Record]:
+    def run(self, jobs: Sequence[Job], play: PlayJob) -> Iterator[Record]:
         """Yield one record for each job, as they end.
 
         Raises:
@@ -85,7 +85,7 @@ class LocalProcesses:
                     crew.append(Worker.hire(play, waiting.popleft(), crowded=crowded))
                 for worker, record in self._ended(crew):
                     stillborn = stillborn + 1 if worker.is_stillborn else 0
-                    if stillborn >= MOST_STILLBORN * self.workers:
+                    if stillborn >= MAX_FAILED_STARTS * self.workers:
                         raise RoboIRGError(f"No worker process can start ({record.cause}).")
                     if worker.is_gone:
                         crew.remove(worker)

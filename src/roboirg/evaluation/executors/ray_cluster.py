@@ -23,11 +23,11 @@ from types import ModuleType
 from typing import Any, NamedTuple, Protocol, Self, cast, runtime_checkable
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, RoboIRGError
-from roboirg.evaluation.episode_errors import cause
+from roboirg.evaluation.episode_errors import format_cause
 from roboirg.evaluation.executors.executor import NO_LIMIT_S
-from roboirg.evaluation.executors.workers import MOST_STILLBORN, Seat
-from roboirg.evaluation.rollout import Play
-from roboirg.evaluation.rollout_result import Course, describe, utc_now
+from roboirg.evaluation.executors.workers import MAX_FAILED_STARTS, WorkerSlot
+from roboirg.evaluation.rollout import PlayJob
+from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.records.record import Job, Record
 
 POLL_S = 1.0
@@ -37,7 +37,7 @@ CONNECT_S = 10.0
 
 
 @runtime_checkable
-class Filming(Protocol):
+class VideoRecorder(Protocol):
     """A way to play that leaves films in a folder, and can do so in another one."""
 
     folder: Path
@@ -82,12 +82,12 @@ class RayCluster:
             raise InvalidValueError(f"workers is {self.workers}; Ray needs at least 1.")
         import_ray()
 
-    def run(self, jobs: Sequence[Job], play: Play) -> Iterator[Record]:
+    def run(self, jobs: Sequence[Job], play: PlayJob) -> Iterator[Record]:
         """Yield one record for each job, as they end."""
         ray = import_ray()
         with _connected(ray, self.address):
             count = self.workers or int(ray.cluster_resources().get("CPU", 1))
-            company = _Company(ray, play, self.episode_timeout_s, min(count, len(jobs)))
+            company = _WorkerPool(ray, play, self.episode_timeout_s, min(count, len(jobs)))
             try:
                 yield from company.play_all(jobs)
             finally:
@@ -135,8 +135,8 @@ def _own_paths() -> list[str]:
     return [path for path in sys.path if path and not path.startswith(prefixes)]
 
 
-def _filming(play: object) -> Filming | None:
-    return play if isinstance(play, Filming) else None
+def _filming(play: object) -> VideoRecorder | None:
+    return play if isinstance(play, VideoRecorder) else None
 
 
 def _check_reachable(address: str | None) -> None:
@@ -152,15 +152,15 @@ def _check_reachable(address: str | None) -> None:
         ) from error
 
 
-class _RemoteSeat:
+class _RemoteWorker:
     """What runs on the machines of the cluster: a seat whose films come back as bytes."""
 
-    def __init__(self, play: Play, episode_timeout_s: float) -> None:
+    def __init__(self, play: PlayJob, episode_timeout_s: float) -> None:
         self._folder = Path(tempfile.mkdtemp(prefix="roboirg-"))
         filming = _filming(play)
-        # A `Filming` play stays one wherever it films.
-        moved = play if filming is None else cast("Play", filming.in_folder(self._folder))
-        self._seat = Seat(moved, episode_timeout_s)
+        # A `VideoRecorder` play stays one wherever it films.
+        moved = play if filming is None else cast("PlayJob", filming.in_folder(self._folder))
+        self._seat = WorkerSlot(moved, episode_timeout_s)
 
     def begin(self) -> None:
         """Answers as soon as the seat has found a place."""
@@ -176,17 +176,17 @@ class _RemoteSeat:
         return _Played(record, films)
 
 
-class _Company:
+class _WorkerPool:
     """The seats of a run and what each of them is playing."""
 
-    def __init__(self, ray: ModuleType, play: Play, episode_timeout_s: float, size: int) -> None:
+    def __init__(self, ray: ModuleType, play: PlayJob, episode_timeout_s: float, size: int) -> None:
         self._ray, self._play, self._episode_timeout_s = ray, play, episode_timeout_s
         self._actor = ray.remote(
             num_cpus=1,
             max_restarts=0,
             scheduling_strategy="SPREAD",
             runtime_env={"env_vars": {"PYTHONPATH": os.pathsep.join(_own_paths())}},
-        )(_RemoteSeat)
+        )(_RemoteWorker)
         # What is awaited, with the seat it comes from and the job; None while it finds a place.
         self._awaited: dict[Any, tuple[Any, Job | None]] = {}
         self._idle: list[Any] = []
@@ -244,7 +244,7 @@ class _Company:
     def _bear(self, error: BaseException) -> None:
         """A seat could not begin: its machine went, or it can never begin anywhere."""
         self._stillborn += 1
-        if self._stillborn >= MOST_STILLBORN * self._size:
+        if self._stillborn >= MAX_FAILED_STARTS * self._size:
             # The last line of Ray's text is the exception itself.
             words = str(error).strip().splitlines()[-1].strip()
             raise RoboIRGError(
@@ -263,8 +263,8 @@ class _Company:
 
 
 def _lost(job: Job, error: BaseException) -> Record:
-    course = Course()
+    course = RolloutResult()
     name = type(error).__name__
     what = f"the machine or process that played it is gone ({name})"
-    course.fail("infrastructure", cause("infrastructure", what))
-    return describe(job, course, started_at=utc_now())
+    course.fail("infrastructure", format_cause("infrastructure", what))
+    return make_record(job, course, started_at=utc_now())

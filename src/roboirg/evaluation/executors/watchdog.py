@@ -24,7 +24,7 @@ Phase = Literal[
 PHASES: tuple[Phase, ...] = get_args(Phase)
 
 
-class Board:
+class Watchdog:
     """A note of one process for another: the phase, and until when it may take.
 
     Times are those of the machine's monotonic clock, which its processes share.
@@ -59,11 +59,11 @@ class Board:
         return 0.0 < self._note[1] < time.monotonic()
 
 
-_boards: list[Board] = []
+_boards: list[Watchdog] = []
 """That of this process, if it is supervised."""
 
 
-def use_board(board: Board) -> None:
+def use_watchdog(board: Watchdog) -> None:
     """From now on this process is supervised by means of this board."""
     _boards[:] = [board]
 

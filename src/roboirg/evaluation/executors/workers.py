@@ -21,16 +21,16 @@ from multiprocessing.process import BaseProcess
 from typing import NamedTuple
 
 from roboirg.core.errors import MissingDependencyError, RenderDeviceError, RoboIRGError
-from roboirg.evaluation.episode_errors import cause
-from roboirg.evaluation.executors.watchdog import Board, Phase, use_board, watched
-from roboirg.evaluation.rollout import Play
-from roboirg.evaluation.rollout_result import Course, describe, utc_now
+from roboirg.evaluation.episode_errors import format_cause
+from roboirg.evaluation.executors.watchdog import Phase, Watchdog, use_watchdog, watched
+from roboirg.evaluation.rollout import PlayJob
+from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.records.record import ErrorKind, Job, Record
 
 GRACE_S = 2.0
 """How long a worker may take to go when it is told to."""
 
-MOST_STILLBORN = 3
+MAX_FAILED_STARTS = 3
 """So many processes for each that is wanted may fail to start, one after the other."""
 
 POLL_S = 0.25
@@ -60,13 +60,13 @@ class Worker:
 
     process: BaseProcess
     connection: Connection
-    board: Board
+    board: Watchdog
     job: Job
     started: float = 0.0
     started_at: str = ""
 
     @classmethod
-    def hire(cls, play: Play, job: Job, *, crowded: bool = False) -> Worker:
+    def hire(cls, play: PlayJob, job: Job, *, crowded: bool = False) -> Worker:
         """Start a process and give it its first job.
 
         Args:
@@ -77,7 +77,7 @@ class Worker:
         # Spawned, not forked: a forked Vulkan driver or thread pool is undefined behavior.
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
-        board = Board(context)
+        board = Watchdog(context)
         # Not a daemon in multiprocessing's sense: policies may have processes of their own.
         process = context.Process(target=_work, args=(theirs, board, play, crowded, os.getpid()))
         process.start()
@@ -156,13 +156,13 @@ class Worker:
             self.process.join()
 
     def _error(self, kind: ErrorKind, what: str) -> Record:
-        course = Course()
-        course.fail(kind, cause(kind, what))
+        course = RolloutResult()
+        course.fail(kind, format_cause(kind, what))
         spent = round(time.monotonic() - self.started, 3)
-        return describe(self.job, course, started_at=self.started_at, duration_s=spent)
+        return make_record(self.job, course, started_at=self.started_at, duration_s=spent)
 
 
-class Seat:
+class WorkerSlot:
     """A place where one job after the other is played by a supervised process.
 
     Args:
@@ -170,7 +170,7 @@ class Seat:
         episode_timeout_s: how long an episode may take.
     """
 
-    def __init__(self, play: Play, episode_timeout_s: float) -> None:
+    def __init__(self, play: PlayJob, episode_timeout_s: float) -> None:
         self._play, self._episode_timeout_s = play, episode_timeout_s
         self._worker: Worker | None = None
 
@@ -220,13 +220,15 @@ def _death(phase: Phase, exit_code: int | None) -> tuple[ErrorKind, str]:
     return "environment", f"{how} in the {phase}"
 
 
-def _work(connection: Connection, board: Board, play: Play, crowded: bool, parent: int) -> None:
+def _work(
+    connection: Connection, board: Watchdog, play: PlayJob, crowded: bool, parent: int
+) -> None:
     """The life of a worker process."""
     # Ctrl-C reaches the whole process group; the parent decides what it means.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     _die_with(parent)
-    use_board(board)
+    use_watchdog(board)
     if crowded:
         # Read by lavapipe when it is loaded, which is later than this.
         os.environ.setdefault("LP_NUM_THREADS", "1")

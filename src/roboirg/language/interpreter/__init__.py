@@ -13,16 +13,16 @@ from typing import NamedTuple
 from roboirg.core.episode import Goal, Scene
 from roboirg.language.interpreter.command import is_command, read_command
 from roboirg.language.interpreter.constraints import tests_for
-from roboirg.language.interpreter.discourse_context import listen
-from roboirg.language.interpreter.reference_resolution import Listener
+from roboirg.language.interpreter.discourse_context import read_discourse
+from roboirg.language.interpreter.reference_resolution import ReferenceResolver
 from roboirg.language.interpreter.temporal_relations import time_told
 from roboirg.language.interpreter.tokens import Sentence, split_sentences
 from roboirg.tasks import get_task
 
-__all__ = ["Resolution", "resolve"]
+__all__ = ["Interpretation", "interpret"]
 
 
-class Resolution(NamedTuple):
+class Interpretation(NamedTuple):
     """The outcome of reading.
 
     Attributes:
@@ -35,7 +35,7 @@ class Resolution(NamedTuple):
     not_understood: tuple[str, ...]
 
 
-def resolve(text: str, scene: Scene, task: str) -> Resolution:
+def interpret(text: str, scene: Scene, task: str) -> Interpretation:
     """All goals of a task that fit what is said; any text will do, whole prompts or their ends.
 
     Args:
@@ -50,15 +50,15 @@ def resolve(text: str, scene: Scene, task: str) -> Resolution:
     candidates = _possible_goals(scene, task)
     sentences = split_sentences(text)
     first, last = _command_span(sentences)
-    context = listen(sentences[:first])
+    context = read_discourse(sentences[:first])
     order: Sentence = tuple(word for part in sentences[first:last] for word in (*part, ","))
     command = read_command(order)
-    listener = Listener(scene, context, context.times | time_told(command.text))
+    listener = ReferenceResolver(scene, context, context.times | time_told(command.text))
     slots = candidates[0].as_mapping() if candidates else ()
     tests = tests_for(slots, command, listener)
     goals = tuple(goal for goal in candidates if all(fits(goal) for fits in tests))
     complaints = listener.complaints if first < last else ["no command", *listener.complaints]
-    return Resolution(goals, tuple(dict.fromkeys(complaints)))
+    return Interpretation(goals, tuple(dict.fromkeys(complaints)))
 
 
 @functools.lru_cache(maxsize=64)

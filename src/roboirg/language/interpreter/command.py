@@ -6,7 +6,7 @@ import functools
 from typing import NamedTuple
 
 from roboirg.language.interpreter.descriptions import Description, describe
-from roboirg.language.interpreter.quantities import Count, Quantity, quantities
+from roboirg.language.interpreter.quantities import CountExpression, Quantity, quantities
 from roboirg.language.interpreter.tokens import Sentence, colors_in, word_set
 
 _TAKING = word_set(
@@ -23,7 +23,7 @@ _SINGULAR = word_set("it cube one")
 class Item(NamedTuple):
     """So many things of one sort; without a number, nothing tells how many."""
 
-    number: Count | None
+    number: CountExpression | None
     thing: Description
 
 
@@ -114,7 +114,7 @@ def _items(words: Sentence) -> tuple[Item, ...]:
     found = [one for one in quantities(text) if _counts_things(one, text)]
     if not found:
         alone = "them" not in words and not _SINGULAR.isdisjoint(words)
-        return (Item(Count(quantity=1) if alone else None, describe(words)),)
+        return (Item(CountExpression(quantity=1) if alone else None, describe(words)),)
     ends = [*(one.start for one in found[1:]), len(text)]
     return tuple(
         Item(one.told, describe(_words_of(text, one, end)))

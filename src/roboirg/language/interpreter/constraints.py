@@ -9,13 +9,13 @@ from roboirg.core.episode import Goal
 from roboirg.language.interpreter.command import Command
 from roboirg.language.interpreter.ordinals import read_position
 from roboirg.language.interpreter.quantities import read_times
-from roboirg.language.interpreter.reference_resolution import Amounts, Listener, common
-from roboirg.language.interpreter.temporal_relations import read_when
+from roboirg.language.interpreter.reference_resolution import Amounts, ReferenceResolver, common
+from roboirg.language.interpreter.temporal_relations import read_temporal_relation
 
 Test = Callable[[Goal], bool]
 
 
-def tests_for(slots: Collection[str], command: Command, listener: Listener) -> list[Test]:
+def tests_for(slots: Collection[str], command: Command, listener: ReferenceResolver) -> list[Test]:
     """What a goal must pass to fit the command.
 
     Args:
@@ -40,7 +40,7 @@ def tests_for(slots: Collection[str], command: Command, listener: Listener) -> l
         if series in slots
     ]
     if "relation" in slots:
-        moments = listener.moments(read_when(command.text))
+        moments = listener.moments(read_temporal_relation(command.text))
         tests.append(lambda goal: moments is None or goal.text("relation") in moments)
     return tests
 
@@ -49,7 +49,7 @@ def _number(slot: str, options: Collection[int] | None) -> Test:
     return lambda goal: options is None or goal.number(slot) in options
 
 
-def _things_in_order(command: Command, listener: Listener) -> Test:
+def _things_in_order(command: Command, listener: ReferenceResolver) -> Test:
     """As many colors as things, each among those that its words leave open."""
     wanted = [listener.objects(thing) for thing in command.things]
 
@@ -63,7 +63,7 @@ def _things_in_order(command: Command, listener: Listener) -> Test:
     return fits
 
 
-def _amounts(command: Command, listener: Listener) -> Test:
+def _amounts(command: Command, listener: ReferenceResolver) -> Test:
     """Each color with its number is one of the items, in any order, and each item is one."""
     items = [listener.amounts(item) for item in command.items]
 

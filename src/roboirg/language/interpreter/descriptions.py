@@ -22,7 +22,7 @@ _PLACE_NOUNS = word_set("place spot position location")
 _SERIES_NOUNS = word_set("visit placement time pass placing stay occasion")
 _FORMER = {"former": 0, "latter": -1}
 
-Kind = Literal["any", "color", "not", "other", "place", "introduced", "introduced place"]
+DescriptionKind = Literal["any", "color", "not", "other", "place", "introduced", "introduced place"]
 
 
 class Description(NamedTuple):
@@ -39,7 +39,7 @@ class Description(NamedTuple):
         position: which of the introduced ones, from 0; None if any of them.
     """
 
-    kind: Kind
+    kind: DescriptionKind
     colors: tuple[str, ...] = ()
     minus: str | None = None
     place: Place | None = None
@@ -86,7 +86,7 @@ def _pointer(words: Sentence) -> Description | None:
     for before, word, after in zip(("", *words), words, (*words[1:], ""), strict=False):
         position = _position(before, word)
         if position is not None and after not in _SERIES_NOUNS:
-            kind: Kind = "introduced place" if after in _PLACE_NOUNS else "introduced"
+            kind: DescriptionKind = "introduced place" if after in _PLACE_NOUNS else "introduced"
             return Description(kind, times=times, position=position)
         if word in _PRONOUNS or (before == "that" and word in _POINTED):
             return Description("introduced")

@@ -10,7 +10,12 @@ from typing import NamedTuple
 from roboirg.language.interpreter.ordinals import named_positions
 from roboirg.language.interpreter.places import Place, read_places
 from roboirg.language.interpreter.quantities import plain_numbers, quantities
-from roboirg.language.interpreter.temporal_relations import Moment, Time, named_moments, time_told
+from roboirg.language.interpreter.temporal_relations import (
+    PressRelation,
+    Time,
+    named_moments,
+    time_told,
+)
 from roboirg.language.interpreter.tokens import COLOR, Sentence, colors_in
 
 _DISMISSAL = re.compile(
@@ -26,14 +31,14 @@ class Remark(NamedTuple):
     numbers: tuple[int, ...]
     amounts: tuple[tuple[str, int], ...]
     positions: tuple[int, ...]
-    moments: tuple[Moment, ...]
+    moments: tuple[PressRelation, ...]
     places: tuple[Place, ...]
     times: frozenset[Time]
     camera: bool
     dismissed: bool
 
 
-class Context(NamedTuple):
+class DiscourseContext(NamedTuple):
     """What has been introduced so far, in order, and what was said about it.
 
     Attributes:
@@ -54,8 +59,8 @@ class Context(NamedTuple):
     numbers: tuple[int, ...] = ()
     amounts: tuple[tuple[str, int], ...] = ()
     positions: tuple[int, ...] = ()
-    moments: tuple[Moment, ...] = ()
-    chosen: Moment | None = None
+    moments: tuple[PressRelation, ...] = ()
+    chosen: PressRelation | None = None
     places: tuple[Place, ...] = ()
     times: frozenset[Time] = frozenset()
     mirrored: bool = False
@@ -90,9 +95,9 @@ def _amounts(text: str) -> tuple[tuple[str, int], ...]:
     return tuple(found)
 
 
-def listen(sentences: Iterable[Sentence]) -> Context:
+def read_discourse(sentences: Iterable[Sentence]) -> DiscourseContext:
     """What is in mind after these sentences; what the speaker waves aside is not."""
-    context = Context()
+    context = DiscourseContext()
     for sentence in sentences:
         remark = read_remark(sentence)
         if not remark.dismissed:
@@ -100,12 +105,12 @@ def listen(sentences: Iterable[Sentence]) -> Context:
     return context
 
 
-def _heard(context: Context, remark: Remark) -> Context:
+def _heard(context: DiscourseContext, remark: Remark) -> DiscourseContext:
     fresh = [color for color in remark.colors if color not in context.colors]
     again = not fresh and len(remark.colors) == 1
     moments = (*context.moments, *remark.moments)
     introduced = tuple(dict.fromkeys(moments))
-    return Context(
+    return DiscourseContext(
         colors=tuple(dict.fromkeys((*context.colors, *fresh))),
         singled=remark.colors[0] if again else context.singled,
         numbers=tuple(dict.fromkeys((*context.numbers, *remark.numbers))),

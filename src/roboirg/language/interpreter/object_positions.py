@@ -12,7 +12,7 @@ from roboirg.language.interpreter.places import Place, find
 from roboirg.language.interpreter.temporal_relations import Time
 
 
-def standing_at(
+def objects_at(
     place: Place, scene: Scene, kind: str, times: Collection[Time], *, mirrored: bool
 ) -> tuple[SceneObject, ...]:
     """What stands at a place at one of these times; at any time if none is given.

@@ -6,7 +6,7 @@ import re
 from collections.abc import Collection
 from typing import Literal, NamedTuple
 
-from roboirg.language.interpreter.quantities import Count, read_value
+from roboirg.language.interpreter.quantities import CountExpression, read_value
 from roboirg.language.interpreter.tokens import NUMBER, ORDINAL, number_of, ordinal_of
 
 Base = int | Literal["that", "last"]
@@ -35,7 +35,7 @@ _POINTER = re.compile(rf"\b(?:that|this|the same) (?:very )?(?:one|number|{_NOUN
 _LATER = ("after", "following", "later than", "behind", "next")
 
 
-class Position(NamedTuple):
+class OrdinalExpression(NamedTuple):
     """How a command tells an element of a series.
 
     Attributes:
@@ -46,7 +46,7 @@ class Position(NamedTuple):
 
     base: Base = "that"
     offsets: tuple[int, ...] = (0,)
-    value: Count | None = None
+    value: CountExpression | None = None
 
     def results(
         self, positions: Collection[int], numbers: Collection[int], length: int
@@ -85,44 +85,44 @@ def named_positions(text: str) -> tuple[int, ...]:
     return tuple(one for one in numbers if isinstance(one, int))
 
 
-def read_position(text: str) -> Position | None:
+def read_position(text: str) -> OrdinalExpression | None:
     """The element of a series that a command tells; None if it tells none."""
     value = read_value(text)
     if value is not None:
-        return Position(value=value)
+        return OrdinalExpression(value=value)
     return _read_last(text) or _read_relative(text) or _read_named(text)
 
 
-def _read_relative(text: str) -> Position | None:
+def _read_relative(text: str) -> OrdinalExpression | None:
     # Before the others: in "the preceding one" no number one is preceded.
     following = _NEXT.search(text)
     if following:
-        return Position("that", (1 if following["way"] in _LATER else -1,))
+        return OrdinalExpression("that", (1 if following["way"] in _LATER else -1,))
     for found in _STEP.finditer(text):
         base = _base(text, found.end())
         if base is not None:
             step = number_of(found["step"] or "") or 1
-            return Position(base, (step if found["way"] in _LATER else -step,))
+            return OrdinalExpression(base, (step if found["way"] in _LATER else -step,))
     for found in _NEIGHBOR.finditer(text):
         base = _base(text, found.end())
         if base is not None:
-            return Position(base, (-1, 1))
+            return OrdinalExpression(base, (-1, 1))
     return None
 
 
-def _read_last(text: str) -> Position | None:
+def _read_last(text: str) -> OrdinalExpression | None:
     found = _PENULTIMATE.search(text)
     if found is None:
         return None
-    return Position("last", (1 - (ordinal_of(found["rank"] or "") or 2),))
+    return OrdinalExpression("last", (1 - (ordinal_of(found["rank"] or "") or 2),))
 
 
-def _read_named(text: str) -> Position | None:
+def _read_named(text: str) -> OrdinalExpression | None:
     found = _ELEMENT.search(text)
     if found is None and not _POINTER.search(text):
         found = _BARE.search(text)
-        return Position(_ordinal(found["ordinal"])) if found else None
-    return Position("that" if found is None else _number(found))
+        return OrdinalExpression(_ordinal(found["ordinal"])) if found else None
+    return OrdinalExpression("that" if found is None else _number(found))
 
 
 def _base(text: str, at: int) -> Base | None:

@@ -12,7 +12,7 @@ _CONCEIVABLE = range(1, 11)
 """What a quantity that was not heard may have been."""
 
 
-class Count(NamedTuple):
+class CountExpression(NamedTuple):
     """``factor * quantity + offset``; without a quantity, one of the context."""
 
     factor: float = 1.0
@@ -36,7 +36,7 @@ class Count(NamedTuple):
 class Quantity(NamedTuple):
     """A quantity in a text, and from which to which character it goes."""
 
-    told: Count
+    told: CountExpression
     start: int
     end: int
     plain: bool = False
@@ -75,17 +75,17 @@ _FACTORS = {"twice": 2.0, "double": 2.0, "thrice": 3.0, "triple": 3.0, "half": 0
 _ADVERBS = {"once": 1, "twice": 2, "thrice": 3}
 _TIMES = re.compile(r" (?:times?|rounds?|turns?|occasions?)\b")
 
-Reading = tuple[re.Pattern[str], Callable[[re.Match[str]], Count], bool]
+Reading = tuple[re.Pattern[str], Callable[[re.Match[str]], CountExpression], bool]
 
 
-def _stepped(found: re.Match[str]) -> Count:
+def _stepped(found: re.Match[str]) -> CountExpression:
     sign = 1 if re.fullmatch(f"{_MORE}|plus", found["way"]) else -1
-    return Count(offset=sign * (number_of(found["step"]) or 0), quantity=_quantity(found))
+    return CountExpression(offset=sign * (number_of(found["step"]) or 0), quantity=_quantity(found))
 
 
-def _scaled(found: re.Match[str]) -> Count:
+def _scaled(found: re.Match[str]) -> CountExpression:
     factor = _FACTORS.get(found["factor"]) or float(number_of(found["factor"].split()[0]) or 1)
-    return Count(factor=factor, quantity=_quantity(found))
+    return CountExpression(factor=factor, quantity=_quantity(found))
 
 
 def _quantity(found: re.Match[str]) -> int | None:
@@ -96,11 +96,11 @@ _DERIVED: tuple[Reading, ...] = ((_STEP, _stepped, False), (_PLUS, _stepped, Fal
                                  (_SCALED, _scaled, False))  # fmt: skip
 _READINGS: tuple[Reading, ...] = (
     *_DERIVED,
-    (_SAME, lambda _found: Count(), False),
-    (_SOME, lambda _found: Count(quantity=2), True),
-    (_ADVERB, lambda found: Count(quantity=_ADVERBS[found[0]]), True),
-    (_PLAIN, lambda found: Count(quantity=number_of(found["number"])), True),
-    (_SINGLE, lambda _found: Count(quantity=1), True),
+    (_SAME, lambda _found: CountExpression(), False),
+    (_SOME, lambda _found: CountExpression(quantity=2), True),
+    (_ADVERB, lambda found: CountExpression(quantity=_ADVERBS[found[0]]), True),
+    (_PLAIN, lambda found: CountExpression(quantity=number_of(found["number"])), True),
+    (_SINGLE, lambda _found: CountExpression(quantity=1), True),
 )
 """How to read a quantity; where two overlap, the first of this order holds."""
 
@@ -123,12 +123,12 @@ def plain_numbers(words: Sentence) -> tuple[int, ...]:
     return tuple(number for number in numbers if number is not None)
 
 
-def read_value(text: str) -> Count | None:
+def read_value(text: str) -> CountExpression | None:
     """A number that is told by another one: ``one less than that``."""
     return next((one.told for one in quantities(text) if one.told.derived), None)
 
 
-def read_times(text: str) -> Count | None:
+def read_times(text: str) -> CountExpression | None:
     """How often something is to be done; None if nothing tells."""
     found = quantities(text)
     told = [one for one in found if not one.plain]

@@ -9,12 +9,18 @@ from roboirg.core.episode import ObjectKind, Scene, SceneObject
 from roboirg.core.motions import Shuttle
 from roboirg.language.interpreter.command import Item
 from roboirg.language.interpreter.descriptions import Description
-from roboirg.language.interpreter.discourse_context import Context
-from roboirg.language.interpreter.object_positions import standing_at
-from roboirg.language.interpreter.ordinals import Position
+from roboirg.language.interpreter.discourse_context import DiscourseContext
+from roboirg.language.interpreter.object_positions import objects_at
+from roboirg.language.interpreter.ordinals import OrdinalExpression
 from roboirg.language.interpreter.places import Place
-from roboirg.language.interpreter.quantities import Count
-from roboirg.language.interpreter.temporal_relations import MOMENTS, Moment, Time, When, neighbors
+from roboirg.language.interpreter.quantities import CountExpression
+from roboirg.language.interpreter.temporal_relations import (
+    MOMENTS,
+    PressRelation,
+    TemporalRelation,
+    Time,
+    neighbors,
+)
 
 Told = TypeVar("Told")
 _CHOSEN: tuple[ObjectKind, ...] = ("container", "box", "tape")
@@ -24,14 +30,14 @@ Amounts = dict[str, set[int] | None]
 """For each color that is possible, how many; None if any number is."""
 
 
-class Listener:
+class ReferenceResolver:
     """Evaluates the command's descriptions; None stands for "nothing tells".
 
     Attributes:
         complaints: what was pointed at without having been introduced, and the like.
     """
 
-    def __init__(self, scene: Scene, context: Context, times: frozenset[Time]) -> None:
+    def __init__(self, scene: Scene, context: DiscourseContext, times: frozenset[Time]) -> None:
         self.complaints: list[str] = []
         self._scene = scene
         self._context = context
@@ -68,11 +74,11 @@ class Listener:
             return dict.fromkeys(colors)
         return {color: count.results(self._told(count, color)) for color in sorted(colors)}
 
-    def times(self, count: Count | None) -> set[int] | None:
+    def times(self, count: CountExpression | None) -> set[int] | None:
         """The numbers that the command leaves open."""
         return None if count is None else count.results(self._told(count, None))
 
-    def _told(self, count: Count, color: str | None) -> tuple[int, ...]:
+    def _told(self, count: CountExpression, color: str | None) -> tuple[int, ...]:
         """The introduced numbers that a count may start from; of that color, if there are any."""
         if count.quantity is not None:
             return ()
@@ -82,7 +88,7 @@ class Listener:
             self._complain("a number")
         return told
 
-    def positions(self, position: Position | None) -> set[int] | None:
+    def positions(self, position: OrdinalExpression | None) -> set[int] | None:
         """The elements of the series that the command leaves open."""
         if position is None:
             return None
@@ -91,7 +97,7 @@ class Listener:
             self._complain("an element of a series")
         return position.results(positions, numbers, self._series_length())
 
-    def moments(self, when: When | None) -> set[Moment] | None:
+    def moments(self, when: TemporalRelation | None) -> set[PressRelation] | None:
         """The moments about the press that the command leaves open."""
         if when is None:
             return None
@@ -106,7 +112,7 @@ class Listener:
             return set(MOMENTS) - told if len(told) == 1 else set(MOMENTS)
         return told
 
-    def _introduced_moments(self, when: When) -> set[Moment]:
+    def _introduced_moments(self, when: TemporalRelation) -> set[PressRelation]:
         chosen = self._context.chosen
         if chosen is not None and (when.kind != "introduced" or len(self._context.moments) > 1):
             return {chosen}
@@ -147,7 +153,7 @@ class Listener:
         return set().union(*(self._at(place, thing.times) for place in chosen))
 
     def _at(self, place: Place, times: frozenset[Time]) -> set[str]:
-        found = standing_at(
+        found = objects_at(
             place,
             self._scene,
             self._kind,

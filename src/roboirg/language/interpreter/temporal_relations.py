@@ -8,12 +8,12 @@ from typing import Literal, NamedTuple
 
 from roboirg.core.conditions import Fact
 
-Moment = Literal["before", "after"]
+PressRelation = Literal["before", "after"]
 Time = Literal["at first", "at last"]
-MOMENTS: tuple[Moment, Moment] = ("before", "after")
+MOMENTS: tuple[PressRelation, PressRelation] = ("before", "after")
 
 _PRESS = re.compile(r"\b(?:press|pressed|presses|pressing|push|pushed|pushing|button)\b")
-_WORD: dict[str, Moment] = {
+_WORD: dict[str, PressRelation] = {
     "before": "before", "prior to": "before", "preceding": "before", "preceded": "before",
     "after": "after", "following": "after", "followed": "after",
 }  # fmt: skip
@@ -43,7 +43,7 @@ _AT_LAST = re.compile(
 )
 
 
-class When(NamedTuple):
+class TemporalRelation(NamedTuple):
     """How a command tells a moment.
 
     Attributes:
@@ -53,10 +53,10 @@ class When(NamedTuple):
     """
 
     kind: Literal["named", "other", "neighbor", "introduced"]
-    moments: tuple[Moment, ...] = ()
+    moments: tuple[PressRelation, ...] = ()
 
 
-def named_moments(text: str) -> tuple[Moment, ...]:
+def named_moments(text: str) -> tuple[PressRelation, ...]:
     """The moments about a press of the button that a sentence names, in order."""
     if not _PRESS.search(text):
         return ()
@@ -73,27 +73,27 @@ def time_told(text: str) -> frozenset[Time]:
     return frozenset(told)
 
 
-def read_when(text: str) -> When | None:
+def read_temporal_relation(text: str) -> TemporalRelation | None:
     """The moment that a command tells; None if it tells none."""
     named = named_moments(text)
     if _NEIGHBOR.search(text):
-        return When("neighbor", named)
+        return TemporalRelation("neighbor", named)
     rejected = _NOT.search(text) if named else None
     if rejected:
-        return When("other", (_WORD[rejected[1]],))
+        return TemporalRelation("other", (_WORD[rejected[1]],))
     if _OTHER.search(text):
-        return When("other", named)
+        return TemporalRelation("other", named)
     if named:
-        return When("named", named)
-    return When("introduced") if _POINTER.search(text) else None
+        return TemporalRelation("named", named)
+    return TemporalRelation("introduced") if _POINTER.search(text) else None
 
 
-def neighbors(moments: Collection[Moment], past: tuple[Fact, ...]) -> set[Moment]:
+def neighbors(moments: Collection[PressRelation], past: tuple[Fact, ...]) -> set[PressRelation]:
     """The moments about the press whose placements come next to those of the given ones."""
     kinds = [fact.kind for fact in past]
     pressed = kinds.index("pressed") if "pressed" in kinds else 0
     earlier = kinds[:pressed].count("placed")
     # Placements are numbered from 1; these two are the last before and the first after the press.
-    numbers: dict[Moment, int] = {"before": earlier, "after": earlier + 1}
+    numbers: dict[PressRelation, int] = {"before": earlier, "after": earlier + 1}
     near = {numbers[one] + step for one in moments for step in (-1, 1)}
     return {one for one, number in numbers.items() if number in near}

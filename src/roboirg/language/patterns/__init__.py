@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from roboirg.language.patterns import before_after, deduction, exclusion, sequence
 from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
-from roboirg.language.request import Request
+from roboirg.language.request import InstructionRequest
 
 __all__ = ["PATTERNS", "REFERENCE", "Derived", "Pattern", "way"]
 
@@ -18,6 +18,6 @@ PATTERNS: Mapping[str, tuple[Pattern, ...]] = {
 }
 
 
-def way(name: str, request: Request) -> Pattern | None:
+def way(name: str, request: InstructionRequest) -> Pattern | None:
     """How a pattern derives the episode's goal, or None if it cannot."""
     return next((one for one in PATTERNS[name] if one.allows(request)), None)

@@ -5,22 +5,22 @@ from __future__ import annotations
 from roboirg.language import templates
 from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain
-from roboirg.language.request import Part, Request
+from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.slot_types import relation
 
 PAIR = "right before and right after the button press"
 
 
-def _rejected(part: Part) -> str:
+def _rejected(part: GoalValue) -> str:
     return next(one for one in templates.MOMENTS if one != part.value)
 
 
-def _single(request: Request, rejected: str) -> str:
+def _single(request: InstructionRequest, rejected: str) -> str:
     """The command's words for the moment or placement that is not meant."""
     return f"the one {templates.MOMENTS[rejected]}" if request.resolved else "that one"
 
 
-def _other(request: Request) -> Derived:
+def _other(request: InstructionRequest) -> Derived:
     """Of the two moments, not the one that somebody chose."""
     (part,) = request.parts_of("relation")
     rejected = _rejected(part)
@@ -40,7 +40,7 @@ def _other(request: Request) -> Derived:
     return Derived(fill(template, introduced), fields, {"patterns": ["contextual logic"]})
 
 
-def _neighbor(request: Request) -> Derived:
+def _neighbor(request: InstructionRequest) -> Derived:
     """The placement that is next to another one; there are only these two."""
     (part,) = request.parts_of("relation")
     rejected = _rejected(part)
@@ -63,7 +63,7 @@ def _neighbor(request: Request) -> Derived:
     return Derived(context, {part.field: which}, notes)
 
 
-def _allows(request: Request) -> bool:
+def _allows(request: InstructionRequest) -> bool:
     return bool(request.parts_of("relation"))
 
 

@@ -9,7 +9,7 @@ from roboirg.language import templates
 from roboirg.language.number_words import cardinal
 from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed
-from roboirg.language.request import Part, PartKind, Request
+from roboirg.language.request import GoalValue, InstructionRequest, SlotTypeName
 from roboirg.language.slot_types import amount, ordinal
 from roboirg.language.slot_types.number import introduce_quantity
 
@@ -58,21 +58,21 @@ def _open(relation: templates.Relation, choices: Sequence[Sequence[int]]) -> boo
     return len(reachable) > 1
 
 
-def _deductions(request: Request) -> list[Deduction]:
+def _deductions(request: InstructionRequest) -> list[Deduction]:
     (slot,) = {part.slot for part in request.parts if part.slot in NUMBER_SLOTS}
     results = [part.number for part in request.parts if part.slot == slot]
     return deductions(results, request.numbers_instead(slot))
 
 
-def _possible(request: Request, kind: PartKind) -> bool:
+def _possible(request: InstructionRequest, kind: SlotTypeName) -> bool:
     return bool(request.parts_of(kind)) and bool(_deductions(request))
 
 
-def _chosen(request: Request) -> Deduction:
+def _chosen(request: InstructionRequest) -> Deduction:
     return request.chooser.pick("relation", _deductions(request))
 
 
-def _pointer(request: Request, number: int) -> Phrase:
+def _pointer(request: InstructionRequest, number: int) -> Phrase:
     if request.resolved:
         return antecedent(cardinal(number), REFERENCE, number)
     return anaphor("that", "that", REFERENCE, number)
@@ -87,7 +87,7 @@ def _notes(deduction: Deduction) -> dict[str, object]:
     }
 
 
-def _times(request: Request) -> Derived:
+def _times(request: InstructionRequest) -> Derived:
     (part,) = request.parts_of("number")
     deduction = _chosen(request)
     (number,) = deduction.references
@@ -96,7 +96,7 @@ def _times(request: Request) -> Derived:
     return Derived(context, {part.field: words}, _notes(deduction))
 
 
-def _visit(request: Request) -> Derived:
+def _visit(request: InstructionRequest) -> Derived:
     (part,) = request.parts_of("visit")
     deduction = _chosen(request)
     (number,) = deduction.references
@@ -105,7 +105,7 @@ def _visit(request: Request) -> Derived:
     return Derived(context, ordinal.by_number(part, value), _notes(deduction))
 
 
-def _amounts(request: Request) -> Derived:
+def _amounts(request: InstructionRequest) -> Derived:
     """The same relation for each color, each with its own quantity."""
     parts = request.parts_of("amount")
     deduction = _chosen(request)
@@ -120,7 +120,7 @@ def _amounts(request: Request) -> Derived:
     return Derived(context, {amount.FIELD: listed(items)}, _notes(deduction))
 
 
-def _shade(part: Part) -> Phrase:
+def _shade(part: GoalValue) -> Phrase:
     return antecedent(part.color, part.slot, part.value)
 
 

@@ -7,11 +7,11 @@ import itertools
 from roboirg.language import templates
 from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, sentences
-from roboirg.language.request import Part, Request
+from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.slot_types import described
 
 
-def _exclude(request: Request) -> Derived:
+def _exclude(request: InstructionRequest) -> Derived:
     """The color that is not among two; a second target is the other one of the two."""
     target, *rest = request.colored
     others = request.other_colors(target.color)
@@ -38,19 +38,23 @@ def _exclude(request: Request) -> Derived:
     return Derived(sentences(context), described(request, things), {"patterns": patterns})
 
 
-def _thing(request: Request, part: Part, template: str, fields: dict[str, Phrase]) -> Phrase:
+def _thing(
+    request: InstructionRequest, part: GoalValue, template: str, fields: dict[str, Phrase]
+) -> Phrase:
     words = {"thing": plain(request.task.commands.colored), **fields}
     return request.by_color(fill(template, words, plural=request.count_of(part) > 1))
 
 
-def _singled(request: Request, part: Part, pair: tuple[str, ...]) -> Phrase:
+def _singled(request: InstructionRequest, part: GoalValue, pair: tuple[str, ...]) -> Phrase:
     """A remark that chooses one of the pair, not the one that is meant."""
     chosen = _rejected(part, pair)
     remark = request.chooser.pick("singled introduction", templates.SINGLED_INTRODUCTIONS)
     return fill(remark, {"single": antecedent(chosen, REFERENCE, chosen)})
 
 
-def _other(request: Request, part: Part, pair: tuple[str, ...], word: str) -> Phrase:
+def _other(
+    request: InstructionRequest, part: GoalValue, pair: tuple[str, ...], word: str
+) -> Phrase:
     """The command's words for the other one of the pair."""
     if request.resolved:
         words = f"the color of {' and '.join(pair)} that is not {_rejected(part, pair)}"
@@ -59,16 +63,16 @@ def _other(request: Request, part: Part, pair: tuple[str, ...], word: str) -> Ph
     return anaphor(words, "other", part.slot, part.value)
 
 
-def _rejected(part: Part, pair: tuple[str, ...]) -> str:
+def _rejected(part: GoalValue, pair: tuple[str, ...]) -> str:
     return next(color for color in pair if color != part.value)
 
 
-def _allows_one(request: Request) -> bool:
+def _allows_one(request: InstructionRequest) -> bool:
     # The second of two picks is told by the pair of the first, whatever the main pattern's name.
     return bool(request.parts_of("color")) or len(request.colored) == 1
 
 
-def _allows_two_amounts(request: Request) -> bool:
+def _allows_two_amounts(request: InstructionRequest) -> bool:
     return bool(request.parts_of("amount")) and len(request.colored) == 2  # noqa: PLR2004
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from roboirg.language.phrases import Phrase
-from roboirg.language.request import Request
+from roboirg.language.request import InstructionRequest
 from roboirg.language.slot_types import Fields
 
 REFERENCE = "reference"
@@ -37,5 +37,5 @@ class Pattern:
         derive: how it is told.
     """
 
-    allows: Callable[[Request], bool]
-    derive: Callable[[Request], Derived]
+    allows: Callable[[InstructionRequest], bool]
+    derive: Callable[[InstructionRequest], Derived]

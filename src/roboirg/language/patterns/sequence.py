@@ -8,7 +8,7 @@ from roboirg.language import templates
 from roboirg.language.number_words import ordinal as ordinal_word
 from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
 from roboirg.language.phrases import anaphor, antecedent, fill, plain
-from roboirg.language.request import Part, Request
+from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.slot_types import ordinal
 
 
@@ -37,22 +37,22 @@ def _leads(step: templates.Step, position: int, length: int) -> bool:
     return 1 <= position - step.offset <= length
 
 
-def _steps(request: Request, part: Part) -> list[templates.Step]:
+def _steps(request: InstructionRequest, part: GoalValue) -> list[templates.Step]:
     length = ordinal.series_length(request, part)
     choices = [number for (number,) in request.numbers_instead(part.slot)]
     return steps(part.number, length, choices)
 
 
-def _part(request: Request) -> Part | None:
+def _part(request: InstructionRequest) -> GoalValue | None:
     return next(iter((*request.parts_of("visit"), *request.parts_of("placement"))), None)
 
 
-def _allows(request: Request) -> bool:
+def _allows(request: InstructionRequest) -> bool:
     part = _part(request)
     return part is not None and bool(_steps(request, part))
 
 
-def _derive(request: Request) -> Derived:
+def _derive(request: InstructionRequest) -> Derived:
     (part,) = (*request.parts_of("visit"), *request.parts_of("placement"))
     step = request.chooser.pick("relation", _steps(request, part))
     position = part.number - step.offset

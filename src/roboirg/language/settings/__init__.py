@@ -8,21 +8,21 @@ from collections.abc import Mapping
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.language.instruction import SETTINGS
-from roboirg.language.request import SettingRule
+from roboirg.language.request import Setting
 from roboirg.tasks import Task
-from roboirg.util.discovery import offered
+from roboirg.util.discovery import discover
 
 __all__ = ["all_settings", "get_setting"]
 
 
 @functools.cache
-def all_settings() -> Mapping[str, SettingRule]:
+def all_settings() -> Mapping[str, Setting]:
     """Every setting by name, explicit first."""
-    rules: list[SettingRule] = offered(sys.modules[__name__], "SETTING")
+    rules: list[Setting] = discover(sys.modules[__name__], "SETTING")
     return {rule.name: rule for rule in sorted(rules, key=lambda rule: SETTINGS.index(rule.name))}
 
 
-def get_setting(name: str, task: Task) -> SettingRule:
+def get_setting(name: str, task: Task) -> Setting:
     """The setting of that name.
 
     Raises:

@@ -3,30 +3,30 @@
 from __future__ import annotations
 
 from roboirg.language.phrases import sentences
-from roboirg.language.request import Draft, Request, Said, SettingRule
+from roboirg.language.request import InstructionRequest, InstructionSpec, Setting, UtteranceSpec
 from roboirg.language.settings.explicit import stated
-from roboirg.language.slot_types import Fields, kinds_in
+from roboirg.language.slot_types import Fields, slot_types_in
 
 
-def introduction(request: Request) -> Said:
+def introduction(request: InstructionRequest) -> UtteranceSpec:
     """What direct and contextual instructions begin with."""
-    said = [kind.introduce(request, parts) for kind, parts in kinds_in(request)]
-    return Said("introduction", sentences(said))
+    said = [kind.introduce(request, parts) for kind, parts in slot_types_in(request)]
+    return UtteranceSpec("introduction", sentences(said))
 
 
-def command(request: Request) -> Said:
+def command(request: InstructionRequest) -> UtteranceSpec:
     """What direct and contextual instructions end with."""
     if request.resolved:
-        return Said("command", request.command(stated(request)))
+        return UtteranceSpec("command", request.command(stated(request)))
     fields: Fields = {}
-    for kind, parts in kinds_in(request):
+    for kind, parts in slot_types_in(request):
         fields |= kind.reduced(request, parts)
-    return Said("command", request.command(fields))
+    return UtteranceSpec("command", request.command(fields))
 
 
-def say(request: Request) -> Draft:
+def say(request: InstructionRequest) -> InstructionSpec:
     """Introduction and command."""
-    return Draft((introduction(request), command(request)))
+    return InstructionSpec((introduction(request), command(request)))
 
 
-SETTING = SettingRule("direct", say)
+SETTING = Setting("direct", say)

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from roboirg.language.request import Draft, Request, Said, SettingRule
-from roboirg.language.slot_types import Fields, kinds_in
+from roboirg.language.request import InstructionRequest, InstructionSpec, Setting, UtteranceSpec
+from roboirg.language.slot_types import Fields, slot_types_in
 
 
-def stated(request: Request) -> Fields:
+def stated(request: InstructionRequest) -> Fields:
     """The fields of the command, every value named outright."""
     fields: Fields = {}
-    for kind, parts in kinds_in(request):
+    for kind, parts in slot_types_in(request):
         fields |= kind.stated(request, parts)
     return fields
 
 
-def say(request: Request) -> Draft:
+def say(request: InstructionRequest) -> InstructionSpec:
     """The command alone."""
-    return Draft((Said("command", request.command(stated(request))),))
+    return InstructionSpec((UtteranceSpec("command", request.command(stated(request))),))
 
 
-SETTING = SettingRule("explicit", say)
+SETTING = Setting("explicit", say)

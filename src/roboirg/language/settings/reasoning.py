@@ -7,14 +7,14 @@ cover is stated explicitly in the command.
 from __future__ import annotations
 
 from roboirg.language.patterns import Pattern, way
-from roboirg.language.request import Draft, Request, Said, SettingRule
+from roboirg.language.request import InstructionRequest, InstructionSpec, Setting, UtteranceSpec
 from roboirg.language.settings.explicit import stated
 
 BLOCK = 4
 """Difficulties repeat after so many episodes; see `pattern_of`."""
 
 
-def pattern_of(request: Request) -> tuple[str, Pattern]:
+def pattern_of(request: InstructionRequest) -> tuple[str, Pattern]:
     """The main pattern of an episode, by name, and how it derives the goal.
 
     The cycle goes through the patterns that the episode allows, so that none takes the turns of
@@ -27,13 +27,13 @@ def pattern_of(request: Request) -> tuple[str, Pattern]:
     return possible[(index + index // BLOCK) % len(possible)]
 
 
-def say(request: Request) -> Draft:
+def say(request: InstructionRequest) -> InstructionSpec:
     """An intermediate reference, and a command that derives the goal from it."""
     name, pattern = pattern_of(request)
     derived = pattern.derive(request)
     command = request.command(stated(request) | derived.fields)
-    said = (Said("introduction", derived.context), Said("command", command))
-    return Draft(said, {"pattern": name, **derived.notes})
+    said = (UtteranceSpec("introduction", derived.context), UtteranceSpec("command", command))
+    return InstructionSpec(said, {"pattern": name, **derived.notes})
 
 
-SETTING = SettingRule("reasoning", say)
+SETTING = Setting("reasoning", say)

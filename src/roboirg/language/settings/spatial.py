@@ -12,7 +12,13 @@ from roboirg.language import templates
 from roboirg.language.instruction import Expression
 from roboirg.language.landmarks import Landmark, landmarks
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain, sentences
-from roboirg.language.request import Draft, Part, Request, Said, SettingRule
+from roboirg.language.request import (
+    GoalValue,
+    InstructionRequest,
+    InstructionSpec,
+    Setting,
+    UtteranceSpec,
+)
 from roboirg.language.settings.explicit import stated
 from roboirg.language.slot_types import described
 
@@ -27,7 +33,7 @@ POINTING: Mapping[int, tuple[tuple[str, Expression], ...]] = {
 }
 
 
-def usable(request: Request, part: Part) -> tuple[Landmark, ...]:
+def usable(request: InstructionRequest, part: GoalValue) -> tuple[Landmark, ...]:
     """The landmarks of the best class that could tell where a thing of this part is."""
     thing = request.task.commands.thing
     scene = request.episode.scene
@@ -40,12 +46,12 @@ def usable(request: Request, part: Part) -> tuple[Landmark, ...]:
     return tuple(landmark for landmark in found if landmark.level == best)
 
 
-def can_say(request: Request) -> bool:
+def can_say(request: InstructionRequest) -> bool:
     """Whether every color has a thing with a landmark."""
     return all(usable(request, part) for part in request.colored)
 
 
-def say(request: Request) -> Draft:
+def say(request: InstructionRequest) -> InstructionSpec:
     """An introduction with a landmark for each color, and a command that points there."""
     parts = request.colored
     chosen = [
@@ -61,16 +67,18 @@ def say(request: Request) -> Draft:
         )
         things.append(request.by_place(place, plural=request.count_of(part) > 1))
     fields = stated(request) | described(request, things)
-    said = (introduction(request, parts, chosen), Said("command", request.command(fields)))
+    said = (introduction(request, parts, chosen), UtteranceSpec("command", request.command(fields)))
     notes = {
         "landmarks": [landmark.phrase for landmark in chosen],
         "landmark_classes": [landmark.level for landmark in chosen],
         "frame": request.frame,
     }
-    return Draft(said, notes)
+    return InstructionSpec(said, notes)
 
 
-def introduction(request: Request, parts: Sequence[Part], chosen: Sequence[Landmark]) -> Said:
+def introduction(
+    request: InstructionRequest, parts: Sequence[GoalValue], chosen: Sequence[Landmark]
+) -> UtteranceSpec:
     """The places, whose left and right is meant where it matters, and when, if things move."""
     noun = plain(f"the {request.task.commands.thing} ")
     things: list[Phrase] = [
@@ -87,7 +95,7 @@ def introduction(request: Request, parts: Sequence[Part], chosen: Sequence[Landm
     said = [fill(template, {"things": listed(things)}, plural=len(things) > 1)]
     if any(isinstance(motion, Swap) for motion in request.episode.scene.motions):
         said.append(plain(request.chooser.pick("moved", templates.MOVED_INTRODUCTIONS)))
-    return Said("introduction", sentences(said))
+    return UtteranceSpec("introduction", sentences(said))
 
 
-SETTING = SettingRule("spatial", say, can_say)
+SETTING = Setting("spatial", say, can_say)

@@ -9,37 +9,37 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from roboirg.language.phrases import Phrase
-from roboirg.language.request import Part, PartKind, Request
+from roboirg.language.request import GoalValue, InstructionRequest, SlotTypeName
 from roboirg.language.slot_types import amount, color, number, ordinal, relation
-from roboirg.language.slot_types.slot_type import Fields, Kind
+from roboirg.language.slot_types.slot_type import Fields, SlotType
 
-__all__ = ["KINDS", "Fields", "Kind", "described", "kinds_in"]
+__all__ = ["SLOT_TYPES", "Fields", "SlotType", "described", "slot_types_in"]
 
-KINDS: Mapping[PartKind, Kind] = {
+SLOT_TYPES: Mapping[SlotTypeName, SlotType] = {
     kind.name: kind
     for kind in (
-        number.KIND,
+        number.NUMBER,
         ordinal.VISIT,
         ordinal.PLACEMENT,
-        relation.KIND,
-        color.KIND,
-        amount.KIND,
+        relation.RELATION,
+        color.COLOR,
+        amount.AMOUNT,
     )
 }
 
 
-def kinds_in(request: Request) -> Iterator[tuple[Kind, tuple[Part, ...]]]:
+def slot_types_in(request: InstructionRequest) -> Iterator[tuple[SlotType, tuple[GoalValue, ...]]]:
     """The kinds that the goal has values of, in the order of speaking, with these values."""
-    for name, kind in KINDS.items():
+    for name, kind in SLOT_TYPES.items():
         parts = request.parts_of(name)
         if parts:
             yield kind, parts
 
 
-def described(request: Request, things: Sequence[Phrase]) -> Fields:
+def described(request: InstructionRequest, things: Sequence[Phrase]) -> Fields:
     """The fields of the command for the goal's colors, given a description for each of them."""
     fields: Fields = {}
-    for kind, parts in kinds_in(request):
+    for kind, parts in slot_types_in(request):
         if kind.described is not None:
             fields |= kind.described(parts, things)
     return fields

@@ -8,15 +8,15 @@ from roboirg.language import templates
 from roboirg.language.instruction import Expression
 from roboirg.language.number_words import cardinal
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain
-from roboirg.language.request import Part, Request
+from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.slot_types import color, number
-from roboirg.language.slot_types.slot_type import Fields, Kind
+from roboirg.language.slot_types.slot_type import Fields, SlotType
 
 FIELD = "cubes"
 """All amounts together are one field of the command."""
 
 
-def pairs(parts: tuple[Part, ...]) -> tuple[tuple[Part, Part], ...]:
+def pairs(parts: tuple[GoalValue, ...]) -> tuple[tuple[GoalValue, GoalValue], ...]:
     """Each color with its count."""
     colors = [part for part in parts if part.slot == "colors"]
     counts = [part for part in parts if part.slot == "counts"]
@@ -28,7 +28,7 @@ def amount(count: Phrase, thing: Phrase) -> Phrase:
     return (*count, *plain(" "), *thing)
 
 
-def cubes(shade: Part, count: int) -> Phrase:
+def cubes(shade: GoalValue, count: int) -> Phrase:
     """``red cube`` or ``red cubes``."""
     return antecedent(f"{shade.color} {noun(count)}", shade.slot, shade.value)
 
@@ -38,17 +38,17 @@ def noun(count: int) -> str:
     return "cube" if count == 1 else "cubes"
 
 
-def _count(part: Part) -> Phrase:
+def _count(part: GoalValue) -> Phrase:
     return antecedent(cardinal(part.number), part.slot, part.value)
 
 
-def _stated(_request: Request, parts: tuple[Part, ...]) -> Fields:
+def _stated(_request: InstructionRequest, parts: tuple[GoalValue, ...]) -> Fields:
     """``two red cubes and one blue cube``."""
     things = [cubes(shade, count.number) for shade, count in pairs(parts)]
     return _described(parts, things)
 
 
-def _reduced(_request: Request, parts: tuple[Part, ...]) -> Fields:
+def _reduced(_request: InstructionRequest, parts: tuple[GoalValue, ...]) -> Fields:
     """``that many of them``; ``that many of the former and that many of the latter``; ..."""
     matched = pairs(parts)
     them: tuple[tuple[str, Expression], ...] = (("them", "them"),)
@@ -63,7 +63,7 @@ def _reduced(_request: Request, parts: tuple[Part, ...]) -> Fields:
     return {FIELD: listed(items)}
 
 
-def _introduce(request: Request, parts: tuple[Part, ...]) -> Phrase:
+def _introduce(request: InstructionRequest, parts: tuple[GoalValue, ...]) -> Phrase:
     template = request.chooser.pick("amount introduction", templates.AMOUNT_INTRODUCTIONS)
     # "One of the red cubes", so that "them" is right for a single one too.
     things = [
@@ -73,7 +73,7 @@ def _introduce(request: Request, parts: tuple[Part, ...]) -> Phrase:
 
 
 def introduce_references(
-    request: Request, parts: tuple[Part, ...], slot: str, quantities: Sequence[int]
+    request: InstructionRequest, parts: tuple[GoalValue, ...], slot: str, quantities: Sequence[int]
 ) -> Phrase:
     """A sentence that names another quantity for each color."""
     purpose, options = "reference amounts", templates.REFERENCE_AMOUNT_INTRODUCTIONS
@@ -84,20 +84,20 @@ def introduce_references(
     return fill(request.chooser.pick(purpose, options), {"things": listed(things)})
 
 
-def _pointing(request: Request, parts: tuple[Part, ...]) -> Phrase:
+def _pointing(request: InstructionRequest, parts: tuple[GoalValue, ...]) -> Phrase:
     return color.those(request, tuple(shade for shade, _ in pairs(parts)))
 
 
-def _rivals(request: Request, parts: tuple[Part, ...]) -> list[Phrase]:
+def _rivals(request: InstructionRequest, parts: tuple[GoalValue, ...]) -> list[Phrase]:
     return [*color.rivals(request, parts), *number.rivals(request, parts)]
 
 
-def _described(parts: tuple[Part, ...], things: Sequence[Phrase]) -> Fields:
+def _described(parts: tuple[GoalValue, ...], things: Sequence[Phrase]) -> Fields:
     counts = [_count(count) for _, count in pairs(parts)]
     return {FIELD: listed([amount(*one) for one in zip(counts, things, strict=True)])}
 
 
-KIND = Kind(
+AMOUNT = SlotType(
     name="amount",
     stated=_stated,
     reduced=_reduced,

@@ -6,18 +6,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from roboirg.language.phrases import Phrase, fill, plain
-from roboirg.language.request import Part, PartKind, Request
+from roboirg.language.request import GoalValue, InstructionRequest, SlotTypeName
 
 Fields = dict[str, Phrase]
 """Words for the fields of a command."""
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class SlotType:
     """One kind of value.
 
     Attributes:
-        name: as in `PartKind`.
+        name: as in `SlotTypeName`.
         stated: the fields of the command, every value named outright.
         reduced: the same fields with words that point back at the introduced values.
         introduce: a sentence that names the values.
@@ -29,22 +29,22 @@ class Kind:
             things of each color.
     """
 
-    name: PartKind
-    stated: Callable[[Request, tuple[Part, ...]], Fields]
-    reduced: Callable[[Request, tuple[Part, ...]], Fields]
-    introduce: Callable[[Request, tuple[Part, ...]], Phrase]
-    pointing: Callable[[Request, tuple[Part, ...]], Phrase]
+    name: SlotTypeName
+    stated: Callable[[InstructionRequest, tuple[GoalValue, ...]], Fields]
+    reduced: Callable[[InstructionRequest, tuple[GoalValue, ...]], Fields]
+    introduce: Callable[[InstructionRequest, tuple[GoalValue, ...]], Phrase]
+    pointing: Callable[[InstructionRequest, tuple[GoalValue, ...]], Phrase]
     reinforcements: tuple[str, ...]
-    rivals: Callable[[Request, tuple[Part, ...]], list[Phrase]]
-    plural: Callable[[tuple[Part, ...]], bool] = lambda parts: len(parts) > 1
-    described: Callable[[tuple[Part, ...], Sequence[Phrase]], Fields] | None = None
+    rivals: Callable[[InstructionRequest, tuple[GoalValue, ...]], list[Phrase]]
+    plural: Callable[[tuple[GoalValue, ...]], bool] = lambda parts: len(parts) > 1
+    described: Callable[[tuple[GoalValue, ...], Sequence[Phrase]], Fields] | None = None
 
 
 def rival_sentences(
     templates: Sequence[str],
     values: Sequence[str | int],
     word: Callable[[str | int], str],
-    parts: tuple[Part, ...],
+    parts: tuple[GoalValue, ...],
 ) -> list[Phrase]:
     """Every template with every value that the goal does not have."""
     taken = {part.value for part in parts}

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from roboirg.language.validation.episode_checks import examine
-from roboirg.language.validation.evidence import Evidence, Failure
+from roboirg.language.validation.episode_checks import check_episode
+from roboirg.language.validation.evidence import RuleViolation, ValidationResults
 from roboirg.language.validation.validation_run import (
     Batch,
     batches,
-    prove,
     random_episode,
-    work_on,
+    validate,
+    validate_batch,
 )
 
 __all__ = [
     "Batch",
-    "Evidence",
-    "Failure",
+    "RuleViolation",
+    "ValidationResults",
     "batches",
-    "examine",
-    "prove",
+    "check_episode",
     "random_episode",
-    "work_on",
+    "validate",
+    "validate_batch",
 ]

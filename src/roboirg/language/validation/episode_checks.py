@@ -8,9 +8,15 @@ from collections.abc import Callable, Iterator
 from roboirg.core.episode import Episode
 from roboirg.language.generator import expressible
 from roboirg.language.instruction import Instruction
-from roboirg.language.interpreter import Resolution, resolve
+from roboirg.language.interpreter import Interpretation, interpret
 from roboirg.language.landmarks import FRAMES
-from roboirg.language.validation.evidence import Evidence, Failure, Placed, Rule, Told
+from roboirg.language.validation.evidence import (
+    CommandGroup,
+    LandmarkGroup,
+    Rule,
+    RuleViolation,
+    ValidationResults,
+)
 from roboirg.language.validation.leaks import leaked
 from roboirg.language.validation.necessity import only_candidate
 from roboirg.language.validation.pairing import unpaired
@@ -20,22 +26,22 @@ from roboirg.tasks import get_task
 ROBOT, CAMERA = FRAMES
 SPATIAL = "spatial"
 
-Read = Callable[[str], Resolution]
+Read = Callable[[str], Interpretation]
 """Reads a text about the scene at hand."""
 Broken = tuple[Rule, str]
 """A rule and the words that break it."""
 
 
-def examine(episode: Episode, *, must_be_expressible: bool = False) -> Evidence:
+def check_episode(episode: Episode, *, must_be_expressible: bool = False) -> ValidationResults:
     """Everything that the words of an episode have to prove.
 
     Args:
         episode: any, of a split or not.
         must_be_expressible: whether it fails if the robot's frame cannot tell its places.
     """
-    found = Evidence()
+    found = ValidationResults()
     # Texts return (stages 1 and 5 are the direct ones): each is read once.
-    read = functools.cache(lambda text: resolve(text, episode.scene, episode.task))
+    read = functools.cache(lambda text: interpret(text, episode.scene, episode.task))
     commands: dict[str, set[str]] = {}
     for telling in tellings(episode):
         instruction = telling.of(episode)
@@ -101,9 +107,11 @@ def leaking(instruction: Instruction, episode: Episode) -> Iterator[Broken]:
         yield "no leak", f"{', '.join(sorted(words))} in: {instruction.command}"
 
 
-def _count(instruction: Instruction, episode: Episode, found: Evidence, *, exception: bool) -> None:
+def _count(
+    instruction: Instruction, episode: Episode, found: ValidationResults, *, exception: bool
+) -> None:
     pattern = instruction.metadata["pattern"]
-    group = Told(
+    group = CommandGroup(
         task=episode.task,
         setting=instruction.setting,
         pattern=None if pattern is None else str(pattern),
@@ -113,11 +121,13 @@ def _count(instruction: Instruction, episode: Episode, found: Evidence, *, excep
     found.exceptions[group] += exception
 
 
-def _look_for_landmarks(episode: Episode, found: Evidence, *, must_be_expressible: bool) -> None:
+def _look_for_landmarks(
+    episode: Episode, found: ValidationResults, *, must_be_expressible: bool
+) -> None:
     if SPATIAL not in get_task(episode.task).settings:
         return
     for frame in FRAMES:
-        group = Placed(episode.task, episode.difficulty, frame)
+        group = LandmarkGroup(episode.task, episode.difficulty, frame)
         lacking = SPATIAL not in expressible(episode, frame=frame)
         found.scenes[group] += 1
         found.unplaced[group] += lacking
@@ -126,5 +136,5 @@ def _look_for_landmarks(episode: Episode, found: Evidence, *, must_be_expressibl
             found.failures.append(_failure(episode, SPATIAL, "expressible", words))
 
 
-def _failure(episode: Episode, setting: str, rule: Rule, words: str) -> Failure:
-    return Failure(rule, episode.task, setting, episode.key, episode.seed, words)
+def _failure(episode: Episode, setting: str, rule: Rule, words: str) -> RuleViolation:
+    return RuleViolation(rule, episode.task, setting, episode.key, episode.seed, words)

@@ -11,7 +11,7 @@ from roboirg.core.episode import Difficulty
 Rule = Literal["read back", "necessity", "self-contained", "no leak", "pairing", "expressible"]
 
 
-class Failure(NamedTuple):
+class RuleViolation(NamedTuple):
     """Words that break a rule.
 
     Attributes:
@@ -31,7 +31,7 @@ class Failure(NamedTuple):
     words: str
 
 
-class Told(NamedTuple):
+class CommandGroup(NamedTuple):
     """A group of episodes told in a setting.
 
     Attributes:
@@ -47,7 +47,7 @@ class Told(NamedTuple):
     difficulty: Difficulty
 
 
-class Placed(NamedTuple):
+class LandmarkGroup(NamedTuple):
     """Scenes whose targets are to be told by their places."""
 
     task: str
@@ -56,7 +56,7 @@ class Placed(NamedTuple):
 
 
 @dataclass(slots=True)
-class Evidence:
+class ValidationResults:
     """What was found, of one episode or of many.
 
     Attributes:
@@ -69,13 +69,13 @@ class Evidence:
     """
 
     texts: Counter[tuple[str, str]] = field(default_factory=Counter)
-    commands: Counter[Told] = field(default_factory=Counter)
-    exceptions: Counter[Told] = field(default_factory=Counter)
-    scenes: Counter[Placed] = field(default_factory=Counter)
-    unplaced: Counter[Placed] = field(default_factory=Counter)
-    failures: list[Failure] = field(default_factory=list)
+    commands: Counter[CommandGroup] = field(default_factory=Counter)
+    exceptions: Counter[CommandGroup] = field(default_factory=Counter)
+    scenes: Counter[LandmarkGroup] = field(default_factory=Counter)
+    unplaced: Counter[LandmarkGroup] = field(default_factory=Counter)
+    failures: list[RuleViolation] = field(default_factory=list)
 
-    def add(self, other: Evidence) -> None:
+    def add(self, other: ValidationResults) -> None:
         """Take in what another one has seen."""
         self.texts.update(other.texts)
         self.commands.update(other.commands)

@@ -9,9 +9,9 @@ from typing import NamedTuple
 from roboirg.core.episode import Episode, Split
 from roboirg.core.errors import InvalidValueError, SceneRejectedError
 from roboirg.episodes.splits import SEED_STRIDE, SIZES, get_episode, make_episode, slot_difficulty
-from roboirg.language.validation.episode_checks import examine
-from roboirg.language.validation.evidence import Evidence
-from roboirg.util.parallel_map import spread
+from roboirg.language.validation.episode_checks import check_episode
+from roboirg.language.validation.evidence import ValidationResults
+from roboirg.util.parallel_map import parallel_map
 
 RANDOM_BASE = 10_000_000
 """First random seed; those of the splits are smaller."""
@@ -69,23 +69,23 @@ def random_episode(task: str, index: int) -> Episode:
     raise SceneRejectedError(f"No seed from {first} on gives a scene of {task}.")
 
 
-def work_on(batch: Batch) -> Evidence:
+def validate_batch(batch: Batch) -> ValidationResults:
     """What the episodes of a batch prove."""
-    found = Evidence()
+    found = ValidationResults()
     for index in range(batch.first, batch.first + batch.size):
         if batch.split is None:
-            found.add(examine(random_episode(batch.task, index)))
+            found.add(check_episode(random_episode(batch.task, index)))
         else:
             episode = get_episode(batch.task, batch.split, index)
-            found.add(examine(episode, must_be_expressible=True))
+            found.add(check_episode(episode, must_be_expressible=True))
     return found
 
 
-def prove(work: Sequence[Batch], workers: int) -> Iterator[tuple[Batch, Evidence]]:
+def validate(work: Sequence[Batch], workers: int) -> Iterator[tuple[Batch, ValidationResults]]:
     """Every batch with what it proves, as they end, in so many processes; 0 for this one.
 
     Raises:
         InvalidValueError: a negative number of workers.
         RoboIRGError: a process died.
     """
-    return spread(work_on, work, workers)
+    return parallel_map(validate_batch, work, workers)

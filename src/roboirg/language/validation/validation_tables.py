@@ -11,16 +11,16 @@ from rich.table import Table
 from roboirg.core.episode import DIFFICULTIES
 from roboirg.language.instruction import SETTINGS
 from roboirg.language.landmarks import FRAMES
-from roboirg.language.validation.evidence import Evidence, Placed, Told
+from roboirg.language.validation.evidence import CommandGroup, LandmarkGroup, ValidationResults
 from roboirg.tasks import every_task
 
-Group = TypeVar("Group", Told, Placed)
+Group = TypeVar("Group", CommandGroup, LandmarkGroup)
 
 NONE = "–"
 """Where a task has no such setting."""
 
 
-def proof_tables(found: Evidence) -> Iterator[Table]:
+def validation_tables(found: ValidationResults) -> Iterator[Table]:
     """Texts and failures, exceptions of necessity, scenes without a landmark."""
     yield _texts(found)
     yield _exceptions(found)
@@ -28,7 +28,7 @@ def proof_tables(found: Evidence) -> Iterator[Table]:
         yield _landmarks(found)
 
 
-def _texts(found: Evidence) -> Table:
+def _texts(found: ValidationResults) -> Table:
     table = _table("Texts read back, and rules broken", ("task",), (*SETTINGS, "broken rules"))
     broken = Counter((failure.task, failure.setting) for failure in found.failures)
     tasks = _tasks(task for task, _ in found.texts)
@@ -55,7 +55,7 @@ def _count(
     )
 
 
-def _exceptions(found: Evidence) -> Table:
+def _exceptions(found: ValidationResults) -> Table:
     """One row for each task and way of telling that has any exception."""
     table = _table(
         "Commands that tell the goal alone: the scene leaves one candidate",
@@ -64,7 +64,7 @@ def _exceptions(found: Evidence) -> Table:
     )
     ways = {group[:3] for group, count in found.exceptions.items() if count}
     for way in (group for group in _ordered(found.commands) if group in ways):
-        groups = [Told(*way, difficulty) for difficulty in DIFFICULTIES]
+        groups = [CommandGroup(*way, difficulty) for difficulty in DIFFICULTIES]
         shares = [_share(found.exceptions, found.commands, group) for group in groups]
         task, setting, pattern = way
         table.add_row(task, setting, pattern or "", *shares)
@@ -73,18 +73,20 @@ def _exceptions(found: Evidence) -> Table:
     return table
 
 
-def _ordered(commands: Iterable[Told]) -> list[tuple[str, str, str | None]]:
+def _ordered(commands: Iterable[CommandGroup]) -> list[tuple[str, str, str | None]]:
     ways = {(one.task, one.setting, one.pattern) for one in commands}
     tasks = _tasks(task for task, _, _ in ways)
     return sorted(ways, key=lambda way: (tasks.index(way[0]), way[1], way[2] or ""))
 
 
-def _landmarks(found: Evidence) -> Table:
+def _landmarks(found: ValidationResults) -> Table:
     columns = [f"{difficulty}, {frame}" for frame in FRAMES for difficulty in DIFFICULTIES]
     table = _table("Scenes without a landmark, by difficulty and frame", ("task",), columns)
     for task in _tasks(group.task for group in found.scenes):
         groups = [
-            Placed(task, difficulty, frame) for frame in FRAMES for difficulty in DIFFICULTIES
+            LandmarkGroup(task, difficulty, frame)
+            for frame in FRAMES
+            for difficulty in DIFFICULTIES
         ]
         table.add_row(task, *(_share(found.unplaced, found.scenes, group) for group in groups))
     return table

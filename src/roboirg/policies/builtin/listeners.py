@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from roboirg.core.episode import Goal
-from roboirg.language import resolve
-from roboirg.policies.builtin.scripted import HandedPolicy
+from roboirg.language import interpret
+from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.tasks import get_task
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
 
-class ListenerPolicy(HandedPolicy):
+class ListenerPolicy(ScriptedPolicy):
     """Hears all that is said and understands it with the resolver.
 
     It knows the scene (for hidden cubes what the video shows) but not the goal. If several goals
@@ -26,7 +26,7 @@ class ListenerPolicy(HandedPolicy):
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
         """A goal that fits what was heard."""
         episode = env.episode
-        goals = resolve(instruction, episode.scene, episode.task).goals
+        goals = interpret(instruction, episode.scene, episode.task).goals
         choices = goals or get_task(episode.task).goals(episode.scene)
         # Seeded by what is heard and where, so that the choice does not depend on what the
         # process played before.

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from roboirg.core.episode import Goal
-from roboirg.policies.builtin.scripted import HandedPolicy
+from roboirg.policies.builtin.scripted import ScriptedPolicy
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
 
-class OraclePolicy(HandedPolicy):
+class OraclePolicy(ScriptedPolicy):
     """Privileged hands and mind; the upper bound, and the proof that an episode can be solved."""
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:  # noqa: ARG002

@@ -24,7 +24,7 @@ UNDOES_PICK = frozenset({"place_on", "put_down", "drop_into", "put_into", "move_
 """Primitives that need the object in the hand: to repeat one, it has to be picked up again."""
 
 
-class HandedPolicy(ABC):
+class ScriptedPolicy(ABC):
     """Decides on a goal at reset and then has the oracle's hands do it.
 
     Privileged: the hands know where everything is.
@@ -65,9 +65,9 @@ class HandedPolicy(ABC):
 
 def _work(env: RoboIRGEnv, stages: tuple[Stage, ...]) -> Iterator[NDArray[np.float64]]:
     """Do one stage after the other; what did not work is tried again."""
-    from roboirg.simulation.expert.primitives import Hands
+    from roboirg.simulation.expert.primitives import MotionPrimitives
 
-    hands, progress = Hands(env.session.world), _Progress(env, stages)
+    hands, progress = MotionPrimitives(env.session.world), _Progress(env, stages)
     index, retries = 0, 0
     while index < len(stages):
         primitive = stages[index].primitive

@@ -14,7 +14,7 @@ from typing import Any
 
 from roboirg.core.episode import Goal, SlotValue, Split
 from roboirg.episodes.splits import SIZES, get_episode
-from roboirg.language.request import COLOR_SLOTS, PART_KINDS
+from roboirg.language.request import COLOR_SLOTS, SLOT_TYPE_NAMES
 from roboirg.policies.planning.vlm_query import UnparsableReply, json_object
 from roboirg.tasks import get_task
 
@@ -54,7 +54,7 @@ class Field:
 
 
 @dataclass(frozen=True)
-class Slots:
+class GoalSchema:
     """All that can be meant in one task.
 
     Attributes:
@@ -107,7 +107,7 @@ class Slots:
 
 
 @functools.cache
-def slots_of(task: str) -> Slots:
+def goal_schema(task: str) -> GoalSchema:
     """All that can be meant in a task.
 
     Raises:
@@ -131,13 +131,13 @@ def answer_for(goal: Goal) -> dict[str, Any]:
     }
 
 
-def full_answer(goal: Goal, slots: Slots) -> dict[str, Any]:
+def full_answer(goal: Goal, slots: GoalSchema) -> dict[str, Any]:
     """The answer that names a goal, every field of the task filled."""
     answer = answer_for(goal)
     return {field.name: answer.get(field.name, 0) for field in slots.fields}
 
 
-def _complete(goals: Mapping[str, Goal], thing: str) -> Slots:
+def _complete(goals: Mapping[str, Goal], thing: str) -> GoalSchema:
     """Fields from all goals; amounts that a goal does not name are 0."""
     answers = [answer_for(goal) for goal in goals.values()]
     names = max(answers, key=len).keys()
@@ -148,7 +148,7 @@ def _complete(goals: Mapping[str, Goal], thing: str) -> Slots:
         _canonical(order | answer): goal
         for answer, goal in zip(answers, goals.values(), strict=True)
     }
-    return Slots(fields, filled, thing)
+    return GoalSchema(fields, filled, thing)
 
 
 def _field(name: str, values: Iterable[SlotValue | list[str]], counted: bool) -> Field:
@@ -159,7 +159,7 @@ def _field(name: str, values: Iterable[SlotValue | list[str]], counted: bool) ->
         items = _sorted(item for value in held if isinstance(value, list) for item in value)
         lengths = [len(value) for value in held if isinstance(value, list)]
         return Field(name, LISTED, items, (min(lengths), max(lengths)))
-    kind = "color" if name in COLOR_SLOTS else PART_KINDS[name]
+    kind = "color" if name in COLOR_SLOTS else SLOT_TYPE_NAMES[name]
     return Field(name, kind, _sorted(held))
 
 

@@ -12,7 +12,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Demonstration, DemonstrationFrames, Observation
 from roboirg.policies.base import Policy, SubgoalFollower
 from roboirg.policies.planning.observation_merging import (
-    Excerpt,
+    DemonstrationSubset,
     both_cameras,
     both_frames,
     both_histories,
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
 
-class PlannedPolicy:
+class HierarchicalPolicy:
     """Asks the planner before each of the policy's chunks and tells the policy what to do next.
 
     Wishes of both are met: the environment shows what either wants, and each gets to see its own
@@ -88,7 +88,10 @@ class PlannedPolicy:
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """A new episode begins for both."""
         self._looked = self._step = self._rows = 0
-        views = [Excerpt(demonstration, self.demonstration_frames, one) for one in self._frames]
+        views = [
+            DemonstrationSubset(demonstration, self.demonstration_frames, one)
+            for one in self._frames
+        ]
         self.planner.reset(instruction, views[0])
         self.policy.reset(instruction, views[1])
 
@@ -130,7 +133,7 @@ class PlannedPolicy:
             _close(self.policy)
 
 
-class PrivilegedPlannedPolicy(PlannedPolicy):
+class PrivilegedHierarchicalPolicy(HierarchicalPolicy):
     """A planner and a policy of which at least one looks behind the scenes."""
 
     def attach(self, env: RoboIRGEnv) -> None:
@@ -140,14 +143,14 @@ class PrivilegedPlannedPolicy(PlannedPolicy):
                 one.attach(env)
 
 
-def put_in_front(planner: Planner, policy: Policy, name: str | None = None) -> PlannedPolicy:
+def with_planner(planner: Planner, policy: Policy, name: str | None = None) -> HierarchicalPolicy:
     """Planner and policy as one policy, which is privileged if either is.
 
     Raises:
         InvalidValueError: the policy has no method ``follow``.
     """
     privileged = any(hasattr(one, "attach") for one in (planner, policy))
-    kind = PrivilegedPlannedPolicy if privileged else PlannedPolicy
+    kind = PrivilegedHierarchicalPolicy if privileged else HierarchicalPolicy
     return kind(planner, policy, name)
 
 

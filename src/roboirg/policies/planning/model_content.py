@@ -52,7 +52,7 @@ class Clip:
 Part = str | Picture | Clip
 
 
-class Turn(NamedTuple):
+class ChatTurn(NamedTuple):
     """What one side of a conversation says."""
 
     role: Literal["user", "model"]

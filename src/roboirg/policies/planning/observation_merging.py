@@ -34,7 +34,7 @@ def both_histories(one: int | None, other: int | None) -> int | None:
     return math.gcd(*wishes) if wishes else None
 
 
-class Excerpt(Mapping[str, NDArray[Any]]):
+class DemonstrationSubset(Mapping[str, NDArray[Any]]):
     """A demonstration as one of the two wants it; still drawn only when it is read.
 
     Args:

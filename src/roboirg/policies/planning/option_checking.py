@@ -13,7 +13,7 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 Options = TypeVar("Options", bound=BaseModel)
 
 
-def checked(kind: type[Options], values: Mapping[str, Any], origin: str) -> Options:
+def check_options(kind: type[Options], values: Mapping[str, Any], origin: str) -> Options:
     """Options of a kind. Texts stand for the numbers and truth values that they spell.
 
     Args:

@@ -17,7 +17,7 @@ from urllib.parse import parse_qsl
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.policies.base import Policy
 from roboirg.policies.planning.models import ModelOptions
-from roboirg.policies.planning.option_checking import checked
+from roboirg.policies.planning.option_checking import check_options
 from roboirg.policies.planning.vlm_listener import ListenerOptions, VLMListener
 from roboirg.policies.requirements import (
     wanted_actions,
@@ -70,7 +70,7 @@ class PrivilegedPolicyFactory(PolicyFactory):
         raise TypeError(f"{self.spec} makes policies; attach(env) is for one of those, not {env}.")
 
 
-def find(spec: str) -> PolicyFactory | None:
+def find_policy_factory(spec: str) -> PolicyFactory | None:
     """What makes the policies of a spec; None if the spec is of another kind.
 
     Needs no network, and no client library of any provider.
@@ -108,8 +108,8 @@ def _listener(_spec: str, name: str, options: Mapping[str, str]) -> Build:
     values: dict[str, Any] = {key: value for key, value in options.items() if key in own}
     model: dict[str, Any] = {key: value for key, value in options.items() if key not in own}
     origin = f"policy {LISTENER}:{name}"
-    values["model"] = checked(ModelOptions, {"provider": name, **model}, origin)
-    settled = checked(ListenerOptions, values, origin)
+    values["model"] = check_options(ModelOptions, {"provider": name, **model}, origin)
+    settled = check_options(ListenerOptions, values, origin)
     return lambda seed: VLMListener(settled, seed)
 
 

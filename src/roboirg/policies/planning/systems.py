@@ -13,8 +13,8 @@ from pydantic import BaseModel, ConfigDict
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.policies.base import Policy
-from roboirg.policies.planning.hierarchical_policy import put_in_front
-from roboirg.policies.planning.option_checking import checked
+from roboirg.policies.planning.hierarchical_policy import with_planner
+from roboirg.policies.planning.option_checking import check_options
 from roboirg.policies.planning.planners import make_planner
 from roboirg.policies.policy_classes import find_class, make_from_class
 from roboirg.policies.policy_urls import is_url, split_url
@@ -110,7 +110,7 @@ def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InvalidValueError(f"System {name_or_file!r} is not TOML ({error}).") from error
     origin = f"system {name_or_file}"
-    return _overridden(checked(System, entries, origin), overrides, origin)
+    return _overridden(check_options(System, entries, origin), overrides, origin)
 
 
 def build_system(system: System, seed: int) -> Policy:
@@ -126,7 +126,7 @@ def build_system(system: System, seed: int) -> Policy:
     options = dict(system.planner)
     kind = str(options.pop("kind", ""))
     planner = make_planner(kind, options, f"the planner of system {system.name}")
-    return put_in_front(planner, policy, system.name)
+    return with_planner(planner, policy, system.name)
 
 
 def _overridden(system: System, overrides: Mapping[str, str], origin: str) -> System:

@@ -15,13 +15,13 @@ from pydantic import Field as Option
 
 from roboirg.core.episode import Goal
 from roboirg.core.observations import Demonstration
-from roboirg.policies.builtin.scripted import HandedPolicy
+from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.policies.planning.config_fingerprint import fingerprint_of
-from roboirg.policies.planning.goal_schema import Field, Slots, slots_of
-from roboirg.policies.planning.model_content import Part, Picture, Turn, summary
-from roboirg.policies.planning.models import ModelOptions, Query
+from roboirg.policies.planning.goal_schema import Field, GoalSchema, goal_schema
+from roboirg.policies.planning.model_content import ChatTurn, Part, Picture, summary
+from roboirg.policies.planning.models import ModelOptions, ModelQuery
 from roboirg.policies.planning.prompts import load_prompts
-from roboirg.policies.planning.vlm_query import Asker
+from roboirg.policies.planning.vlm_query import VLMQuery
 from roboirg.tasks import get_task
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ class NotUnderstood(Exception):  # noqa: N818 - an outcome; never leaves `VLMLis
     """There is no goal to pursue."""
 
 
-class VLMListener(HandedPolicy):
+class VLMListener(ScriptedPolicy):
     """Understands what a vision-language model understands, and does it with the oracle's hands.
 
     If the model gives no valid answer, even when asked again, or means what is not there, the
@@ -74,7 +74,7 @@ class VLMListener(HandedPolicy):
         self.demonstration_frames = options.frames_every
         self.prompts = load_prompts(PROMPTS, options.prompts)
         self.understood: Goal | None = None
-        self._asker = Asker(options.model, self.prompts["again"])
+        self._asker = VLMQuery(options.model, self.prompts["again"])
         self._demonstration: Demonstration = {}
         self._impossible = 0
 
@@ -123,7 +123,7 @@ class VLMListener(HandedPolicy):
         Raises:
             NotUnderstood: it gave no valid answer, or none that this scene allows.
         """
-        slots = slots_of(env.episode.task)
+        slots = goal_schema(env.episode.task)
         picture = Picture(env.picture(CAMERA))
         goal = self._asker.ask(self._query(slots, instruction, picture), slots.read)
         self.understood = goal
@@ -142,7 +142,7 @@ class VLMListener(HandedPolicy):
         """Let go of the connection."""
         self._asker.close()
 
-    def _query(self, slots: Slots, instruction: str, picture: Picture) -> Query:
+    def _query(self, slots: GoalSchema, instruction: str, picture: Picture) -> ModelQuery:
         words, reasoning = self.prompts, None
         if self.options.reasoning:
             reasoning = words.fill("reasoning_field")
@@ -154,7 +154,7 @@ class VLMListener(HandedPolicy):
             picture,
             words.fill("question", fields=listing),
         )
-        return Query(words.fill("system"), (Turn("user", parts),), slots.schema(reasoning))
+        return ModelQuery(words.fill("system"), (ChatTurn("user", parts),), slots.schema(reasoning))
 
     def _video(self) -> Iterator[Part]:
         steps = len(self._demonstration.get("joint_positions", ()))
@@ -164,7 +164,7 @@ class VLMListener(HandedPolicy):
         yield self.prompts.fill("video", steps=str(steps))
         yield summary(self._demonstration[f"{CAMERA}_rgb"], self.options.frames, steps)
 
-    def _lines(self, slots: Slots, reasoning: str | None) -> Iterator[str]:
+    def _lines(self, slots: GoalSchema, reasoning: str | None) -> Iterator[str]:
         if reasoning is not None:
             yield f"- reasoning: {reasoning}"
         for field in slots.fields:

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from string import Template
 from typing import Any, TypeVar
 
-from roboirg.policies.planning.model_content import Turn
-from roboirg.policies.planning.models import Model, ModelOptions, Query, Reply, make_model
+from roboirg.policies.planning.model_content import ChatTurn
+from roboirg.policies.planning.models import Model, ModelOptions, ModelQuery, ModelReply, make_model
 
 Value = TypeVar("Value")
 
@@ -18,12 +18,12 @@ SILENCE = "(no answer)"
 """Stands for an empty reply when it is quoted back; services refuse empty turns."""
 
 
-class UnparsableReply(Exception):  # noqa: N818 - caught by `Asker.ask`, which asks again
+class UnparsableReply(Exception):  # noqa: N818 - caught by `VLMQuery.ask`, which asks again
     """A reply is not what was asked for; the sentence tells the model why."""
 
 
 @dataclass
-class Asker:
+class VLMQuery:
     """Asks one model and keeps the account of an episode.
 
     Attributes:
@@ -40,7 +40,7 @@ class Asker:
     unparsed: int = field(default=0, init=False)
     _model: Model | None = field(default=None, init=False, repr=False)
 
-    def ask(self, query: Query, parse: Callable[[str], Value]) -> Value | None:
+    def ask(self, query: ModelQuery, parse: Callable[[str], Value]) -> Value | None:
         """What `parse` makes of the reply; None if it could make nothing of two of them.
 
         Raises:
@@ -52,8 +52,8 @@ class Asker:
         try:
             return parse(reply.text)
         except UnparsableReply as error:
-            said = Turn("model", (reply.text or SILENCE,))
-            asked = Turn("user", (self.again.substitute(why=str(error)),))
+            said = ChatTurn("model", (reply.text or SILENCE,))
+            asked = ChatTurn("user", (self.again.substitute(why=str(error)),))
         try:
             second = self._answer(query._replace(turns=(*query.turns, said, asked)))
             return parse(second.text)
@@ -85,7 +85,7 @@ class Asker:
         if model is not None:
             model.close()
 
-    def _answer(self, query: Query) -> Reply:
+    def _answer(self, query: ModelQuery) -> ModelReply:
         if self._model is None:
             self._model = make_model(self.options)
         self.calls += 1

@@ -15,7 +15,7 @@ FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
 _LONGEST_WORDS = 300
 
 
-class Link(NamedTuple):
+class ConnectionSpec(NamedTuple):
     """A server and how it is spoken to.
 
     Attributes:
@@ -61,7 +61,7 @@ class TryAgainError(Exception):
 Opened = TypeVar("Opened")
 
 
-def keep_trying(link: Link, attempt: Callable[[float], Opened]) -> Opened:
+def keep_trying(link: ConnectionSpec, attempt: Callable[[float], Opened]) -> Opened:
     """Connect, again and again if need be.
 
     Args:
@@ -85,7 +85,7 @@ def keep_trying(link: Link, attempt: Callable[[float], Opened]) -> Opened:
         pause = min(2 * pause, LONGEST_PAUSE)
 
 
-def read_reply(link: Link, data: bytes) -> dict[str, Any]:
+def read_reply(link: ConnectionSpec, data: bytes) -> dict[str, Any]:
     """The message in a reply.
 
     Raises:
@@ -97,7 +97,7 @@ def read_reply(link: Link, data: bytes) -> dict[str, Any]:
         raise PolicyReplyError(f"{link} sent something else than a message: {error}.") from error
 
 
-def refusal(link: Link, text: str) -> PolicyReplyError:
+def refusal(link: ConnectionSpec, text: str) -> PolicyReplyError:
     """The error of a server that answers with a traceback: its last line tells most."""
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     words = lines[-1][:_LONGEST_WORDS].rstrip(".") if lines else "an empty text"

@@ -13,7 +13,7 @@ from roboirg.core.errors import (
     PolicyTimeoutError,
 )
 from roboirg.policies.remote.connections import (
-    Link,
+    ConnectionSpec,
     TryAgainError,
     keep_trying,
     read_reply,
@@ -45,7 +45,7 @@ class HttpConnection:
         PolicyReplyError: it has no metadata that make sense.
     """
 
-    def __init__(self, link: Link) -> None:
+    def __init__(self, link: ConnectionSpec) -> None:
         self._link, self._closed = link, False
         self._client: httpx.Client = httpx.Client(
             base_url=f"{'https' if link.options.tls else 'http'}://{link.endpoint}",

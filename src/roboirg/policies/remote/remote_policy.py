@@ -16,7 +16,7 @@ from roboirg.core.errors import InvalidActionError, PolicyReplyError
 from roboirg.core.observations import CAMERAS, Demonstration, Observation
 from roboirg.policies.policy_urls import read_options, split_url
 from roboirg.policies.remote.endpoints import RemoteOptions, read_endpoints
-from roboirg.policies.remote.server_session import Connect, Session
+from roboirg.policies.remote.server_session import Connect, ServerSession
 from roboirg.policies.remote.websocket_connection import WebsocketConnection
 
 UNKNOWN_VERSION = "unknown"
@@ -51,7 +51,7 @@ class RemotePolicy(ABC):
         self.metadata: dict[str, Any] = {}
         self._space: ActionSpace = JOINT_ANGLE
         self._instruction = ""
-        self._session = Session(
+        self._session = ServerSession(
             parts.scheme, read_endpoints(parts), self.options, type(self).connect
         )
         # Whoever forgets close() keeps the server no longer than the policy.

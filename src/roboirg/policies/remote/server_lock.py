@@ -36,7 +36,7 @@ _held: dict[Path, int] = {}
 """Lock files of the servers that this process has for itself, and which thread took them."""
 
 
-class Lease:
+class ServerLock:
     """The right to use a server, until it is released.
 
     Args:
@@ -65,9 +65,9 @@ class Lease:
             os.close(number)
 
 
-def take(
+def lock_server(
     endpoints: Sequence[Endpoint], *, wait: float, shared: bool = False, folder: Path | None = None
-) -> Lease:
+) -> ServerLock:
     """Get one of several servers, as soon as one is free.
 
     Args:
@@ -120,7 +120,7 @@ def lock_folder() -> Path:
     return folder
 
 
-def _try(endpoint: Endpoint, folder: Path, *, shared: bool) -> Lease | None:
+def _try(endpoint: Endpoint, folder: Path, *, shared: bool) -> ServerLock | None:
     path = _path(endpoint, folder)
     number = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
     try:
@@ -132,7 +132,7 @@ def _try(endpoint: Endpoint, folder: Path, *, shared: bool) -> Lease | None:
     except OSError:
         os.close(number)
         raise
-    return Lease(endpoint, path, number, shared=shared)
+    return ServerLock(endpoint, path, number, shared=shared)
 
 
 def _path(endpoint: Endpoint, folder: Path) -> Path:

@@ -6,14 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from roboirg.core.errors import PolicyConnectionError
-from roboirg.policies.remote.connections import Connection, Link
+from roboirg.policies.remote.connections import Connection, ConnectionSpec
 from roboirg.policies.remote.endpoints import Endpoint, RemoteOptions
-from roboirg.policies.remote.server_lock import Lease, take
+from roboirg.policies.remote.server_lock import ServerLock, lock_server
 
-Connect = Callable[[Link], Connection]
+Connect = Callable[[ConnectionSpec], Connection]
 
 
-class Session:
+class ServerSession:
     """Begins and ends with an episode; can begin again.
 
     Args:
@@ -32,14 +32,14 @@ class Session:
     ) -> None:
         self._scheme, self._endpoints = scheme, endpoints
         self._options, self._connect = options, connect
-        self._lease: Lease | None = None
+        self._lease: ServerLock | None = None
         self._connection: Connection | None = None
 
     @property
-    def link(self) -> Link:
+    def link(self) -> ConnectionSpec:
         """The server in use, for messages the first of those to choose from if there is none."""
         endpoint = self._endpoints[0] if self._lease is None else self._lease.endpoint
-        return Link(self._scheme, endpoint, self._options)
+        return ConnectionSpec(self._scheme, endpoint, self._options)
 
     def begin(self) -> Mapping[str, Any]:
         """Take a server, connect, and give its metadata.
@@ -50,7 +50,9 @@ class Session:
             PolicyReplyError: it began with something else than its metadata.
         """
         self.end()
-        self._lease = take(self._endpoints, wait=self._options.wait, shared=self._options.shared)
+        self._lease = lock_server(
+            self._endpoints, wait=self._options.wait, shared=self._options.shared
+        )
         try:
             self._connection = self._connect(self.link)
         except BaseException:

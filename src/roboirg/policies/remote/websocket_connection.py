@@ -21,14 +21,14 @@ from roboirg.core.errors import (
     RoboIRGError,
 )
 from roboirg.policies.remote.connections import (
-    Link,
+    ConnectionSpec,
     TryAgainError,
     keep_trying,
     read_reply,
     refusal,
 )
 from roboirg.policies.remote.message_codec import pack
-from roboirg.policies.remote.write_timeout import SendLimit
+from roboirg.policies.remote.write_timeout import WriteTimeout
 
 try:
     from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
@@ -58,14 +58,14 @@ class WebsocketConnection:
         PolicyReplyError: the server began with something else than its metadata.
     """
 
-    def __init__(self, link: Link) -> None:
+    def __init__(self, link: ConnectionSpec) -> None:
         self._link = link
         self._closing = contextlib.ExitStack()
         self._socket: ClientConnection | None = keep_trying(link, self._attempt)
         self._gave_up = False
         # The library has no time limit for sending. The socket's own would also end the thread that
         # receives, and begins anew with every piece that is taken in.
-        self._limit = SendLimit(link.options.timeout, partial(self._give_up, self._socket))
+        self._limit = WriteTimeout(link.options.timeout, partial(self._give_up, self._socket))
         self._closing.callback(self._limit.close)
         self.metadata: Mapping[str, Any] = self._receive(
             "its metadata", link.options.connect, time.monotonic() + link.options.connect

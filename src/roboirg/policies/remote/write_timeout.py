@@ -13,7 +13,7 @@ LONGEST_NAP = 1.0
 """Seconds between two looks."""
 
 
-class SendLimit:
+class WriteTimeout:
     """Gives up when a message has not been sent in time, by a thread of its own.
 
     The thread looks from time to time, because starting a timer with every message costs more than

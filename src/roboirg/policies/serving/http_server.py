@@ -33,7 +33,7 @@ class _Server(ThreadingHTTPServer):
     def __init__(
         self, place: tuple[str, int], service: Service, metadata: Mapping[str, Any], key: str | None
     ) -> None:
-        super().__init__(place, _Handler)
+        super().__init__(place, _PolicyHandler)
         self.answer, self.metadata, self.key = service.connection(), metadata, key
 
 
@@ -55,7 +55,7 @@ def open_http(
     return _Server((host, port), service, metadata, key)
 
 
-class _Handler(BaseHTTPRequestHandler):
+class _PolicyHandler(BaseHTTPRequestHandler):
     """Answers one request after the other of a connection."""
 
     server: _Server

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
 
-class InChunks:
+class ChunkedPolicy:
     """A privileged policy, whose whole movements have to be done, in chunks of the horizon.
 
     It looks behind the scenes and does not go by observations, so what is left of a movement needs

@@ -26,12 +26,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.actions import ARM_JOINTS, check_chunk
-from roboirg.evaluation.episode_errors import Fault, blame
-from roboirg.evaluation.rollout_result import Course
-from roboirg.real.control.deadman import DeadMan
+from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
+from roboirg.evaluation.rollout_result import RolloutResult
+from roboirg.real.control.deadman import LoopWatchdog
 from roboirg.real.control.limits import Limits
-from roboirg.real.control.policy_process import Host, Reply
-from roboirg.real.control.robot import HORIZON, Command, JudgingRobot, Robot, Sensed
+from roboirg.real.control.policy_process import PolicyHost, PolicyReply
+from roboirg.real.control.robot import HORIZON, Command, JudgingRobot, Robot, SensorReading
 from roboirg.records.record import Job
 
 ANSWER_SHARE = 0.5
@@ -60,7 +60,7 @@ class ControlLoop:
     """
 
     robot: Robot
-    host: Host
+    host: PolicyHost
     limits: Limits
     cameras: Sequence[str] = ()
     ended: Callable[[], bool] = _never
@@ -68,17 +68,17 @@ class ControlLoop:
     overruns: int = 0
     _rows: deque[Command] = field(default_factory=deque)
     _asked: float | None = None
-    _reply: Reply | None = None
+    _reply: PolicyReply | None = None
     _instruction: str = ""
     _is_prepared: bool = False
     _last: NDArray[np.float64] = field(default_factory=lambda: np.zeros(ARM_JOINTS))
 
-    def play(self, job: Job, spec: str, seed: int, instruction: str) -> Course:
+    def play(self, job: Job, spec: str, seed: int, instruction: str) -> RolloutResult:
         """Play a trial to its end; the arm is at rest afterwards, whatever happened.
 
         The course of a robot that does not judge is left without a verdict.
         """
-        course = Course(cause=None, error=None)
+        course = RolloutResult(cause=None, error=None)
         self._instruction = instruction
         try:
             with self._stopping():
@@ -87,14 +87,14 @@ class ControlLoop:
                     dead_man = None
                     # A policy in this process may keep the interpreter busy, and only on the twin.
                     if self.robot.clock.is_real and not self._shares_scene:
-                        dead_man = DeadMan(self.robot.stop, self.limits.dead_man_s)
+                        dead_man = LoopWatchdog(self.robot.stop, self.limits.dead_man_s)
                         stack.enter_context(dead_man)
                     self._run(job, course, dead_man)
             if isinstance(self.robot, JudgingRobot):
-                with blame("environment"):
+                with attribute_errors("environment"):
                     self.robot.judge(course)
             course.usage = self._request("close") or {}
-        except Fault as fault:
+        except EpisodeError as fault:
             if isinstance(self.robot, JudgingRobot) and self._is_prepared:
                 with contextlib.suppress(Exception):  # what happened before is an extra
                     self.robot.judge(course)
@@ -110,13 +110,13 @@ class ControlLoop:
             with contextlib.suppress(Exception):  # what happened first is what is told
                 self.robot.stop()
             raise
-        with blame("environment"):
+        with attribute_errors("environment"):
             self.robot.stop()
 
-    def _set_up(self, job: Job, spec: str, seed: int, course: Course) -> None:
+    def _set_up(self, job: Job, spec: str, seed: int, course: RolloutResult) -> None:
         """Everything before the arm may move."""
         self._request("make", spec, seed)
-        with blame("environment"):
+        with attribute_errors("environment"):
             self.robot.prepare(job, self.cameras)
             sensed = self.robot.observe()
         self._is_prepared = True
@@ -135,14 +135,16 @@ class ControlLoop:
     def _shares_scene(self) -> bool:
         return bool(getattr(self.host, "shares_scene", False))
 
-    def _run(self, job: Job, course: Course, dead_man: DeadMan | None) -> None:
+    def _run(self, job: Job, course: RolloutResult, dead_man: LoopWatchdog | None) -> None:
         clock, period = self.robot.clock, 1.0 / self.robot.rate
         due = clock.now()
         for tick in range(job.max_steps):
             if dead_man is not None:
                 if dead_man.tripped_after is not None:
                     silence = f"{dead_man.tripped_after:.3f} s"
-                    raise Fault("infrastructure", f"the control loop stood still for {silence}", "")
+                    raise EpisodeError(
+                        "infrastructure", f"the control loop stood still for {silence}", ""
+                    )
                 dead_man.feed()
             self._tick(period)
             course.steps = tick + 1
@@ -159,42 +161,42 @@ class ControlLoop:
 
     def _tick(self, period: float) -> None:
         """One control period: one command, or the position held."""
-        with blame("environment"):
+        with attribute_errors("environment"):
             sensed = self.robot.observe()
         self._check_cameras(sensed)
         death = self.host.death()
         if death is not None:
-            raise Fault("policy", death, "")
+            raise EpisodeError("policy", death, "")
         self._listen(sensed, period)
         if not self._rows:
-            with blame("environment"):
+            with attribute_errors("environment"):
                 self.robot.stop()
             self.held += 1
             self._last = sensed.joints
             self._check_patience()
             return
         command = self._rows.popleft()
-        with blame("policy"):
+        with attribute_errors("policy"):
             self.limits.check(command, self._last, sensed.joints, period)
-        with blame("environment"):
+        with attribute_errors("environment"):
             self.robot.command(command)
         self._last = command[:ARM_JOINTS]
 
-    def _check_cameras(self, sensed: Sensed) -> None:
+    def _check_cameras(self, sensed: SensorReading) -> None:
         now = self.robot.clock.now()
         for camera in self.cameras:
             age = now - sensed.taken.get(camera, float("-inf"))
             if age > self.limits.picture_age_s + _SLACK:
                 words = f"no new picture from the {camera} camera for {age:.3f} s"
-                raise Fault("environment", words, "")
+                raise EpisodeError("environment", words, "")
 
-    def _listen(self, sensed: Sensed, period: float) -> None:
+    def _listen(self, sensed: SensorReading, period: float) -> None:
         """Ask for a chunk when there is none left, and take it when it is there."""
         clock = self.robot.clock
         if self._rows:
             return
         if self._asked is None:
-            with blame("environment"):
+            with attribute_errors("environment"):
                 seen = {**sensed.fields, "instruction": self._instruction}
             self._asked, self._reply = clock.now(), None
             self.host.ask("act", seen)
@@ -208,7 +210,7 @@ class ControlLoop:
         if not clock.is_real and thought < self._reply.latency_s - _SLACK:
             return
         rows = self._reply.checked()
-        with blame("policy"):
+        with attribute_errors("policy"):
             self._rows.extend(check_chunk(rows)[:HORIZON])
         self._asked = self._reply = None
 
@@ -223,7 +225,7 @@ class ControlLoop:
         thought = self.robot.clock.now() - self._asked
         if thought > self.limits.policy_timeout_s + _SLACK:
             limit = f"{self.limits.policy_timeout_s:g} s"
-            raise Fault("timeout", f"policy's act() took longer than {limit}", "")
+            raise EpisodeError("timeout", f"policy's act() took longer than {limit}", "")
 
     def _request(self, what: str, *args: Any) -> Any:  # noqa: ANN401
         """Have the policy do something while the arm is at rest."""
@@ -231,5 +233,7 @@ class ControlLoop:
         reply = self.host.answer(SETUP_TIMEOUT_S)
         if reply is None:
             stack = "".join(traceback.format_stack(limit=3))
-            raise Fault("timeout", f"policy's {what} took longer than {SETUP_TIMEOUT_S:g} s", stack)
+            raise EpisodeError(
+                "timeout", f"policy's {what} took longer than {SETUP_TIMEOUT_S:g} s", stack
+            )
         return reply.checked()

@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Self
 
 
-class DeadMan:
+class LoopWatchdog:
     """Stops an arm when nobody has said for a while that the loop is alive. Real time.
 
     Use as a context manager, with the loop inside.

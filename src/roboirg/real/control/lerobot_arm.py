@@ -30,7 +30,7 @@ from roboirg.core.actions import ARM_JOINTS
 from roboirg.core.errors import InvalidValueError
 from roboirg.real.control.clock import Clock, RealClock
 from roboirg.real.control.kinematics import end_effector
-from roboirg.real.control.robot import COMMAND_RATE, Command, Sensed
+from roboirg.real.control.robot import COMMAND_RATE, Command, SensorReading
 from roboirg.records.record import Job
 
 PREFIX = "lerobot:"
@@ -42,7 +42,7 @@ FIRST_OBSERVATION_S = 10.0
 METHODS = ("connect", "disconnect", "get_observation", "send_action")
 
 
-class LeRobotOptions(BaseModel):
+class LeRobotArmOptions(BaseModel):
     """Names and units of a robot, after ``?`` in its spec.
 
     Attributes:
@@ -97,7 +97,7 @@ class LeRobotArm:
     def __init__(
         self,
         robot: Any,  # noqa: ANN401 - LeRobot's class, or one like it
-        options: LeRobotOptions,
+        options: LeRobotArmOptions,
         arrange: Callable[[Job], None],
     ) -> None:
         lacking = [name for name in METHODS if not callable(getattr(robot, name, None))]
@@ -129,7 +129,7 @@ class LeRobotArm:
         self._hold = None
         self._reading().newest(FIRST_OBSERVATION_S)
 
-    def observe(self) -> Sensed:
+    def observe(self) -> SensorReading:
         """The newest observation."""
         raw, taken = self._reading().newest(0.0)
         options = self._options
@@ -146,7 +146,7 @@ class LeRobotArm:
         fields["gripper"] = np.full(2, share * FINGER_RANGE, np.float32)
         fields["end_effector"] = end_effector(joints)
         names = {"front": options.front, "wrist": options.wrist}
-        return Sensed(fields, {camera: taken[names[camera]] for camera in self._cameras})
+        return SensorReading(fields, {camera: taken[names[camera]] for camera in self._cameras})
 
     def command(self, command: Command) -> None:
         """Send joint targets and the gripper."""
@@ -280,7 +280,7 @@ def make_arm(spec: str, arrange: Callable[[Job], None]) -> LeRobotArm:
     module_name, _, name = place.partition(":")
     try:
         given = dict(parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query)))
-        options = LeRobotOptions.model_validate(given)
+        options = LeRobotArmOptions.model_validate(given)
         make = getattr(importlib.import_module(module_name), name)
     except ValidationError as error:
         first = error.errors()[0]

@@ -1,8 +1,8 @@
-"""A policy apart from the control loop: in a thread, or in a process that may die alone.
+"""Run a policy apart from the control loop: in a thread or in its own process.
 
-The loop asks and later looks whether there is an answer; it is never kept waiting longer than it
-wants. What is asked is done by `Desk`, in another thread (policies that look behind the twin's
-scenes) or in another process (all others).
+The loop sends a request and polls for the reply, so it never waits longer than it wants.
+`PolicyServiceLoop` handles the requests, in another thread (privileged policies, which read the
+twin's state) or in another process (all others).
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from roboirg.core.errors import MissingDependencyError, RenderDeviceError
-from roboirg.evaluation.episode_errors import Fault, blame, one_line
+from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors, one_line
 from roboirg.policies.base import Policy, PrivilegedPolicy
 from roboirg.policies.loading import make_policy
-from roboirg.real.control.action_chunks import InChunks
+from roboirg.real.control.action_chunks import ChunkedPolicy
 from roboirg.records.record import ErrorKind
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ STOP_WAIT_S = 2.0
 """Given to a process to end by itself before it is killed."""
 
 
-class Reply(NamedTuple):
+class PolicyReply(NamedTuple):
     """What came of a request.
 
     Attributes:
@@ -51,31 +51,31 @@ class Reply(NamedTuple):
             Fault: there is none.
         """
         if self.fault is not None:
-            raise Fault(*self.fault)
+            raise EpisodeError(*self.fault)
         return self.value
 
 
-class Desk:
+class PolicyServiceLoop:
     """Holds a policy and does what is asked of it."""
 
     def __init__(self) -> None:
         self._policy: Policy | None = None
         self._scene: contextlib.AbstractContextManager[object] = contextlib.nullcontext()
 
-    def handle(self, what: str, *args: Any) -> Reply:  # noqa: ANN401
+    def handle(self, what: str, *args: Any) -> PolicyReply:  # noqa: ANN401
         """Do one of ``make``, ``attach``, ``reset``, ``act`` and ``close``."""
         try:
-            with blame("policy"):
+            with attribute_errors("policy"):
                 value = getattr(self, f"_{what}")(*args)
-        except Fault as fault:
-            return Reply(fault=(fault.kind, str(fault), fault.details))
+        except EpisodeError as fault:
+            return PolicyReply(fault=(fault.kind, str(fault), fault.details))
         except (MissingDependencyError, RenderDeviceError) as error:
-            return Reply(fault=("policy", one_line(error), ""))
-        return Reply(value, float(getattr(self._policy, "latency_s", 0.0)))
+            return PolicyReply(fault=("policy", one_line(error), ""))
+        return PolicyReply(value, float(getattr(self._policy, "latency_s", 0.0)))
 
     def _make(self, spec: str, seed: int) -> None:
         made = make_policy(spec, seed)
-        self._policy = InChunks(made) if isinstance(made, PrivilegedPolicy) else made
+        self._policy = ChunkedPolicy(made) if isinstance(made, PrivilegedPolicy) else made
 
     def _attach(self, env: RoboIRGEnv, lock: contextlib.AbstractContextManager[object]) -> None:
         self._scene = lock
@@ -105,13 +105,13 @@ class Desk:
         return self._policy
 
 
-class Host(Protocol):
+class PolicyHost(Protocol):
     """Where a policy works."""
 
     def ask(self, what: str, *args: Any) -> None:  # noqa: ANN401
         """Have something done; `answer` tells when it is."""
 
-    def answer(self, timeout_s: float) -> Reply | None:
+    def answer(self, timeout_s: float) -> PolicyReply | None:
         """The reply to what was asked, if there is one within that time."""
 
     def death(self) -> str | None:
@@ -133,13 +133,13 @@ class ThreadHost:
     shares_scene = True
 
     def __init__(self) -> None:
-        self._courier = _Courier(Desk().handle)
+        self._courier = _RequestThread(PolicyServiceLoop().handle)
 
     def ask(self, what: str, *args: Any) -> None:  # noqa: ANN401
         """Have something done."""
         self._courier.requests.put((what, *args))
 
-    def answer(self, timeout_s: float) -> Reply | None:
+    def answer(self, timeout_s: float) -> PolicyReply | None:
         """The reply, if there is one within that time."""
         return self._courier.answer(timeout_s)
 
@@ -162,13 +162,13 @@ class ProcessHost:
         self.process.start()
         theirs.close()
         # Whoever does not read makes the writer wait: so it is the courier who talks to it.
-        self._courier = _Courier(self._talk)
+        self._courier = _RequestThread(self._talk)
 
     def ask(self, what: str, *args: Any) -> None:  # noqa: ANN401
         """Have something done."""
         self._courier.requests.put((what, *args))
 
-    def answer(self, timeout_s: float) -> Reply | None:
+    def answer(self, timeout_s: float) -> PolicyReply | None:
         """The reply, if there is one within that time."""
         return self._courier.answer(timeout_s)
 
@@ -190,26 +190,26 @@ class ProcessHost:
             self.process.kill()
             self.process.join()
 
-    def _talk(self, what: str, *args: Any) -> Reply:  # noqa: ANN401
+    def _talk(self, what: str, *args: Any) -> PolicyReply:  # noqa: ANN401
         try:
             self._connection.send((what, *args))
-            reply: Reply = self._connection.recv()
+            reply: PolicyReply = self._connection.recv()
         except (EOFError, OSError):
             self.process.join(STOP_WAIT_S)
-            return Reply(fault=("policy", self.death() or "its process went away", ""))
+            return PolicyReply(fault=("policy", self.death() or "its process went away", ""))
         return reply
 
 
-class _Courier:
+class _RequestThread:
     """A thread that takes requests to a desk and brings the replies."""
 
-    def __init__(self, handle: Callable[..., Reply]) -> None:
+    def __init__(self, handle: Callable[..., PolicyReply]) -> None:
         self.requests: queue.SimpleQueue[tuple[Any, ...] | None] = queue.SimpleQueue()
-        self._replies: queue.SimpleQueue[Reply] = queue.SimpleQueue()
+        self._replies: queue.SimpleQueue[PolicyReply] = queue.SimpleQueue()
         self._handle = handle
         threading.Thread(target=self._work, name="policy", daemon=True).start()
 
-    def answer(self, timeout_s: float) -> Reply | None:
+    def answer(self, timeout_s: float) -> PolicyReply | None:
         """The next reply, if there is one within that time."""
         try:
             return self._replies.get(timeout=max(timeout_s, 0.0))
@@ -225,7 +225,7 @@ def _serve(connection: Connection) -> None:
     """What the process does: answer until nobody asks any more."""
     # Ctrl-C is for the loop, which stops the arm and then this.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    desk = Desk()
+    desk = PolicyServiceLoop()
     while True:
         try:
             request = connection.recv()

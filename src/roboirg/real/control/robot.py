@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.evaluation.rollout_result import Course
+from roboirg.evaluation.rollout_result import RolloutResult
 from roboirg.real.control.clock import Clock
 from roboirg.records.record import Job
 
@@ -32,7 +32,7 @@ Command = NDArray[np.float64]
 """(8,): absolute joint targets, rad, and the gripper, +1 open to -1 closed."""
 
 
-class Sensed(NamedTuple):
+class SensorReading(NamedTuple):
     """What a robot senses.
 
     Attributes:
@@ -57,7 +57,7 @@ class Robot(Protocol):
     Attributes:
         name: for records.
         rate: commands per second.
-        clock: whose seconds `Sensed.taken` are.
+        clock: whose seconds `SensorReading.taken` are.
     """
 
     name: str
@@ -75,7 +75,7 @@ class Robot(Protocol):
             cameras: whose pictures are wanted.
         """
 
-    def observe(self) -> Sensed:
+    def observe(self) -> SensorReading:
         """The newest that is known; never waits for a camera."""
 
     def command(self, command: Command) -> None:
@@ -95,5 +95,5 @@ class JudgingRobot(Protocol):
     def is_over(self) -> bool:
         """Whether there is a verdict."""
 
-    def judge(self, course: Course) -> None:
+    def judge(self, course: RolloutResult) -> None:
         """Fill in the verdict and all that happened."""

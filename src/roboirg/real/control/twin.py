@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.actions import ARM_JOINTS, JOINT_ANGLE
-from roboirg.evaluation.rollout import Needs, make_env
-from roboirg.evaluation.rollout_result import Course
+from roboirg.evaluation.rollout import EnvRequirements, make_env
+from roboirg.evaluation.rollout_result import RolloutResult
 from roboirg.real.control.clock import Clock, VirtualClock
-from roboirg.real.control.robot import CAMERA_RATE, COMMAND_RATE, Command, Sensed
+from roboirg.real.control.robot import CAMERA_RATE, COMMAND_RATE, Command, SensorReading
 from roboirg.records.record import Job
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ class Twin:
     def prepare(self, job: Job, cameras: Sequence[str]) -> None:
         """Build the scene of the trial."""
         self.cameras = tuple(cameras)
-        env = make_env(job, Needs((), JOINT_ANGLE))
+        env = make_env(job, EnvRequirements((), JOINT_ANGLE))
         if cameras:
             # Pictures are to be had, but only those that are read are drawn.
             env.set_frame_hook(_look_away, every=_NEVER)
@@ -66,11 +66,11 @@ class Twin:
         self.env, self._hold, self._gripper = env, None, 1.0
         self._began = self.clock.now()
 
-    def observe(self) -> Sensed:
+    def observe(self) -> SensorReading:
         """Joints and fingers now, and pictures that are drawn when they are read."""
         felt = {name: value for name, value in self._feeling.items() if name != "instruction"}
         taken = {camera: self.taken(camera) for camera in self.cameras}
-        return Sensed(_Fields(felt, self._playing(), self.cameras), taken)
+        return SensorReading(_Fields(felt, self._playing(), self.cameras), taken)
 
     def taken(self, camera: str) -> float:  # noqa: ARG002 - of both cameras alike
         """When a camera's newest picture was taken, s."""
@@ -105,7 +105,7 @@ class Twin:
         """Whether the judge has a verdict, or time is up."""
         return self._playing().status != "ongoing"
 
-    def judge(self, course: Course) -> None:
+    def judge(self, course: RolloutResult) -> None:
         """Fill in what happened and, if the trial is over, the judge's verdict."""
         first, *later = self._infos
         device = str(self._playing().render_device)

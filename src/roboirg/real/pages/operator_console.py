@@ -11,7 +11,7 @@ from roboirg.real.study.trial_text import places_of, turns_of
 from roboirg.records.record import Job, Record
 
 
-class Console:
+class OperatorConsole:
     """Talks to whoever sits at the terminal.
 
     Args:

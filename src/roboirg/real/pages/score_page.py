@@ -11,7 +11,7 @@ from roboirg.core.errors import MissingDependencyError
 from roboirg.real.pages.arrangement_svg import draw_svg
 from roboirg.real.study.failure_choices import failure_choices
 from roboirg.real.study.study_plan import PlannedTrial
-from roboirg.real.study.trial_log import SUCCESS, VOID_CHOICE, Ledger, said_of
+from roboirg.real.study.trial_log import SUCCESS, VOID_CHOICE, TrialLog, said_of
 from roboirg.real.study.trial_text import meant_by, places_of, turns_of
 from roboirg.records.record import Record
 
@@ -26,7 +26,7 @@ class Button(NamedTuple):
     """A verdict that can be given.
 
     Attributes:
-        value: as `Ledger.score` takes it.
+        value: as `TrialLog.score` takes it.
         key: of the keyboard.
         words: what it says.
         group: success, grounding, execution or void.
@@ -40,7 +40,7 @@ class Button(NamedTuple):
     chosen: bool
 
 
-def render(ledger: Ledger, trial: PlannedTrial, *, token: str, message: str = "") -> str:
+def render(ledger: TrialLog, trial: PlannedTrial, *, token: str, message: str = "") -> str:
     """The page of a trial.
 
     Args:

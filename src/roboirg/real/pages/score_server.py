@@ -18,7 +18,7 @@ from urllib.parse import parse_qsl, urlsplit
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.real.pages.score_page import check_page_support, redirect_of, render
 from roboirg.real.study.study_plan import PlannedTrial, StudyPlan
-from roboirg.real.study.trial_log import Ledger
+from roboirg.real.study.trial_log import TrialLog
 
 LOOPBACK = "127.0.0.1"
 LARGEST_FORM = 65_536
@@ -52,7 +52,7 @@ class ScoreServer(ThreadingHTTPServer):
         self.token = secrets.token_urlsafe(24)
         self.writing = threading.Lock()
         try:
-            super().__init__((LOOPBACK, port), _Handler)
+            super().__init__((LOOPBACK, port), _ScoreHandler)
         except (OSError, OverflowError) as error:
             raise InvalidValueError(
                 f"Port {port} cannot be had ({error}); choose another or 0."
@@ -63,9 +63,9 @@ class ScoreServer(ThreadingHTTPServer):
         """The address to open; it holds the token."""
         return f"http://{LOOPBACK}:{self.server_address[1]}/?token={self.token}"
 
-    def ledger(self) -> Ledger:
+    def ledger(self) -> TrialLog:
         """What the disk says now."""
-        return Ledger.read(self.plan, self.folder)
+        return TrialLog.read(self.plan, self.folder)
 
     def score(self, form: dict[str, str]) -> str:
         """Store a verdict; returns what to tell the operator.
@@ -114,7 +114,7 @@ class ScoreServer(ThreadingHTTPServer):
         return "", f" (without a video: there is no file {name!r} in the study's folder)"
 
 
-class _Handler(BaseHTTPRequestHandler):
+class _ScoreHandler(BaseHTTPRequestHandler):
     """One request."""
 
     server: ScoreServer
@@ -213,7 +213,7 @@ class _Handler(BaseHTTPRequestHandler):
         self.wfile.write(body)
 
 
-def _shown(ledger: Ledger, name: str) -> PlannedTrial:
+def _shown(ledger: TrialLog, name: str) -> PlannedTrial:
     """The trial that is asked for, else the first to score, else the last."""
     if name:
         return ledger.plan.trial(name)

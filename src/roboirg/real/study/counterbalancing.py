@@ -107,7 +107,7 @@ def balanced_episodes(task: str, split: str, count: int) -> tuple[int, ...]:
     return tuple(chosen)
 
 
-def tallies(episodes: Sequence[Episode]) -> dict[str, Counter[object]]:
+def arrangement_counts(episodes: Sequence[Episode]) -> dict[str, Counter[object]]:
     """How often each color, side and number occurs, and each arrangement."""
     kinds = [arrangement_of(episode) for episode in episodes]
     return {

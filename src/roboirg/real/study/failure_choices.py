@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from roboirg.core.conditions import Rule, facts_of
 from roboirg.core.episode import Episode
-from roboirg.judging.failure_attribution import FailureName, Finding
+from roboirg.judging.failure_attribution import FailureAttribution, FailureName
 from roboirg.records.record import Attribution
 
 EXECUTION_WORDS: tuple[tuple[FailureName, str], ...] = (
@@ -46,7 +46,9 @@ class FailureChoice(NamedTuple):
             note: the operator's own words.
         """
         words = f"the robot {self.words}" + (f" ({note})" if note else "")
-        return Attribution(**Finding.of(self.failure, self.subject, step, words)._asdict())
+        return Attribution(
+            **FailureAttribution.of(self.failure, self.subject, step, words)._asdict()
+        )
 
 
 def failure_choices(episode: Episode) -> tuple[FailureChoice, ...]:

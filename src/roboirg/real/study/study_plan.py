@@ -40,11 +40,11 @@ DEFAULT_DEMONSTRATIONS = 50
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
 
-class _Data(BaseModel):
+class _StudyModel(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class PlannedTrial(_Data):
+class PlannedTrial(_StudyModel):
     """One trial.
 
     Attributes:
@@ -69,7 +69,7 @@ class PlannedTrial(_Data):
         return get_episode(self.job.task, self.job.split, self.job.episode)
 
 
-class PlannedDemonstration(_Data):
+class PlannedDemonstration(_StudyModel):
     """One demonstration for fine-tuning, told in the explicit setting.
 
     Attributes:
@@ -88,7 +88,7 @@ class PlannedDemonstration(_Data):
         return get_episode(self.task, DEMONSTRATION_SPLIT, self.number)
 
 
-class StudyPlan(_Data):
+class StudyPlan(_StudyModel):
     """All that is to be done, in order.
 
     Attributes:

@@ -16,9 +16,9 @@ import numpy as np
 from roboirg.core.actions import JOINT_ANGLE
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.plan import say
+from roboirg.evaluation.plan import instruct_job
 from roboirg.evaluation.plan_parsing import split_name
-from roboirg.evaluation.rollout_result import describe, utc_now
+from roboirg.evaluation.rollout_result import make_record, utc_now
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.policies.loading import is_privileged, load_policy_class, policy_version
 from roboirg.policies.requirements import (
@@ -28,10 +28,10 @@ from roboirg.policies.requirements import (
 )
 from roboirg.real.control.control_loop import ControlLoop
 from roboirg.real.control.limits import Limits
-from roboirg.real.control.policy_process import Host, ProcessHost, ThreadHost
+from roboirg.real.control.policy_process import PolicyHost, ProcessHost, ThreadHost
 from roboirg.real.control.robot import JudgingRobot, Robot
 from roboirg.real.study.study_plan import PlannedTrial, StudyPlan
-from roboirg.real.study.trial_log import UNSCORED, Ledger
+from roboirg.real.study.trial_log import UNSCORED, TrialLog
 from roboirg.records.record import Job, Record
 
 ROBOT_LOCK = ".robot.lock"
@@ -64,7 +64,7 @@ class Study:
     scorer: Scorer = "operator"
     ended: Callable[[], bool] = _never
     told: Callable[[PlannedTrial, Record], None] = lambda _trial, _record: None
-    _hosts: dict[str, Host] = field(default_factory=dict)
+    _hosts: dict[str, PolicyHost] = field(default_factory=dict)
 
     def run(self, policies: Sequence[str] = (), *, retry_errors: bool = True) -> tuple[Record, ...]:
         """Play what is not done; a trial that ends in an error does not end the study.
@@ -83,7 +83,7 @@ class Study:
         """
         wanted = self._wanted(policies)
         cameras = {name: self._cameras_of(spec or name) for name, spec in wanted.items()}
-        ledger = Ledger.read(self.plan, self.folder)
+        ledger = TrialLog.read(self.plan, self.folder)
         _check_versions(ledger, wanted)
         undone = ("open", "error", "void") if retry_errors else ("open",)
         todo = [
@@ -104,12 +104,12 @@ class Study:
                 self.robot.close()
 
     def _trial(
-        self, trial: PlannedTrial, cameras: Mapping[str, tuple[str, ...]], ledger: Ledger
+        self, trial: PlannedTrial, cameras: Mapping[str, tuple[str, ...]], ledger: TrialLog
     ) -> Record:
         job, started_at, start = trial.job, utc_now(), time.monotonic()
         host = self._host(job)
         loop = ControlLoop(self.robot, host, self.limits, cameras[job.policy], self.ended)
-        course = loop.play(job, job.policy_spec, policy_seed(trial), say(job).text)
+        course = loop.play(job, job.policy_spec, policy_seed(trial), instruct_job(job).text)
         if course.error is not None:
             # It may still be busy, or dead: the next trial gets another.
             host.close()
@@ -118,7 +118,7 @@ class Study:
             "robot": self.robot.name, "held": loop.held, "overruns": loop.overruns,
             "rate": self.robot.rate,
         }  # fmt: skip
-        record = describe(
+        record = make_record(
             job, course, started_at=started_at, duration_s=round(time.monotonic() - start, 3)
         )
         if course.error is None and self.scorer == "operator":
@@ -133,7 +133,7 @@ class Study:
         self.told(trial, stored)
         return stored
 
-    def _host(self, job: Job) -> Host:
+    def _host(self, job: Job) -> PolicyHost:
         if job.policy not in self._hosts:
             apart = not is_privileged(job.policy_spec)
             self._hosts[job.policy] = ProcessHost() if apart else ThreadHost()
@@ -176,7 +176,7 @@ def policy_seed(trial: PlannedTrial) -> int:
     return int(seeds.generate_state(1)[0])
 
 
-def _check_versions(ledger: Ledger, policies: Mapping[str, str | None]) -> None:
+def _check_versions(ledger: TrialLog, policies: Mapping[str, str | None]) -> None:
     """Refuse to mix words, worlds or policies of two versions."""
     now = {name: policy_version(spec or name) for name, spec in policies.items()}
     for trial in ledger.plan.trials:

@@ -15,8 +15,8 @@ from typing import Any, Literal
 from pydantic import JsonValue
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.episode_errors import cause
-from roboirg.evaluation.rollout_result import Course, describe, utc_now
+from roboirg.evaluation.episode_errors import format_cause
+from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.real.study.failure_choices import failure_choices
 from roboirg.real.study.study_plan import PlannedTrial, StudyPlan
 from roboirg.records.record import Record
@@ -24,9 +24,9 @@ from roboirg.records.store import RECORDS_FILE, RecordStore, StoreError, read_co
 
 METADATA = "real_trial"
 """Under which a record's ``policy_metadata`` hold what is said of a real trial."""
-UNSCORED = cause("infrastructure", "played, and waiting for the operator's verdict")
-WITHDRAWN = cause("infrastructure", "the operator took the score back")
-VOID = cause("infrastructure", "the operator declared the trial void")
+UNSCORED = format_cause("infrastructure", "played, and waiting for the operator's verdict")
+WITHDRAWN = format_cause("infrastructure", "the operator took the score back")
+VOID = format_cause("infrastructure", "the operator declared the trial void")
 
 State = Literal["open", "waiting", "scored", "void", "error"]
 """Not played or scored; played but not scored; with a verdict; declared void; ended in an error."""
@@ -38,7 +38,7 @@ SUCCESS, VOID_CHOICE = "success", "void"
 
 
 @dataclass
-class Ledger:
+class TrialLog:
     """The trials of a plan and their records.
 
     Attributes:
@@ -52,7 +52,7 @@ class Ledger:
     _scored: list[str] = field(default_factory=list)
 
     @classmethod
-    def read(cls, plan: StudyPlan, folder: Path) -> Ledger:
+    def read(cls, plan: StudyPlan, folder: Path) -> TrialLog:
         """What the folder says now.
 
         Raises:
@@ -133,14 +133,16 @@ class Ledger:
             StoreError: it cannot be written.
         """
         said = {"action": "score", "operator": operator, "note": note}
-        base = self.newest(trial.name) or describe(trial.job, Course(), started_at=utc_now())
+        base = self.newest(trial.name) or make_record(
+            trial.job, RolloutResult(), started_at=utc_now()
+        )
         changes: dict[str, Any] = {
-            "outcome": "success", "error": None, "cause": None, "attribution": None,
+            "outcome": "success", "error": None, "format_cause": None, "attribution": None,
             "video": video or base.video, "details": None,
         }  # fmt: skip
         if choice == VOID_CHOICE:
             words = f"{VOID}; {note}" if note else VOID
-            changes |= {"outcome": "error", "error": "infrastructure", "cause": words}
+            changes |= {"outcome": "error", "error": "infrastructure", "format_cause": words}
         elif choice != SUCCESS:
             choices = {one.key: one for one in failure_choices(trial.episode)}
             if choice not in choices:
@@ -149,7 +151,7 @@ class Ledger:
                     f"{', '.join(choices)}."
                 )
             found = choices[choice].attribution(base.steps, note)
-            changes |= {"outcome": "failure", "cause": found.sentence, "attribution": found}
+            changes |= {"outcome": "failure", "format_cause": found.sentence, "attribution": found}
         return self._append(trial, base.model_copy(update=changes), said)
 
     def undo(self, *, operator: str) -> str:
@@ -219,7 +221,7 @@ def append(folder: Path, record: Record) -> None:
 def _withdrawn(record: Record) -> Record:
     return record.model_copy(
         update={
-            "outcome": "error", "error": "infrastructure", "cause": WITHDRAWN,
+            "outcome": "error", "error": "infrastructure", "format_cause": WITHDRAWN,
             "attribution": None, "video": None,
         }
     )  # fmt: skip

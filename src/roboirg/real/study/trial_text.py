@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from roboirg import language
-from roboirg.evaluation.plan import say
+from roboirg.evaluation.plan import instruct_job
 from roboirg.real.pages.arrangement_drawing import shapes_of, where
 from roboirg.real.study.study_plan import PlannedDemonstration, PlannedTrial
 
@@ -11,7 +11,7 @@ from roboirg.real.study.study_plan import PlannedDemonstration, PlannedTrial
 def turns_of(planned: PlannedTrial | PlannedDemonstration) -> tuple[str, ...]:
     """The utterances, in the order in which they are spoken."""
     if isinstance(planned, PlannedTrial):
-        return say(planned.job).turns
+        return instruct_job(planned.job).turns
     return language.instruct(planned.episode, "explicit").turns
 
 

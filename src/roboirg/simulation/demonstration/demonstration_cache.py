@@ -35,7 +35,7 @@ _PACKAGES = ("sapien", "numpy", "scipy", "toppra")
 _log = logging.getLogger(__name__)
 
 
-def perform(episode: Episode, attempt: Attempt, *, watched: bool) -> Recording:
+def replay_or_plan(episode: Episode, attempt: Attempt, *, watched: bool) -> Recording:
     """Have a demonstration played: replayed if it is known, else planned and kept.
 
     Args:

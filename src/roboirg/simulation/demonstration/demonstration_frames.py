@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from roboirg.core.episode import Episode, Stage
 from roboirg.simulation.demonstration.demonstration_cache import recording_key
 from roboirg.simulation.demonstration.recording import Recording
-from roboirg.simulation.episode_session import Session
+from roboirg.simulation.episode_session import EpisodeSession
 from roboirg.simulation.observation_builder import draw
 from roboirg.simulation.rendering.render_device import describe, find_render_device
 from roboirg.simulation.rendering.render_mode import FAITHFUL, Rendering
@@ -36,7 +36,7 @@ _DRIVER_LIBRARIES = ("libvulkan_", "libGLX_nvidia", "libnvidia-glcore")
 
 
 @dataclass(frozen=True)
-class Frames:
+class DemonstrationFramesArray:
     """All pictures of one kind in a demonstration.
 
     Attributes:
@@ -72,7 +72,7 @@ class Frames:
         return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
-def read_frames(wanted: Sequence[Frames]) -> list[NDArray[Any]]:
+def read_frames(wanted: Sequence[DemonstrationFramesArray]) -> list[NDArray[Any]]:
     """Pictures of one demonstration; the same whether they are drawn or read back.
 
     Args:
@@ -94,13 +94,13 @@ def read_frames(wanted: Sequence[Frames]) -> list[NDArray[Any]]:
     return arrays
 
 
-def _draw(wanted: Sequence[tuple[Frames, NDArray[Any]]]) -> None:
+def _draw(wanted: Sequence[tuple[DemonstrationFramesArray, NDArray[Any]]]) -> None:
     """Replay the demonstration and draw what is due into the arrays.
 
     The world goes on while pictures are drawn; they are fetched before the next ones begin.
     """
     (first, _), *_ = wanted
-    session = Session(first.episode, visible=True, rendering=first.rendering)
+    session = EpisodeSession(first.episode, visible=True, rendering=first.rendering)
     world, cameras = session.world, session.world.cameras
     due = tuple(dict.fromkeys(frames.field.rpartition("_")[0] for frames, _ in wanted))
     steps = begun = 0

@@ -8,12 +8,19 @@ from typing import Any
 from numpy.typing import NDArray
 
 from roboirg.core.episode import Episode
-from roboirg.simulation.demonstration.demonstration_frames import Frames, read_frames
+from roboirg.simulation.demonstration.demonstration_frames import (
+    DemonstrationFramesArray,
+    read_frames,
+)
 from roboirg.simulation.demonstration.recording import Recording
-from roboirg.simulation.observation_builder import Wishes, drawn_space, stack_felt
+from roboirg.simulation.observation_builder import (
+    ObservationSpec,
+    picture_space,
+    stack_proprioception,
+)
 
 
-class Video(Mapping[str, NDArray[Any]]):
+class DemonstrationVideo(Mapping[str, NDArray[Any]]):
     """A demonstration as a mapping from an observation's fields to arrays.
 
     Pictures are drawn when they are read for the first time, at any later moment, and then kept.
@@ -30,7 +37,10 @@ class Video(Mapping[str, NDArray[Any]]):
     """
 
     def __init__(
-        self, felt: Mapping[str, NDArray[Any]], frames: Mapping[str, Frames], length: int
+        self,
+        felt: Mapping[str, NDArray[Any]],
+        frames: Mapping[str, DemonstrationFramesArray],
+        length: int,
     ) -> None:
         self.length = length
         self._arrays = dict(felt)
@@ -76,8 +86,8 @@ class Video(Mapping[str, NDArray[Any]]):
 
 
 def make_video(
-    episode: Episode, recording: Recording, wishes: Wishes, felt: Sequence[dict[str, Any]]
-) -> Video:
+    episode: Episode, recording: Recording, wishes: ObservationSpec, felt: Sequence[dict[str, Any]]
+) -> DemonstrationVideo:
     """The video of a demonstration that has been played.
 
     Args:
@@ -89,8 +99,8 @@ def make_video(
     wish = wishes.demonstration_frames
     every = wish if isinstance(wish, int) else 1
     frames = {
-        field: Frames(episode, recording, field, space, every, wishes.rendering)
-        for field, space in drawn_space(wishes).items()
+        field: DemonstrationFramesArray(episode, recording, field, space, every, wishes.rendering)
+        for field, space in picture_space(wishes).items()
         if wish != "none"
     }
-    return Video(stack_felt(felt, wishes), frames, len(felt))
+    return DemonstrationVideo(stack_proprioception(felt, wishes), frames, len(felt))

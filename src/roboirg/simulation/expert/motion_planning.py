@@ -17,8 +17,8 @@ from scipy.spatial.transform import Rotation
 from roboirg.core.actions import ARM_JOINTS
 from roboirg.core.episode import ROBOT_BASE
 from roboirg.core.errors import MotionPlanningError
-from roboirg.simulation.expert.trajectory_timing import timed
-from roboirg.simulation.panda import TOOL_LINK, Robot, rotation_of
+from roboirg.simulation.expert.trajectory_timing import time_parameterize
+from roboirg.simulation.panda import TOOL_LINK, Panda, rotation_of
 from roboirg.simulation.physics_settings import HOME
 
 WAYPOINT_DISTANCE = 0.02
@@ -57,14 +57,14 @@ class ToolPose(NamedTuple):
         return cls(np.asarray(pose.p, dtype=np.float64), rotation_of(pose))
 
 
-class Planner:
+class MotionPlanner:
     """Plans for one robot; keeps its kinematic model.
 
     Args:
         robot: whose joints are to move.
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Panda) -> None:
         self._model = robot.articulation.create_pinocchio_model()
         names = [link.name for link in robot.articulation.links]
         self._tool = names.index(TOOL_LINK)
@@ -92,7 +92,7 @@ class Planner:
         Raises:
             MotionPlanningError: the line leaves the joint limits or cannot be followed.
         """
-        return timed(self._waypoints(arm, goal))
+        return time_parameterize(self._waypoints(arm, goal))
 
     def travel(self, arm: NDArray[np.float64], goal: ToolPose) -> NDArray[np.float64]:
         """As `straight`; by way of home where the straight line is not feasible.
@@ -103,7 +103,7 @@ class Planner:
         try:
             return self.straight(arm, goal)
         except MotionPlanningError:
-            home = timed(np.linspace(arm, HOME, 10))
+            home = time_parameterize(np.linspace(arm, HOME, 10))
             return np.concatenate([home, self.straight(HOME, goal)])
 
     def inverse(self, arm: NDArray[np.float64], goal: ToolPose) -> NDArray[np.float64]:

@@ -18,7 +18,7 @@ from roboirg.core.episode import Primitive
 from roboirg.core.errors import MotionPlanningError
 from roboirg.core.motions import Point
 from roboirg.simulation.expert.grasping import grasp_rotations
-from roboirg.simulation.expert.motion_planning import Planner, ToolPose
+from roboirg.simulation.expert.motion_planning import MotionPlanner, ToolPose
 from roboirg.simulation.panda import rotation_of
 from roboirg.simulation.physics_settings import CLOSED, GRIPPER_STEPS, HOME_ACTION, OPEN
 from roboirg.simulation.world import World
@@ -50,7 +50,7 @@ Piece = NDArray[np.float64]
 """Actions (n, 8): joint targets and the gripper."""
 
 
-class Hands:
+class MotionPrimitives:
     """Executes primitives in one world.
 
     Args:
@@ -59,7 +59,7 @@ class Hands:
 
     def __init__(self, world: World) -> None:
         self._world = world
-        self._planner = Planner(world.robot)
+        self._planner = MotionPlanner(world.robot)
         self._gripper = OPEN
 
     def perform(self, primitive: Primitive) -> Iterator[Piece]:
@@ -201,21 +201,21 @@ class Hands:
 
 # The table belongs to the class.
 # ruff: noqa: SLF001
-_ROUTINES: dict[str, Callable[[Hands, Primitive], Iterator[Piece]]] = {
-    "pick_cube": Hands._pick_cube,
-    "place_on": Hands._place_on,
-    "drop_into": Hands._drop_into,
-    "put_into": Hands._put_into,
-    "move_over": Hands._move_over,
-    "put_down": Hands._put_down,
-    "pick_container": Hands._pick_container,
-    "press": Hands._press,
-    "press_below": Hands._press_below,
-    "hover": Hands._hover,
-    "hold": Hands._hold,
-    "hold_until": Hands._hold_until,
-    "retreat": Hands._retreat,
-    "go_home": Hands._go_home,
+_ROUTINES: dict[str, Callable[[MotionPrimitives, Primitive], Iterator[Piece]]] = {
+    "pick_cube": MotionPrimitives._pick_cube,
+    "place_on": MotionPrimitives._place_on,
+    "drop_into": MotionPrimitives._drop_into,
+    "put_into": MotionPrimitives._put_into,
+    "move_over": MotionPrimitives._move_over,
+    "put_down": MotionPrimitives._put_down,
+    "pick_container": MotionPrimitives._pick_container,
+    "press": MotionPrimitives._press,
+    "press_below": MotionPrimitives._press_below,
+    "hover": MotionPrimitives._hover,
+    "hold": MotionPrimitives._hold,
+    "hold_until": MotionPrimitives._hold_until,
+    "retreat": MotionPrimitives._retreat,
+    "go_home": MotionPrimitives._go_home,
 }
 
 

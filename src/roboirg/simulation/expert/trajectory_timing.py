@@ -30,7 +30,7 @@ GRID_INTERVALS = 10
 """Into which the way between two way points is divided."""
 
 
-def timed(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def time_parameterize(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """The fastest motion through way points within the joint limits, at the control rate.
 
     Args:

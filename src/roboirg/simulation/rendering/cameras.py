@@ -18,8 +18,8 @@ import sapien.render
 from numpy.typing import NDArray
 
 from roboirg.core.observations import CAMERAS, FRONT, WRIST
-from roboirg.simulation.panda import CAMERA_LINK, Robot
-from roboirg.simulation.rendering.culling import Bodies
+from roboirg.simulation.panda import CAMERA_LINK, Panda
+from roboirg.simulation.rendering.culling import CullableBodies
 from roboirg.simulation.rendering.render_mode import FAITHFUL, Rendering
 from roboirg.simulation.rendering.shaders import COLOR, STOCK_COLOR, slim_shader, stand_in_table
 from roboirg.simulation.rendering.viewpoint import (
@@ -63,7 +63,7 @@ class Cameras:
         rendering: how pictures are made.
     """
 
-    def __init__(self, scene: sapien.Scene, robot: Robot, rendering: Rendering = FAITHFUL) -> None:
+    def __init__(self, scene: sapien.Scene, robot: Panda, rendering: Rendering = FAITHFUL) -> None:
         self._scene = scene
         shader = slim_shader() if rendering.slim_shader else None
         fixed = sapien.Entity()
@@ -76,7 +76,7 @@ class Cameras:
         robot.links[CAMERA_LINK].entity.add_component(self._components[WRIST])
         for component in self._components.values() if rendering.quick_start else ():
             component.set_texture("BRDFLUT", stand_in_table())
-        self._bodies = Bodies(scene, robot.drawables)
+        self._bodies = CullableBodies(scene, robot.drawables)
         self._culling = rendering.culling
         self._last: dict[str, _Drawn] = {}
         # The poses of everything, the wrist camera too, when a camera's last picture was right.

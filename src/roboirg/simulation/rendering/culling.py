@@ -37,7 +37,7 @@ _DRAWN, _LEFT_OUT = 0, 99
 
 
 @dataclass(frozen=True)
-class Drawable:
+class CullableBody:
     """What is known of a body that can be drawn.
 
     Attributes:
@@ -49,7 +49,7 @@ class Drawable:
     cameras: Collection[str] = CAMERAS
 
 
-class Bodies:
+class CullableBodies:
     """All that can be drawn in a scene.
 
     Args:
@@ -58,7 +58,9 @@ class Bodies:
     """
 
     def __init__(
-        self, scene: sapien.Scene, drawables: Mapping[sapien.render.RenderBodyComponent, Drawable]
+        self,
+        scene: sapien.Scene,
+        drawables: Mapping[sapien.render.RenderBodyComponent, CullableBody],
     ) -> None:
         self._bodies = [
             component

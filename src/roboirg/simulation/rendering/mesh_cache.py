@@ -21,7 +21,7 @@ _WORD = 8
 """Bytes; arrays and what is told of them begin at multiples of it."""
 
 
-def kept_arrays(name: str, sources: bytes, make: Callable[[], Arrays]) -> Arrays:
+def cached_arrays(name: str, sources: bytes, make: Callable[[], Arrays]) -> Arrays:
     """Arrays that were derived before, or are now.
 
     Args:
@@ -30,7 +30,7 @@ def kept_arrays(name: str, sources: bytes, make: Callable[[], Arrays]) -> Arrays
         make: derives them.
     """
     cache = open_cache("meshes")
-    key = f"{name}-{hashlib.sha256(code_of('mesh_cache') + sources).hexdigest()[:24]}"
+    key = f"{name}-{hashlib.sha256(source_code('mesh_cache') + sources).hexdigest()[:24]}"
     content = cache.read(key)
     if content is not None:
         return unpacked(content)
@@ -65,7 +65,7 @@ def unpacked(content: memoryview) -> Arrays:
 
 
 @functools.cache
-def code_of(*modules: str) -> bytes:
+def source_code(*modules: str) -> bytes:
     """The text of modules in this folder: what they derive changes with it."""
     return b"".join((Path(__file__).parent / f"{name}.py").read_bytes() for name in modules)
 

@@ -14,7 +14,7 @@ from roboirg.simulation.rendering.cameras import Cameras
 CAMERA = "front"
 
 
-class Grounding:
+class PixelGrounding:
     """Follows the stages of one episode; draws only until it has seen a stage's object.
 
     Args:

@@ -18,7 +18,7 @@ import sapien.render
 from numpy.typing import NDArray
 
 from roboirg.simulation.rendering import camera_mesh, shaders
-from roboirg.simulation.rendering.mesh_cache import Arrays, code_of, kept_arrays
+from roboirg.simulation.rendering.mesh_cache import Arrays, cached_arrays, source_code
 from roboirg.simulation.rendering.mesh_simplification import (
     CAMERA_SHARE,
     LINK_SHARE,
@@ -173,7 +173,7 @@ def _derived(path: Path, rendering: Rendering) -> Arrays:
         arrays["hull"] = points[ConvexHull(points).vertices]
         return arrays
 
-    return kept_arrays(_name(path, rendering), _sources(), derive)
+    return cached_arrays(_name(path, rendering), _sources(), derive)
 
 
 def _derived_for_front(path: Path, rendering: Rendering, place: _Place) -> Arrays:
@@ -194,8 +194,8 @@ def _derived_for_front(path: Path, rendering: Rendering, place: _Place) -> Array
             arrays |= _numbered(share_corners(seen), number)
         return arrays
 
-    sources = _sources() + code_of("occlusion", "viewpoint") + repr(place).encode()
-    return kept_arrays(f"{_name(path, rendering)}-front", sources, derive)
+    sources = _sources() + source_code("occlusion", "viewpoint") + repr(place).encode()
+    return cached_arrays(f"{_name(path, rendering)}-front", sources, derive)
 
 
 def _is_light(path: Path, rendering: Rendering) -> bool:
@@ -210,7 +210,7 @@ def _name(path: Path, rendering: Rendering) -> str:
 def _sources() -> bytes:
     """What determines derived meshes; the installed files' contents are known and checked."""
     return (
-        code_of("robot_meshes", "triangles", "camera_mesh", "mesh_simplification")
+        source_code("robot_meshes", "triangles", "camera_mesh", "mesh_simplification")
         + camera_mesh.packed_mask()
     )
 

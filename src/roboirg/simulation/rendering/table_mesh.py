@@ -20,7 +20,7 @@ import sapien.render
 from numpy.typing import NDArray
 
 from roboirg.simulation.model_files import find_model_files
-from roboirg.simulation.rendering.mesh_cache import Arrays, code_of, kept_arrays
+from roboirg.simulation.rendering.mesh_cache import Arrays, cached_arrays, source_code
 
 METALLIC = 1.0
 """What the table's texture of that says everywhere."""
@@ -57,7 +57,7 @@ _TEXTURES = (
 @functools.cache
 def table_shape() -> sapien.render.RenderShapeTriangleMesh:
     """The table's shape, unscaled, to be cloned; a number replaces the texture of its metal."""
-    arrays = kept_arrays("table", code_of("table_mesh"), _derive)
+    arrays = cached_arrays("table", source_code("table_mesh"), _derive)
     shape = _loaded(arrays[_MESH].tobytes())
     material = shape.parts[0].material
     for texture in _TEXTURES:

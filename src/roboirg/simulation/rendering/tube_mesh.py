@@ -13,7 +13,7 @@ Rgba = tuple[float, float, float, float]
 SEGMENTS = 48
 
 
-def ring(
+def tube(
     outer: float, inner: float, half: float, rgba: Rgba
 ) -> sapien.render.RenderShapeTriangleMesh:
     """An upright ring about the origin, to be attached to a body.

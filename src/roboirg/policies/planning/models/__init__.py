@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from roboirg.policies.planning.models.model import Model, ModelOptions, Query, Reply
+from roboirg.policies.planning.models.model import Model, ModelOptions, ModelQuery, ModelReply
 
-__all__ = ["Model", "ModelOptions", "Query", "Reply", "make_model"]
+__all__ = ["Model", "ModelOptions", "ModelQuery", "ModelReply", "make_model"]
 
 
 def make_model(options: ModelOptions) -> Model:

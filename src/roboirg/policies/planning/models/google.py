@@ -12,7 +12,7 @@ from roboirg.core.errors import (
 )
 from roboirg.policies.planning.model_content import Part, Picture, png
 from roboirg.policies.planning.models.bounded_wait import timed_out, within
-from roboirg.policies.planning.models.model import ModelOptions, Query, Reply
+from roboirg.policies.planning.models.model import ModelOptions, ModelQuery, ModelReply
 
 if TYPE_CHECKING:
     from google.genai import types
@@ -50,7 +50,7 @@ class GoogleModel:
         )
         self._client = genai.Client(vertexai=False, api_key=self._key, http_options=http)
 
-    def answer(self, query: Query) -> Reply:
+    def answer(self, query: ModelQuery) -> ModelReply:
         """Ask; see `Model`."""
         contents = self._contents(query)
         config = self._config(query)
@@ -72,7 +72,7 @@ class GoogleModel:
         """Let go of the connection."""
         self._client.close()
 
-    def _contents(self, query: Query) -> list[Any]:
+    def _contents(self, query: ModelQuery) -> list[Any]:
         from google.genai import types
 
         return [
@@ -93,7 +93,7 @@ class GoogleModel:
             video_metadata=None if fps is None else types.VideoMetadata(fps=fps),
         )
 
-    def _config(self, query: Query) -> types.GenerateContentConfig:
+    def _config(self, query: ModelQuery) -> types.GenerateContentConfig:
         from google.genai import types
 
         options = self._options
@@ -122,7 +122,7 @@ class GoogleModel:
         return PolicyReplyError(f"{self._what} answered with something else ({kind}: {words}).")
 
 
-def _read(response: types.GenerateContentResponse) -> Reply:
+def _read(response: types.GenerateContentResponse) -> ModelReply:
     """The words of the first candidate, thoughts left out but counted as output."""
     candidates = response.candidates or []
     content = candidates[0].content if candidates else None
@@ -130,6 +130,6 @@ def _read(response: types.GenerateContentResponse) -> Reply:
     text = "".join(part.text for part in parts if part.text and not part.thought)
     usage = response.usage_metadata
     if usage is None:
-        return Reply(text)
+        return ModelReply(text)
     output = (usage.candidates_token_count or 0) + (usage.thoughts_token_count or 0)
-    return Reply(text, usage.prompt_token_count or 0, output)
+    return ModelReply(text, usage.prompt_token_count or 0, output)

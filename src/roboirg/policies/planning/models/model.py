@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from roboirg.core.errors import MissingDependencyError
-from roboirg.policies.planning.model_content import Turn
+from roboirg.policies.planning.model_content import ChatTurn
 
 Provider = Literal["openai", "google"]
 
@@ -101,7 +101,7 @@ class ModelOptions(BaseModel):
         return {**self.model_dump(mode="json", exclude=silent), "address": self.address()}
 
 
-class Query(NamedTuple):
+class ModelQuery(NamedTuple):
     """A question to a model.
 
     Attributes:
@@ -111,11 +111,11 @@ class Query(NamedTuple):
     """
 
     system: str
-    turns: tuple[Turn, ...]
+    turns: tuple[ChatTurn, ...]
     schema: Mapping[str, Any] | None = None
 
 
-class Reply(NamedTuple):
+class ModelReply(NamedTuple):
     """What a model answered; empty if it said nothing."""
 
     text: str
@@ -126,7 +126,7 @@ class Reply(NamedTuple):
 class Model(Protocol):
     """Anything that answers questions."""
 
-    def answer(self, query: Query) -> Reply:
+    def answer(self, query: ModelQuery) -> ModelReply:
         """Ask.
 
         Raises:

@@ -12,9 +12,9 @@ from roboirg.core.errors import (
     PolicyReplyError,
     RoboIRGError,
 )
-from roboirg.policies.planning.model_content import Clip, Part, Picture, Turn, evenly, png
+from roboirg.policies.planning.model_content import ChatTurn, Clip, Part, Picture, evenly, png
 from roboirg.policies.planning.models.bounded_wait import timed_out, within
-from roboirg.policies.planning.models.model import ModelOptions, Query, Reply
+from roboirg.policies.planning.models.model import ModelOptions, ModelQuery, ModelReply
 
 OPENAI = "https://api.openai.com/v1"
 BUSY = frozenset({408, 409, 429, 502, 503, 504})
@@ -44,7 +44,7 @@ class OpenAIModel:
             max_retries=options.retries,
         )
 
-    def answer(self, query: Query) -> Reply:
+    def answer(self, query: ModelQuery) -> ModelReply:
         """Ask; see `Model`."""
         request = self._request(query)
 
@@ -62,7 +62,7 @@ class OpenAIModel:
         """Let go of the connection."""
         self._client.close()
 
-    def _request(self, query: Query) -> dict[str, Any]:
+    def _request(self, query: ModelQuery) -> dict[str, Any]:
         options = self._options
         request: dict[str, Any] = {
             "model": options.model,
@@ -80,7 +80,7 @@ class OpenAIModel:
             request["response_format"] = {"type": "json_schema", "json_schema": form}
         return request
 
-    def _message(self, turn: Turn) -> dict[str, Any]:
+    def _message(self, turn: ChatTurn) -> dict[str, Any]:
         if turn.role == "model":
             return {"role": "assistant", "content": "".join(map(str, turn.parts))}
         content = [piece for part in turn.parts for piece in self._pieces(part)]
@@ -96,13 +96,13 @@ class OpenAIModel:
         else:
             yield from map(_image, _pictures(part, self._options.clip_frames))
 
-    def _read(self, completion: Any) -> Reply:  # noqa: ANN401 - anything may have arrived
+    def _read(self, completion: Any) -> ModelReply:  # noqa: ANN401 - anything may have arrived
         try:
             text = completion.choices[0].message.content or ""
             usage = completion.usage
             if usage is None:
-                return Reply(str(text))
-            return Reply(str(text), int(usage.prompt_tokens), int(usage.completion_tokens))
+                return ModelReply(str(text))
+            return ModelReply(str(text), int(usage.prompt_tokens), int(usage.completion_tokens))
         except (AttributeError, IndexError, TypeError, ValueError) as error:
             raise PolicyReplyError(
                 f"{self._what} answered with something that is no chat completion "

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from roboirg.core.errors import UnknownNameError
-from roboirg.policies.planning.option_checking import checked
+from roboirg.policies.planning.option_checking import check_options
 from roboirg.policies.planning.planner import Planner
 
 PLANNERS: Mapping[str, str] = {
@@ -38,5 +38,5 @@ def make_planner(kind: str, options: Mapping[str, Any], origin: str) -> Planner:
     module, _, name = PLANNERS[kind].partition(":")
     planner_class = getattr(importlib.import_module(module), name)
     options_type: type[BaseModel] = planner_class.options_type
-    planner: Planner = planner_class(checked(options_type, options, origin))
+    planner: Planner = planner_class(check_options(options_type, options, origin))
     return planner

@@ -10,8 +10,15 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from roboirg.core.observations import Demonstration, Observation
-from roboirg.policies.planning.model_content import VIDEO_RATE, Clip, Part, Picture, Pixels, Turn
-from roboirg.policies.planning.models import Query
+from roboirg.policies.planning.model_content import (
+    VIDEO_RATE,
+    ChatTurn,
+    Clip,
+    Part,
+    Picture,
+    Pixels,
+)
+from roboirg.policies.planning.models import ModelQuery
 from roboirg.policies.planning.planners.vlm_planner import (
     VLMPlanner,
     VLMPlannerOptions,
@@ -62,7 +69,7 @@ class GeminiPlanner(VLMPlanner):
         self.demonstration_frames = "all" if options.observe_every == 1 else options.observe_every
         self._demonstration: Pixels | None = None
         self._frames: list[Pixels] = []
-        self._said: list[Turn] = []
+        self._said: list[ChatTurn] = []
         self._passed = 0
 
     def begin(self, demonstration: Demonstration) -> None:
@@ -90,15 +97,15 @@ class GeminiPlanner(VLMPlanner):
     def ask(self, observation: Observation, step: int) -> str | None:  # noqa: ARG002
         """What the model says, with pixels; the last subgoal if it says that all is done."""
         first = not self._said
-        turn = Turn("user", tuple(self._first() if first else self._next()))
+        turn = ChatTurn("user", tuple(self._first() if first else self._next()))
         system = self.prompts.fill("system", forms=self.forms(), places=self.places())
         fields = ("subgoal_sequence", "subgoal") if first else ("description", "subgoal")
-        query = Query(system, (*self._said, turn), _schema(fields))
+        query = ModelQuery(system, (*self._said, turn), _schema(fields))
         answer = self._asker.ask(query, _reader(self._subgoal))
         if answer is None:
             return None
         text, subgoal = answer
-        self._said += [turn, Turn("model", (text,))]
+        self._said += [turn, ChatTurn("model", (text,))]
         self._frames = []
         return subgoal
 

@@ -9,8 +9,8 @@ from pydantic import BaseModel, Field
 
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.policies.planning.keyframes import NEAR, merged
-from roboirg.policies.planning.model_content import Clip, Part, Picture, Pixels, Turn, summary
-from roboirg.policies.planning.models import Query
+from roboirg.policies.planning.model_content import ChatTurn, Clip, Part, Picture, Pixels, summary
+from roboirg.policies.planning.models import ModelQuery
 from roboirg.policies.planning.planners.qwen import VIDEO_FRAMES
 from roboirg.policies.planning.planners.vlm_planner import (
     VLMPlanner,
@@ -43,7 +43,7 @@ class MemerOptions(VLMPlannerOptions):
     video_frames: int = Field(default=VIDEO_FRAMES, ge=1)
 
 
-class Choice(NamedTuple):
+class KeyframeChoice(NamedTuple):
     """What the model answered: a subgoal, and positions of recent frames, from 1."""
 
     subgoal: str
@@ -91,9 +91,9 @@ class MemerPlanner(VLMPlanner):
     def ask(self, observation: Observation, step: int) -> str | None:  # noqa: ARG002
         """The subgoal in the model's words, with pixels; the memory grows by what it chose."""
         steps = tuple(self._recent)
-        query = Query(
+        query = ModelQuery(
             self.prompts.fill("system"),
-            (Turn("user", tuple(self._parts())),),
+            (ChatTurn("user", tuple(self._parts())),),
             _schema(len(steps)),
         )
         choice = self._asker.ask(query, _reader(len(steps)))
@@ -139,10 +139,10 @@ def _schema(count: int) -> dict[str, Any]:
     }
 
 
-def _reader(count: int) -> Callable[[str], Choice]:
+def _reader(count: int) -> Callable[[str], KeyframeChoice]:
     """What reads a reply to a question with so many recent frames."""
 
-    def read(text: str) -> Choice:
+    def read(text: str) -> KeyframeChoice:
         reply = json_object(text)
         subgoal = from_boxes(text_of(reply, "current_subtask"))
         positions = reply.get("keyframe_positions")
@@ -150,6 +150,6 @@ def _reader(count: int) -> Callable[[str], Choice]:
             raise UnparsableReply("The field 'keyframe_positions' has to be a list of numbers.")
         if any(type(one) is not int or not 1 <= one <= count for one in positions):
             raise UnparsableReply(f"Positions of frames are whole numbers from 1 to {count}.")
-        return Choice(subgoal, tuple(positions))
+        return KeyframeChoice(subgoal, tuple(positions))
 
     return read

@@ -9,8 +9,8 @@ from typing import ClassVar
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from roboirg.core.observations import Demonstration, Observation
-from roboirg.policies.planning.model_content import Clip, Part, Picture, Turn, summary
-from roboirg.policies.planning.models import Query
+from roboirg.policies.planning.model_content import ChatTurn, Clip, Part, Picture, summary
+from roboirg.policies.planning.models import ModelQuery
 from roboirg.policies.planning.planners.vlm_planner import (
     VLMPlanner,
     VLMPlannerOptions,
@@ -23,7 +23,7 @@ VIDEO_FRAMES = 10
 """Frames of the demonstration at most."""
 
 
-class Hold(BaseModel):
+class SubgoalHold(BaseModel):
     """A subgoal that is kept for a while, because the model believes in it too early.
 
     Attributes:
@@ -47,9 +47,9 @@ class Hold(BaseModel):
 
 
 HOLDS = (
-    Hold(says="press the button", until=90),
-    Hold(says="press the first button", until=100),
-    Hold(says="press the second button", until=250),
+    SubgoalHold(says="press the button", until=90),
+    SubgoalHold(says="press the first button", until=100),
+    SubgoalHold(says="press the second button", until=250),
 )
 """MME-VLA's rules for ButtonUnmask and ButtonUnmaskSwap, by what is said: a policy does not know
 its task. Only subgoals of these tasks read so."""
@@ -64,7 +64,7 @@ class QwenOptions(VLMPlannerOptions):
     """
 
     video_frames: int = Field(default=VIDEO_FRAMES, ge=1)
-    holds: tuple[Hold, ...] = HOLDS
+    holds: tuple[SubgoalHold, ...] = HOLDS
 
 
 class QwenPlanner(VLMPlanner):
@@ -101,7 +101,9 @@ class QwenPlanner(VLMPlanner):
 
     def ask(self, observation: Observation, step: int) -> str | None:  # noqa: ARG002
         """The next subgoal in the model's words, with pixels."""
-        query = Query(self.prompts.fill("system"), (Turn("user", tuple(self._parts(observation))),))
+        query = ModelQuery(
+            self.prompts.fill("system"), (ChatTurn("user", tuple(self._parts(observation))),)
+        )
         answer = self._asker.ask(query, _read)
         if answer is None:
             return None

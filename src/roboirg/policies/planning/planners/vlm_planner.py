@@ -12,7 +12,7 @@ from roboirg.policies.planning.config_fingerprint import fingerprint_of
 from roboirg.policies.planning.model_content import Pixels
 from roboirg.policies.planning.models import ModelOptions
 from roboirg.policies.planning.prompts import SHARED, load_prompts
-from roboirg.policies.planning.vlm_query import Asker
+from roboirg.policies.planning.vlm_query import VLMQuery
 
 CAMERA = "front"
 PLACE = "[at]"
@@ -54,7 +54,7 @@ class VLMPlanner(ABC):
         self.demonstration_frames: DemonstrationFrames = "all"
         self.prompts = load_prompts(self.kind, options.prompts)
         self._shared = load_prompts(SHARED)
-        self._asker = Asker(options.model, self.prompts["again"])
+        self._asker = VLMQuery(options.model, self.prompts["again"])
         self._instruction = ""
         self._chunks = 0
         self._subgoal: str | None = None
