@@ -24,6 +24,7 @@ from roboirg.evaluation.seed_selection import (
 )
 from roboirg.evaluation.seed_summary import cause_lines, follow_progress, print_summary
 from roboirg.language import expressible
+from roboirg.language.settings import settings_of
 from roboirg.tasks import every_task, get_task
 
 TASKS = tuple(every_task())
@@ -42,7 +43,7 @@ def first_seed(slot):
 def test_every_setting_of_every_episode_can_be_expressed(task):
     for split in SPLITS:
         for index in range(SIZES[split]):
-            assert expressible(get_episode(task, split, index)) == get_task(task).settings
+            assert expressible(get_episode(task, split, index)) == settings_of(get_task(task))
 
 
 @each_task

@@ -7,11 +7,12 @@ from roboirg.core.episode import SPLITS, Episode
 from roboirg.core.errors import SceneRejectedError
 from roboirg.episodes.splits import CYCLE, get_episode, make_episode
 from roboirg.language import variants
+from roboirg.language.settings import settings_of
 from roboirg.tasks import every_task
 
 TASKS = tuple(every_task())
-PAIRS = [(name, setting) for name, task in every_task().items() for setting in task.settings]
-SPATIAL_TASKS = tuple(name for name, task in every_task().items() if "spatial" in task.settings)
+PAIRS = [(name, setting) for name, task in every_task().items() for setting in settings_of(task)]
+SPATIAL_TASKS = tuple(name for name, task in every_task().items() if "spatial" in settings_of(task))
 
 
 def split_episodes(task: str) -> Iterator[Episode]:

@@ -9,7 +9,7 @@ from language_variants import TASKS
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.episodes.splits import get_episode
-from roboirg.language import FORMS, SETTINGS, export
+from roboirg.language import FORMS, export, setting_names
 from roboirg.language.variants import instructions, split_episodes
 
 LISTS = {
@@ -26,7 +26,7 @@ LISTS = {
 def rows():
     """Eight episodes of each task in all settings and forms."""
     episodes = [get_episode(task, "test", index) for task in TASKS for index in range(8)]
-    return tuple(export.row(*one) for one in instructions(episodes, SETTINGS, FORMS))
+    return tuple(export.row(*one) for one in instructions(episodes, setting_names(), FORMS))
 
 
 def test_every_row_has_the_same_columns_and_types():
@@ -100,7 +100,7 @@ def test_arrow_reads_json_lines_and_parquet_alike():
         assert mine.type == theirs.type, mine.name
 
 
-@pytest.mark.parametrize("settings", [SETTINGS, ("explicit",)])
+@pytest.mark.parametrize("settings", [setting_names(), ("explicit",)])
 def test_parquet_has_its_types_whatever_is_in_it(settings):
     pytest.importorskip("pyarrow")
     from pyarrow import parquet
@@ -137,6 +137,6 @@ def test_without_pyarrow_one_sentence_says_what_to_do(monkeypatch):
 
 def test_every_episode_is_there():
     episodes = list(split_episodes("StopCube", "test"))
-    found = [export.row(*one) for one in instructions(episodes, SETTINGS, FORMS)]
+    found = [export.row(*one) for one in instructions(episodes, setting_names(), FORMS)]
     assert len(found) == 50 * 4 * 2  # no spatial setting
     assert [one["episode"] for one in found[::8]] == list(range(50))

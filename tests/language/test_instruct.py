@@ -9,7 +9,7 @@ from language_variants import PAIRS, random_episodes
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.episodes.splits import get_episode
-from roboirg.language import SETTINGS, expressible, instruct
+from roboirg.language import expressible, instruct, setting_names
 from roboirg.language.settings import all_settings
 from roboirg.tasks import every_task
 
@@ -21,7 +21,7 @@ WITHOUT_SPATIAL = ("StopCube", "VideoRepick", "VideoPlaceButton", "VideoPlaceOrd
 
 def test_every_task_has_the_settings_of_the_paper():
     four = ["explicit", "direct", "reasoning", "contextual"]
-    assert [*all_settings()] == [*SETTINGS] == [*four, "spatial"]
+    assert [*all_settings()] == [*setting_names()] == [*four, "spatial"]
     expected = {
         (name, setting)
         for name in every_task()

@@ -15,6 +15,7 @@ from roboirg.episodes.splits import get_episode
 from roboirg.language import expressible, instruct, interpret, interpreter
 from roboirg.language.interpreter.places import Beside, Towards, read_places
 from roboirg.language.interpreter.tokens import split_sentences
+from roboirg.language.settings import settings_of
 from roboirg.tasks import every_task, get_task
 
 FOLDER = Path(interpreter.__file__).parent
@@ -176,7 +177,7 @@ def test_rivals_that_are_not_waved_aside_make_a_text_ambiguous():
 
 @pytest.mark.parametrize("task", every_task())
 def test_case_spaces_digits_and_spelling_do_not_matter(task):
-    for episode, setting in itertools.product(EPISODES[task], get_task(task).settings):
+    for episode, setting in itertools.product(EPISODES[task], settings_of(get_task(task))):
         assert setting in expressible(episode)
         text = instruct(episode, setting).text
         digits = text

@@ -14,6 +14,7 @@ from roboirg.episodes.splits import get_episode
 from roboirg.language import FORMS, STAGE_SETS, instruct, templates
 from roboirg.language.number_words import CARDINALS, ORDINALS
 from roboirg.language.patterns import deduction, sequence
+from roboirg.language.settings import settings_of
 from roboirg.language.variants import tellings
 from roboirg.tasks import every_task, get_task
 
@@ -98,7 +99,7 @@ def test_every_choice_is_noted(task):
             assert templates.PAIR_ANAPHORS[index] in derived.command
         elif derived.metadata["relation"] != "neighbor":
             assert len(noted(derived, "relation/" if named(derived) else "complement/")) == 1
-        if "spatial" in get_task(task).settings:
+        if "spatial" in settings_of(get_task(task)):
             placed = instruct(episode, "spatial")
             assert len(noted(placed, "landmark-")) == len(placed.metadata["landmarks"])
 
@@ -124,7 +125,7 @@ def check_english(text):
     lower = text.lower()
     assert not re.search(r"\ba [aeio]", lower), text
     assert not re.search(r"\ban [^aeiou]", lower), text
-    assert not re.search(r"\b(up|down) it\b|color|favorite|neighbor", text), text
+    assert not re.search(r"\b(up|down) it\b|colour|favourite|neighbour", text), text
     check_numbers(lower)
     check_agreement(lower)
 

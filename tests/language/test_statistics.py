@@ -8,7 +8,8 @@ from language_variants import TASKS
 from rich.console import Console
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
-from roboirg.language import SETTINGS, corpus_statistics, expression_figure, statistics_tables
+from roboirg.language import corpus_statistics, expression_figure, setting_names, statistics_tables
+from roboirg.language.settings import settings_of
 from roboirg.language.variants import instructions, split_episodes
 from roboirg.tasks import every_task
 
@@ -17,7 +18,7 @@ from roboirg.tasks import every_task
 def said():
     """All implicit forms of the test split."""
     episodes = [episode for task in TASKS for episode in split_episodes(task, "test")]
-    return tuple(one for _, one in instructions(episodes, SETTINGS, ("implicit",)))
+    return tuple(one for _, one in instructions(episodes, setting_names(), ("implicit",)))
 
 
 def test_expressions_are_counted_once_per_scene():
@@ -25,7 +26,9 @@ def test_expressions_are_counted_once_per_scene():
     assert corpus_statistics.expression_counts(said() * 2) == counts
     scenes = corpus_statistics.scene_counts(said() * 2)
     assert scenes["direct"] == 50 * len(TASKS)
-    assert scenes["spatial"] == 50 * sum("spatial" in one.settings for one in every_task().values())
+    assert scenes["spatial"] == 50 * sum(
+        "spatial" in settings_of(one) for one in every_task().values()
+    )
     assert "explicit" not in counts
     for setting, by_class in counts.items():
         assert max(by_class.values()) <= scenes[setting]

@@ -10,6 +10,7 @@ from language_variants import SPATIAL_TASKS, TASKS, random_episodes
 
 from roboirg.episodes.splits import SIZES
 from roboirg.language import expressible, instruct, interpret
+from roboirg.language.settings import settings_of
 from roboirg.language.validation import Batch, ValidationResults, random_episode, validate_batch
 from roboirg.tasks import get_task
 
@@ -29,7 +30,7 @@ def test_every_way_of_telling_is_valid(task, split):
     found = evidence(task, split)
     assert not found.failures
     episodes = RANDOM_SCENES if split is None else SIZES[split]
-    read = {setting: found.texts[task, setting] for setting in get_task(task).settings}
+    read = {setting: found.texts[task, setting] for setting in settings_of(get_task(task))}
     # Two forms; four sets of stages with two kinds of distractors; two frames.
     spatial = read.pop("spatial", 4 * episodes)
     assert read == {

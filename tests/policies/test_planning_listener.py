@@ -36,6 +36,7 @@ from roboirg.core.errors import (
 )
 from roboirg.episodes.splits import SIZES, get_episode
 from roboirg.language import instruct, interpret
+from roboirg.language.settings import settings_of
 from roboirg.policies import play
 from roboirg.policies.planning.goal_schema import full_answer, goal_schema
 from roboirg.policies.planning.models import ModelOptions
@@ -149,7 +150,7 @@ def test_a_listener_that_is_told_the_truth_decides_on_the_true_goal_in_all_setti
     with fake_vlm(["{}"]) as server:
         policy = make_listener(server)
         for task, known in every_task().items():
-            for setting, index in itertools.product(known.settings, range(EPISODES)):
+            for setting, index in itertools.product(settings_of(known), range(EPISODES)):
                 episode = get_episode(task, "test", index)
                 env = stand_in(episode, setting)
                 server.answer = hearing(episode)
@@ -157,7 +158,7 @@ def test_a_listener_that_is_told_the_truth_decides_on_the_true_goal_in_all_setti
                 asked += 1
         policy.close()
     assert asked == len(server.requests) == policy.usage()["calls"]
-    assert asked == EPISODES * sum(len(known.settings) for known in every_task().values())
+    assert asked == EPISODES * sum(len(settings_of(known)) for known in every_task().values())
 
 
 def test_random_answers_reach_the_chance_level():

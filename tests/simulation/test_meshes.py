@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays, scalar_dtypes
 
 from roboirg.simulation.model_files import find_model_files
-from roboirg.simulation.rendering import mesh_cache, robot_meshes, table_mesh
+from roboirg.simulation.rendering import mesh_cache, table_mesh
 from roboirg.simulation.rendering.mesh_cache import cached_arrays, packed, unpacked
 from roboirg.util.cache import open_cache
 
@@ -181,7 +181,7 @@ def test_the_table_is_the_installed_one():
 
 def test_code_that_derives_is_part_of_the_key(cache, monkeypatch):
     cached_arrays("thing", b"", dict)
-    monkeypatch.setattr(mesh_cache, "code_of", lambda *_: b"other code")
+    monkeypatch.setattr(mesh_cache, "source_code", lambda *_: b"other code")
     cached_arrays("thing", b"", dict)
     assert len(complete(cache)) == 2
-    assert robot_meshes.code_of("meshes") != mesh_cache.source_code("meshes")
+    assert mesh_cache.source_code("robot_meshes") != mesh_cache.source_code("triangles")

@@ -14,6 +14,7 @@ from roboirg.core.errors import SceneRejectedError
 from roboirg.core.motions import Away, Glow, Shuttle, Vanish, subjects_of
 from roboirg.episodes.fingerprint import plain
 from roboirg.episodes.splits import SIZES, get_episode, make_episode
+from roboirg.language.settings import settings_of
 from roboirg.tasks import every_task, get_task
 from roboirg.tasks.shared.fixtures import bin_footprint, button_footprint, cube_footprint
 from roboirg.tasks.shared.placement import Circle, overlap
@@ -80,7 +81,7 @@ def test_registry_holds_each_task_once_and_in_the_order_of_codes():
 
 @each_task
 def test_settings_are_known_and_begin_with_explicit(task):
-    settings = get_task(task).settings
+    settings = settings_of(get_task(task))
     assert settings[0] == "explicit"
     assert set(settings) <= SETTINGS
     assert ("spatial" in settings) == get_task(task).spatial

@@ -109,10 +109,11 @@ def doctor() -> None:
 @app.command("tasks")
 def list_tasks() -> None:
     """List the tasks, their suites and their settings."""
+    from roboirg.language import settings_of
     from roboirg.tasks import every_task
 
     for task in every_task().values():
-        typer.echo(f"{task.name:<16} {task.suite:<12} {', '.join(task.settings)}")
+        typer.echo(f"{task.name:<16} {task.suite:<12} {', '.join(settings_of(task))}")
 
 
 @app.command("build-splits")
@@ -193,11 +194,12 @@ def instruct(
     from roboirg.episodes.splits import get_episode
     from roboirg.evaluation.plan_parsing import parse_stages, says_all
     from roboirg.language import instruct as make_instruction
+    from roboirg.language import settings_of
     from roboirg.tasks import get_task
 
     spoken = parse_stages(stages)
     found = get_episode(task, split, episode)
-    for name in get_task(task).settings if says_all(setting) else (setting,):
+    for name in settings_of(get_task(task)) if says_all(setting) else (setting,):
         instruction = make_instruction(
             found, name, form, stages=spoken, distractor=distractor, frame=frame
         )

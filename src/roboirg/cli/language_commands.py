@@ -199,11 +199,11 @@ def _tasks(text: str) -> tuple[str, ...]:
 
 def _settings(text: str) -> tuple[str, ...]:
     from roboirg.evaluation.plan_parsing import parse_names, says_all
-    from roboirg.language import SETTINGS
+    from roboirg.language import setting_names
 
     if says_all(text):
-        return SETTINGS
-    return tuple(_known("setting", name, SETTINGS) for name in parse_names("setting", text))
+        return setting_names()
+    return tuple(_known("setting", name, setting_names()) for name in parse_names("setting", text))
 
 
 def _splits(text: str) -> tuple[Split, ...]:

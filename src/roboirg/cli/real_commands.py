@@ -44,7 +44,6 @@ def plan(
 ) -> None:
     """Write a study's plan: plan.json, CSV, and a sheet to print."""
     from roboirg.evaluation.plan_parsing import parse_names, says_all
-    from roboirg.language.instruction import SETTINGS
     from roboirg.real.pages.trial_sheet import check_sheet_support
     from roboirg.real.study.study_plan import make_study
     from roboirg.tasks import find_tasks
@@ -54,7 +53,7 @@ def plan(
     made = make_study(
         policy,
         tasks=find_tasks(parse_names("task", tasks)),
-        settings=SETTINGS if says_all(settings) else parse_names("setting", settings),
+        settings=None if says_all(settings) else parse_names("setting", settings),
         trials=trials,
         demonstrations=demonstrations,
         seed=seed,

@@ -28,7 +28,7 @@ from roboirg.evaluation.plan_parsing import (
     says_all,
     split_name,
 )
-from roboirg.language.instruction import FORMS, SETTINGS, Instruction
+from roboirg.language.instruction import FORMS, Instruction
 from roboirg.records.record import (
     ALL_STAGES,
     DEFAULT_DISTRACTOR,
@@ -225,9 +225,9 @@ class Plan(BaseModel):
         check_observe_every(self.observe_every)
 
     def _check_settings(self, task: str) -> None:
-        has = tasks.get_task(task).settings
+        has = language.settings_of(tasks.get_task(task))
         for setting in () if self.settings == "all" else self.settings:
-            _check_names("setting", (setting,), SETTINGS)
+            _check_names("setting", (setting,), language.setting_names())
             if setting not in has:
                 raise InvalidValueError(
                     f"{task} has no {setting} setting; its settings are {', '.join(has)}."

@@ -24,7 +24,7 @@ from roboirg.episodes.splits import (
     slot_key,
     slot_seed,
 )
-from roboirg.language import expressible
+from roboirg.language import expressible, settings_of
 from roboirg.policies import make_policy, play
 from roboirg.tasks import every_task, get_task
 from roboirg.util.parallel_map import parallel_map
@@ -96,7 +96,7 @@ def check_words(slot: EpisodeSlot, seed: int) -> Rejection | None:
     except SceneRejectedError as error:
         return Rejection(seed, "no room", str(error))
     sayable = expressible(episode)
-    unsaid = [name for name in get_task(slot.task).settings if name not in sayable]
+    unsaid = [name for name in settings_of(get_task(slot.task)) if name not in sayable]
     return Rejection(seed, "not expressible", ", ".join(unsaid)) if unsaid else None
 
 

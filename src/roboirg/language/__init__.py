@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from roboirg.language.generator import STAGE_SETS, expressible, instruct
-from roboirg.language.instruction import FORMS, SETTINGS, Instruction, Mention, Utterance
+from roboirg.language.generator import expressible, instruct
+from roboirg.language.instruction import FORMS, Instruction, Mention, Utterance
 from roboirg.language.interpreter import Interpretation, interpret
+from roboirg.language.request import STAGE_SETS
+from roboirg.language.settings import setting_names, settings_of
 from roboirg.language.templates import LANGUAGE_VERSION
 
 __all__ = [
     "FORMS",
     "LANGUAGE_VERSION",
-    "SETTINGS",
     "STAGE_SETS",
     "Instruction",
     "Interpretation",
@@ -19,4 +20,6 @@ __all__ = [
     "expressible",
     "instruct",
     "interpret",
+    "setting_names",
+    "settings_of",
 ]

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.language.corpus_statistics import expression_counts, expression_order, scene_counts
-from roboirg.language.instruction import SETTINGS, Instruction
+from roboirg.language.instruction import Instruction
+from roboirg.language.settings import setting_names
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -85,7 +86,7 @@ def _drawn(said: Sequence[Instruction], title: str) -> Figure:
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     counts, scenes = expression_counts(said), scene_counts(said)
-    settings = [setting for setting in SETTINGS if setting in counts]
+    settings = [setting for setting in setting_names() if setting in counts]
     classes = expression_order(counts)
     size = (
         PANEL_INCHES * max(1, len(settings)) + SIDE_INCHES,

@@ -7,18 +7,16 @@ from typing import TypeVar
 
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.language.instruction import FORMS, Instruction, Mention, SettingName, Utterance
+from roboirg.language.instruction import FORMS, Instruction, Mention, Utterance
 from roboirg.language.landmarks import FRAMES
 from roboirg.language.phrases import speak
-from roboirg.language.request import DISTRACTORS, InstructionRequest, InstructionSpec
-from roboirg.language.settings import all_settings, get_setting
+from roboirg.language.request import DISTRACTORS, STAGE_SETS, InstructionRequest, InstructionSpec
+from roboirg.language.settings import all_settings, get_setting, settings_of
 from roboirg.language.template_sampler import TemplateSampler
 from roboirg.language.templates import LANGUAGE_VERSION
 from roboirg.tasks import get_task
 
 Name = TypeVar("Name", bound=str)
-
-STAGE_SETS: tuple[tuple[int, ...], ...] = ((1, 5), (1, 2, 5), (1, 2, 3, 5), (1, 2, 3, 4, 5))
 
 _UNSAID: dict[str, object] = {
     "pattern": None,
@@ -65,10 +63,11 @@ def instruct(
     """
     rule = get_setting(setting, get_task(episode.task))
     request = _request(episode, form, stages, distractor, distractors, frame)
-    if not rule.can_say(request):
+    refused = rule.refusal(request)
+    if refused is not None:
         raise InvalidValueError(
             f"The {setting} setting cannot express episode {episode.key} (seed {episode.seed}): "
-            "no landmark tells its target from the other objects."
+            f"{refused}."
         )
     return _instruction(request, rule.name, rule.say(request))
 
@@ -82,8 +81,24 @@ def expressible(episode: Episode, *, frame: str = "robot") -> tuple[str, ...]:
     """
     request = _request(episode, "implicit", STAGE_SETS[-1], "neutral", 1, frame)
     return tuple(
-        name for name in get_task(episode.task).settings if all_settings()[name].can_say(request)
+        name
+        for name in settings_of(get_task(episode.task))
+        if all_settings()[name].refusal(request) is None
     )
+
+
+def can_express(
+    episode: Episode,
+    setting: str,
+    *,
+    stages: Sequence[int] = (1, 2, 3, 4, 5),
+    distractor: str = "neutral",
+    distractors: int = 1,
+    frame: str = "robot",
+) -> bool:
+    """Whether an episode can be told in a setting of its task, with the options of `instruct`."""
+    request = _request(episode, "implicit", stages, distractor, distractors, frame)
+    return get_setting(setting, get_task(episode.task)).refusal(request) is None
 
 
 def _request(
@@ -112,9 +127,7 @@ def _request(
     )
 
 
-def _instruction(
-    request: InstructionRequest, setting: SettingName, draft: InstructionSpec
-) -> Instruction:
+def _instruction(request: InstructionRequest, setting: str, draft: InstructionSpec) -> Instruction:
     utterances, mentions = _spoken(draft)
     return Instruction(
         task=request.task.name,

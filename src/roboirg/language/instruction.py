@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
-SettingName = Literal["explicit", "direct", "reasoning", "contextual", "spatial"]
 Form = Literal["implicit", "resolved"]
 UtteranceStage = Literal["introduction", "reinforcement", "distractor", "cue", "command"]
 Role = Literal["antecedent", "anaphor"]
@@ -15,7 +14,6 @@ Expression = Literal[
     "that", "then", "there", "pair", "other", "before", "after",
 ]  # fmt: skip
 
-SETTINGS: tuple[SettingName, ...] = get_args(SettingName)
 FORMS: tuple[Form, ...] = get_args(Form)
 
 
@@ -59,7 +57,7 @@ class Instruction:
     Attributes:
         task: name of the task.
         episode: the episode's key, ``task/split/index``.
-        setting: one of the five settings.
+        setting: name of the setting, for example ``"direct"``.
         form: ``implicit``, or ``resolved`` with each referring expression of the command
             replaced by what it stands for. The explicit setting is its own resolved form.
         utterances: in the order of speaking; the last one is the command.
@@ -70,7 +68,7 @@ class Instruction:
 
     task: str
     episode: str
-    setting: SettingName
+    setting: str
     form: Form
     utterances: tuple[Utterance, ...]
     mentions: tuple[Mention, ...] = ()

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 from roboirg.core.episode import Color, Episode, Goal, Scene, SceneObject
 from roboirg.core.errors import InvalidValueError
-from roboirg.language.instruction import Form, SettingName, UtteranceStage
+from roboirg.language.instruction import Form, UtteranceStage
 from roboirg.language.landmarks import Frame
 from roboirg.language.phrases import Phrase, fill
 from roboirg.language.template_sampler import TemplateSampler
@@ -17,6 +17,7 @@ from roboirg.tasks import Task, get_task
 
 Distractor = Literal["neutral", "competing"]
 DISTRACTORS: tuple[Distractor, ...] = ("neutral", "competing")
+STAGE_SETS: tuple[tuple[int, ...], ...] = ((1, 5), (1, 2, 5), (1, 2, 3, 5), (1, 2, 3, 4, 5))
 
 SlotTypeName = Literal["number", "visit", "placement", "relation", "color", "amount"]
 SLOT_TYPE_NAMES: Mapping[str, SlotTypeName] = {
@@ -143,21 +144,6 @@ class InstructionSpec:
 
     said: tuple[UtteranceSpec, ...]
     notes: Mapping[str, object] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """One setting of the language.
-
-    Attributes:
-        name: as in `SETTINGS`.
-        say: the words for a request.
-        can_say: whether there are any.
-    """
-
-    name: SettingName
-    say: Callable[[InstructionRequest], InstructionSpec]
-    can_say: Callable[[InstructionRequest], bool] = lambda _request: True
 
 
 # Kept, because the settings and forms of an episode ask the same.

@@ -8,7 +8,8 @@ from rich.table import Table
 
 from roboirg.language import corpus_statistics
 from roboirg.language.corpus_statistics import Counts
-from roboirg.language.instruction import SETTINGS, Instruction
+from roboirg.language.instruction import Instruction
+from roboirg.language.settings import setting_names
 from roboirg.language.templates import RELATIONS, STEPS
 from roboirg.tasks import every_task
 
@@ -34,12 +35,12 @@ def expression_table(counts: Counts) -> Table:
     """In how many scenes each class of referring expression occurs, by setting."""
     classes = corpus_statistics.expression_order(counts)
     title = "Referring expressions (each once per scene)"
-    return _tallied(title, "setting", counts, SETTINGS, classes)
+    return _tallied(title, "setting", counts, setting_names(), classes)
 
 
 def _lengths(lengths: Mapping[str, corpus_statistics.Lengths]) -> Table:
     table = _table("Words per instruction", "setting", ("mean", "fewest", "most"))
-    for setting in SETTINGS:
+    for setting in setting_names():
         if setting in lengths:
             one = lengths[setting]
             table.add_row(setting, f"{one.mean:.1f}", str(one.shortest), str(one.longest))

@@ -8,15 +8,11 @@ from typing import Any, NamedTuple
 
 from roboirg.core.episode import Episode, Split
 from roboirg.episodes.splits import SIZES, get_episode
-from roboirg.language.generator import STAGE_SETS, expressible, instruct
-from roboirg.language.instruction import FORMS, Form, Instruction, SettingName
+from roboirg.language.generator import can_express, expressible, instruct
+from roboirg.language.instruction import FORMS, Form, Instruction
 from roboirg.language.landmarks import FRAMES
-from roboirg.language.request import DISTRACTORS
-from roboirg.language.settings import all_settings
-from roboirg.tasks import all_tasks
-
-EXPLICIT: SettingName = "explicit"
-"""The setting that every other one is compared with; it is no variant."""
+from roboirg.language.settings import EXPLICIT, all_settings, settings_of
+from roboirg.tasks import all_tasks, get_task
 
 
 class Variant(NamedTuple):
@@ -48,26 +44,21 @@ def all_variants() -> tuple[Variant, ...]:
     return tuple(
         Variant(task.name, setting)
         for task in all_tasks().values()
-        for setting in task.settings
+        for setting in settings_of(task)
         if setting != EXPLICIT
     )
 
 
 def tellings(episode: Episode) -> Iterator[Telling]:
-    """Every setting, form, stage set, distractor level and frame in which it can be told."""
-    frames = [frame for frame in FRAMES if "spatial" in expressible(episode, frame=frame)]
-    options: dict[str, list[dict[str, Any]]] = {name: [{}] for name in all_settings()}
-    options["contextual"] = [
-        {"stages": stages, "distractor": distractor}
-        for stages, distractor in itertools.product(STAGE_SETS, DISTRACTORS)
-    ]
-    options["spatial"] = [{"frame": frame} for frame in frames]
-    settings = [*expressible(episode)]
-    if frames and "spatial" not in settings:
-        settings.append("spatial")  # only the camera's frame tells it
-    for setting, form in itertools.product(settings, FORMS):
-        for chosen in options[setting]:
-            yield Telling(setting, form, chosen)
+    """Every setting, form and combination of options in which an episode can be told."""
+    for name in settings_of(get_task(episode.task)):
+        sayable = [
+            options
+            for options in all_settings()[name].variants
+            if can_express(episode, name, **options)
+        ]
+        for form, options in itertools.product(FORMS, sayable):
+            yield Telling(name, form, options)
 
 
 def instructions(

@@ -73,7 +73,8 @@ class StoreContents(NamedTuple):
 class RecordStore:
     """The records of one output folder, open for appending by this process alone.
 
-    Use as a context manager. It keeps a `RecordIndexEntry` of each record in memory, not the record.
+    Use as a context manager. It keeps a `RecordIndexEntry` of each record
+    in memory, not the record itself.
 
     Args:
         folder: made if it does not exist.

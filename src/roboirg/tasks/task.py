@@ -82,9 +82,3 @@ class Task:
     stages: Callable[[Scene, Goal], tuple[Stage, ...]]
     commands: Commands
     demonstration: Callable[[Scene], tuple[Stage, ...]] = _no_stages
-
-    @property
-    def settings(self) -> tuple[str, ...]:
-        """The settings in which the task can be stated, explicit first."""
-        settings = ("explicit", "direct", "reasoning", "contextual")
-        return (*settings, "spatial") if self.spatial else settings

@@ -34,7 +34,7 @@ from roboirg.analysis.tables.table import (
 )
 from roboirg.analysis.tables.table_notes import notes_of
 from roboirg.core.errors import UnknownNameError
-from roboirg.language import STAGE_SETS
+from roboirg.language import STAGE_SETS, settings_of
 from roboirg.records.record import Job
 from roboirg.tasks import all_tasks
 
@@ -202,7 +202,7 @@ def _entry(sample: CellResults | None, applies: bool, rng: np.random.Generator) 
 
 def _applies(task: str, variant: SettingColumn) -> bool:
     known = all_tasks().get(task)
-    return known is None or variant.setting in known.settings
+    return known is None or variant.setting in settings_of(known)
 
 
 def _chance_rows(which: RateTable, columns: Sequence[Column], samples: Samples) -> list[Row]:
@@ -273,7 +273,7 @@ def _coverage() -> Table:
     """The paper's table; the row of this benchmark is read off its tasks."""
     rows = published_coverage()
     kinds = tuple(rows[0].covers)
-    has = {setting for task in all_tasks().values() for setting in task.settings}
+    has = {setting for task in all_tasks().values() for setting in settings_of(task)}
     drawn = []
     for row in rows:
         words = {kind: "yes" if kind in has else "no" for kind in kinds}

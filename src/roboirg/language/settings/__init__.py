@@ -7,19 +7,31 @@ import sys
 from collections.abc import Mapping
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.language.instruction import SETTINGS
-from roboirg.language.request import Setting
+from roboirg.language.setting import Setting
 from roboirg.tasks import Task
 from roboirg.util.discovery import discover
 
-__all__ = ["all_settings", "get_setting"]
+__all__ = ["EXPLICIT", "all_settings", "get_setting", "setting_names", "settings_of"]
+
+EXPLICIT = "explicit"
+"""The setting that every other one is compared with."""
 
 
 @functools.cache
 def all_settings() -> Mapping[str, Setting]:
     """Every setting by name, explicit first."""
-    rules: list[Setting] = discover(sys.modules[__name__], "SETTING")
-    return {rule.name: rule for rule in sorted(rules, key=lambda rule: SETTINGS.index(rule.name))}
+    found: list[Setting] = discover(sys.modules[__name__], "SETTING")
+    return {one.name: one for one in sorted(found, key=lambda one: (one.order, one.name))}
+
+
+def setting_names() -> tuple[str, ...]:
+    """The names of all settings, explicit first."""
+    return tuple(all_settings())
+
+
+def settings_of(task: Task) -> tuple[str, ...]:
+    """The names of the settings in which a task can be stated, explicit first."""
+    return tuple(one.name for one in all_settings().values() if one.applies_to(task))
 
 
 def get_setting(name: str, task: Task) -> Setting:
@@ -31,8 +43,8 @@ def get_setting(name: str, task: Task) -> Setting:
     """
     if name not in all_settings():
         raise UnknownNameError("setting", name, all_settings())
-    if name not in task.settings:
+    if not all_settings()[name].applies_to(task):
         raise InvalidValueError(
-            f"{task.name} has no {name} setting; its settings are {', '.join(task.settings)}."
+            f"{task.name} has no {name} setting; its settings are {', '.join(settings_of(task))}."
         )
     return all_settings()[name]

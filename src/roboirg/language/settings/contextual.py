@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
 from roboirg.language import templates
 from roboirg.language.phrases import Phrase, fill, plain, sentences
-from roboirg.language.request import InstructionRequest, InstructionSpec, Setting, UtteranceSpec
+from roboirg.language.request import (
+    DISTRACTORS,
+    STAGE_SETS,
+    InstructionRequest,
+    InstructionSpec,
+    UtteranceSpec,
+)
+from roboirg.language.setting import Setting
 from roboirg.language.settings import direct
 from roboirg.language.slot_types import slot_types_in
 
@@ -60,4 +68,16 @@ def _competing(request: InstructionRequest) -> Iterator[Phrase]:
     return request.chooser.endless("competing distractor", rivals)
 
 
-SETTING = Setting("contextual", say)
+SETTING = Setting(
+    name="contextual",
+    order=3,
+    summary="direct, with reinforcement, a distractor and a cue before the command",
+    color="#009E73",
+    say=say,
+    reads=frozenset({"stages", "distractor", "distractors"}),
+    variants=tuple(
+        {"stages": stages, "distractor": distractor}
+        for stages, distractor in itertools.product(STAGE_SETS, DISTRACTORS)
+    ),
+    example=1,
+)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from roboirg.language.phrases import sentences
-from roboirg.language.request import InstructionRequest, InstructionSpec, Setting, UtteranceSpec
+from roboirg.language.request import InstructionRequest, InstructionSpec, UtteranceSpec
+from roboirg.language.setting import Setting
 from roboirg.language.settings.explicit import stated
 from roboirg.language.slot_types import Fields, slot_types_in
 
@@ -29,4 +30,11 @@ def say(request: InstructionRequest) -> InstructionSpec:
     return InstructionSpec((introduction(request), command(request)))
 
 
-SETTING = Setting("direct", say)
+SETTING = Setting(
+    name="direct",
+    order=1,
+    summary="an introduction names every value; the command points back at it",
+    color="#0072B2",
+    say=say,
+    example=2,
+)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from roboirg.language.request import InstructionRequest, InstructionSpec, Setting, UtteranceSpec
+from roboirg.language.request import InstructionRequest, InstructionSpec, UtteranceSpec
+from roboirg.language.setting import Setting
 from roboirg.language.slot_types import Fields, slot_types_in
 
 
@@ -19,4 +20,12 @@ def say(request: InstructionRequest) -> InstructionSpec:
     return InstructionSpec((UtteranceSpec("command", request.command(stated(request))),))
 
 
-SETTING = Setting("explicit", say)
+SETTING = Setting(
+    name="explicit",
+    order=0,
+    summary="one command states every value",
+    color="#000000",
+    say=say,
+    hidden_slots=lambda _instruction, _goal: frozenset(),
+    implicit=False,
+)

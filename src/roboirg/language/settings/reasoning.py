@@ -6,9 +6,22 @@ cover is stated explicitly in the command.
 
 from __future__ import annotations
 
+from roboirg.core.episode import Goal
+from roboirg.language.instruction import Instruction
 from roboirg.language.patterns import Pattern, way
-from roboirg.language.request import InstructionRequest, InstructionSpec, Setting, UtteranceSpec
+from roboirg.language.request import COLOR_SLOTS, InstructionRequest, InstructionSpec, UtteranceSpec
+from roboirg.language.setting import Setting
 from roboirg.language.settings.explicit import stated
+
+_COLOR_SLOTS = frozenset(COLOR_SLOTS)
+_DERIVED = {
+    "color exclusion": _COLOR_SLOTS,
+    "number deduction": frozenset(("repeats", "counts", "visit")),
+    "sequential relation": frozenset(("visit", "placement", "relation")),
+    "contextual logic": frozenset(("colors", "relation")),
+}
+"""The slots that each reasoning pattern hides."""
+_HIDE_ONLY_COLOR = ("color exclusion", "contextual logic")
 
 BLOCK = 4
 """Difficulties repeat after so many episodes; see `pattern_of`."""
@@ -36,4 +49,18 @@ def say(request: InstructionRequest) -> InstructionSpec:
     return InstructionSpec(said, {"pattern": name, **derived.notes})
 
 
-SETTING = Setting("reasoning", say)
+def _hidden_slots(instruction: Instruction, goal: Goal) -> frozenset[str]:
+    """The slots of the goal that the episode's pattern derives."""
+    return frozenset(goal.as_mapping()) & _DERIVED[str(instruction.metadata["pattern"])]
+
+
+SETTING = Setting(
+    name="reasoning",
+    order=2,
+    summary="the context gives an intermediate reference, from which the goal is derived",
+    color="#D55E00",
+    say=say,
+    hidden_slots=_hidden_slots,
+    hides_only_color=lambda instruction: instruction.metadata["pattern"] in _HIDE_ONLY_COLOR,
+    example=3,
+)

@@ -10,15 +10,16 @@ from collections.abc import Mapping, Sequence
 from roboirg.core.motions import Swap
 from roboirg.language import templates
 from roboirg.language.instruction import Expression
-from roboirg.language.landmarks import Landmark, landmarks
+from roboirg.language.landmarks import FRAMES, Landmark, landmarks
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain, sentences
 from roboirg.language.request import (
+    COLOR_SLOTS,
     GoalValue,
     InstructionRequest,
     InstructionSpec,
-    Setting,
     UtteranceSpec,
 )
+from roboirg.language.setting import Setting
 from roboirg.language.settings.explicit import stated
 from roboirg.language.slot_types import described
 
@@ -46,9 +47,11 @@ def usable(request: InstructionRequest, part: GoalValue) -> tuple[Landmark, ...]
     return tuple(landmark for landmark in found if landmark.level == best)
 
 
-def can_say(request: InstructionRequest) -> bool:
-    """Whether every color has a thing with a landmark."""
-    return all(usable(request, part) for part in request.colored)
+def refusal(request: InstructionRequest) -> str | None:
+    """Say that no landmark tells a target apart, unless every color has a thing with one."""
+    if all(usable(request, part) for part in request.colored):
+        return None
+    return "no landmark tells its target from the other objects"
 
 
 def say(request: InstructionRequest) -> InstructionSpec:
@@ -98,4 +101,17 @@ def introduction(
     return UtteranceSpec("introduction", sentences(said))
 
 
-SETTING = Setting("spatial", say, can_say)
+SETTING = Setting(
+    name="spatial",
+    order=4,
+    summary="a place tells the thing; the command points there",
+    color="#CC79A7",
+    say=say,
+    applies_to=lambda task: task.spatial,
+    refusal=refusal,
+    hidden_slots=lambda _instruction, goal: frozenset(goal.as_mapping()) & frozenset(COLOR_SLOTS),
+    reads=frozenset({"frame"}),
+    variants=tuple({"frame": frame} for frame in FRAMES),
+    hides_only_color=lambda _instruction: True,
+    example=6,
+)

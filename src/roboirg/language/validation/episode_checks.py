@@ -10,6 +10,7 @@ from roboirg.language.generator import expressible
 from roboirg.language.instruction import Instruction
 from roboirg.language.interpreter import Interpretation, interpret
 from roboirg.language.landmarks import FRAMES
+from roboirg.language.settings import settings_of
 from roboirg.language.validation.evidence import (
     CommandGroup,
     LandmarkGroup,
@@ -124,7 +125,7 @@ def _count(
 def _look_for_landmarks(
     episode: Episode, found: ValidationResults, *, must_be_expressible: bool
 ) -> None:
-    if SPATIAL not in get_task(episode.task).settings:
+    if SPATIAL not in settings_of(get_task(episode.task)):
         return
     for frame in FRAMES:
         group = LandmarkGroup(episode.task, episode.difficulty, frame)

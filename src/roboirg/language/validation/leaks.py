@@ -7,15 +7,8 @@ from typing import cast
 
 from roboirg.core.episode import ALL_COLORS, Goal, SlotValue
 from roboirg.language.instruction import Instruction
+from roboirg.language.settings import all_settings
 
-_COLOR_SLOTS = frozenset(("color", "colors"))
-_DERIVED = {
-    "color exclusion": _COLOR_SLOTS,
-    "number deduction": frozenset(("repeats", "counts", "visit")),
-    "sequential relation": frozenset(("visit", "placement", "relation")),
-    "contextual logic": frozenset(("colors", "relation")),
-}
-"""The slots that each reasoning pattern hides."""
 _NUMBERS = {
     1: frozenset(("1", "one", "ones", "once", "first", "single", "1st")),
     2: frozenset(("2", "two", "twos", "twice", "second", "double", "2nd", "both", "pair")),
@@ -35,20 +28,11 @@ _RANKS = ("first", "second", "third")
 def leaked(instruction: Instruction, goal: Goal) -> frozenset[str]:
     """The words of an implicit command that give a hidden value away, and its landmarks."""
     words = frozenset(re.findall(r"[a-z0-9]+", _without_ranks(instruction).lower()))
-    found = [words & _spellings(goal[slot]) for slot in hidden_slots(instruction, goal)]
+    hidden = all_settings()[instruction.setting].hidden_slots(instruction, goal)
+    found = [words & _spellings(goal[slot]) for slot in hidden]
     places = cast("list[str]", instruction.metadata["landmarks"])
     named = [place for place in places if place in instruction.command]
     return frozenset(named).union(*found)
-
-
-def hidden_slots(instruction: Instruction, goal: Goal) -> frozenset[str]:
-    """The slots that the command of an implicit form must not state."""
-    slots = frozenset(goal.as_mapping())
-    if instruction.setting in ("direct", "contextual"):
-        return slots
-    if instruction.setting == "spatial":
-        return slots & _COLOR_SLOTS
-    return slots & _DERIVED[str(instruction.metadata["pattern"])]
 
 
 def _spellings(value: SlotValue) -> frozenset[str]:

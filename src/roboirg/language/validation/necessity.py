@@ -6,10 +6,9 @@ from collections import Counter
 
 from roboirg.core.episode import Episode, Goal
 from roboirg.language.instruction import Instruction
+from roboirg.language.settings import all_settings
 from roboirg.tasks import get_task
 
-_TOLD_COUNTS: frozenset[object] = frozenset(("spatial", "color exclusion", "contextual logic"))
-"""The setting and the patterns whose commands state numbers and hide colors."""
 _NUMBER_SLOTS = ("repeats", "counts")
 
 
@@ -19,7 +18,7 @@ def only_candidate(episode: Episode, instruction: Instruction) -> bool:
     It does where all cubes have one color, and in BinFill also where only one choice of colors
     has so many cubes each, or where all colors are wanted in equal numbers.
     """
-    if not {instruction.setting, instruction.metadata["pattern"]} & _TOLD_COUNTS:
+    if not all_settings()[instruction.setting].hides_only_color(instruction):
         return False
     candidates = get_task(episode.task).goals(episode.scene)
     wanted = _numbers(episode.goal)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from roboirg.core.episode import Episode
 from roboirg.language.generator import instruct
 from roboirg.language.instruction import Instruction, Mention
-from roboirg.language.variants import EXPLICIT
+from roboirg.language.settings import EXPLICIT
 
 MANY = 4
 """Distractors of the long context that a short one must be the beginning of."""

@@ -9,8 +9,8 @@ from typing import TypeVar
 from rich.table import Table
 
 from roboirg.core.episode import DIFFICULTIES
-from roboirg.language.instruction import SETTINGS
 from roboirg.language.landmarks import FRAMES
+from roboirg.language.settings import setting_names
 from roboirg.language.validation.evidence import CommandGroup, LandmarkGroup, ValidationResults
 from roboirg.tasks import every_task
 
@@ -29,14 +29,18 @@ def validation_tables(found: ValidationResults) -> Iterator[Table]:
 
 
 def _texts(found: ValidationResults) -> Table:
-    table = _table("Texts read back, and rules broken", ("task",), (*SETTINGS, "broken rules"))
+    table = _table(
+        "Texts read back, and rules broken", ("task",), (*setting_names(), "broken rules")
+    )
     broken = Counter((failure.task, failure.setting) for failure in found.failures)
     tasks = _tasks(task for task, _ in found.texts)
     for task in tasks:
-        cells = [_count(found.texts, broken, (task, setting)) for setting in SETTINGS]
-        table.add_row(task, *cells, f"{sum(broken[task, setting] for setting in SETTINGS):,}")
+        cells = [_count(found.texts, broken, (task, setting)) for setting in setting_names()]
+        table.add_row(
+            task, *cells, f"{sum(broken[task, setting] for setting in setting_names()):,}"
+        )
     if len(tasks) > 1:
-        sums = [sum(found.texts[task, setting] for task in tasks) for setting in SETTINGS]
+        sums = [sum(found.texts[task, setting] for task in tasks) for setting in setting_names()]
         table.add_section()
         table.add_row("all tasks", *(f"{one:,}" for one in sums), f"{broken.total():,}")
     return table

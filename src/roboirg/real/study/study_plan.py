@@ -20,7 +20,7 @@ from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.plan_parsing import split_name
-from roboirg.language.instruction import SETTINGS
+from roboirg.language.settings import setting_names, settings_of
 from roboirg.real.study.counterbalancing import balanced_episodes, kind_of
 from roboirg.records.record import DEFAULT_MAX_STEPS, Job
 from roboirg.records.store import write_atomically
@@ -127,7 +127,7 @@ def make_study(
     policies: Sequence[str],
     *,
     tasks: Sequence[str],
-    settings: Sequence[str] = SETTINGS,
+    settings: Sequence[str] | None = None,
     trials: int = DEFAULT_TRIALS,
     demonstrations: int = DEFAULT_DEMONSTRATIONS,
     seed: int = 0,
@@ -139,7 +139,7 @@ def make_study(
     Args:
         policies: specs, ``NAME=SPEC``, or labels of what is not run by `roboirg real run`.
         tasks: of the real robot.
-        settings: in which each arrangement is told.
+        settings: in which each arrangement is told; by default all.
         trials: arrangements per task; each policy is tried on each in every setting.
         demonstrations: per task.
         seed: of the orders.
@@ -152,6 +152,7 @@ def make_study(
     """
     named = [split_name(policy) for policy in policies]
     names = [name for name, _ in named]
+    settings = setting_names() if settings is None else settings
     _check(names, tasks, settings, trials, demonstrations, seed, max_steps)
     rng = np.random.default_rng(seed)
     chosen = {task: balanced_episodes(task, split, trials) for task in tasks}
@@ -276,6 +277,6 @@ def _check(
     for task in tasks:
         kind_of(task)
         for setting in settings:
-            has = get_task(task).settings
+            has = settings_of(get_task(task))
             if setting not in has:
                 raise UnknownNameError(f"setting of {task}", setting, has)
