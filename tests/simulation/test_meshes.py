@@ -184,4 +184,4 @@ def test_code_that_derives_is_part_of_the_key(cache, monkeypatch):
     monkeypatch.setattr(mesh_cache, "source_code", lambda *_: b"other code")
     cached_arrays("thing", b"", dict)
     assert len(complete(cache)) == 2
-    assert mesh_cache.source_code("robot_meshes") != mesh_cache.source_code("triangles")
+    assert robot_meshes.source_code("robot_meshes") != mesh_cache.source_code("robot_meshes")

@@ -12,6 +12,12 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from roboirg import language, policies, tasks
 from roboirg.core.actions import find_action_space
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.instruction_options import (
+    ALL_STAGES,
+    DEFAULT_DISTRACTOR,
+    DEFAULT_DISTRACTORS,
+    DEFAULT_FRAME,
+)
 from roboirg.core.observations import (
     DemonstrationFrames,
     check_demonstration_frames,
@@ -29,17 +35,7 @@ from roboirg.evaluation.plan_parsing import (
     split_name,
 )
 from roboirg.language.instruction import FORMS, Instruction
-from roboirg.records.record import (
-    ALL_STAGES,
-    DEFAULT_DISTRACTOR,
-    DEFAULT_DISTRACTORS,
-    DEFAULT_FRAME,
-    DEFAULT_MAX_STEPS,
-    DEFAULT_MESHES,
-    ERROR_KINDS,
-    ErrorKind,
-    Job,
-)
+from roboirg.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, ERROR_KINDS, ErrorKind, Job
 from roboirg.records.store import write_atomically
 
 PLAN_FILE = "plan.json"

@@ -13,6 +13,13 @@ from typing import Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, JsonValue
 
+from roboirg.core.instruction_options import (
+    ALL_STAGES,
+    DEFAULT_DISTRACTOR,
+    DEFAULT_DISTRACTORS,
+    DEFAULT_FRAME,
+    InstructionOptions,
+)
 from roboirg.core.observations import DemonstrationFrames
 
 SCHEMA_VERSION: Literal[2] = 2
@@ -29,10 +36,6 @@ ERROR_KINDS: tuple[ErrorKind, ...] = get_args(ErrorKind)
 
 FailureKind = Literal["grounding", "execution"]
 
-ALL_STAGES = (1, 2, 3, 4, 5)
-DEFAULT_DISTRACTOR = "neutral"
-DEFAULT_DISTRACTORS = 1
-DEFAULT_FRAME = "robot"
 DEFAULT_MAX_STEPS = 1300
 DEFAULT_MESHES = "faithful"
 
@@ -100,6 +103,13 @@ class Job(_RecordModel):
     observe_every: int | None = None
     meshes: str = DEFAULT_MESHES
     spec: str | None = None
+
+    @property
+    def options(self) -> InstructionOptions:
+        """How the episode is told."""
+        return InstructionOptions(
+            self.setting, self.form, self.stages, self.distractor, self.distractors, self.frame
+        )
 
     @property
     def policy_spec(self) -> str:

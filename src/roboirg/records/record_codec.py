@@ -11,11 +11,13 @@ import msgspec
 from pydantic import ValidationError
 
 from roboirg.core.errors import RoboIRGError
-from roboirg.records.record import (
+from roboirg.core.instruction_options import (
     ALL_STAGES,
     DEFAULT_DISTRACTOR,
     DEFAULT_DISTRACTORS,
     DEFAULT_FRAME,
+)
+from roboirg.records.record import (
     DEFAULT_MAX_STEPS,
     DEFAULT_MESHES,
     IDENTITY,

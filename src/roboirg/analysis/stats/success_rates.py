@@ -8,16 +8,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from roboirg.analysis.stats.intervals import Interval, wilson_interval
-from roboirg.core.observations import DemonstrationFrames
-from roboirg.records.record import (
+from roboirg.core.instruction_options import (
     ALL_STAGES,
     DEFAULT_DISTRACTOR,
     DEFAULT_DISTRACTORS,
     DEFAULT_FRAME,
-    DEFAULT_MESHES,
-    Job,
-    Result,
 )
+from roboirg.core.observations import DemonstrationFrames
+from roboirg.records.record import DEFAULT_MESHES, Job, Result
 
 SETTING_ORDER = ("explicit", "direct", "reasoning", "contextual", "spatial")
 

@@ -1,0 +1,32 @@
+"""The options that select one instruction of an episode: setting, form and what the setting reads."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+ALL_STAGES = (1, 2, 3, 4, 5)
+DEFAULT_DISTRACTOR = "neutral"
+DEFAULT_DISTRACTORS = 1
+DEFAULT_FRAME = "robot"
+
+
+class InstructionOptions(NamedTuple):
+    """How an episode is told. Two equal values give the same words for the same episode.
+
+    Attributes:
+        setting: name of the setting, for example ``"direct"``.
+        form: ``implicit``, or ``resolved`` with the command's referring expressions replaced by
+            what they stand for.
+        stages: of the contextual setting: 1 introduction, 2 reinforcement, 3 distractor, 4 cue,
+            5 command.
+        distractor: of the contextual setting: ``neutral`` or ``competing``.
+        distractors: of the contextual setting: how many.
+        frame: of the spatial setting: whose left and right are meant, ``robot`` or ``camera``.
+    """
+
+    setting: str = "explicit"
+    form: str = "implicit"
+    stages: tuple[int, ...] = ALL_STAGES
+    distractor: str = DEFAULT_DISTRACTOR
+    distractors: int = DEFAULT_DISTRACTORS
+    frame: str = DEFAULT_FRAME
