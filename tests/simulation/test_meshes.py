@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays, scalar_dtypes
 
 from roboirg.simulation.model_files import find_model_files
-from roboirg.simulation.rendering import mesh_cache, table_mesh
+from roboirg.simulation.rendering import mesh_cache, robot_meshes, table_mesh
 from roboirg.simulation.rendering.mesh_cache import cached_arrays, packed, unpacked
 from roboirg.util.cache import open_cache
 

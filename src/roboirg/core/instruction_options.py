@@ -1,4 +1,4 @@
-"""The options that select one instruction of an episode: setting, form and what the setting reads."""
+"""The options that select one instruction of an episode."""
 
 from __future__ import annotations
 
