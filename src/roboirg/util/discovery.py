@@ -41,7 +41,7 @@ def discover(package: ModuleType, attribute: str, kind: type[Thing], group: str)
         InvalidValueError: an entry point cannot be loaded, is of another kind, or takes a name
             that is already in use; the sentence names its package.
     """
-    found = list(_from_modules(package, attribute, kind))
+    found = discover_in_modules(package, attribute, kind)
     taken = {one.name: "roboirg" for one in found}
     for entry, thing in _from_entry_points(attribute, kind, group):
         _take_name(taken, thing, entry, group)
@@ -54,11 +54,11 @@ def entry_point_names(group: str) -> Mapping[str, str]:
     return {entry.name: _distribution(entry) for entry in _sorted_entry_points(group)}
 
 
-def _from_modules(package: ModuleType, attribute: str, kind: type[Thing]) -> Iterator[Thing]:
-    for info in pkgutil.iter_modules(package.__path__):
-        thing = getattr(importlib.import_module(f"{package.__name__}.{info.name}"), attribute, None)
-        if isinstance(thing, kind):
-            yield thing
+def discover_in_modules(package: ModuleType, attribute: str, kind: type[Thing]) -> list[Thing]:
+    """Return what the modules of a package define, in the order of their names."""
+    names = (f"{package.__name__}.{info.name}" for info in pkgutil.iter_modules(package.__path__))
+    things = (getattr(importlib.import_module(name), attribute, None) for name in names)
+    return [thing for thing in things if isinstance(thing, kind)]
 
 
 def _from_entry_points(
@@ -68,7 +68,7 @@ def _from_entry_points(
         where = f"The entry point {entry.name!r} ({entry.value}) of {_distribution(entry)}"
         try:
             thing = entry.load()
-        except Exception as error:  # noqa: BLE001 - another package's code: anything can be raised
+        except Exception as error:
             raise InvalidValueError(
                 f"{where} in the group {group!r} cannot be loaded: {type(error).__name__}: {error}"
             ) from error
