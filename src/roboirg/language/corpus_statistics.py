@@ -1,4 +1,4 @@
-"""What a set of instructions is made of: referring expressions, lengths, patterns, landmarks."""
+"""Statistics of instructions: referring expressions, lengths, patterns, landmarks."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ class Lengths(NamedTuple):
 
 
 Counts = Mapping[str, Mapping[str, int]]
-"""By setting, then by what is counted."""
+"""Counts by group (setting or task), then by class."""
 
 
 def expressions(instruction: Instruction) -> frozenset[str]:
-    """The classes of referring expressions that an instruction contains, each once."""
+    """Return the classes of referring expressions in an instruction."""
     return frozenset(
         mention.expression for mention in instruction.mentions if mention.expression is not None
     )
 
 
 def expression_counts(instructions: Iterable[Instruction]) -> Counts:
-    """In how many scenes each expression class occurs, by setting.
+    """Count the scenes with each expression class, by setting.
 
-    A scene counts once for a setting, however many instructions it has there.
+    A scene counts once for a setting, even if it has several instructions there.
     """
     scenes = {
         (instruction.setting, instruction.episode, expression)
@@ -46,19 +46,19 @@ def expression_counts(instructions: Iterable[Instruction]) -> Counts:
 
 
 def expression_order(counts: Counts) -> tuple[str, ...]:
-    """The classes that occur at all, in the order of their definition."""
+    """Return the classes that occur, in the order of their definition."""
     found = {name for one in counts.values() for name in one}
     return tuple(name for name in get_args(Expression) if name in found)
 
 
 def scene_counts(instructions: Iterable[Instruction]) -> Mapping[str, int]:
-    """How many scenes there are, by setting."""
+    """Count the scenes by setting."""
     scenes = {(instruction.setting, instruction.episode) for instruction in instructions}
     return Counter(setting for setting, _ in scenes)
 
 
 def word_counts(instructions: Iterable[Instruction]) -> Mapping[str, Lengths]:
-    """Lengths of the prompts in words, by setting."""
+    """Return the lengths of the prompts in words, by setting."""
     found: dict[str, list[int]] = {}
     for instruction in instructions:
         found.setdefault(instruction.setting, []).append(len(instruction.text.split()))
@@ -69,17 +69,17 @@ def word_counts(instructions: Iterable[Instruction]) -> Mapping[str, Lengths]:
 
 
 def pattern_counts(instructions: Iterable[Instruction]) -> Counts:
-    """How many instructions use each reasoning pattern as their main one, by task."""
+    """Count the instructions by task and main reasoning pattern."""
     return _tally(instructions, lambda one: _texts(one.metadata.get("pattern")))
 
 
 def relation_counts(instructions: Iterable[Instruction]) -> Counts:
-    """How many instructions use each relation of numbers, by task."""
+    """Count the instructions by task and relation to the reference."""
     return _tally(instructions, lambda one: _texts(one.metadata.get("relation")))
 
 
 def landmark_counts(instructions: Iterable[Instruction]) -> Counts:
-    """How many targets are told by each landmark class, by task."""
+    """Count the targets by task and landmark class."""
     return _tally(instructions, lambda one: _texts(one.metadata.get("landmark_classes")))
 
 

@@ -1,4 +1,4 @@
-"""Phrases that know which of their words refer: filling templates, and exact mention spans.
+"""Fill templates with phrases, and keep the exact spans of mentions.
 
 A template is a sentence with fields and alternatives: ``{cube}`` takes a phrase, and
 ``[was|were]`` takes its first form in the singular and its second in the plural.
@@ -16,7 +16,7 @@ _MARK = re.compile(r"\{(?P<field>[a-z_.0-9]+)\}|\[(?P<one>[^\[\]|]*)\|(?P<many>[
 
 
 class Tag(NamedTuple):
-    """What a piece of text refers to; see `Mention`."""
+    """The referent of a piece of text; see `Mention`."""
 
     role: Role
     expression: Expression | None
@@ -25,7 +25,7 @@ class Tag(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """A run of characters that is one mention (with a tag) or none."""
+    """A run of characters: one mention if it has a tag, else none."""
 
     text: str
     tag: Tag | None = None
@@ -35,25 +35,25 @@ Phrase = tuple[Piece, ...]
 
 
 def plain(text: str) -> Phrase:
-    """Words that refer to nothing."""
+    """Return words that are no mention."""
     return (Piece(text),)
 
 
 def antecedent(text: str, slot: str, value: str | int) -> Phrase:
-    """Words that introduce a slot value."""
+    """Return words that introduce a slot value."""
     return (Piece(text, Tag("antecedent", None, slot, value)),)
 
 
 def anaphor(text: str, expression: Expression, slot: str, value: str | int) -> Phrase:
-    """Words that point back at a slot value."""
+    """Return words that point back at a slot value."""
     return (Piece(text, Tag("anaphor", expression, slot, value)),)
 
 
 def fill(template: str, fields: Mapping[str, Phrase], *, plural: bool = False) -> Phrase:
-    """The template with its fields filled and its alternatives decided.
+    """Fill the fields of a template, and choose singular or plural alternatives.
 
     Raises:
-        KeyError: the template has a field that is not given.
+        KeyError: a field of the template is missing.
     """
     pieces: list[Piece] = []
     end = 0
@@ -70,7 +70,7 @@ def fill(template: str, fields: Mapping[str, Phrase], *, plural: bool = False) -
 
 
 def listed(phrases: Sequence[Phrase]) -> Phrase:
-    """``a``, ``a and b``, ``a, b and c``."""
+    """Join phrases into a list: ``a``, ``a and b``, ``a, b and c``."""
     pieces: list[Piece] = []
     for position, phrase in enumerate(phrases):
         if position:
@@ -81,7 +81,7 @@ def listed(phrases: Sequence[Phrase]) -> Phrase:
 
 
 def sentences(phrases: Iterable[Phrase]) -> Phrase:
-    """Complete sentences one after the other, with a space in between."""
+    """Join complete sentences with spaces."""
     pieces: list[Piece] = []
     for phrase in phrases:
         if pieces:
@@ -93,7 +93,7 @@ def sentences(phrases: Iterable[Phrase]) -> Phrase:
 def speak(
     index: int, stage: UtteranceStage, phrase: Phrase
 ) -> tuple[Utterance, tuple[Mention, ...]]:
-    """The utterance that a phrase becomes as number `index`, and where its mentions are."""
+    """Turn a phrase into the utterance of number `index`, and its tags into mentions."""
     mentions: list[Mention] = []
     start = 0
     for piece in phrase:
@@ -106,5 +106,5 @@ def speak(
 
 
 def _capitalized(text: str) -> str:
-    """A capital at the start of every sentence; no character is added or removed."""
+    """Capitalize every sentence, without adding or removing characters."""
     return re.sub(r"(^|[.!?] )([a-z])", lambda found: found[1] + found[2].upper(), text)

@@ -1,4 +1,4 @@
-"""The settings, one file each; a file that defines ``SETTING`` is a setting of the language."""
+"""The settings of the language: one file each, or installed with another package."""
 
 from __future__ import annotations
 
@@ -9,37 +9,52 @@ from collections.abc import Mapping
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.language.setting import Setting
 from roboirg.tasks import Task
-from roboirg.util.discovery import discover
+from roboirg.util.discovery import discover, load_entry_points
 
 __all__ = ["EXPLICIT", "all_settings", "get_setting", "setting_names", "settings_of"]
 
 EXPLICIT = "explicit"
-"""The setting that every other one is compared with."""
+"""The setting with which every other one is compared."""
+
+ENTRY_POINTS = "roboirg.settings"
+"""Group of the entry points by which installed packages add settings."""
 
 
 @functools.cache
 def all_settings() -> Mapping[str, Setting]:
-    """Every setting by name, explicit first."""
-    found: list[Setting] = discover(sys.modules[__name__], "SETTING")
-    return {one.name: one for one in sorted(found, key=lambda one: (one.order, one.name))}
+    """Return every setting by name, explicit first.
+
+    Raises:
+        InvalidValueError: two settings have the same name, or an entry point is no `Setting`.
+    """
+    found = [*discover(sys.modules[__name__], "SETTING"), *load_entry_points(ENTRY_POINTS)]
+    settings: dict[str, Setting] = {}
+    for one in found:
+        if not isinstance(one, Setting):
+            raise InvalidValueError(f"An entry point of {ENTRY_POINTS} is no Setting: {one!r}.")
+        if one.name in settings:
+            raise InvalidValueError(f"Two settings are named {one.name!r}.")
+        settings[one.name] = one
+    order = sorted(settings.values(), key=lambda one: (one.order, one.name))
+    return {one.name: one for one in order}
 
 
 def setting_names() -> tuple[str, ...]:
-    """The names of all settings, explicit first."""
+    """Return the names of all settings, explicit first."""
     return tuple(all_settings())
 
 
 def settings_of(task: Task) -> tuple[str, ...]:
-    """The names of the settings in which a task can be stated, explicit first."""
+    """Return the names of the settings that a task has, explicit first."""
     return tuple(one.name for one in all_settings().values() if one.applies_to(task))
 
 
 def get_setting(name: str, task: Task) -> Setting:
-    """The setting of that name.
+    """Return a setting of a task by name.
 
     Raises:
-        UnknownNameError: there is none.
-        InvalidValueError: it is not defined for the task.
+        UnknownNameError: the setting does not exist.
+        InvalidValueError: the task lacks it.
     """
     if name not in all_settings():
         raise UnknownNameError("setting", name, all_settings())
