@@ -27,6 +27,7 @@ from roboirg.language.validation.episode_checks import (
 from roboirg.language.validation.validation_run import RANDOM_BASE, random_episode
 from roboirg.language.validation.validation_tables import validation_tables
 from roboirg.tasks import every_task, get_task
+from roboirg.util.plurals import counted
 
 EPISODE = get_episode("PickXtimes", "test", 3)
 
@@ -143,7 +144,7 @@ def test_scenes_without_landmark_are_counted_and_fail_only_in_splits():
     (failure,) = strict.failures
     assert (failure.rule, failure.words) == ("expressible", refusal.reason)
     (table,) = [one for one in validation_tables(found) if "spatial" in str(one.title)]
-    assert table.caption == f"{refusal.reason}: {count}"
+    assert table.caption == f"{refusal.reason}: {counted(count, 'refusal')}"
 
 
 def test_random_scenes_are_not_those_of_the_splits():

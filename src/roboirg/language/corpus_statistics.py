@@ -18,8 +18,8 @@ class Lengths(NamedTuple):
     longest: int
 
 
-Counts = Mapping[str, Mapping[str, int]]
-"""Counts by group (setting or task), then by class."""
+ClassCounts = Mapping[str, Mapping[str, int]]
+"""ClassCounts by group (setting or task), then by class."""
 
 
 def expressions(instruction: Instruction) -> frozenset[str]:
@@ -29,7 +29,7 @@ def expressions(instruction: Instruction) -> frozenset[str]:
     )
 
 
-def expression_counts(instructions: Iterable[Instruction]) -> Counts:
+def expression_counts(instructions: Iterable[Instruction]) -> ClassCounts:
     """Count the scenes with each expression class, by setting.
 
     A scene counts once for a setting, even if it has several instructions there.
@@ -45,7 +45,7 @@ def expression_counts(instructions: Iterable[Instruction]) -> Counts:
     return counts
 
 
-def expression_order(counts: Counts) -> tuple[str, ...]:
+def expression_order(counts: ClassCounts) -> tuple[str, ...]:
     """Return the classes that occur, in the order of their definition."""
     found = {name for one in counts.values() for name in one}
     return tuple(name for name in get_args(Expression) if name in found)
@@ -68,24 +68,24 @@ def word_counts(instructions: Iterable[Instruction]) -> Mapping[str, Lengths]:
     }
 
 
-def pattern_counts(instructions: Iterable[Instruction]) -> Counts:
+def pattern_counts(instructions: Iterable[Instruction]) -> ClassCounts:
     """Count the instructions by task and main reasoning pattern."""
     return _tally(instructions, lambda one: _texts(one.metadata.get("pattern")))
 
 
-def relation_counts(instructions: Iterable[Instruction]) -> Counts:
+def relation_counts(instructions: Iterable[Instruction]) -> ClassCounts:
     """Count the instructions by task and relation to the reference."""
     return _tally(instructions, lambda one: _texts(one.metadata.get("relation")))
 
 
-def landmark_counts(instructions: Iterable[Instruction]) -> Counts:
+def landmark_counts(instructions: Iterable[Instruction]) -> ClassCounts:
     """Count the targets by task and landmark class."""
     return _tally(instructions, lambda one: _texts(one.metadata.get("landmark_classes")))
 
 
 def _tally(
     instructions: Iterable[Instruction], values: Callable[[Instruction], Sequence[str]]
-) -> Counts:
+) -> ClassCounts:
     counts: dict[str, Counter[str]] = {}
     for instruction in instructions:
         for value in values(instruction):

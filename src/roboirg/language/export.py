@@ -18,14 +18,14 @@ from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.language.instruction import Instruction
 from roboirg.tasks import get_task
 
-Format = Literal["jsonl", "parquet"]
-EXPORT_FORMATS: tuple[Format, ...] = get_args(Format)
+ExportFormat = Literal["jsonl", "parquet"]
+EXPORT_FORMATS: tuple[ExportFormat, ...] = get_args(ExportFormat)
 
-Row = dict[str, Any]
+ExportRow = dict[str, Any]
 """Plain JSON values by column."""
 
 
-def row(episode: Episode, instruction: Instruction) -> Row:
+def row(episode: Episode, instruction: Instruction) -> ExportRow:
     """Return an instruction as a row; `docs/language.md` explains the columns."""
     metadata: Mapping[str, Any] = instruction.metadata
     return {
@@ -60,7 +60,7 @@ def row(episode: Episode, instruction: Instruction) -> Row:
     }
 
 
-def _turns(instruction: Instruction) -> list[Row]:
+def _turns(instruction: Instruction) -> list[ExportRow]:
     """Return the utterances, each with its position in the prompt."""
     lengths = [len(utterance.text) + 1 for utterance in instruction.utterances]
     starts = itertools.accumulate(lengths, initial=0)
@@ -70,7 +70,7 @@ def _turns(instruction: Instruction) -> list[Row]:
     ]
 
 
-def _mentions(instruction: Instruction) -> list[Row]:
+def _mentions(instruction: Instruction) -> list[ExportRow]:
     """Return the mentions, with their positions in the prompt."""
     starts = [turn["start"] for turn in _turns(instruction)]
     return [
@@ -94,7 +94,7 @@ def _texts(value: object) -> list[str]:
     return [str(one) for one in (value if isinstance(value, list) else [value])]
 
 
-def encode(rows: Iterable[Row], kind: Format) -> bytes:
+def encode(rows: Iterable[ExportRow], kind: ExportFormat) -> bytes:
     """Return the content of a file with the rows; the same rows give the same bytes.
 
     In Parquet, the bytes also depend on the version of pyarrow.
@@ -105,7 +105,7 @@ def encode(rows: Iterable[Row], kind: Format) -> bytes:
     return _ENCODERS[kind](rows)
 
 
-def check_export_support(kind: Format) -> None:
+def check_export_support(kind: ExportFormat) -> None:
     """Check early that a format can be written.
 
     Raises:
@@ -122,11 +122,11 @@ def check_export_support(kind: Format) -> None:
         ) from error
 
 
-def _jsonl(rows: Iterable[Row]) -> bytes:
+def _jsonl(rows: Iterable[ExportRow]) -> bytes:
     return "".join(f"{json.dumps(one, ensure_ascii=False)}\n" for one in rows).encode()
 
 
-def _parquet(rows: Iterable[Row]) -> bytes:
+def _parquet(rows: Iterable[ExportRow]) -> bytes:
     check_export_support("parquet")
     import pyarrow as pa
     from pyarrow import parquet
@@ -160,13 +160,13 @@ def _struct(*fields: tuple[str, Any]) -> Any:  # noqa: ANN401 - pyarrow ships no
     return pa.struct(list(fields))
 
 
-_ENCODERS: Mapping[Format, Callable[[Iterable[Row]], bytes]] = {
+_ENCODERS: Mapping[ExportFormat, Callable[[Iterable[ExportRow]], bytes]] = {
     "jsonl": _jsonl,
     "parquet": _parquet,
 }
 
 
-def write_rows(rows: Iterable[Row], path: Path, kind: Format) -> None:
+def write_rows(rows: Iterable[ExportRow], path: Path, kind: ExportFormat) -> None:
     """Write the rows to a file, atomically.
 
     Raises:

@@ -58,7 +58,7 @@ def instruct(
             5 command. Each option from here on changes only the settings that read it.
         distractor: ``neutral`` remarks, or ``competing`` ones that name other values.
         distractors: number of remarks.
-        frame: ``robot`` or ``camera``: in which left and right are meant.
+        frame: of left and right, ``robot`` or ``camera``.
 
     Raises:
         UnknownNameError: a name does not exist.
@@ -95,7 +95,7 @@ def find_refusals(episode: Episode, *, frame: str = DEFAULT_FRAME) -> Mapping[st
 
     Args:
         episode: what to say.
-        frame: ``robot`` or ``camera``: in which left and right are meant.
+        frame: of left and right, ``robot`` or ``camera``.
     """
     reasons = {
         name: find_refusal(episode, InstructionOptions(name, frame=frame))
@@ -109,7 +109,7 @@ def expressible(episode: Episode, *, frame: str = DEFAULT_FRAME) -> tuple[str, .
 
     Args:
         episode: what to say.
-        frame: ``robot`` or ``camera``: in which left and right are meant.
+        frame: of left and right, ``robot`` or ``camera``.
     """
     refused = find_refusals(episode, frame=frame)
     return tuple(name for name in settings_of(get_task(episode.task)) if name not in refused)

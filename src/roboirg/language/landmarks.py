@@ -51,13 +51,13 @@ class Landmark(NamedTuple):
     sided: bool = False
 
 
-class Reading(NamedTuple):
+class Ranking(NamedTuple):
     """A quantity to rank objects by, largest first; differences count from `margin` on."""
 
     quantity: Callable[[SceneObject], float]
     margin: float = MARGIN
 
-    def selected(self, candidates: Sequence[SceneObject], rank: int) -> SceneObject | None:
+    def select(self, candidates: Sequence[SceneObject], rank: int) -> SceneObject | None:
         """Return the candidate of a rank (from 0); None unless it is clear by the margin."""
         if rank >= len(candidates):
             return None
@@ -73,17 +73,17 @@ class Reading(NamedTuple):
 class Selector(NamedTuple):
     """A landmark and its meaning: the candidate of rank `rank`.
 
-    Ambiguous words select an object only if all their readings agree on it.
+    Ambiguous words select an object only if all their rankings agree on it.
     """
 
     landmark: Landmark
-    readings: tuple[Reading, ...]
+    rankings: tuple[Ranking, ...]
     candidates: tuple[SceneObject, ...]
     rank: int = 0
 
-    def selected(self) -> SceneObject | None:
+    def select(self) -> SceneObject | None:
         """Return the object that the landmark singles out; None if it is unclear."""
-        first, *others = (reading.selected(self.candidates, self.rank) for reading in self.readings)
+        first, *others = (ranking.select(self.candidates, self.rank) for ranking in self.rankings)
         return first if all(other is first for other in others) else None
 
 
@@ -98,13 +98,13 @@ def landmarks(
         scene: the scene.
         thing: kind of the candidates.
         target: one of the candidates.
-        frame: in which left and right are meant.
+        frame: of left and right.
     """
     found: list[Landmark] = []
     for selector in selectors(scene, thing, frame):
         if found and selector.landmark.level > found[0].level:
             break
-        if selector.selected() is target:
+        if selector.select() is target:
             found.append(selector.landmark)
     return tuple(found)
 
@@ -142,24 +142,24 @@ def candidates_in(scene: Scene, thing: Thing) -> tuple[SceneObject, ...]:
 class _Direction(NamedTuple):
     extreme: str
     rank: str
-    reading: Reading
+    ranking: Ranking
     sided: bool = False
 
 
 def _directions(frame: Frame) -> tuple[_Direction, ...]:
     if frame == "robot":
         robot = "you"
-        left = Reading(lambda item: item.position.y)
+        left = Ranking(lambda item: item.position.y)
     else:
         robot = "the robot"
-        left = Reading(lambda item: -_column(item), COLUMN_MARGIN)
-    right = Reading(_negated(left.quantity), left.margin)
+        left = Ranking(lambda item: -_column(item), COLUMN_MARGIN)
+    right = Ranking(_negated(left.quantity), left.margin)
     near, far = f"closest to {robot}", f"farthest from {robot}"
     return (
         _Direction("at the far left", "from the left", left, sided=True),
         _Direction("at the far right", "from the right", right, sided=True),
-        _Direction(near, near, Reading(lambda item: -item.position.x)),
-        _Direction(far, far, Reading(lambda item: item.position.x)),
+        _Direction(near, near, Ranking(lambda item: -item.position.x)),
+        _Direction(far, far, Ranking(lambda item: item.position.x)),
     )
 
 
@@ -176,14 +176,14 @@ def _column(item: SceneObject) -> float:
 def _extremes(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
     for direction in _directions(frame):
         yield Selector(
-            Landmark(direction.extreme, 1, direction.sided), (direction.reading,), candidates
+            Landmark(direction.extreme, 1, direction.sided), (direction.ranking,), candidates
         )
 
 
 def _sides(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
-    left, right = (direction.reading for direction in _directions(frame) if direction.sided)
-    for side, reading in (("left", left), ("right", right)):
-        yield Selector(Landmark(f"on the {side}", 1, sided=True), (reading,), candidates)
+    left, right = (direction.ranking for direction in _directions(frame) if direction.sided)
+    for side, ranking in (("left", left), ("right", right)):
+        yield Selector(Landmark(f"on the {side}", 1, sided=True), (ranking,), candidates)
 
 
 def _corners(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
@@ -196,8 +196,8 @@ def _corners(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Sele
                 phrase = f"closest to the {side} corner of the table that is {reach} the robot"
                 y = mirrored
             corners = [(area[depth], area[y]) for area in (WORK_AREA, TABLE)]
-            readings = tuple(_nearness(corner) for corner in corners)
-            yield Selector(Landmark(phrase, 2, sided=True), readings, candidates)
+            rankings = tuple(_nearness(corner) for corner in corners)
+            yield Selector(Landmark(phrase, 2, sided=True), rankings, candidates)
 
 
 def _ranks(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
@@ -207,7 +207,7 @@ def _ranks(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Select
             continue
         for direction in _directions(frame):
             landmark = Landmark(f"{ordinal} {direction.rank}", 3, direction.sided)
-            yield Selector(landmark, (direction.reading,), candidates, rank)
+            yield Selector(landmark, (direction.ranking,), candidates, rank)
 
 
 def _fixtures(scene: Scene, candidates: tuple[SceneObject, ...]) -> Iterator[Selector]:
@@ -217,8 +217,8 @@ def _fixtures(scene: Scene, candidates: tuple[SceneObject, ...]) -> Iterator[Sel
             continue
         away = _distance(fixtures[0].position)
         near = Landmark(f"closest to the {kind}", 4)
-        yield Selector(near, (Reading(_negated(away)),), candidates)
-        yield Selector(Landmark(f"farthest from the {kind}", 4), (Reading(away),), candidates)
+        yield Selector(near, (Ranking(_negated(away)),), candidates)
+        yield Selector(Landmark(f"farthest from the {kind}", 4), (Ranking(away),), candidates)
 
 
 def _other_colors(candidates: Sequence[SceneObject]) -> Iterator[Selector]:
@@ -238,7 +238,7 @@ def _chains(
     rank: int = 0,
 ) -> Iterator[Selector]:
     for selector in anchors:
-        anchor = selector.selected()
+        anchor = selector.select()
         if anchor is None:
             continue
         others = _without(candidates, anchor)
@@ -255,8 +255,8 @@ def _without(candidates: Sequence[SceneObject], anchor: SceneObject) -> tuple[Sc
     return tuple(item for item in candidates if item is not anchor)
 
 
-def _nearness(place: Sequence[float]) -> Reading:
-    return Reading(_negated(_distance(place)))
+def _nearness(place: Sequence[float]) -> Ranking:
+    return Ranking(_negated(_distance(place)))
 
 
 def _distance(place: Sequence[float]) -> Callable[[SceneObject], float]:

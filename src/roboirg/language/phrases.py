@@ -24,29 +24,29 @@ class Tag(NamedTuple):
     value: str | int
 
 
-class Piece(NamedTuple):
+class TaggedText(NamedTuple):
     """A run of characters: one mention if it has a tag, else none."""
 
     text: str
     tag: Tag | None = None
 
 
-Phrase = tuple[Piece, ...]
+Phrase = tuple[TaggedText, ...]
 
 
 def plain(text: str) -> Phrase:
     """Return words that are no mention."""
-    return (Piece(text),)
+    return (TaggedText(text),)
 
 
 def antecedent(text: str, slot: str, value: str | int) -> Phrase:
     """Return words that introduce a slot value."""
-    return (Piece(text, Tag("antecedent", None, slot, value)),)
+    return (TaggedText(text, Tag("antecedent", None, slot, value)),)
 
 
 def anaphor(text: str, expression: Expression, slot: str, value: str | int) -> Phrase:
     """Return words that point back at a slot value."""
-    return (Piece(text, Tag("anaphor", expression, slot, value)),)
+    return (TaggedText(text, Tag("anaphor", expression, slot, value)),)
 
 
 def fill(template: str, fields: Mapping[str, Phrase], *, plural: bool = False) -> Phrase:
@@ -55,37 +55,37 @@ def fill(template: str, fields: Mapping[str, Phrase], *, plural: bool = False) -
     Raises:
         KeyError: a field of the template is missing.
     """
-    pieces: list[Piece] = []
+    pieces: list[TaggedText] = []
     end = 0
     for mark in _MARK.finditer(template):
-        pieces.append(Piece(template[end : mark.start()]))
+        pieces.append(TaggedText(template[end : mark.start()]))
         name = mark["field"]
         if name is not None:
             pieces.extend(fields[name])
         else:
-            pieces.append(Piece(mark["many"] if plural else mark["one"]))
+            pieces.append(TaggedText(mark["many"] if plural else mark["one"]))
         end = mark.end()
-    pieces.append(Piece(template[end:]))
+    pieces.append(TaggedText(template[end:]))
     return tuple(piece for piece in pieces if piece.text)
 
 
 def listed(phrases: Sequence[Phrase]) -> Phrase:
     """Join phrases into a list: ``a``, ``a and b``, ``a, b and c``."""
-    pieces: list[Piece] = []
+    pieces: list[TaggedText] = []
     for position, phrase in enumerate(phrases):
         if position:
             last = position == len(phrases) - 1
-            pieces.append(Piece(" and " if last else ", "))
+            pieces.append(TaggedText(" and " if last else ", "))
         pieces.extend(phrase)
     return tuple(pieces)
 
 
 def sentences(phrases: Iterable[Phrase]) -> Phrase:
     """Join complete sentences with spaces."""
-    pieces: list[Piece] = []
+    pieces: list[TaggedText] = []
     for phrase in phrases:
         if pieces:
-            pieces.append(Piece(" "))
+            pieces.append(TaggedText(" "))
         pieces.extend(phrase)
     return tuple(pieces)
 

@@ -83,7 +83,7 @@ class InstructionRequest:
 
     @property
     def frame(self) -> Frame:
-        """The frame in which left and right are meant."""
+        """The frame of left and right."""
         return cast("Frame", self.options.frame)
 
     @property
@@ -96,7 +96,7 @@ class InstructionRequest:
         return tuple(one for one in self.goal_values if one.slot_type == slot_type)
 
     @property
-    def colored(self) -> tuple[GoalValue, ...]:
+    def color_values(self) -> tuple[GoalValue, ...]:
         """The goal values that are colors, counted or not."""
         return tuple(one for one in self.goal_values if one.slot in COLOR_SLOTS)
 

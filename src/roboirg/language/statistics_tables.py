@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from rich.table import Table
 
 from roboirg.language import corpus_statistics
-from roboirg.language.corpus_statistics import Counts
+from roboirg.language.corpus_statistics import ClassCounts
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import setting_names
 from roboirg.language.templates import RELATIONS, STEPS
@@ -31,7 +31,7 @@ def overview_tables(instructions: Sequence[Instruction]) -> Iterator[Table]:
 _RELATIONS = [*(one.name for one in (*RELATIONS, *STEPS)), "neighbor"]
 
 
-def expression_table(counts: Counts) -> Table:
+def expression_table(counts: ClassCounts) -> Table:
     """Return the number of scenes with each class of referring expression, by setting."""
     classes = corpus_statistics.expression_order(counts)
     title = "Referring expressions (each once per scene)"
@@ -48,7 +48,7 @@ def _lengths(lengths: Mapping[str, corpus_statistics.Lengths]) -> Table:
 
 
 def _count_table(
-    title: str, kind: str, counts: Counts, rows: Sequence[str], columns: Sequence[str]
+    title: str, kind: str, counts: ClassCounts, rows: Sequence[str], columns: Sequence[str]
 ) -> Table:
     used = [name for name in columns if any(name in one for one in counts.values())]
     table = _table(title, kind, used)
@@ -58,7 +58,7 @@ def _count_table(
     return table
 
 
-def _found(counts: Counts) -> list[str]:
+def _found(counts: ClassCounts) -> list[str]:
     return sorted({name for one in counts.values() for name in one})
 
 

@@ -13,7 +13,7 @@ from roboirg.language.slot_types import described
 
 def _exclude(request: InstructionRequest) -> Derived:
     """Derive a color as the one outside a pair, and a second one as the other of the pair."""
-    target, *rest = request.colored
+    target, *rest = request.color_values
     others = request.other_colors(target.color)
     pair = request.sampler.pick("pair", list(itertools.permutations(others)))
     both = " and ".join(pair)
@@ -69,11 +69,11 @@ def _rejected(goal_value: GoalValue, pair: tuple[str, ...]) -> str:
 
 def _allows_one(request: InstructionRequest) -> bool:
     # The pair of the first pick determines the second one too, whatever the main pattern.
-    return bool(request.values_of("color")) or len(request.colored) == 1
+    return bool(request.values_of("color")) or len(request.color_values) == 1
 
 
 def _allows_two_amounts(request: InstructionRequest) -> bool:
-    return bool(request.values_of("amount")) and len(request.colored) == 2  # noqa: PLR2004
+    return bool(request.values_of("amount")) and len(request.color_values) == 2  # noqa: PLR2004
 
 
 ONE_COLOR = Pattern(_allows_one, _exclude)

@@ -49,14 +49,14 @@ def usable(request: InstructionRequest, goal_value: GoalValue) -> tuple[Landmark
 
 def refusal(request: InstructionRequest) -> str | None:
     """Return a reason if some color of the goal has no thing with a landmark."""
-    if all(usable(request, goal_value) for goal_value in request.colored):
+    if all(usable(request, goal_value) for goal_value in request.color_values):
         return None
     return "no landmark singles out a target"
 
 
 def say(request: InstructionRequest) -> InstructionSpec:
     """Return an introduction with a landmark for each color, and a command that points there."""
-    colors = request.colored
+    colors = request.color_values
     chosen = [
         request.sampler.pick(f"landmark-{color.field}", usable(request, color)) for color in colors
     ]

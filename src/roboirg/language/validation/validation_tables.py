@@ -16,6 +16,7 @@ from roboirg.language.validation.validation_results import (
     ValidationResults,
 )
 from roboirg.tasks import every_task
+from roboirg.util.plurals import counted
 
 Group = TypeVar("Group", CommandGroup, SceneGroup)
 
@@ -92,22 +93,24 @@ def _refusals(results: ValidationResults, setting: str) -> Table:
         for variant in dict.fromkeys(group.variant for group in scenes)
         for difficulty in DIFFICULTIES
     ]
-    headers = [
-        f"{difficulty}, {variant}" if variant else difficulty for variant, difficulty in columns
-    ]
+    headers = [", ".join(filter(None, (difficulty, variant))) for variant, difficulty in columns]
     table = _table(f"Scenes that the {setting} setting cannot express", ("task",), headers)
     for task in _tasks(group.task for group in scenes):
         groups = [SceneGroup(task, setting, *column) for column in columns]
         shares = [_share(results.refused, results.scenes, group) for group in groups]
         table.add_row(task, *shares)
-    reasons = [
-        (one.reason, count)
-        for one, count in results.reasons.most_common()
-        if one.setting == setting
-    ]
-    if reasons:
-        table.caption = "\n".join(f"{reason}: {count:,}" for reason, count in reasons)
+    table.caption = _reasons(results, setting)
     return table
+
+
+def _reasons(results: ValidationResults, setting: str) -> str | None:
+    """Return one line for each reason, the most common one first; None without refusals."""
+    lines = [
+        f"{refusal.reason}: {counted(count, 'refusal')}"
+        for refusal, count in results.reasons.most_common()
+        if refusal.setting == setting
+    ]
+    return "\n".join(lines) or None
 
 
 def _share(some: Mapping[Group, int], all_: Mapping[Group, int], group: Group) -> str:
