@@ -84,15 +84,6 @@ def test_a_setting_is_in_the_lists_of_its_tasks(register):
         instruct(get_episode("VideoUnmask", "test", 0), "dummy")
 
 
-def test_two_settings_of_one_name_are_refused(register):
-    register(dataclasses.replace(DUMMY, name="direct"))
-    with pytest.raises(InvalidValueError, match="Two settings are named 'direct'"):
-        all_settings()
-    register("no setting")
-    with pytest.raises(InvalidValueError, match="is no Setting"):
-        all_settings()
-
-
 def test_a_refusal_says_why_wherever_it_shows(register):
     register(DUMMY)
     assert "dummy" not in expressible(EPISODE)

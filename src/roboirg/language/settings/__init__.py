@@ -9,15 +9,12 @@ from collections.abc import Mapping
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.language.setting import Setting
 from roboirg.tasks import Task
-from roboirg.util.discovery import discover, load_entry_points
+from roboirg.util.discovery import discover
 
 __all__ = ["EXPLICIT", "all_settings", "get_setting", "setting_names", "settings_of"]
 
 EXPLICIT = "explicit"
 """The setting with which every other one is compared."""
-
-ENTRY_POINTS = "roboirg.settings"
-"""Group of the entry points by which installed packages add settings."""
 
 
 @functools.cache
@@ -25,18 +22,10 @@ def all_settings() -> Mapping[str, Setting]:
     """Return every setting by name, explicit first.
 
     Raises:
-        InvalidValueError: two settings have the same name, or an entry point is no `Setting`.
+        InvalidValueError: an entry point of another package does not give a valid setting.
     """
-    found = [*discover(sys.modules[__name__], "SETTING"), *load_entry_points(ENTRY_POINTS)]
-    settings: dict[str, Setting] = {}
-    for one in found:
-        if not isinstance(one, Setting):
-            raise InvalidValueError(f"An entry point of {ENTRY_POINTS} is no Setting: {one!r}.")
-        if one.name in settings:
-            raise InvalidValueError(f"Two settings are named {one.name!r}.")
-        settings[one.name] = one
-    order = sorted(settings.values(), key=lambda one: (one.order, one.name))
-    return {one.name: one for one in order}
+    found = discover(sys.modules[__name__], "SETTING", Setting, "roboirg.settings")
+    return {one.name: one for one in sorted(found, key=lambda one: (one.order, one.name))}
 
 
 def setting_names() -> tuple[str, ...]:
