@@ -88,7 +88,7 @@ def test_options_of_the_words_are_passed_on(tmp_path: Path):
         (("--forms", "implied"), UnknownNameError, "There is no form 'implied'"),
         (("--tasks", "StopCub"), UnknownNameError, "Did you mean 'StopCube'?"),
         (("--split", "dev"), UnknownNameError, "There is no split 'dev'"),
-        (("--stages", "2,5"), InvalidValueError, "none of the four sets"),
+        (("--stages", "2,5"), InvalidValueError, "must be one of"),
         (("--tasks", "StopCube", "--settings", "spatial"), InvalidValueError, "None of these"),
     ],
 )

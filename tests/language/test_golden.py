@@ -76,7 +76,7 @@ GOLDEN: dict[tuple[str, str], str] = {
 
 
 def digest(task, setting):
-    """A hash of all that is said in 24 episodes."""
+    """A hash of all instructions of 24 episodes."""
     sha = hashlib.sha256()
     for episode in random_episodes(task, 24):
         for options in expressible_options(episode):

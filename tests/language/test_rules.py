@@ -1,4 +1,4 @@
-"""What the language promises: English, exact spans, balanced patterns, noted choices."""
+"""Rules of the language: English, exact spans, balanced patterns, noted choices."""
 
 import functools
 import itertools
@@ -27,7 +27,7 @@ def words_of(text):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_every_text_of_the_splits(task):
-    """English, mentions and what they point at, in every way of telling."""
+    """English, mentions and their referents, in every setting, form and option."""
     for episode in split_episodes(task):
         for options in expressible_options(episode):
             instruction = instruct_with(episode, options)
@@ -71,7 +71,7 @@ def values_of(goal, mention):
 
 
 def referents(mention):
-    """What an anaphor needs to have been introduced."""
+    """The values that must be introduced before an anaphor."""
     if mention.expression == "other":
         return set()  # derived: the goal's value itself never was
     values = mention.value.split(" and ") if mention.expression == "them" else [mention.value]
@@ -145,7 +145,7 @@ THING = "cube|container|box|tape"
 
 
 def check_agreement(lower):
-    """Verbs agree with what stands before them: one thing, or several joined by *and*."""
+    """Verbs agree with their subject: one thing, or several joined by *and*."""
     for sentence in re.split(r"(?<=\.) ", lower):
         several = r"\b(cubes|containers|boxes|tapes|colors|those) (is|was|has)\b"
         assert not re.search(several, sentence), sentence

@@ -1,4 +1,4 @@
-"""Every variant there is, counted in the registry."""
+"""The variants, counted from the registry."""
 
 from collections import Counter
 
@@ -30,7 +30,7 @@ def test_every_variant_has_a_resolved_counterpart():
         assert {(setting, "implicit"), (setting, "resolved")} <= told
 
 
-def test_every_option_is_told():
+def test_every_combination_of_options_is_there():
     for name, task in every_task().items():
         told = list(variants.expressible_options(get_episode(name, "test", 0)))
         assert len(set(told)) == len(told)

@@ -42,8 +42,8 @@ class Setting:
         name: in the command line, records and tables, for example ``"direct"``.
         order: position in lists and tables; explicit is 0.
         summary: one line for docs and help, without a final stop.
-        color: in figures, as ``"#rrggbb"``; choose one that color-blind readers can tell from
-            the others.
+        color: in figures, as ``"#rrggbb"``; ours are from the palette of Okabe and Ito, which
+            color-blind readers can tell apart.
         say: returns the words for a request.
         applies_to: whether a task has the setting.
         refusal: returns why the setting cannot express a request, in words that follow "cannot

@@ -107,7 +107,7 @@ def introduction(
 SETTING = Setting(
     name="spatial",
     order=4,
-    summary="a place tells the thing; the command points there",
+    summary="a place identifies the object; the command points there",
     color="#CC79A7",
     say=say,
     applies_to=lambda task: task.spatial,
