@@ -125,7 +125,7 @@ def _request(episode: Episode, options: InstructionOptions) -> InstructionReques
 def _check_options(options: InstructionOptions) -> None:
     if options.stages not in STAGE_SETS:
         sets = ", ".join(str(one) for one in STAGE_SETS)
-        raise InvalidValueError(f"The stages are {options.stages}; they must be one of {sets}.")
+        raise InvalidValueError(f"The stages {options.stages} must be one of {sets}.")
     count: object = options.distractors
     if isinstance(count, bool) or not isinstance(count, int) or count < 1:
         raise InvalidValueError(f"distractors is {count!r}; it must be a whole number from 1 on.")
