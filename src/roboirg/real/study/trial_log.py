@@ -137,12 +137,12 @@ class TrialLog:
             trial.job, RolloutResult(), started_at=utc_now()
         )
         changes: dict[str, Any] = {
-            "outcome": "success", "error": None, "format_cause": None, "attribution": None,
+            "outcome": "success", "error": None, "cause": None, "attribution": None,
             "video": video or base.video, "details": None,
         }  # fmt: skip
         if choice == VOID_CHOICE:
             words = f"{VOID}; {note}" if note else VOID
-            changes |= {"outcome": "error", "error": "infrastructure", "format_cause": words}
+            changes |= {"outcome": "error", "error": "infrastructure", "cause": words}
         elif choice != SUCCESS:
             choices = {one.key: one for one in failure_choices(trial.episode)}
             if choice not in choices:
@@ -151,7 +151,7 @@ class TrialLog:
                     f"{', '.join(choices)}."
                 )
             found = choices[choice].attribution(base.steps, note)
-            changes |= {"outcome": "failure", "format_cause": found.sentence, "attribution": found}
+            changes |= {"outcome": "failure", "cause": found.sentence, "attribution": found}
         return self._append(trial, base.model_copy(update=changes), said)
 
     def undo(self, *, operator: str) -> str:
@@ -221,7 +221,7 @@ def append(folder: Path, record: Record) -> None:
 def _withdrawn(record: Record) -> Record:
     return record.model_copy(
         update={
-            "outcome": "error", "error": "infrastructure", "format_cause": WITHDRAWN,
+            "outcome": "error", "error": "infrastructure", "cause": WITHDRAWN,
             "attribution": None, "video": None,
         }
     )  # fmt: skip
