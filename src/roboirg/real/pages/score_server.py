@@ -99,7 +99,7 @@ class ScoreServer(LoopbackServer):
         return name, f"The score of {name} was undone."
 
     def _find_video(self, name: str) -> tuple[str, str]:
-        """Return a video's path, or a warning if there is no such file; the verdict counts anyway."""
+        """Return a video's path, or a warning if it does not exist; the verdict counts anyway."""
         if not name:
             return "", ""
         path = PurePosixPath(name)
