@@ -10,7 +10,7 @@ from typing import Any
 from roboirg.policies.remote.http_connection import MSGPACK
 from roboirg.policies.remote.message_codec import pack, unpack
 from roboirg.policies.serving.service import Service
-from roboirg.policies.serving.websocket_server import LARGEST_REQUEST, knows
+from roboirg.policies.serving.websocket_server import LARGEST_REQUEST, is_authorized
 from roboirg.util.http_server import HTTPServerBase, RequestHandler
 
 CLIENT_TIMEOUT_S = 60.0
@@ -65,7 +65,7 @@ class _ChallengeRequestHandler(RequestHandler):
     def do_GET(self) -> None:  # noqa: N802 - name of the base class
         if self.path == "/healthz":
             self.send_text("OK\n")
-        elif self._has_key():
+        elif self._check_key():
             if self.path == "/metadata":
                 self.send_bytes(pack(self.server.metadata), MSGPACK)
             else:
@@ -73,7 +73,7 @@ class _ChallengeRequestHandler(RequestHandler):
 
     def do_POST(self) -> None:  # noqa: N802 - name of the base class
         body = self.read_body(LARGEST_REQUEST, message="Too large.")
-        if body is None or not self._has_key():
+        if body is None or not self._check_key():
             return
         if self.path not in ("/reset", "/infer"):
             self.send_refusal(HTTPStatus.NOT_FOUND, "There is no such page.")
@@ -82,12 +82,12 @@ class _ChallengeRequestHandler(RequestHandler):
         else:
             self._answer(body)
 
-    def _has_key(self) -> bool:
+    def _check_key(self) -> bool:
         """Return whether the client sent the key; refuse the request if not."""
-        known = knows(self.server.key, self.headers.get("Authorization"))
-        if not known:
+        authorized = is_authorized(self.server.key, self.headers.get("Authorization"))
+        if not authorized:
             self.send_refusal(HTTPStatus.UNAUTHORIZED, "The key is missing or wrong.")
-        return known
+        return authorized
 
     def _answer(self, body: bytes) -> None:
         try:
