@@ -59,7 +59,7 @@ class Check:
     remedy: str = ""
 
 
-def examine() -> list[Check]:
+def run_checks() -> list[Check]:
     """Look at everything and return one check for each; takes a few seconds, raises nothing."""
     return [
         _check_python(),
@@ -87,7 +87,7 @@ def report(checks: Sequence[Check]) -> str:
 
 def run_doctor() -> int:
     """Print the report and return the exit code: 0 if every check passed, otherwise 1."""
-    checks = examine()
+    checks = run_checks()
     sys.stdout.write(report(checks) + "\n")
     return 0 if all(check.ok for check in checks) else 1
 
@@ -256,7 +256,7 @@ def _render_test_frame() -> str:
     """
     # Named here and not at the top: only the child process may load them.
     devices = importlib.import_module("roboirg.simulation.rendering.render_device")
-    device = devices.describe(devices.find_render_device())
+    device = devices.describe_device(devices.find_render_device())
     kind = "drawn by the processor" if device.is_software else "GPU"
     # Flushed at once: the next lines may crash this process.
     sys.stdout.write(f"{_DEVICE_PREFIX}{device.name} at {device.alias} ({kind})\n")

@@ -19,13 +19,13 @@ from roboirg.simulation.panda import BASE_LINK, CAMERA_LINK, FINGERS, Panda
 from roboirg.simulation.rendering import culling, robot_meshes, shaders
 from roboirg.simulation.rendering.cameras import Cameras
 from roboirg.simulation.rendering.render_device import render_system
-from roboirg.simulation.rendering.render_mode import FAITHFUL, LIGHT, STOCK, Rendering
+from roboirg.simulation.rendering.render_settings import FAITHFUL, LIGHT, STOCK, RenderSettings
 from roboirg.simulation.scenery import add_scenery
 from roboirg.tasks import all_tasks
 
 pytestmark = pytest.mark.sim
 
-CULLING_ALONE = Rendering(slim_shader=False, meshes="stock")
+CULLING_ALONE = RenderSettings(slim_shader=False, meshes="stock")
 
 MANY_FRAMES = bool(os.environ.get("ROBOIRG_TEST_MANY_FRAMES"))
 """Whether to compare at least 500 frames of oracle's runs over all tasks, not a sample."""
@@ -136,7 +136,7 @@ def test_pictures_are_those_of_the_stock_path():
 def test_each_camera_keeps_its_record_of_what_it_draws(monkeypatch):
     scene = get_episode("PickXtimes", "test", 2).scene
     physics_settings.apply_render_settings()
-    assert culling.keeps_records(), "SAPIEN records differently now: `Bodies.take` became slow"
+    assert culling.keeps_command_buffers(), "SAPIEN keeps no command buffers; culling became slow"
     quick, slow = Stage(scene, FAITHFUL), Stage(scene, FAITHFUL)
     for moment in moments("PickXtimes", 2):
         wanted = quick.show(moment)
@@ -152,7 +152,7 @@ def test_cameras_leave_out_what_they_cannot_see(takes):
         stage.show(moment)
     links = {camera: {} for camera in CAMERAS}
     for camera, drawn in takes:
-        links[camera] |= {it.entity.name: it for it in drawn if it in stage.robot.drawables}
+        links[camera] |= {it.entity.name: it for it in drawn if it in stage.robot.cullable_bodies}
     assert {BASE_LINK, *FINGERS} <= set(links["wrist"])
     assert not {"panda_hand", CAMERA_LINK} & set(links["wrist"])
     triangles = {
@@ -166,7 +166,7 @@ def test_cameras_leave_out_what_they_cannot_see(takes):
 
 def test_a_camera_draws_again_only_when_something_in_its_view_has_moved(takes):
     scene = get_episode("PickXtimes", "test", 2).scene
-    ours, always = Stage(scene, FAITHFUL), Stage(scene, Rendering(culling=False))
+    ours, always = Stage(scene, FAITHFUL), Stage(scene, RenderSettings(culling=False))
     some = moments("PickXtimes", 2, pick=lambda _: range(10, 30))
     for moment in some:
         for mine, wanted in zip(ours.show(moment), always.show(moment), strict=True):
@@ -179,7 +179,7 @@ def test_a_camera_draws_again_only_when_something_in_its_view_has_moved(takes):
 
 def test_an_unknown_shader_is_used_as_it_is(monkeypatch, caplog):
     scene = get_episode("PickXtimes", "test", 2).scene
-    usual = Stage(scene, Rendering(slim_shader=False))
+    usual = Stage(scene, RenderSettings(slim_shader=False))
     with monkeypatch.context() as patch:
         patch.setattr(shaders, "_STOCK_SHA256", "of another version")
         for function in (shaders.slim_shader, robot_meshes._shapes):

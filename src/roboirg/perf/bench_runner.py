@@ -12,8 +12,8 @@ from pathlib import Path
 
 from rich.table import Table
 
-import roboirg
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.version import __version__
 from roboirg.perf.measures import Measure
 
 _SCALES = {"ms": 1e3}
@@ -21,7 +21,7 @@ _SCALES = {"ms": 1e3}
 
 
 @dataclass(frozen=True)
-class Figure:
+class MeasureResult:
     """What came of a measure.
 
     Attributes:
@@ -47,9 +47,9 @@ class Figure:
     reached: bool
 
 
-def run(
+def run_measures(
     measures: Sequence[Measure], rounds: int, tell: Callable[[str], None]
-) -> tuple[Figure, ...]:
+) -> tuple[MeasureResult, ...]:
     """Every measure in every round, ours after its baseline, which is timed once a round.
 
     Args:
@@ -73,10 +73,10 @@ def run(
                     known[measure.baseline] = measure.baseline()
                 base.append(known[measure.baseline])
             own.append(measure.ours())
-    return tuple(map(_figure, measures, ours, baselines))
+    return tuple(map(_summarize, measures, ours, baselines))
 
 
-def _figure(measure: Measure, ours: Sequence[float], baseline: Sequence[float]) -> Figure:
+def _summarize(measure: Measure, ours: Sequence[float], baseline: Sequence[float]) -> MeasureResult:
     value, ratio = statistics.median(ours), None
     reached = value <= measure.goal
     if baseline:
@@ -84,7 +84,7 @@ def _figure(measure: Measure, ours: Sequence[float], baseline: Sequence[float]) 
         if measure.inverse:
             ratio = 1.0 / ratio
         reached = ratio >= measure.goal
-    return Figure(
+    return MeasureResult(
         name=measure.name,
         unit=measure.unit,
         ours=tuple(ours),
@@ -97,9 +97,9 @@ def _figure(measure: Measure, ours: Sequence[float], baseline: Sequence[float]) 
     )
 
 
-def table(figures: Sequence[Figure]) -> Table:
+def results_table(figures: Sequence[MeasureResult]) -> Table:
     """Medians, ratios and goals."""
-    shown = Table(title=f"{roboirg.__version__} on {os.cpu_count()} cores", title_justify="left")
+    shown = Table(title=f"{__version__} on {os.cpu_count()} cores", title_justify="left")
     shown.add_column("measure")
     for name in ("ours", "baseline", "against", "ratio", "goal", ""):
         shown.add_column(name, justify="left" if name == "against" else "right")
@@ -107,8 +107,8 @@ def table(figures: Sequence[Figure]) -> Table:
         base = statistics.median(figure.baseline) if figure.baseline else None
         shown.add_row(
             figure.name,
-            _told(figure.value, figure.unit),
-            "" if base is None else _told(base, figure.unit),
+            _format_value(figure.value, figure.unit),
+            "" if base is None else _format_value(base, figure.unit),
             figure.against,
             "" if figure.ratio is None else f"{figure.ratio:.2f} x",
             f"{'<=' if figure.ratio is None else '>='} {figure.goal:g}",
@@ -117,14 +117,14 @@ def table(figures: Sequence[Figure]) -> Table:
     return shown
 
 
-def write(figures: Sequence[Figure], path: Path) -> None:
+def write_results(figures: Sequence[MeasureResult], path: Path) -> None:
     """All rounds of all figures, and the machine, as JSON.
 
     Raises:
         InvalidValueError: the file cannot be written.
     """
     told = {
-        "roboirg": roboirg.__version__,
+        "roboirg": __version__,
         "python": platform.python_version(),
         "machine": platform.platform(),
         "cores": os.cpu_count(),
@@ -136,5 +136,5 @@ def write(figures: Sequence[Figure], path: Path) -> None:
         raise InvalidValueError(f"{str(path)!r} cannot be written: {error}") from error
 
 
-def _told(value: float, unit: str) -> str:
+def _format_value(value: float, unit: str) -> str:
     return f"{value * _SCALES.get(unit, 1.0):.3g} {unit}"

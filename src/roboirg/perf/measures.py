@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from roboirg.perf import engine, remote_rates, resetting, starting, stepping
+from roboirg.perf import engine_costs, process_costs, remote_rates, reset_times, step_times
 from roboirg.perf.workloads import Workload, as_in_demonstrations, over_the_table
-from roboirg.simulation.rendering.render_mode import LIGHT
+from roboirg.simulation.rendering.render_settings import LIGHT
 
 Timing = Callable[[], float]
 
@@ -39,32 +39,46 @@ class Measure:
 def measures() -> tuple[Measure, ...]:
     """Everything, in the order of the table; a baseline that several have is one function."""
     table, shown = over_the_table(), as_in_demonstrations()
-    video = resetting.shown_episode()
+    video = reset_times.video_episode()
 
     def stock_table() -> float:
-        return stepping.stock(table)
+        return step_times.stock_step(table)
 
     def stock_video() -> float:
-        return stepping.stock(shown)
+        return step_times.stock_step(shown)
 
     def stock_reset() -> float:
-        return resetting.stock(video)
+        return reset_times.stock_reset(video)
 
     stepped = (
-        ("eager step, over the table", lambda: stepping.eager(table), stock_table, 7),
-        ("eager step, as in videos", lambda: stepping.eager(shown), stock_video, 5),
-        ("... light meshes, over the table", lambda: stepping.eager(table, LIGHT), stock_table, 12),
-        ("... light meshes, as in videos", lambda: stepping.eager(shown, LIGHT), stock_video, 10),
-        ("lazy step, 16 to a picture pair", lambda: stepping.lazy(table), stock_table, 70),
+        ("eager step, over the table", lambda: step_times.eager_step(table), stock_table, 7),
+        ("eager step, as in videos", lambda: step_times.eager_step(shown), stock_video, 5),
+        (
+            "... light meshes, over the table",
+            lambda: step_times.eager_step(table, LIGHT),
+            stock_table,
+            12,
+        ),
+        (
+            "... light meshes, as in videos",
+            lambda: step_times.eager_step(shown, LIGHT),
+            stock_video,
+            10,
+        ),
+        ("lazy step, 16 to a picture pair", lambda: step_times.lazy_step(table), stock_table, 70),
     )
     reset = (
-        ("video reset, cold, all frames", lambda: resetting.cold(video, frames=True), 4.5),
-        ("video reset, cold, frames on demand", lambda: resetting.cold(video, frames=False), 30),
-        ("video reset, warm, all frames", lambda: resetting.warm(video, frames=True), 60),
+        ("video reset, cold, all frames", lambda: reset_times.cold_reset(video, frames=True), 4.5),
+        (
+            "video reset, cold, frames on demand",
+            lambda: reset_times.cold_reset(video, frames=False),
+            30,
+        ),
+        ("video reset, warm, all frames", lambda: reset_times.warm_reset(video, frames=True), 60),
     )
     started = (
-        ("next episode in the same process", starting.next_episode, 15),
-        ("process start to first observation", starting.process_start, 5),
+        ("next episode in the same process", process_costs.next_episode, 15),
+        ("process start to first observation", process_costs.process_start, 5),
     )
     return (
         *(Measure(name, ours, base, "stock", goal) for name, ours, base, goal in stepped),
@@ -83,13 +97,19 @@ def measures() -> tuple[Measure, ...]:
             unit="1/s",
             inverse=True,
         ),
-        Measure("run engine, of an episode", engine.engine, engine.episode, "episode", 50),
-        Measure("resuming with 100,000 records", engine.resume, None, "", 3, "s"),
-        Measure("memory of a process", starting.memory, None, "", 0.5, "GiB"),
+        Measure(
+            "run engine, of an episode",
+            engine_costs.engine_time,
+            engine_costs.episode_time,
+            "episode",
+            50,
+        ),
+        Measure("resuming with 100,000 records", engine_costs.resume_time, None, "", 3, "s"),
+        Measure("memory of a process", process_costs.process_memory, None, "", 0.5, "GiB"),
         Measure(
             "steps a second of 2 processes",
-            partial(starting.throughput, 2),
-            partial(starting.throughput, 1),
+            partial(process_costs.throughput, 2),
+            partial(process_costs.throughput, 1),
             "1 process",
             1.6,
             unit="1/s",
@@ -103,15 +123,15 @@ def _floors(table: Workload) -> tuple[Measure, ...]:
     return (
         Measure(
             "eager step against its floor",
-            lambda: stepping.eager(table),
-            lambda: stepping.floor(table),
+            lambda: step_times.eager_step(table),
+            lambda: step_times.floor_step(table),
             "floor",
             0.8,
         ),
         Measure(
             "step without pictures",
-            lambda: stepping.without_pictures(table),
-            lambda: stepping.physics(table),
+            lambda: step_times.undrawn_step(table),
+            lambda: step_times.physics_step(table),
             "physics",
             0.5,
         ),

@@ -8,7 +8,7 @@ import sys
 import time
 from typing import Literal
 
-import roboirg
+from roboirg.envs.factory import make
 
 Path = Literal["ours", "stock"]
 TASK = "PickXtimes"
@@ -17,12 +17,12 @@ TASK = "PickXtimes"
 def observe(path: Path, index: int) -> None:
     """Play an episode without a video up to its first observation."""
     if path == "ours":
-        roboirg.make(TASK, episode=index).reset()
+        make(TASK, episode=index).reset()
         return
     from roboirg.core.observations import CAMERAS
     from roboirg.episodes.splits import get_episode
     from roboirg.simulation.episode_session import EpisodeSession
-    from roboirg.simulation.rendering.render_mode import STOCK
+    from roboirg.simulation.rendering.render_settings import STOCK
 
     session = EpisodeSession(get_episode(TASK, "test", index), visible=True, rendering=STOCK)
     session.play_demonstration()
@@ -51,10 +51,10 @@ def _main(path: Path, what: str) -> None:
             observe(path, 1)
         told["seconds"] = time.perf_counter() - start
     elif what == "memory":
-        from roboirg.perf import stepping
+        from roboirg.perf import step_times
         from roboirg.perf.workloads import over_the_table
 
-        stepping.eager(over_the_table())
+        step_times.eager_step(over_the_table())
         told["gibibytes"] = _most_resident()
     sys.stdout.write(json.dumps(told))
 

@@ -13,8 +13,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-import roboirg
 from roboirg.core.observations import CAMERAS, Demonstration, Observation
+from roboirg.envs.factory import make
 from roboirg.policies import Policy, make_policy, play
 from roboirg.policies.requirements import wanted_cameras
 
@@ -25,7 +25,7 @@ SWING = 0.2
 """Radians."""
 
 
-class Waving:
+class WavingPolicy:
     """Swings the arm to and fro, so that every picture has to be drawn; decides nothing."""
 
     cameras: ClassVar[tuple[str, ...]] = CAMERAS
@@ -53,7 +53,7 @@ class Waving:
 
 def in_process() -> float:
     """Steps a second without a server."""
-    return _rate(make_policy(f"{__name__}:Waving", 0))
+    return _rate(make_policy(f"{__name__}:WavingPolicy", 0))
 
 
 def over_loopback() -> float:
@@ -63,7 +63,7 @@ def over_loopback() -> float:
 
 def _rate(policy: Policy) -> float:
     """The median over some episodes, which a hiccup does not move."""
-    env = roboirg.make(
+    env = make(
         "PickXtimes",
         cameras=wanted_cameras(policy),
         demonstration_frames="none",
@@ -83,7 +83,7 @@ def _server() -> str:
     """The address of a server that lives as long as this process."""
     command = (
         "from roboirg.policies.serving.policy_server import open_server; "
-        f"server = open_server('{__name__}:Waving', 'openpi'); "
+        f"server = open_server('{__name__}:WavingPolicy', 'openpi'); "
         "print(server.url, flush=True); server.listening.serve_forever()"
     )
     child = subprocess.Popen(  # noqa: S603 - this very package

@@ -13,7 +13,7 @@ from roboirg.core.episode import Episode
 from roboirg.episodes.splits import get_episode
 from roboirg.simulation.episode_session import EpisodeSession
 from roboirg.simulation.expert.primitives import MotionPrimitives
-from roboirg.simulation.rendering.render_mode import FAITHFUL, Rendering
+from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
 
 STEPS = 48
 """Control steps of a stretch that are timed."""
@@ -33,7 +33,9 @@ class Workload:
     before: NDArray[np.float64]
     actions: NDArray[np.float64]
 
-    def begun(self, *, visible: bool = True, rendering: Rendering = FAITHFUL) -> EpisodeSession:
+    def begun(
+        self, *, visible: bool = True, rendering: RenderSettings = FAITHFUL
+    ) -> EpisodeSession:
         """The episode, played up to the stretch."""
         session = EpisodeSession(self.episode, visible=visible, rendering=rendering)
         for action in self.before:

@@ -31,8 +31,8 @@ def print_episode(episode: Episode, console: Console) -> None:
         f"[bold]{episode.key}[/] {episode.difficulty}, seed {episode.seed}", highlight=False
     )
     console.print(objects_table(episode.scene))
-    _print_list("moves by itself", motion_lines(episode.scene), console)
-    _print_list("the video shows", video_lines(episode), console)
+    _print_list("moves by itself", describe_motions(episode.scene), console)
+    _print_list("the video shows", describe_video(episode), console)
     goal = ", ".join(f"{slot} {_value(value)}" for slot, value in episode.goal.slots)
     _print_list("goal", [goal], console)
     console.print(instructions_table(episode))
@@ -52,7 +52,7 @@ def objects_table(scene: Scene) -> Table:
     return table
 
 
-def motion_lines(scene: Scene) -> list[str]:
+def describe_motions(scene: Scene) -> list[str]:
     """The scripted movements in words; those that say the same of several objects are one."""
     subjects: dict[str, list[str]] = {}
     for motion in scene.motions:
@@ -61,7 +61,7 @@ def motion_lines(scene: Scene) -> list[str]:
     return [f"{', '.join(names)}: {words}" for words, names in subjects.items()]
 
 
-def video_lines(episode: Episode) -> list[str]:
+def describe_video(episode: Episode) -> list[str]:
     """The stages of the demonstration, and what of it counts."""
     shown = [plain_subgoal(stage) for stage in episode.demonstration if stage.recorded]
     lines = [f"{number}. {words}" for number, words in enumerate(shown, start=1)]

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import roboirg
 from roboirg.core.episode import Episode
 from roboirg.core.errors import MotionPlanningError
 from roboirg.core.observations import CAMERAS
+from roboirg.envs.factory import make
 from roboirg.judging import Status, plain_subgoal
 from roboirg.language import instruct
 from roboirg.policies import make_policy, play
@@ -20,7 +20,7 @@ from roboirg.visualization.key_events import KeyEvents
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
-MOST, FEWEST = 12, 6
+MAX_MOMENTS, MIN_MOMENTS = 12, 6
 """Moments on a sheet; where less than the fewest are remarkable, others fill it up."""
 FILLER_STEPS = 16
 """Control steps between two moments that may fill a sheet up."""
@@ -50,7 +50,7 @@ def play_through(episode: Episode) -> Playthrough:
         RenderDeviceError: no Vulkan device can render.
         MissingDependencyError: the simulator is not installed.
     """
-    env = roboirg.make(episode, cameras=())
+    env = make(episode, cameras=())
     watch = _MomentRecorder(KeyEvents(episode.scene.motions))
     env.set_frame_hook(watch)
     try:
@@ -122,11 +122,11 @@ class _MomentRecorder:
     def chosen(self) -> tuple[SheetPanel, ...]:
         """The most remarkable moments, in order of time."""
         ranked = [self.seen[step] for step in sorted(self.seen)]
-        kept = choose([rank for rank, _ in ranked])
+        kept = choose_moments([rank for rank, _ in ranked])
         return tuple(ranked[position][1] for position in kept)
 
 
-def choose(ranks: Sequence[int]) -> tuple[int, ...]:
+def choose_moments(ranks: Sequence[int]) -> tuple[int, ...]:
     """Which moments go on a sheet, given how remarkable each is, 0 the most.
 
     Rank by rank, as many as fit, evenly spaced where not all do; the last rank only fills a sheet
@@ -135,6 +135,6 @@ def choose(ranks: Sequence[int]) -> tuple[int, ...]:
     kept: list[int] = []
     for rank in (_ESSENTIAL, _STAGE, _HAPPENING, _SHOWN_STAGE, _FILLER):
         candidates = [position for position, one in enumerate(ranks) if one == rank]
-        room = max(0, (FEWEST if rank == _FILLER else MOST) - len(kept))
+        room = max(0, (MIN_MOMENTS if rank == _FILLER else MAX_MOMENTS) - len(kept))
         kept += [candidates[number] for number in evenly_spaced(len(candidates), room)]
     return tuple(sorted(kept))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from roboirg.core.observations import CAMERAS
 from roboirg.perf.workloads import STEPS, Workload
-from roboirg.simulation.rendering.render_mode import FAITHFUL, STOCK, Rendering
+from roboirg.simulation.rendering.render_settings import FAITHFUL, STOCK, RenderSettings
 
 Action = NDArray[np.float64]
 
@@ -20,17 +20,17 @@ CHUNK = 16
 """Control steps per picture pair of a policy that acts in chunks."""
 
 
-def eager(workload: Workload, rendering: Rendering = FAITHFUL) -> float:
+def eager_step(workload: Workload, rendering: RenderSettings = FAITHFUL) -> float:
     """Both pictures after every step."""
     return _with_pictures(workload, rendering, every=1)
 
 
-def lazy(workload: Workload, rendering: Rendering = FAITHFUL) -> float:
+def lazy_step(workload: Workload, rendering: RenderSettings = FAITHFUL) -> float:
     """Both pictures after every chunk."""
     return _with_pictures(workload, rendering, every=CHUNK)
 
 
-def stock(workload: Workload) -> float:
+def stock_step(workload: Workload) -> float:
     """What RoboMME does: everything drawn at every step, color and segmentation fetched."""
     session = workload.begun(rendering=STOCK)
     cameras = session.world.cameras
@@ -45,7 +45,7 @@ def stock(workload: Workload) -> float:
     return _median(workload, step)
 
 
-def floor(workload: Workload) -> float:
+def floor_step(workload: Workload) -> float:
     """Physics and the pictures of what is visible, without rules, words or observations."""
     world = workload.begun().world
     world.cameras.pictures(CAMERAS)
@@ -57,17 +57,17 @@ def floor(workload: Workload) -> float:
     return _median(workload, step)
 
 
-def without_pictures(workload: Workload) -> float:
+def undrawn_step(workload: Workload) -> float:
     """Physics and rules."""
     return _median(workload, workload.begun(visible=False).step, CHUNK)
 
 
-def physics(workload: Workload) -> float:
+def physics_step(workload: Workload) -> float:
     """Physics alone."""
     return _median(workload, workload.begun(visible=False).world.advance, CHUNK)
 
 
-def _with_pictures(workload: Workload, rendering: Rendering, every: int) -> float:
+def _with_pictures(workload: Workload, rendering: RenderSettings, every: int) -> float:
     session = workload.begun(rendering=rendering)
     cameras = session.world.cameras
     cameras.pictures(CAMERAS)

@@ -10,7 +10,7 @@ import sys
 import time
 from multiprocessing.synchronize import Barrier
 
-from roboirg.perf import stepping
+from roboirg.perf import step_times
 from roboirg.perf.probe_process import Path
 from roboirg.perf.workloads import STEPS, over_the_table
 
@@ -31,9 +31,9 @@ def next_episode(path: Path) -> float:
     return _in_process(path, "next")["seconds"]
 
 
-def memory() -> float:
+def process_memory() -> float:
     """What a process holds at most that plays and looks at both cameras, GiB."""
-    return _in_process("ours", "memory")["gibibytes"]
+    return _in_process("ours", "process_memory")["gibibytes"]
 
 
 def throughput(workers: int) -> float:
@@ -58,10 +58,10 @@ _NO_BYTECODE = "PYTHONDONTWRITEBYTECODE"
 
 def _work(barrier: Barrier) -> None:
     workload = over_the_table()
-    stepping.eager(workload)
+    step_times.eager_step(workload)
     barrier.wait()
     for _ in range(_ROUNDS):
-        stepping.eager(workload)
+        step_times.eager_step(workload)
     barrier.wait()
 
 

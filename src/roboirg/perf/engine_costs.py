@@ -18,22 +18,22 @@ from roboirg.evaluation.runner import run_plan
 from roboirg.records.record import EventRecord, Job, Record
 from roboirg.records.store import RECORDS_FILE, RecordStore
 
-MANY = 100_000
+MANY_RECORDS = 100_000
 _EVENTS = 60
 """About as many as an episode of BinFill has."""
 
 
-def engine() -> float:
+def engine_time() -> float:
     """Seconds per episode from plan to record, by way of a worker, if nothing is played."""
     plan = make_plan(["random"], tasks="PickXtimes", settings="explicit,direct", episodes="50")
     clock = _Clock()
     with tempfile.TemporaryDirectory() as folder:
-        run_plan(plan, Path(folder), _nothing, LocalProcesses(1), reporter=clock)
+        run_plan(plan, Path(folder), _unplayed_record, LocalProcesses(1), reporter=clock)
     # Without the start of the process, which a run has once.
     return (clock.times[-1] - clock.times[0]) / (len(clock.times) - 1)
 
 
-def episode() -> float:
+def episode_time() -> float:
     """Seconds per episode of the oracle, without pictures: the quickest there are."""
     plan = make_plan(["oracle"], tasks="PickXtimes,StopCube", settings="explicit", episodes="3")
     start = time.perf_counter()
@@ -44,14 +44,14 @@ def episode() -> float:
     return (time.perf_counter() - start) / len(jobs)
 
 
-def resume() -> float:
+def resume_time() -> float:
     """Seconds until a run that has 100,000 records knows what is left to be played."""
-    plan, folder = _many()
+    plan, folder = _many_records()
     start = time.perf_counter()
     plan.jobs()
     with RecordStore(folder) as store:
-        if len(store.stored) != MANY:
-            raise AssertionError(f"{len(store.stored)} of {MANY} records were found")
+        if len(store.stored) != MANY_RECORDS:
+            raise AssertionError(f"{len(store.stored)} of {MANY_RECORDS} records were found")
     return time.perf_counter() - start
 
 
@@ -67,21 +67,21 @@ class _Clock(SilentReporter):
         self.times.append(time.perf_counter())
 
 
-def _nothing(job: Job) -> Record:
+def _unplayed_record(job: Job) -> Record:
     event = EventRecord(step=1, kind="picked", subject="cube_red")
     course = RolloutResult("success", cause=None, events=[event] * _EVENTS)
     return make_record(job, course, started_at=utc_now())
 
 
 @functools.cache
-def _many() -> tuple[Plan, Path]:
+def _many_records() -> tuple[Plan, Path]:
     """A plan of that many jobs, and a folder with all of their records."""
     plan = make_plan(
         ["random"],
         tasks="PickXtimes",
         settings="explicit,direct",
         episodes="50",
-        policy_seeds=f"0-{MANY // 100 - 1}",
+        policy_seeds=f"0-{MANY_RECORDS // 100 - 1}",
     )
     folder = Path(tempfile.mkdtemp(prefix="roboirg-bench-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
@@ -90,7 +90,7 @@ def _many() -> tuple[Plan, Path]:
         for job in plan.jobs():
             place = (job.episode, job.setting)
             if place not in lines:
-                lines[place] = _nothing(job).model_dump_json().encode() + b"\n"
+                lines[place] = _unplayed_record(job).model_dump_json().encode() + b"\n"
             file.write(
                 lines[place].replace(b'"policy_seed":0', b'"policy_seed":%d' % job.policy_seed)
             )

@@ -8,21 +8,21 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-import roboirg
 from roboirg.core.episode import Episode
 from roboirg.core.observations import CAMERAS
+from roboirg.envs.factory import make
 from roboirg.episodes.splits import get_episode
 from roboirg.simulation.episode_session import EpisodeSession
-from roboirg.simulation.rendering.render_mode import STOCK
+from roboirg.simulation.rendering.render_settings import STOCK
 from roboirg.util.cache import FOLDER_VARIABLE, OFF
 
 
-def shown_episode() -> Episode:
+def video_episode() -> Episode:
     """An episode whose video is neither long nor short: VideoRepick, hard, 150 frames."""
     return get_episode("VideoRepick", "test", 3)
 
 
-def stock(episode: Episode) -> float:
+def stock_reset(episode: Episode) -> float:
     """What RoboMME does: planned and drawn at every reset, color and segmentation fetched."""
     start = time.perf_counter()
     session = EpisodeSession(episode, visible=True, rendering=STOCK)
@@ -37,13 +37,13 @@ def stock(episode: Episode) -> float:
     return time.perf_counter() - start
 
 
-def cold(episode: Episode, *, frames: bool) -> float:
+def cold_reset(episode: Episode, *, frames: bool) -> float:
     """Nothing is cached; the video's frames are read, or left alone."""
     with _cache(OFF):
         return _reset(episode, frames=frames)
 
 
-def warm(episode: Episode, *, frames: bool) -> float:
+def warm_reset(episode: Episode, *, frames: bool) -> float:
     """The demonstration, and its frames if they are read, have been kept by an earlier reset."""
     with tempfile.TemporaryDirectory() as folder, _cache(folder):
         _reset(episode, frames=frames)
@@ -52,7 +52,7 @@ def warm(episode: Episode, *, frames: bool) -> float:
 
 def _reset(episode: Episode, *, frames: bool) -> float:
     start = time.perf_counter()
-    env = roboirg.make(episode)
+    env = make(episode)
     _, info = env.reset()
     if frames:
         video = info["demonstration"]
