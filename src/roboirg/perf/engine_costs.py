@@ -1,4 +1,4 @@
-"""What the run engine costs beside the episodes that it plays."""
+"""Cost of the run engine apart from the episodes it plays."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from roboirg.records.store import RECORDS_FILE, RecordStore
 
 MANY_RECORDS = 100_000
 _EVENTS = 60
-"""About as many as an episode of BinFill has."""
+"""About the number of events in an episode of BinFill."""
 
 
 def engine_time() -> float:
-    """Seconds per episode from plan to record, by way of a worker, if nothing is played."""
+    """Return seconds per episode from plan to record, through a worker that plays nothing."""
     plan = make_plan(["random"], tasks="PickXtimes", settings="explicit,direct", episodes="50")
-    clock = _Clock()
+    clock = _RecordClock()
     with tempfile.TemporaryDirectory() as folder:
         run_plan(plan, Path(folder), _unplayed_record, LocalProcesses(1), reporter=clock)
-    # Without the start of the process, which a run has once.
+    # Excludes starting the process, which a run does once.
     return (clock.times[-1] - clock.times[0]) / (len(clock.times) - 1)
 
 
 def episode_time() -> float:
-    """Seconds per episode of the oracle, without pictures: the quickest there are."""
+    """Return seconds per episode of the oracle without pictures, the fastest kind."""
     plan = make_plan(["oracle"], tasks="PickXtimes,StopCube", settings="explicit", episodes="3")
     start = time.perf_counter()
     jobs = plan.jobs()
@@ -45,7 +45,7 @@ def episode_time() -> float:
 
 
 def resume_time() -> float:
-    """Seconds until a run that has 100,000 records knows what is left to be played."""
+    """Return seconds until a run with 100,000 records knows which jobs remain."""
     plan, folder = _many_records()
     start = time.perf_counter()
     plan.jobs()
@@ -55,8 +55,8 @@ def resume_time() -> float:
     return time.perf_counter() - start
 
 
-class _Clock(SilentReporter):
-    """Notes when records arrive."""
+class _RecordClock(SilentReporter):
+    """Notes the time of each record."""
 
     def __init__(self) -> None:
         self.times: list[float] = []
@@ -69,13 +69,13 @@ class _Clock(SilentReporter):
 
 def _unplayed_record(job: Job) -> Record:
     event = EventRecord(step=1, kind="picked", subject="cube_red")
-    course = RolloutResult("success", cause=None, events=[event] * _EVENTS)
-    return make_record(job, course, started_at=utc_now())
+    result = RolloutResult("success", cause=None, events=[event] * _EVENTS)
+    return make_record(job, result, started_at=utc_now())
 
 
 @functools.cache
 def _many_records() -> tuple[Plan, Path]:
-    """A plan of that many jobs, and a folder with all of their records."""
+    """Return a plan of 100,000 jobs and a folder with all their records."""
     plan = make_plan(
         ["random"],
         tasks="PickXtimes",
@@ -88,10 +88,10 @@ def _many_records() -> tuple[Plan, Path]:
     lines: dict[tuple[int, str], bytes] = {}
     with (folder / RECORDS_FILE).open("wb") as file:
         for job in plan.jobs():
-            place = (job.episode, job.setting)
-            if place not in lines:
-                lines[place] = _unplayed_record(job).model_dump_json().encode() + b"\n"
+            key = (job.episode, job.setting)
+            if key not in lines:
+                lines[key] = _unplayed_record(job).model_dump_json().encode() + b"\n"
             file.write(
-                lines[place].replace(b'"policy_seed":0', b'"policy_seed":%d' % job.policy_seed)
+                lines[key].replace(b'"policy_seed":0', b'"policy_seed":%d' % job.policy_seed)
             )
     return plan, folder

@@ -1,4 +1,4 @@
-"""Seconds per control step, with pictures, without, and with nothing but physics."""
+"""Seconds per control step: with pictures, without pictures, and physics alone."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ CHUNK = 16
 
 
 def eager_step(workload: Workload, rendering: RenderSettings = FAITHFUL) -> float:
-    """Both pictures after every step."""
+    """Time steps with both pictures after every step."""
     return _with_pictures(workload, rendering, every=1)
 
 
 def lazy_step(workload: Workload, rendering: RenderSettings = FAITHFUL) -> float:
-    """Both pictures after every chunk."""
+    """Time steps with both pictures after every chunk."""
     return _with_pictures(workload, rendering, every=CHUNK)
 
 
 def stock_step(workload: Workload) -> float:
-    """What RoboMME does: everything drawn at every step, color and segmentation fetched."""
-    session = workload.begun(rendering=STOCK)
+    """Time steps as in RoboMME: draw everything, fetch color and segmentation at every step."""
+    session = workload.start(rendering=STOCK)
     cameras = session.world.cameras
     cameras.pictures(CAMERAS)
 
@@ -46,8 +46,8 @@ def stock_step(workload: Workload) -> float:
 
 
 def floor_step(workload: Workload) -> float:
-    """Physics and the pictures of what is visible, without rules, words or observations."""
-    world = workload.begun().world
+    """Time physics and pictures of what is visible, without rules, words or observations."""
+    world = workload.start().world
     world.cameras.pictures(CAMERAS)
 
     def step(action: Action) -> None:
@@ -58,17 +58,17 @@ def floor_step(workload: Workload) -> float:
 
 
 def undrawn_step(workload: Workload) -> float:
-    """Physics and rules."""
-    return _median(workload, workload.begun(visible=False).step, CHUNK)
+    """Time physics and rules."""
+    return _median(workload, workload.start(visible=False).step, CHUNK)
 
 
 def physics_step(workload: Workload) -> float:
-    """Physics alone."""
-    return _median(workload, workload.begun(visible=False).world.advance, CHUNK)
+    """Time physics alone."""
+    return _median(workload, workload.start(visible=False).world.advance, CHUNK)
 
 
 def _with_pictures(workload: Workload, rendering: RenderSettings, every: int) -> float:
-    session = workload.begun(rendering=rendering)
+    session = workload.start(rendering=rendering)
     cameras = session.world.cameras
     cameras.pictures(CAMERAS)
     count = 0
@@ -83,13 +83,13 @@ def _with_pictures(workload: Workload, rendering: RenderSettings, every: int) ->
     return _median(workload, step, every)
 
 
-def _median(workload: Workload, step: Callable[[Action], object], together: int = 1) -> float:
-    """Seconds per step: the median over so many steps together, which a hiccup does not move."""
-    gc.collect()  # what an earlier measurement left behind
+def _median(workload: Workload, step: Callable[[Action], object], group: int = 1) -> float:
+    """Return seconds per step: the median over groups of steps, robust against hiccups."""
+    gc.collect()  # left by an earlier measurement
     durations = []
-    for first in range(0, STEPS, together):
+    for first in range(0, STEPS, group):
         start = time.perf_counter()
-        for action in workload.actions[first : first + together]:
+        for action in workload.actions[first : first + group]:
             step(action)
-        durations.append((time.perf_counter() - start) / together)
+        durations.append((time.perf_counter() - start) / group)
     return statistics.median(durations)

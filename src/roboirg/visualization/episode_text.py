@@ -1,4 +1,4 @@
-"""An episode in words and tables for the terminal."""
+"""Description of an episode in words and tables, for the terminal."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from roboirg.language import expressible, instruct, settings_of
 from roboirg.tasks import get_task
 
 MINIMUM_WIDTH = 100
-"""Columns to use where the output is not a terminal."""
+"""Columns if the output is not a terminal."""
 
 _RELATIONS = {"placed": "placed on", "binned": "in", "stopped": "stopped on", "hovering": "over"}
 
 
 def print_episode(episode: Episode, console: Console) -> None:
-    """Everything but pictures: objects, motions, video, goal, and what is said in each setting."""
+    """Print objects, motions, video, goal, and the instruction in each setting."""
     if not console.is_terminal:
         console.width = max(console.width, MINIMUM_WIDTH)
     console.print(
@@ -39,7 +39,7 @@ def print_episode(episode: Episode, console: Console) -> None:
 
 
 def objects_table(scene: Scene) -> Table:
-    """All objects with their places at the start, meters and degrees."""
+    """Return a table of all objects with their initial positions (m) and yaw (degrees)."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for name in ("object", "kind", "color"):
         table.add_column(name)
@@ -53,7 +53,7 @@ def objects_table(scene: Scene) -> Table:
 
 
 def describe_motions(scene: Scene) -> list[str]:
-    """The scripted movements in words; those that say the same of several objects are one."""
+    """Describe the scripted motions; objects with the same motion share a line."""
     subjects: dict[str, list[str]] = {}
     for motion in scene.motions:
         subject, words = _motion_words(motion)
@@ -62,7 +62,7 @@ def describe_motions(scene: Scene) -> list[str]:
 
 
 def describe_video(episode: Episode) -> list[str]:
-    """The stages of the demonstration, and what of it counts."""
+    """Describe the stages of the demonstration and the facts that instructions refer to."""
     shown = [plain_subgoal(stage) for stage in episode.demonstration if stage.recorded]
     lines = [f"{number}. {words}" for number, words in enumerate(shown, start=1)]
     if episode.scene.past:
@@ -77,7 +77,7 @@ def fact_words(fact: Fact) -> str:
 
 
 def instructions_table(episode: Episode) -> Table:
-    """What is said in every setting, and its resolved form."""
+    """Return a table of the instruction in every setting, implicit and resolved."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_lines=False)
     table.add_column("setting", style="bold")
     table.add_column("form", style="dim")
