@@ -97,7 +97,7 @@ def test_the_remarkable_is_chosen_first_and_fillers_only_fill_up():
     assert len(choose_moments([1] * 40)) == MAX_MOMENTS
 
 
-def test_motions_are_told_in_words_and_like_ones_together():
+def test_motions_are_described_and_like_ones_merged():
     over = Fact("over", "cube", "target")
     motions = (
         Away("a", 0, 32),
@@ -122,7 +122,7 @@ def test_motions_are_told_in_words_and_like_ones_together():
     assert fact_words(Fact("still", "robot")) == "robot still"
 
 
-def test_the_video_is_told_by_its_stages_and_by_what_counts():
+def test_the_video_is_described_by_its_stages_and_facts():
     lines = describe_video(get_episode("VideoPlaceButton", "test", 0))
     assert lines[:2] == ["1. pick up the cube", "2. drop the cube onto target"]
     assert "go home" not in " ".join(lines)  # it is not in the video
@@ -151,10 +151,10 @@ def test_a_playthrough_shows_the_start_each_stage_and_the_end():
 
 def test_what_moves_by_itself_is_remarkable_while_it_does():
     episode = get_episode("ButtonUnmaskSwap", "test", 3)
-    happenings = KeyEvents(episode.scene.motions)
-    told = {step: happenings.at(step, 0) for step in range(300)}
-    assert str(told[33]).endswith("container 3 appear")
-    swaps = [step for step, words in told.items() if words and "change places" in words]
+    key_events = KeyEvents(episode.scene.motions)
+    captions = {step: key_events.at(step, 0) for step in range(300)}
+    assert str(captions[33]).endswith("container 3 appear")
+    swaps = [step for step, words in captions.items() if words and "change places" in words]
     count = sum(isinstance(motion, Swap) for motion in episode.scene.motions)
     assert swaps == [90, 140, 190][:count]
 

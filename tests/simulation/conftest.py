@@ -1,4 +1,4 @@
-"""What tests of the simulator share."""
+"""Fixtures for tests of the simulator."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from roboirg.simulation.rendering.culling import CullableBodies
 
 @pytest.fixture
 def takes(monkeypatch):
-    """All pictures that are taken: the camera's name and the bodies that it draws, as a list."""
+    """All pictures taken: the camera's name and a list of the bodies it draws."""
     taken, take_picture = [], CullableBodies.take_picture
 
     def noted(self, camera, visible):

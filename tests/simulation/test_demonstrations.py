@@ -1,4 +1,4 @@
-"""Demonstrations: a replay is the demonstration to the last bit, and a cache changes nothing."""
+"""Demonstrations: replays are exact, and the cache changes nothing."""
 
 import os
 import pickle
@@ -36,7 +36,7 @@ def cache(tmp_path, monkeypatch):
 
 @pytest.fixture
 def unplanned(monkeypatch):
-    """Makes planning a mistake."""
+    """Makes planning fail once called."""
 
     def forbid():
         monkeypatch.setattr(MotionPrimitives, "perform", None)
@@ -46,7 +46,7 @@ def unplanned(monkeypatch):
 
 @pytest.fixture
 def drawn(monkeypatch):
-    """Which pictures have been drawn."""
+    """Cameras whose pictures have been drawn, in order."""
     names, picture = [], Cameras.picture
 
     def counted(self, camera):
@@ -82,11 +82,11 @@ def test_a_replay_is_the_demonstration_to_the_last_bit(task, visible):
     )
     first, second = [], []
     made = planned.play_demonstration(lambda _: first.append(planned.state_hash()))
-    kept = Recording.from_bytes(made.to_bytes())
-    again = replayed.play_demonstration(lambda _: second.append(replayed.state_hash()), kept)
+    restored = Recording.from_bytes(made.to_bytes())
+    again = replayed.play_demonstration(lambda _: second.append(replayed.state_hash()), restored)
     assert first == second
-    assert len(first) == kept.video_length(planned.episode) > 0
-    assert again.end == made.end == kept.end
+    assert len(first) == restored.video_length(planned.episode) > 0
+    assert again.end == made.end == restored.end
     assert planned.events == replayed.events
     # What cannot be read, such as the solver's memory of contacts, shows in what comes next.
     rng = np.random.default_rng(5)
@@ -192,7 +192,7 @@ def test_every_nth_picture_or_none_if_that_is_wanted(drawn):
 
 
 def story(task=SHORT):
-    """All that an environment and a run tell."""
+    """Everything that an environment and a run return."""
     _, observation, info = reset(task, cameras=("front", "wrist"), depth=True, grounded=True)
     job = Job(policy=f"{__name__}:Viewer", task=task, split="test", episode=1, setting="direct")
     record = EpisodeRunner(None)(job).model_dump(
@@ -203,7 +203,7 @@ def story(task=SHORT):
 
 
 class Viewer:
-    """Acts by what it has seen of the video."""
+    """Acts on the pictures of the video."""
 
     def reset(self, instruction, demonstration):
         self.seen = demonstration["wrist_rgb"].mean(axis=(1, 2, 3))
@@ -281,7 +281,7 @@ def test_a_replay_that_ends_differently_is_replaced_and_told(cache, caplog, faul
     assert len(caplog.records) == 1
 
 
-def test_who_looks_on_sees_the_right_demonstration_once(cache):
+def test_a_frame_hook_sees_the_right_demonstration_once(cache):
     _, _, _ = reset()
     (entry,) = cache.glob("actions/*")
     store = demonstration_cache.open_cache("actions")
@@ -337,9 +337,9 @@ def test_two_processes_may_fill_the_cache_at_once(cache):
     for process in processes:
         process.stdin.write("\n")
         process.stdin.flush()
-    told = [process.communicate(timeout=120) for process in processes]
-    assert [complaints for _, complaints in told] == ["", ""]
-    assert len({line for lines, _ in told for line in lines.splitlines()}) == 1
+    outputs = [process.communicate(timeout=120) for process in processes]
+    assert [errors for _, errors in outputs] == ["", ""]
+    assert len({line for lines, _ in outputs for line in lines.splitlines()}) == 1
     for kind in ("actions", "frames"):
         assert len(list(cache.glob(f"{kind}/*"))) == 1
 
@@ -356,9 +356,9 @@ def test_keys_change_with_what_determines_a_demonstration(monkeypatch):
             assert demonstration_cache.recording_key(episode) != key
         demonstration_cache._platform_fingerprint.cache_clear()
     assert demonstration_cache.recording_key(episode) == key
-    ground = demonstration_cache._platform_fingerprint()
+    fingerprint = demonstration_cache._platform_fingerprint()
     for part in ("sapien 3", "numpy ", "scipy ", "toppra ", "python 3"):
-        assert part in ground
+        assert part in fingerprint
 
 
 def test_pictures_drawn_otherwise_are_other_entries(cache):
@@ -377,10 +377,10 @@ def test_pictures_drawn_otherwise_are_other_entries(cache):
 
 
 def test_a_recording_survives_as_it_is():
-    moves = [RecordedStep(1, np.nextafter(np.arange(8.0), 9.0)), RecordedStep(2, np.full(8, -0.0))]
-    recording = Recording.from_steps(moves, "ab12")
+    steps = [RecordedStep(1, np.nextafter(np.arange(8.0), 9.0)), RecordedStep(2, np.full(8, -0.0))]
+    recording = Recording.from_steps(steps, "ab12")
     again = Recording.from_bytes(recording.to_bytes())
     assert again.actions.tobytes() == recording.actions.tobytes()
-    assert [move.stage for move in again.steps()] == [1, 2]
+    assert [step.stage for step in again.steps()] == [1, 2]
     assert again.end == "ab12"
     assert Recording.from_steps([], "").actions.shape == (0, 8)

@@ -1,4 +1,4 @@
-"""Derived meshes: exact, kept in the common cache, and the same whatever happens to that."""
+"""Derived meshes: exact, cached, and unaffected by damage to the cache."""
 
 import os
 import signal
@@ -100,7 +100,7 @@ def told_by(process):
 
 @pytest.fixture(scope="module")
 def right(tmp_path_factory):
-    """A filled cache and the picture that its meshes give."""
+    """A filled cache and the checksum of a picture with its meshes."""
     cache = tmp_path_factory.mktemp("filled") / "meshes"
     processes = [filler(cache) for _ in range(2)]
     for process in processes:

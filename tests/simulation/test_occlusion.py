@@ -1,4 +1,4 @@
-"""What can be seen of what never moves, against a painter that tries every triangle and pixel."""
+"""Occlusion culling, compared with a renderer that tries every triangle and pixel."""
 
 import numpy as np
 import pytest
@@ -16,9 +16,9 @@ from roboirg.simulation.rendering.viewpoint import (
 )
 
 GRID = 256
-"""Parts of a pixel to which renderers round the places of corners."""
+"""Subpixel grid to which renderers round corners."""
 WINDOW = 12
-"""Pixels around the picture's middle in which everything happens."""
+"""Half width of the tested area at the picture's center, pixels."""
 
 
 DEPTH_NOISE = 1e-5
@@ -26,9 +26,9 @@ DEPTH_NOISE = 1e-5
 
 
 def painted(corners, shift, noise, *, both_sides):
-    """The triangle that a renderer would show at each pixel of the window; -1 for none.
+    """Return the triangle that a renderer would show at each pixel of the window; -1 for none.
 
-    Each triangle's corners are shifted by so many pixels, and its depth by so many meters.
+    `shift` displaces each triangle's corners (pixels) and `noise` its depth (m).
     """
     places = FOCAL_LENGTH * corners[..., :2] / corners[..., 2:] + SIZE / 2
     places = np.round((places + shift) * GRID) / GRID

@@ -65,17 +65,17 @@ class Stage:
 
 
 def moments(task, index, pick=lambda count: np.linspace(0, count - 1, FRAMES).astype(int)):
-    """Moments of an oracle's run, by default so many from all of it."""
+    """Return evenly spaced moments of an oracle's run."""
     taken = []
 
     def note(env, _demonstration):
         world = env.session.world
-        things = world.bodies.values()
+        bodies = world.bodies.values()
         taken.append(
             (
                 world.robot.articulation.get_qpos().copy(),
-                [thing.entity.pose for thing in things],
-                [None if it.button is None else it.button.get_qpos().copy() for it in things],
+                [body.entity.pose for body in bodies],
+                [None if it.button is None else it.button.get_qpos().copy() for it in bodies],
             )
         )
 
@@ -193,7 +193,7 @@ def test_an_unknown_shader_is_used_as_it_is(monkeypatch, caplog):
         function.cache_clear()
 
 
-def test_a_damaged_shader_in_the_cache_is_written_anew(monkeypatch, tmp_path):
+def test_a_damaged_shader_in_the_cache_is_rewritten(monkeypatch, tmp_path):
     monkeypatch.setenv("ROBOIRG_CACHE", str(tmp_path))
     folder = Path(shaders.slim_shader.__wrapped__())
     assert folder.is_relative_to(tmp_path)
