@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, TypedDict, Unpack
 from roboirg.core.errors import MissingDependencyError
 
 if TYPE_CHECKING:
-    # Both load NumPy, which `import roboirg` must not.
+    # Not at run time: these load NumPy and SAPIEN, which `import roboirg` must not.
     from roboirg.core.episode import Episode
     from roboirg.core.observations import DemonstrationFrames
     from roboirg.envs.environment import RoboIRGEnv
 
 
 class EnvOptions(TypedDict, total=False):
-    """Options of an environment; `RoboIRGEnv` has the same ones with their defaults."""
+    """Keyword arguments of `make`; `RoboIRGEnv` has the same ones, with defaults."""
 
     setting: str
     """Explicit, direct, reasoning, contextual or spatial."""

@@ -48,7 +48,7 @@ class MotionPlayer:
         players = [
             _player(motion, bodies, spot) for motion, spot in zip(motions, spots, strict=True)
         ]
-        # Swaps come first: a returning object is placed where another one is by then.
+        # Swaps come first: an object that returns under another needs that one's new position.
         self._players = sorted(players, key=lambda player: not isinstance(player, _SwapPlayer))
 
     def before_step(self, context: MotionContext) -> None:

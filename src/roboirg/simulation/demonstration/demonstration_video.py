@@ -29,7 +29,7 @@ class DemonstrationVideo(Mapping[str, NDArray[Any]]):
 
     Args:
         proprioception: the fields that are not drawn, with a leading axis T.
-        frames: the fields that are drawn.
+        sequences: the fields that are drawn.
         length: control steps in the video, T.
 
     Attributes:
@@ -39,12 +39,12 @@ class DemonstrationVideo(Mapping[str, NDArray[Any]]):
     def __init__(
         self,
         proprioception: Mapping[str, NDArray[Any]],
-        frames: Mapping[str, FrameSequence],
+        sequences: Mapping[str, FrameSequence],
         length: int,
     ) -> None:
         self.length = length
         self._arrays = dict(proprioception)
-        self._frames = dict(frames)
+        self._sequences = dict(sequences)
 
     def __getitem__(self, field: str) -> NDArray[Any]:
         """Return a field for all steps; raises KeyError if it does not exist."""
@@ -54,22 +54,22 @@ class DemonstrationVideo(Mapping[str, NDArray[Any]]):
 
     def draw(self) -> None:
         """Draw all pictures that have not been drawn, in one replay for all cameras."""
-        self._read([field for field in self._frames if field not in self._arrays])
+        self._read([field for field in self._sequences if field not in self._arrays])
 
     def _read(self, fields: Sequence[str]) -> None:
-        arrays = read_frames([self._frames[field] for field in fields])
+        arrays = read_frames([self._sequences[field] for field in fields])
         self._arrays.update(zip(fields, arrays, strict=True))
 
     def __iter__(self) -> Iterator[str]:
-        yield from self._frames
-        yield from (field for field in self._arrays if field not in self._frames)
+        yield from self._sequences
+        yield from (field for field in self._arrays if field not in self._sequences)
 
     def __len__(self) -> int:
         """Return the number of fields; `length` is the number of control steps."""
         return sum(1 for _ in self)
 
     def __contains__(self, field: object) -> bool:
-        return field in self._frames or field in self._arrays
+        return field in self._sequences or field in self._arrays
 
     def __reduce__(self) -> tuple[type[dict[str, Any]], tuple[dict[str, Any]]]:
         self.draw()
@@ -77,9 +77,9 @@ class DemonstrationVideo(Mapping[str, NDArray[Any]]):
 
     def __repr__(self) -> str:
         fields = [
-            f"{field} ({'' if field in self._arrays else 'not '}drawn)" for field in self._frames
+            f"{field} ({'' if field in self._arrays else 'not '}drawn)" for field in self._sequences
         ]
-        fields += (field for field in self._arrays if field not in self._frames)
+        fields += (field for field in self._arrays if field not in self._sequences)
         return f"<Video of {self.length} steps: {', '.join(fields)}>"
 
 
@@ -99,10 +99,10 @@ def make_video(
     """
     selection = spec.demonstration_frames
     every = selection if isinstance(selection, int) else 1
-    frames = {
+    sequences = {
         field: FrameSequence(episode, recording, field, space, every, spec.rendering)
         for field, space in picture_space(spec).items()
         if selection != "none"
     }
     arrays = stack_proprioception(proprioception, spec)
-    return DemonstrationVideo(arrays, frames, len(proprioception))
+    return DemonstrationVideo(arrays, sequences, len(proprioception))
