@@ -157,8 +157,8 @@ def test_make_is_typed_with_the_options_of_the_environment():
     assert task.name == "task"
     typed = {name: hint.__forward_arg__ for name, hint in EnvOptions.__annotations__.items()}
     assert typed == {option.name: option.annotation for option in options}
-    documented = re.findall(r"^        (\w+): ", RoboIRGEnv.__doc__.partition("Args:")[2], re.M)
-    assert documented[: 1 + len(typed)] == ["task", *typed]
+    documented = roboirg.make.__doc__.partition("Keyword Args:")[2].partition("Raises:")[0]
+    assert re.findall(r"^        (\w+): ", documented, re.MULTILINE) == list(typed)
     made = inspect.signature(roboirg.make).parameters["options"]
     assert made.annotation == "Unpack[EnvOptions]"
     with pytest.raises(TypeError, match="camera"):

@@ -71,28 +71,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     observation with a leading axis T (pictures are drawn when they are read), and
     `demonstration_subgoals`, T texts.
 
-    Args:
-        task: name of the task, or a custom episode (`split` and `episode` are then ignored).
-        setting: explicit, direct, reasoning, contextual or spatial.
-        form: implicit, or resolved for the paired explicit counterpart.
-        split: train, val or test.
-        episode: index of the episode in the split, from 0.
-        stages: stages, of five, that a contextual instruction includes.
-        distractor: neutral or competing, for contextual instructions.
-        distractors: number of distractors in a contextual instruction.
-        frame: whose left and right a spatial instruction uses: robot or camera.
-        actions: joint_angle, ee_pose or waypoint.
-        cameras: cameras whose pictures observations hold; () renders nothing.
-        depth: add depth for the same cameras.
-        calibration: add extrinsic and intrinsic matrices for the same cameras.
-        grounded: add the pixel of the subgoal's object to info; costs rendering.
-        demonstration_frames: pictures in the video: "all", "none", or n for every n-th.
-        observe_every: n adds `history` to each observation: the observations after every n-th
-            control step since the last one.
-        history_cameras: cameras in the history; None for those of observations.
-        meshes: "faithful", or "light" for faster pictures that differ slightly from RoboMME's.
-        max_steps: number of control steps the policy has.
-        render_mode: None or "rgb_array" (front and wrist side by side).
+    The arguments are those of `roboirg.make`, which documents them.
 
     Raises:
         UnknownNameError: a task, setting, split, form, action space or camera does not exist.

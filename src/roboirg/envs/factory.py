@@ -15,55 +15,58 @@ if TYPE_CHECKING:
 
 
 class EnvOptions(TypedDict, total=False):
-    """Keyword arguments of `make`; `RoboIRGEnv` has the same ones, with defaults."""
+    """Keyword arguments of `make`, which documents them; `RoboIRGEnv` has their defaults."""
 
     setting: str
-    """Explicit, direct, reasoning, contextual or spatial."""
     form: str
-    """Implicit, or resolved for the paired explicit counterpart."""
     split: str
-    """Train, val or test; ignored for an `Episode`."""
     episode: int
-    """Index of the episode in the split, from 0; ignored for an `Episode`."""
     stages: Sequence[int]
-    """Stages, of five, that a contextual instruction includes."""
     distractor: str
-    """Neutral or competing, for contextual instructions."""
     distractors: int
-    """Number of distractors in a contextual instruction."""
     frame: str
-    """Whose left and right a spatial instruction uses: robot or camera."""
     actions: str
-    """Action space: joint_angle, ee_pose or waypoint."""
     cameras: Sequence[str]
-    """Cameras whose pictures observations hold; () renders nothing."""
     depth: bool
-    """Add depth for the same cameras."""
     calibration: bool
-    """Add extrinsic and intrinsic matrices for the same cameras."""
     grounded: bool
-    """Add the pixel of the subgoal's object to info; costs rendering."""
     demonstration_frames: DemonstrationFrames
-    """Pictures in the video: "all", "none", or n for every n-th."""
     observe_every: int | None
-    """Add `history`, with an observation after every n-th control step."""
     history_cameras: Sequence[str] | None
-    """Cameras in the history; None for those of observations."""
     meshes: str
-    """Faithful, or light for faster pictures that differ slightly from RoboMME's."""
     max_steps: int
-    """Number of control steps the policy has."""
     render_mode: str | None
-    """None or rgb_array (front and wrist side by side)."""
 
 
 def make(task: str | Episode, **options: Unpack[EnvOptions]) -> RoboIRGEnv:
     """Create the Gymnasium environment of one episode.
 
     Args:
-        task: name of the task, for example ``"PickXtimes"``, or a custom episode.
-        **options: see `EnvOptions`; the defaults are those of
-            `roboirg.envs.environment.RoboIRGEnv`.
+        task: name of the task, for example ``"PickXtimes"``, or a custom episode (`split` and
+            `episode` are then ignored).
+        **options: the keyword arguments below; `RoboIRGEnv` has their defaults.
+
+    Keyword Args:
+        setting: explicit, direct, reasoning, contextual or spatial.
+        form: implicit, or resolved for the paired explicit counterpart.
+        split: train, val or test.
+        episode: index of the episode in the split, from 0.
+        stages: stages, of five, that a contextual instruction includes.
+        distractor: neutral or competing, for contextual instructions.
+        distractors: number of distractors in a contextual instruction.
+        frame: whose left and right a spatial instruction uses: robot or camera.
+        actions: joint_angle, ee_pose or waypoint.
+        cameras: cameras whose pictures observations hold; () renders nothing.
+        depth: add depth for the same cameras.
+        calibration: add extrinsic and intrinsic matrices for the same cameras.
+        grounded: add the pixel of the subgoal's object to info; costs rendering.
+        demonstration_frames: pictures in the video: "all", "none", or n for every n-th.
+        observe_every: n adds `history` to each observation: the observations after every n-th
+            control step since the last one.
+        history_cameras: cameras in the history; None for those of observations.
+        meshes: "faithful", or "light" for faster pictures that differ slightly from RoboMME's.
+        max_steps: number of control steps the policy has.
+        render_mode: None or "rgb_array" (front and wrist side by side).
 
     Raises:
         MissingDependencyError: the simulator is not installed.
