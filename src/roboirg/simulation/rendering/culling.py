@@ -86,8 +86,8 @@ class CullableBodies:
             camera: np.array([one is None or camera in one.cameras for one in known])
             for camera in CAMERAS
         }
-        self._current = np.ones(len(self._bodies), dtype=bool)
-        self._command_buffers: dict[sapien.render.RenderCameraComponent, NDArray[np.bool_]] = {}
+        self._drawn = np.ones(len(self._bodies), dtype=bool)
+        self._recorded: dict[sapien.render.RenderCameraComponent, NDArray[np.bool_]] = {}
 
     def poses(self) -> NDArray[np.float64]:
         """Return the current poses of the bodies, (n, 4, 4)."""
@@ -121,13 +121,13 @@ class CullableBodies:
             self._take_with_visibility(camera, visible)
             return
         # Set the modes even if the command buffer is kept: another change may invalidate it.
-        for number in np.flatnonzero(visible != self._current):
+        for number in np.flatnonzero(visible != self._drawn):
             self._bodies[number].shading_mode = _DRAWN if visible[number] else _LEFT_OUT
-        self._current = visible
-        recorded = self._command_buffers.get(camera)
+        self._drawn = visible
+        recorded = self._recorded.get(camera)
         if recorded is None or not np.array_equal(recorded, visible):
             invalidate_command_buffers(self._bodies[0])
-            self._command_buffers[camera] = visible
+            self._recorded[camera] = visible
         camera.take_picture()
 
     def _take_with_visibility(
