@@ -33,7 +33,7 @@ def next_episode(path: Path) -> float:
 
 def process_memory() -> float:
     """Return the peak memory of a process that plays and draws both cameras, GiB."""
-    return _in_process("ours", "process_memory")["gibibytes"]
+    return _in_process("ours", "memory")["gibibytes"]
 
 
 def throughput(workers: int) -> float:
