@@ -133,7 +133,7 @@ def test_pictures_are_those_of_the_stock_path():
     assert light.levels <= MEAN_LEVELS * light.pixels
 
 
-def test_each_camera_keeps_its_record_of_what_it_draws(monkeypatch):
+def test_each_camera_keeps_the_command_buffer_of_its_bodies(monkeypatch):
     scene = get_episode("PickXtimes", "test", 2).scene
     physics_settings.apply_render_settings()
     assert culling.keeps_command_buffers(), "SAPIEN keeps no command buffers; culling became slow"
@@ -141,7 +141,7 @@ def test_each_camera_keeps_its_record_of_what_it_draws(monkeypatch):
     for moment in moments("PickXtimes", 2):
         wanted = quick.show(moment)
         with monkeypatch.context() as patch:
-            patch.setattr(culling, "keeps_records", lambda: False)
+            patch.setattr(culling, "keeps_command_buffers", lambda: False)
             for ours, theirs in zip(slow.show(moment), wanted, strict=True):
                 assert np.array_equal(ours, theirs)
 
@@ -177,7 +177,7 @@ def test_a_camera_draws_again_only_when_something_in_its_view_has_moved(takes):
     assert drawn.count("wrist") > 0.9 * len(some)
 
 
-def test_an_unknown_shader_is_used_as_it_is(monkeypatch, caplog):
+def test_an_unknown_shader_is_used_unpatched(monkeypatch, caplog):
     scene = get_episode("PickXtimes", "test", 2).scene
     usual = Stage(scene, RenderSettings(slim_shader=False))
     with monkeypatch.context() as patch:
@@ -185,7 +185,7 @@ def test_an_unknown_shader_is_used_as_it_is(monkeypatch, caplog):
         for function in (shaders.slim_shader, robot_meshes._shapes):
             function.cache_clear()
         unknown = Stage(scene, FAITHFUL)
-        assert "it is used as it is" in caplog.text
+        assert "it is used unpatched" in caplog.text
         for moment in moments("PickXtimes", 2)[::4]:
             for ours, theirs in zip(unknown.show(moment), usual.show(moment), strict=True):
                 assert np.array_equal(ours, theirs)
