@@ -176,8 +176,8 @@ class Staged:
             self.episode,
             self.events,
             timed_out=ongoing and timed_out,
-            turn=self.turn,
-            elapsed=self.step,
+            policy_start_step=self.turn,
+            elapsed_steps=self.step,
             cause=self.judge.cause or cause,
         )
 

@@ -113,7 +113,9 @@ def test_whoever_does_only_what_is_meant_fails_by_execution(episode: Episode, sh
     staged = Staged(episode).play(episode.stages)
     end = staged.turn + int(share * (staged.step - staged.turn))
     events = [event for event in staged.events if event.step <= end]
-    found = attribute_failure(episode, events, timed_out=True, turn=staged.turn, elapsed=end)
+    found = attribute_failure(
+        episode, events, timed_out=True, policy_start_step=staged.turn, elapsed_steps=end
+    )
     assert found is not None
     assert found.kind == "execution"
     assert found.step <= end - staged.turn
