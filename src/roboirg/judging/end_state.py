@@ -85,9 +85,7 @@ def _standing_acts(replay: EpisodeReplay) -> Iterator[FactInterval]:
             yield interval
 
 
-def _classify(
-    replay: EpisodeReplay, fact: Fact, wanted: tuple[Fact, ...]
-) -> FailureName | None:
+def _classify(replay: EpisodeReplay, fact: Fact, wanted: tuple[Fact, ...]) -> FailureName | None:
     """Classify an act; taking hold of an object counts as lifting it."""
     if fact in wanted:
         return None

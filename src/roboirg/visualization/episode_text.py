@@ -1,4 +1,4 @@
-"""An episode in words and tables for the terminal."""
+"""Print an episode as text and tables."""
 
 from __future__ import annotations
 
@@ -18,13 +18,11 @@ from roboirg.language import expressible, instruct, settings_of
 from roboirg.tasks import get_task
 
 MINIMUM_WIDTH = 100
-"""Columns to use where the output is not a terminal."""
-
-_RELATIONS = {"placed": "placed on", "binned": "in", "stopped": "stopped on", "hovering": "over"}
+"""Columns to use if the output is not a terminal."""
 
 
 def print_episode(episode: Episode, console: Console) -> None:
-    """Everything but pictures: objects, motions, video, goal, and what is said in each setting."""
+    """Print an episode's objects, motions, video, goal and its instruction in each setting."""
     if not console.is_terminal:
         console.width = max(console.width, MINIMUM_WIDTH)
     console.print(
@@ -39,7 +37,7 @@ def print_episode(episode: Episode, console: Console) -> None:
 
 
 def objects_table(scene: Scene) -> Table:
-    """All objects with their places at the start, meters and degrees."""
+    """Return a table of all objects with their poses at the start, meters and degrees."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for name in ("object", "kind", "color"):
         table.add_column(name)
@@ -53,7 +51,7 @@ def objects_table(scene: Scene) -> Table:
 
 
 def motion_lines(scene: Scene) -> list[str]:
-    """The scripted movements in words; those that say the same of several objects are one."""
+    """Return the scripted movements in words; equal movements share a line."""
     subjects: dict[str, list[str]] = {}
     for motion in scene.motions:
         subject, words = _motion_words(motion)
@@ -62,7 +60,7 @@ def motion_lines(scene: Scene) -> list[str]:
 
 
 def video_lines(episode: Episode) -> list[str]:
-    """The stages of the demonstration, and what of it counts."""
+    """Return the stages of the demonstration, and the facts that the task refers to."""
     shown = [plain_subgoal(stage) for stage in episode.demonstration if stage.recorded]
     lines = [f"{number}. {words}" for number, words in enumerate(shown, start=1)]
     if episode.scene.past:
@@ -71,13 +69,12 @@ def video_lines(episode: Episode) -> list[str]:
 
 
 def fact_words(fact: Fact) -> str:
-    """A fact in words, with the objects' names."""
-    words = _RELATIONS.get(fact.kind, fact.kind.replace("_", " "))
-    return " ".join(part for part in (fact.subject, words, fact.place) if part)
+    """Return a fact in words, with the objects' names."""
+    return " ".join(part for part in (fact.subject, fact.traits.state, fact.place) if part)
 
 
 def instructions_table(episode: Episode) -> Table:
-    """What is said in every setting, and its resolved form."""
+    """Return a table of the instruction in every setting, with its resolved form."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_lines=False)
     table.add_column("setting", style="bold")
     table.add_column("form", style="dim")
@@ -94,7 +91,7 @@ def instructions_table(episode: Episode) -> Table:
 
 
 def _motion_words(motion: Motion) -> tuple[str, str]:
-    """Who moves, and how."""
+    """Return the object that moves, and its movement in words."""
     match motion:
         case Away(subject, start, end, under):
             begin = f"away from step {start}" if start else "away"
