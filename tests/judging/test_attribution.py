@@ -86,7 +86,7 @@ def test_a_pose_that_cannot_be_reached_and_what_came_before(task: str) -> None:
     staged = Staged(get_episode(task, "test", 3)).tick(5)
     found = staged.finding(timed_out=False, cause="no way to (9, 9, 9)")
     assert found == FailureAttribution(
-        "execution", "unreachable", None, 5, "A pose could not be reached: no way to (9, 9, 9)."
+        "execution", "unreachable", None, 5, "Could not reach a pose: no way to (9, 9, 9)."
     )
     assert staged.finding(timed_out=False) is None
 

@@ -46,7 +46,7 @@ def test_one_stage_per_evaluation():
 def test_what_is_forbidden_counts_before_what_is_expected():
     judge = judged([stage(A, BAD)], [A, BAD])
     assert judge.status is Status.FAILURE
-    assert judge.cause == "pressed button while due: do it"
+    assert judge.cause == "pressed button; expected: do it"
 
 
 def test_what_ends_a_stage_is_not_held_against_the_next_in_the_same_step():
@@ -114,7 +114,7 @@ def test_causes_call_things_by_what_they_are():
     judge = Judge(episode.stages, episode.scene)
     judge.update(0, frozenset([Fact("lifted", covers[second])]))
     assert judge.cause == (
-        f"lifted the container over the {second} cube while due: "
+        f"lifted the container over the {second} cube; expected: "
         f"pick up the container that hides the {first} cube"
     )
     empty = next(

@@ -1,8 +1,8 @@
-"""The tasks, one file each; a file that defines ``TASK`` is a task.
+"""The tasks, one file each: a module that defines ``TASK`` is a task.
 
-Those of three suites are the benchmark. The suite ``real`` has the twins of the tasks for a real
-robot: they are played, told and judged like all others, but are asked for by their names or by
-their suite's.
+The tasks of three suites are the benchmark. The suite ``real`` has the simulated twins of the tasks
+for a real robot. They work like all others, but are selected only by their names or their suite,
+as are tasks of other packages with suites of their own.
 """
 
 from __future__ import annotations
@@ -19,24 +19,23 @@ from roboirg.util.discovery import discover
 __all__ = ["Task", "all_tasks", "every_task", "find_tasks", "get_task"]
 
 ALL = "all"
-"""Stands for all tasks of the benchmark where tasks are named."""
+"""The word for all tasks of the benchmark."""
+
+
+def all_tasks(suites: tuple[Suite, ...] = BENCHMARK_SUITES) -> Mapping[str, Task]:
+    """Return the tasks of some suites, by default of the benchmark, by name, sorted by code."""
+    return {name: task for name, task in every_task().items() if task.suite in suites}
 
 
 @functools.cache
-def all_tasks(suites: tuple[Suite, ...] = BENCHMARK_SUITES) -> Mapping[str, Task]:
-    """The tasks of some suites, by default of the benchmark, by name and in the order of codes."""
-    tasks: list[Task] = discover(sys.modules[__name__], "TASK")
-    chosen = (task for task in tasks if task.suite in suites)
-    return {task.name: task for task in sorted(chosen, key=lambda task: task.code)}
-
-
 def every_task() -> Mapping[str, Task]:
-    """Every task there is, inside the benchmark and beside it."""
-    return all_tasks(SUITES)
+    """Return all tasks, of the benchmark and of other suites, by name, sorted by code."""
+    tasks: list[Task] = discover(sys.modules[__name__], "TASK")
+    return {task.name: task for task in sorted(tasks, key=lambda task: task.code)}
 
 
 def get_task(name: str) -> Task:
-    """The task of that name.
+    """Return the task of that name.
 
     Raises:
         UnknownNameError: there is none; the message lists all and names the nearest.
@@ -48,25 +47,29 @@ def get_task(name: str) -> Task:
 
 
 def find_tasks(words: Iterable[str]) -> tuple[str, ...]:
-    """The tasks that are meant by names of tasks, of suites, or ``all`` for the benchmark.
+    """Return the names of the tasks that some words select.
+
+    Args:
+        words: names of tasks or suites, or ``all`` for the benchmark.
 
     Returns:
-        Their names, each once: those of ``all`` first, the others in the order of the words.
+        Each name once: those of ``all`` first, the others in the order of the words.
 
     Raises:
         UnknownNameError: a word is none of these.
     """
-    in_turn = sorted(words, key=lambda word: word.lower() != ALL)
-    return tuple(dict.fromkeys(name for word in in_turn for name in _meant(word)))
+    ordered = sorted(words, key=lambda word: word.lower() != ALL)
+    return tuple(dict.fromkeys(name for word in ordered for name in _select(word)))
 
 
-def _meant(word: str) -> tuple[str, ...]:
-    lower = word.lower()
-    if lower == ALL:
+def _select(word: str) -> tuple[str, ...]:
+    """Return the names of the tasks that a word selects."""
+    if word.lower() == ALL:
         return tuple(all_tasks())
-    suite = next((one for one in SUITES if one == lower), None)
-    if suite is not None:
-        return tuple(all_tasks((suite,)))
+    suites = dict.fromkeys((*SUITES, *(task.suite for task in every_task().values())))
+    for suite in suites:
+        if suite.lower() == word.lower():
+            return tuple(all_tasks((suite,)))
     if word not in every_task():
-        raise UnknownNameError("task", word, (*every_task(), *SUITES))
+        raise UnknownNameError("task", word, (*every_task(), *suites))
     return (word,)
