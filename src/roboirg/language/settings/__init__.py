@@ -1,4 +1,7 @@
-"""The settings, one file each; a file that defines ``SETTING`` is a setting of the language."""
+"""The settings, one file each; a file that defines ``SETTING`` is a setting of the language.
+
+Installed packages add theirs through entry points of the group ``roboirg.settings``.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ EXPLICIT = "explicit"
 @functools.cache
 def all_settings() -> Mapping[str, Setting]:
     """Every setting by name, explicit first."""
-    found: list[Setting] = discover(sys.modules[__name__], "SETTING")
+    found = discover(sys.modules[__name__], "SETTING", Setting, "roboirg.settings")
     return {one.name: one for one in sorted(found, key=lambda one: (one.order, one.name))}
 
 
