@@ -31,13 +31,15 @@ def task(tmp_path, monkeypatch):
     module = importlib.util.module_from_spec(spec)
     monkeypatch.setitem(sys.modules, "place_and_press", module)
     spec.loader.exec_module(module)
-    discover = tasks.discover
-    monkeypatch.setattr(
-        tasks, "discover", lambda *args, **options: [*discover(*args, **options), module.TASK]
-    )
-    tasks.every_task.cache_clear()
-    yield module.TASK
-    tasks.every_task.cache_clear()
+    registry = (*tasks.every_task().values(), module.TASK)
+    caches = (tasks.all_tasks, tasks.all_suites)
+    with monkeypatch.context() as patch:
+        patch.setattr(tasks, "_registry", lambda: registry)
+        for cache in caches:
+            cache.cache_clear()
+        yield module.TASK
+    for cache in caches:
+        cache.cache_clear()
 
 
 def test_it_is_found_beside_the_benchmark(task):
