@@ -93,18 +93,20 @@ def test_events_tell_the_same_story_as_the_facts(history):
 def test_every_forbidden_fact_of_every_stage_fails(task, index):
     episode = get_episode(task, "test", index)
     tested = 0
-    for number, due in enumerate(episode.stages):
-        for wrong in due.forbids:
+    for number, stage in enumerate(episode.stages):
+        for wrong in stage.forbids:
             if isinstance(wrong, Rule):
                 continue  # driven by the rule tests of each task
             judge = Judge(episode.stages, episode.scene)
             judge.index = number
-            judge.update(0, frozenset([wrong, *facts_of(due.expects)]))
+            judge.update(0, frozenset([wrong, *facts_of(stage.expects)]))
             assert judge.status is Status.FAILURE
             assert describe_object(wrong.subject, episode.scene) in str(judge.cause)
-            assert plain_subgoal(due) in str(judge.cause)
+            assert plain_subgoal(stage) in str(judge.cause)
             tested += 1
-    assert tested > 0 or all(isinstance(one, Rule) for due in episode.stages for one in due.forbids)
+    assert tested > 0 or all(
+        isinstance(one, Rule) for stage in episode.stages for one in stage.forbids
+    )
 
 
 def test_causes_call_things_by_what_they_are():

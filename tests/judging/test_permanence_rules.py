@@ -32,7 +32,7 @@ def put_down(name):
 
 
 def verdict(episode, *steps):
-    """The judge after so many evaluations, one after each of the sets of facts."""
+    """The judge after one evaluation for each set of facts."""
     judge = Judge(episode.stages, episode.scene)
     for number, facts in enumerate(steps):
         judge.update(number, frozenset(facts))

@@ -253,9 +253,9 @@ def test_videos_and_perfect_runs_succeed(task, difficulty):
     episode = make(task, difficulty)
     judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
     step = 0
-    for due in judge.stages:
+    for stage in judge.stages:
         assert judge.status is Status.ONGOING
-        for _ in range(due.lasting + 1):
-            judge.update(step, frozenset([due.expects]))
+        for _ in range(stage.lasting + 1):
+            judge.update(step, frozenset([stage.expects]))
             step += 1
     assert judge.status is Status.SUCCESS
