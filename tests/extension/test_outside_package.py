@@ -135,7 +135,8 @@ def test_an_episode_of_each_is_played_and_shown(roboirg, names):
         "--settings", settings, "--episodes", "1", "--out", "played",
     )  # fmt: skip
     records = [
-        json.loads(line) for line in (roboirg.folder / "played/records.jsonl").read_text().splitlines()
+        json.loads(line)
+        for line in (roboirg.folder / "played/records.jsonl").read_text().splitlines()
     ]
     assert {(one["task"], one["setting"]) for one in records} == {
         (one, how) for one in (task, "PickXtimes") for how in ("explicit", setting)
