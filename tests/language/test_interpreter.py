@@ -13,7 +13,7 @@ from roboirg.core.episode import COLORS, Goal, Point, Scene, SceneObject
 from roboirg.core.errors import UnknownNameError
 from roboirg.episodes.splits import get_episode
 from roboirg.language import expressible, instruct, interpret, interpreter
-from roboirg.language.interpreter.places import Beside, Towards, read_places
+from roboirg.language.interpreter.places import DirectionalPlace, RelativePlace, read_places
 from roboirg.language.interpreter.tokens import split_sentences
 from roboirg.language.settings import settings_of
 from roboirg.tasks import every_task, get_task
@@ -79,10 +79,10 @@ def test_endless_places_are_given_up():
     text = "Take the cube " + "closest to the cube " * 5000 + "at the far left."
     (place,) = read_places(*split_sentences(text))
     depth = 0
-    while isinstance(place, Beside):
+    while isinstance(place, RelativePlace):
         place, depth = place.anchor, depth + 1
     assert depth == 4
-    assert place == Towards("left", 0)
+    assert place == DirectionalPlace("left", 0)
     goals = get_task("PickXtimes").goals(PICK)
     assert len(interpret(text, PICK, "PickXtimes").goals) < len(goals)
 

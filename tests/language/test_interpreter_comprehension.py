@@ -1,5 +1,8 @@
 """The interpreter names what it does not understand, and then returns no goals."""
 
+import re
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -101,6 +104,21 @@ def test_negations_are_named_and_license_no_goal(text, negation):
 )  # fmt: skip
 def test_harmless_negations_and_remarks_change_nothing(text):
     assert interpret(text, PICK, "PickXtimes") == ((Goal.of(color="red", repeats=1),), (), ())
+
+
+PAGE = Path(__file__).parents[2] / "docs" / "interpreter.md"
+ROWS = re.findall(r"^\| \*(.+?)\*.*? \| `(.+?)`", PAGE.read_text(), flags=re.MULTILINE)
+
+
+@pytest.mark.parametrize(("text", "complaint"), ROWS)
+def test_the_page_quotes_true_complaints(text, complaint):
+    assert complaint in interpret(text, PICK, "PickXtimes").not_understood
+
+
+def test_the_page_teaches_a_new_verb():
+    assert len(ROWS) >= 8
+    taught = re.search(r'"(Hoist .*)", "red", 2\)', PAGE.read_text())
+    assert interpret(taught[1], PICK, "PickXtimes").unknown_words == ("hoist",)
 
 
 @pytest.mark.parametrize(

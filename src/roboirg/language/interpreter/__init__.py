@@ -13,7 +13,11 @@ from typing import NamedTuple
 
 from roboirg.core.episode import Goal, Scene
 from roboirg.language.interpreter.command import is_command, read_command
-from roboirg.language.interpreter.comprehension import Gap, find_gaps, is_unknown_command
+from roboirg.language.interpreter.comprehension import (
+    ComprehensionGap,
+    find_gaps,
+    is_unknown_command,
+)
 from roboirg.language.interpreter.constraints import goal_constraints
 from roboirg.language.interpreter.discourse_context import read_discourse, read_remark
 from roboirg.language.interpreter.negations import is_negated_command
@@ -101,7 +105,7 @@ def _command_span(sentences: tuple[Sentence, ...]) -> tuple[int, int]:
     return (first, last) if last else (len(sentences), len(sentences))
 
 
-def _command_gaps(sentences: tuple[Sentence, ...], first: int, last: int) -> list[Gap]:
+def _command_gaps(sentences: tuple[Sentence, ...], first: int, last: int) -> list[ComprehensionGap]:
     """Return what the interpreter does not understand of the command.
 
     Args:
@@ -109,21 +113,15 @@ def _command_gaps(sentences: tuple[Sentence, ...], first: int, last: int) -> lis
         first: index of the first commanding sentence.
         last: index after the last one; the same as `first` if there is no command.
     """
-    if first == last:
-        return [
-            Gap("finds no command"),
-            *(gap for words in sentences[-1:] for gap in find_gaps(words)),
-        ]
-    gaps = [
-        gap for words in sentences[:first] if is_negated_command(words) for gap in find_gaps(words)
+    negated = [words for words in sentences[:first] if is_negated_command(words)]
+    following = [words for words in sentences[last:] if _matters(words)]
+    gaps = [] if first < last else [ComprehensionGap("finds no command")]
+    gaps += [
+        ComprehensionGap(f'does not read what follows the command: "{" ".join(words)}"')
+        for words in following
     ]
-    gaps += [gap for words in sentences[first:last] for gap in find_gaps(words)]
-    for words in sentences[last:]:
-        if _matters(words):
-            gaps += [
-                Gap(f'does not read what follows the command: "{" ".join(words)}"'),
-                *find_gaps(words),
-            ]
+    for words in (*negated, *(sentences[first:last] or sentences[-1:]), *following):
+        gaps += find_gaps(words)
     return gaps
 
 

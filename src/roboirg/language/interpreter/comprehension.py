@@ -39,7 +39,7 @@ _BEFORE_UNKNOWN_VERB = BEFORE_VERB | {"you"}
 _LOCATING = PREPOSITIONS | PLACE_WORDS
 
 
-class Gap(NamedTuple):
+class ComprehensionGap(NamedTuple):
     """A part of a command that the interpreter does not understand.
 
     Attributes:
@@ -58,20 +58,23 @@ def is_unknown_command(words: Sentence) -> bool:
 
 
 @functools.lru_cache(maxsize=4096)
-def find_gaps(words: Sentence) -> tuple[Gap, ...]:
+def find_gaps(words: Sentence) -> tuple[ComprehensionGap, ...]:
     """Return the parts of a commanding sentence that the interpreter does not understand."""
     negations = unread_negations(words)
     return (
-        *(Gap(f'does not understand the negation "{negation}"') for negation in negations),
+        *(
+            ComprehensionGap(f'does not understand the negation "{negation}"')
+            for negation in negations
+        ),
         *_unknown_words(words),
         *_unread_places(words),
     )
 
 
-def _unknown_words(words: Sentence) -> Iterator[Gap]:
+def _unknown_words(words: Sentence) -> Iterator[ComprehensionGap]:
     for at, word in enumerate(words):
         if not is_known(word):
-            yield Gap(f"does not know the {_with_role(words, at)}", (word,))
+            yield ComprehensionGap(f"does not know the {_with_role(words, at)}", (word,))
 
 
 def _with_role(words: Sentence, at: int) -> str:
@@ -109,7 +112,7 @@ def _modifies(word: str) -> bool:
     return color_of(word) is not None or number_of(word) is not None
 
 
-def _unread_places(words: Sentence) -> Iterator[Gap]:
+def _unread_places(words: Sentence) -> Iterator[ComprehensionGap]:
     """Yield the places that `places` cannot read although it knows their words."""
     read = {at for place in place_mentions(words) for at in range(place.start, place.end)}
     in_series = not SERIES_NOUNS.isdisjoint(words)
@@ -119,7 +122,9 @@ def _unread_places(words: Sentence) -> Iterator[Gap]:
         end = at + 1
         while end < len(words) - 1 and (words[end] in _LOCATING or _modifies(words[end])):
             end += 1
-        yield Gap(f'does not know the place "{" ".join(words[at : end + 1])}"', (word,))
+        yield ComprehensionGap(
+            f'does not know the place "{" ".join(words[at : end + 1])}"', (word,)
+        )
 
 
 def _locates(words: Sentence, at: int) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from roboirg.core.episode import Scene, SceneObject
 from roboirg.core.motions import Swap
-from roboirg.language.interpreter.places import Place, find
+from roboirg.language.interpreter.places import Place, find_objects
 from roboirg.language.interpreter.temporal_relations import Time
 
 
@@ -26,10 +26,10 @@ def objects_at(
     """
     found: list[str] = []
     if "at first" in times or not times:
-        found += [item.name for item in find(place, scene, kind, mirrored=mirrored)]
+        found += [item.name for item in find_objects(place, scene, kind, mirrored=mirrored)]
     if "at last" in times or not times:
         final = _final_scene(scene)
-        found += [item.name for item in find(place, final, kind, mirrored=mirrored)]
+        found += [item.name for item in find_objects(place, final, kind, mirrored=mirrored)]
     return tuple(scene[name] for name in dict.fromkeys(found))
 
 

@@ -49,7 +49,7 @@ _TANGENT_TIE = 2 / 128
 
 
 @dataclass(frozen=True, slots=True)
-class Towards:
+class DirectionalPlace:
     """A place along a direction of the table, or towards a corner if it has a side and a depth.
 
     Attributes:
@@ -64,7 +64,7 @@ class Towards:
 
 
 @dataclass(frozen=True, slots=True)
-class Beside:
+class RelativePlace:
     """A place by its distance from an anchor.
 
     Attributes:
@@ -80,7 +80,7 @@ class Beside:
     rank: int = 1
 
 
-Place = Towards | Beside
+Place = DirectionalPlace | RelativePlace
 
 
 class PlaceMention(NamedTuple):
@@ -115,7 +115,7 @@ def _read(words: Sentence, at: int, depth: int = 0) -> tuple[Place, int] | None:
     if rank is not None:
         return _read_from(words, at + 1, rank) or _read_relative(words, at + 1, rank, depth)
     if word in _OUTERMOST:
-        return Towards(_OUTERMOST[word], 0), at + 1
+        return DirectionalPlace(_OUTERMOST[word], 0), at + 1
     return (
         _read_side(words, at)
         or _read_corner(words, at)
@@ -128,7 +128,7 @@ def _read_side(words: Sentence, at: int) -> tuple[Place, int] | None:
     """Read ``left box``, ``tape on your right``: the place of one of two things."""
     word, following = _word(words, at), _word(words, at + 1)
     if word in _SIDES and following in _PAIRED:
-        return Towards(_SIDES[word], 0), at + 2
+        return DirectionalPlace(_SIDES[word], 0), at + 2
     if word not in _PAIRED or following not in _TO_A_SIDE:
         return None
     after = at + 2
@@ -137,7 +137,7 @@ def _read_side(words: Sentence, at: int) -> tuple[Place, int] | None:
     side = _SIDES.get(_word(words, after))
     if side is None or _word(words, after + 1) in ("corner", *_PAIRED):
         return None
-    return Towards(side, 0), after + 1
+    return DirectionalPlace(side, 0), after + 1
 
 
 def _read_extreme(words: Sentence, at: int) -> tuple[Place, int] | None:
@@ -146,7 +146,7 @@ def _read_extreme(words: Sentence, at: int) -> tuple[Place, int] | None:
         return None
     after = _skip(words, at + 1)
     side = _SIDES.get(_word(words, after))
-    return None if side is None else (Towards(side, 0), after + 1)
+    return None if side is None else (DirectionalPlace(side, 0), after + 1)
 
 
 def _read_corner(words: Sentence, at: int) -> tuple[Place, int] | None:
@@ -162,10 +162,10 @@ def _read_corner(words: Sentence, at: int) -> tuple[Place, int] | None:
         depth = _depth(_word(words, after))
         robot = _skip(words, after + 1)
         if depth and _word(words, robot) in _ROBOT:
-            return Towards(_SIDES[word], depth), robot + 1
+            return DirectionalPlace(_SIDES[word], depth), robot + 1
     side, depth = _SIDES.get(_word(words, start + 1)), _depth(word)
     if side is not None and depth and _word(words, start + 2) == "corner":
-        return Towards(side, depth), start + 3
+        return DirectionalPlace(side, depth), start + 3
     return None
 
 
@@ -176,9 +176,9 @@ def _read_from(words: Sentence, at: int, rank: int) -> tuple[Place, int] | None:
     after = _skip(words, at)
     word = _word(words, after)
     if word in _SIDES:
-        return Towards(_SIDES[word], 0, rank), after + 1
+        return DirectionalPlace(_SIDES[word], 0, rank), after + 1
     if word in ("front", "back"):
-        return Towards(None, -1 if word == "front" else 1, rank), after + 1
+        return DirectionalPlace(None, -1 if word == "front" else 1, rank), after + 1
     return None
 
 
@@ -191,15 +191,15 @@ def _read_relative(words: Sentence, at: int, rank: int, depth: int) -> tuple[Pla
     after = _skip(words, at + 1)
     noun, following = _word(words, after), _word(words, after + 1)
     if noun in _ROBOT:
-        return Towards(None, -1 if nearest else 1, rank), after + 1
+        return DirectionalPlace(None, -1 if nearest else 1, rank), after + 1
     if noun in _FIXTURES:
         return _read_fixture(words, after, nearest=nearest, rank=rank)
     if color_of(noun) and following in _COLORED:
-        return Beside(noun, following, nearest, rank), after + 2
+        return RelativePlace(noun, following, nearest, rank), after + 2
     if noun in _THINGS and depth < _MAX_DEPTH:
         inner = _read(words, _skip(words, after + 1), depth + 1)
         if inner is not None:
-            return Beside(inner[0], noun, nearest, rank), inner[1]
+            return RelativePlace(inner[0], noun, nearest, rank), inner[1]
     return None
 
 
@@ -209,8 +209,8 @@ def _read_fixture(
     """Read ``button``, ``target on your left``."""
     noun, side = words[at], _SIDES.get(_word(words, at + 3))
     if side is not None and words[at + 1 : at + 3] in (("on", "your"), ("on", "the")):
-        return Beside(Towards(side, 0), noun, nearest, rank), at + 4
-    return Beside(noun, noun, nearest, rank), at + 1
+        return RelativePlace(DirectionalPlace(side, 0), noun, nearest, rank), at + 4
+    return RelativePlace(noun, noun, nearest, rank), at + 1
 
 
 def _word(words: Sentence, at: int) -> str:
@@ -227,7 +227,9 @@ def _depth(word: str) -> int:
     return -1 if word in _NEAR else 1 if word in _FAR else 0
 
 
-def find(place: Place, scene: Scene, kind: str, *, mirrored: bool) -> tuple[SceneObject, ...]:
+def find_objects(
+    place: Place, scene: Scene, kind: str, *, mirrored: bool
+) -> tuple[SceneObject, ...]:
     """Return what stands at a place among the things of one kind; several for near ties.
 
     Cubes that appear later are not compared; containers appear together.
@@ -239,7 +241,7 @@ def find(place: Place, scene: Scene, kind: str, *, mirrored: bool) -> tuple[Scen
         mirrored: whether left and right are those of the front camera's picture.
     """
     candidates = _present(scene, kind)
-    if isinstance(place, Towards):
+    if isinstance(place, DirectionalPlace):
         return _ranked(candidates, place.rank, *_measure(place, mirrored=mirrored))
     found: list[SceneObject] = []
     for anchor in _anchors(place, scene, mirrored=mirrored):
@@ -268,7 +270,9 @@ def _ranked(
     return tuple(item for item in items if abs(measure(item) - wanted) <= tie)
 
 
-def _measure(place: Towards, *, mirrored: bool) -> tuple[Callable[[SceneObject], float], float]:
+def _measure(
+    place: DirectionalPlace, *, mirrored: bool
+) -> tuple[Callable[[SceneObject], float], float]:
     """Return the measure of a direction, the smallest first, and the margin of a tie."""
     if place.side is None:
         return lambda item: -place.depth * item.position.x, _TIE
@@ -292,9 +296,9 @@ def _tangent(item: SceneObject) -> float:
     return item.position.y * math.hypot(*_VIEW) / ahead
 
 
-def _anchors(place: Beside, scene: Scene, *, mirrored: bool) -> tuple[SceneObject, ...]:
+def _anchors(place: RelativePlace, scene: Scene, *, mirrored: bool) -> tuple[SceneObject, ...]:
     if not isinstance(place.anchor, str):
-        return find(place.anchor, scene, place.kind, mirrored=mirrored)
+        return find_objects(place.anchor, scene, place.kind, mirrored=mirrored)
     like = _present(scene, place.kind)
     if color_of(place.anchor):
         like = [item for item in like if item.color == place.anchor]
