@@ -89,7 +89,7 @@ def read_frames(wanted: Sequence[DemonstrationFramesArray]) -> list[NDArray[Any]
             missing.append((frames, array))
     if missing:
         _draw(missing)
-    for frames, array in missing if cache.keeps else ():
+    for frames, array in missing if cache.enabled else ():
         cache.write(frames.key(), _compress(array))
     return arrays
 
