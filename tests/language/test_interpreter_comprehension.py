@@ -40,6 +40,8 @@ TAKE = "Take the red cube and put it on the target once"
         ("Take the cube behind the lamp.", 'place "behind the lamp"', ["lamp", "behind"]),
         ("Take the cube near the button.", 'place "near the button"', ["near"]),
         ("Take the cube left of the button.", 'place "left of the button"', ["left"]),
+        ("Take the cube beside the button and put it on the target three times.",
+         'place "beside the button"', ["beside"]),
         ("Take the cube next to the target.", 'place "next to the target"', ["next"]),
         ("Take the cube and put it on the plate.", 'place "on the plate"', ["plate"]),
         ("Take the red cube and put it on the target a dozen times.", "dozen", ["dozen"]),

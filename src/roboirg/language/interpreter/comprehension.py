@@ -19,6 +19,7 @@ from roboirg.language.interpreter.vocabulary import (
     PLACE_WORDS,
     PREPOSITIONS,
     SERIES_NOUNS,
+    STEP_NOUNS,
     STEP_WORDS,
     THING_NOUNS,
     UNSEEN_COLORS,
@@ -115,9 +116,9 @@ def _modifies(word: str) -> bool:
 def _unread_places(words: Sentence) -> Iterator[ComprehensionGap]:
     """Yield the places that `places` cannot read although it knows their words."""
     read = {at for place in place_mentions(words) for at in range(place.start, place.end)}
-    in_series = not SERIES_NOUNS.isdisjoint(words)
+    has_steps = not STEP_NOUNS.isdisjoint(words)
     for at, word in enumerate(words):
-        if at in read or not _locates(words, at) or (in_series and word in STEP_WORDS):
+        if at in read or not _locates(words, at) or (has_steps and word in STEP_WORDS):
             continue
         end = at + 1
         while end < len(words) - 1 and (words[end] in _LOCATING or _modifies(words[end])):

@@ -41,7 +41,7 @@ def word_set(words: str) -> frozenset[str]:
 
 
 FILLERS = word_set("please okay kindly carefully gently slowly quickly softly neatly calmly")
-"""Words that change nothing wherever they stand; no reader sees them."""
+"""Words that change nothing in any position; `split_sentences` drops them."""
 
 _LARGEST_NUMBER = 10**9
 """Stands for every number with more digits."""

@@ -24,10 +24,11 @@ THING_NOUNS = word_set(
     "cube cubes box boxes tape tapes container containers target targets disc discs button buttons "
     "bin bins one ones thing things"
 )
-SERIES_NOUNS = word_set(
-    "visit visits placement placements pass passes passage stay time times occasion occasions "
-    "placing moment moments point instant part number rounds round turns turn"
+STEP_NOUNS = word_set(
+    "visit visits placement placements pass passes passage stay occasion occasions placing moment "
+    "moments number"
 )
+SERIES_NOUNS = STEP_NOUNS | word_set("time times point instant part rounds round turns turn")
 DETERMINERS = word_set(
     "the a an that this those these its your my his her their our both each every any all some "
     "another other same such which whose"
@@ -38,19 +39,19 @@ PLACE_WORDS = word_set(
 )
 """Words that mean something only inside a place or a step that the interpreter reads."""
 STEP_WORDS = word_set("behind beside below under adjacent ahead next")
-"""Those of them that also tell an element of a series: the visit behind the third."""
+"""Words that describe a step if the sentence has one of `STEP_NOUNS`: visit behind the third."""
 PREPOSITIONS = word_set(
     "in inside into on onto at by to from of over above next top side left right"
 )
 
 _NOUNS = word_set(
     "table robot video camera picture beginning start outset end pair couple color colors amount "
-    "place places spot position location press presses swaps swap order way hand neighbor "
-    "neighbors"
+    "place places spot position location press presses swaps swap order way hand mind "
+    "neighbor neighbors"
 )
 _PRONOUNS = word_set(
     "it them they you yourself i me us we what when where which who whichever there here then "
-    "everything anything something mind colored"
+    "everything anything something"
 )
 _VERB_FORMS = word_set(
     "is are was were be been am do does did done has had have stops stopped hides hid hidden "
@@ -58,18 +59,17 @@ _VERB_FORMS = word_set(
     "exchanged shuffled started began stands stood happened showed shown saw seen went goes go "
     "going think thinks remember find choose chose chosen prefer preferred like liked want need "
     "sure use used keep kept see look differs took given say said meant mean forget worry hesitate "
-    "work preceded followed ready visits"
+    "work preceded followed ready colored"
 )
 _COMPARISONS = word_set(
     "many often much more less fewer larger greater higher bigger smaller lower than as half "
     "double triple thrice twice once plus minus different unlike differs other except apart "
     "outside neither either former latter last final next very previous following preceding "
-    "penultimate direct directly immediately later earlier prior single one's"
+    "penultimate direct directly immediately later earlier prior single"
 )
 _CONNECTIVES = word_set(
-    "and but or so then now first finally afterwards again also too if while because with for "
-    "before after during until in inside into on onto at by to from of off over above up down "
-    "back away left right just only too not no never once out both together respectively "
+    "and but or so then now finally afterwards again also too if while because with for before "
+    "after during until off up down back away out just only not no never together respectively "
     "initially originally begin long"
 )
 _MODALS = word_set("can could will would must should may")
