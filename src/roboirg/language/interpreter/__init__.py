@@ -20,7 +20,7 @@ from roboirg.language.interpreter.comprehension import (
 )
 from roboirg.language.interpreter.constraints import goal_constraints
 from roboirg.language.interpreter.discourse_context import read_discourse, read_remark
-from roboirg.language.interpreter.negations import is_negated_command
+from roboirg.language.interpreter.negations import is_negated_command, unread_negations
 from roboirg.language.interpreter.reference_resolution import ReferenceResolver
 from roboirg.language.interpreter.temporal_relations import mentioned_times
 from roboirg.language.interpreter.tokens import Sentence, split_sentences
@@ -131,7 +131,7 @@ def _matters(words: Sentence) -> bool:
     if remark.dismissed:
         return False
     named = remark.colors or remark.numbers or remark.positions or remark.moments or remark.places
-    return bool(named) or not VERBS.isdisjoint(words)
+    return bool(named or unread_negations(words)) or not VERBS.isdisjoint(words)
 
 
 def _joined(sentences: Iterable[Sentence]) -> Sentence:

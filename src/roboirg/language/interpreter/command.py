@@ -12,7 +12,12 @@ from roboirg.language.interpreter.tokens import Sentence, colors_in, word_set
 from roboirg.language.interpreter.vocabulary import PUTTING, TAKING, VERBS
 
 BEFORE_VERB = word_set(", ; : and then to finally now after that next afterwards but first")
-_REQUESTS = frozenset((modal, "you") for modal in ("can", "could", "will", "would"))
+_REQUESTS = frozenset(
+    pair
+    for modal in ("can", "could", "will", "would", "must", "should")
+    for pair in ((modal, "you"), ("you", modal))
+)
+"""Pairs of words before a verb that make a sentence a command."""
 _INTO = word_set("into inside in")
 _BARE_PRONOUNS = word_set("it them that")
 _PARTICLES = word_set("up down back")
@@ -112,7 +117,9 @@ def _clauses(words: Sentence) -> list[Sentence]:
 def _is_verb(words: Sentence, at: int) -> bool:
     if words[at] not in VERBS:
         return False
-    return at == 0 or words[at - 1] in BEFORE_VERB or words[max(0, at - 2) : at] in _REQUESTS
+    if at == 0 or words[at - 1] in BEFORE_VERB or words[max(0, at - 2) : at] in _REQUESTS:
+        return True
+    return words[at - 1] in ("you", "do") and words[max(0, at - 2) : at - 1] in ((), (",",))
 
 
 def _items(words: Sentence) -> tuple[Item, ...]:

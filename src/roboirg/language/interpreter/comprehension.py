@@ -13,6 +13,7 @@ from typing import NamedTuple
 from roboirg.language.interpreter.command import BEFORE_VERB
 from roboirg.language.interpreter.negations import OBJECT, VERB, unread_negations
 from roboirg.language.interpreter.places import place_mentions
+from roboirg.language.interpreter.quantities import quantities
 from roboirg.language.interpreter.tokens import Sentence, color_of, number_of
 from roboirg.language.interpreter.vocabulary import (
     DETERMINERS,
@@ -37,6 +38,7 @@ _UNKNOWN_COMMAND = re.compile(
 )
 _AFTER_VERB = re.compile(rf"{OBJECT}|[,;:]|up\b|down\b|$")
 _BEFORE_UNKNOWN_VERB = BEFORE_VERB | {"you"}
+_COMPARISON = re.compile(r"\b(?P<word>more|fewer|less)\b(?: than \w+)?")
 _LOCATING = PREPOSITIONS | PLACE_WORDS
 
 
@@ -69,6 +71,7 @@ def find_gaps(words: Sentence) -> tuple[ComprehensionGap, ...]:
         ),
         *_unknown_words(words),
         *_unread_places(words),
+        *_unread_comparisons(words),
     )
 
 
@@ -82,21 +85,28 @@ def _with_role(words: Sentence, at: int) -> str:
     """Return an unknown word with the part of speech that it seems to be."""
     word = words[at]
     before, after = words[at - 1] if at else ",", words[at + 1] if at + 1 < len(words) else ","
-    if before in _BEFORE_UNKNOWN_VERB and _AFTER_VERB.match(" ".join(words[at + 1 :])):
-        return f'verb "{word}"'
     if word in UNSEEN_COLORS:
         return f'color "{word}"'
+    if not may_be_verb(word):
+        return f'word "{word}"'
+    if before in _BEFORE_UNKNOWN_VERB and _AFTER_VERB.match(" ".join(words[at + 1 :])):
+        return f'verb "{word}"'
     if after in THING_NOUNS | SERIES_NOUNS or color_of(after) or not is_known(after):
         return f'word "{word}"'
+    return _noun(words, at)
+
+
+def _noun(words: Sentence, at: int) -> str:
+    """Return an unknown word that seems to be a noun, as a thing or with the words for a place."""
     noun_phrase = _phrase_start(words, at)
-    if all(not is_known(other) for other in words[noun_phrase:at]):
-        return f'word "{word}"'
+    if not any(is_known(word) for word in words[noun_phrase:at]):
+        return f'word "{words[at]}"'
     start = noun_phrase
     while start and words[start - 1] in _LOCATING | {"the"}:
         start -= 1
     if words[start] in _LOCATING:
         return f'place "{" ".join(words[start : at + 1])}"'
-    return f'thing "{word}"'
+    return f'thing "{words[at]}"'
 
 
 def _phrase_start(words: Sentence, at: int) -> int:
@@ -126,6 +136,17 @@ def _unread_places(words: Sentence) -> Iterator[ComprehensionGap]:
         yield ComprehensionGap(
             f'does not know the place "{" ".join(words[at : end + 1])}"', (word,)
         )
+
+
+def _unread_comparisons(words: Sentence) -> Iterator[ComprehensionGap]:
+    """Yield the comparisons that are no part of a number, such as *fewer than three*."""
+    text = " ".join(words)
+    spans = [(quantity.start, quantity.end) for quantity in quantities(text)]
+    for found in _COMPARISON.finditer(text):
+        if not any(start <= found.start() < end for start, end in spans):
+            yield ComprehensionGap(
+                f'does not understand the comparison "{found[0]}"', (found["word"],)
+            )
 
 
 def _locates(words: Sentence, at: int) -> bool:

@@ -34,6 +34,7 @@ _PROHIBITION = re.compile(
 _NEGATION = re.compile(
     r"(?:\b(?:do|does|did|must|should|may|can|will|would|is|are) )?"
     r"\b(?P<negation>not|never|dont|avoid|refrain|no|none|nothing|nor|without|instead|rather than"
+    rf"|minus(?= {NUMBER}\b)|stop(?= (?:{'|'.join(sorted(GERUNDS))})\b)"
     rf"|neither(?= (?:the )?(?:{COLOR}|{THING}|container)\b)"
     rf"|(?:all|any|every|anything|everything)(?: \w+){{0,2}} but(?! (?:to|then|first|{VERB})))\b"
     rf"(?: (?:to|ever|even|from|of|the|an?|any)\b)*(?: {COLOR}\b)?(?: (?!and\b|or\b)\w+)?"
@@ -49,6 +50,7 @@ _READ_ELSEWHERE = tuple(
         r"\bwhichever\b.*?\bnot\b",
         rf"\bnot {_REMARK}",
         rf"\bno {NUMBER}\b",
+        rf"\b(?:that|it|this|{NUMBER}) minus\b",
     )
 )
 

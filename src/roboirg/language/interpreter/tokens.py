@@ -7,8 +7,11 @@ from collections.abc import Iterable
 
 Sentence = tuple[str, ...]
 
-_WORD = re.compile(r"[0-9]+(?:st|nd|rd|th)\b|[^\W\d_]+(?:'[^\W\d_]+)?|[0-9]+|[,;:]|[^\W_]")
-_SENTENCE_END = re.compile(r"[.!?\n。！？¿¡।]+")
+_WORD = re.compile(
+    r"[0-9]+(?:st|nd|rd|th)\b|[0-9]+[.][0-9]+|[^\W\d_]+(?:'[^\W\d_]+)?|[0-9]+|[,;:]|[^\W_]"
+)
+_SENTENCE_END = re.compile(r"(?:[.](?![0-9])|[!?\n。！？¿¡।])+")
+_MINUS = re.compile(r"(?<!\w)[-−](?=[0-9])")
 _SPELLINGS = (
     ("’", "'"),
     ("cannot", "can not"),
@@ -72,6 +75,7 @@ def split_sentences(text: str) -> tuple[Sentence, ...]:
     text = text.lower()
     for variant, usual in _SPELLINGS:
         text = text.replace(variant, usual)
+    text = _MINUS.sub("minus ", text)
     parts = (_WORD.findall(part) for part in _SENTENCE_END.split(text))
     kept = (tuple(word for word in part if word not in FILLERS) for part in parts)
     return tuple(part for part in kept if part)

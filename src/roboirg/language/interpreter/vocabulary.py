@@ -68,8 +68,8 @@ _COMPARISONS = word_set(
     "penultimate direct directly immediately later earlier prior single"
 )
 _CONNECTIVES = word_set(
-    "and but or so then now finally afterwards again also too if while because with for before "
-    "after during until off up down back away out just only not no never together respectively "
+    "and but so then now finally afterwards again also too with for before after during until up "
+    "down back just only not no never together respectively "
     "initially originally begin long"
 )
 _MODALS = word_set("can could will would must should may")
@@ -94,12 +94,13 @@ _KNOWN = (
 )
 
 _OPENERS = word_set(
-    "look see watch ignore imagine consider note notice mind listen hear know say call keep love "
-    "enjoy admire suppose because since when whenever unless although though until till as than "
-    "where about against around despite except like outside through toward towards unlike via "
-    "within across along maybe perhaps yesterday today tomorrow tonight sometimes often anyway "
-    "still even almost nearly quite very soon meanwhile otherwise however therefore besides who "
-    "why how might shall yes yeah oh hey hi hello sorry thanks thank only half lots"
+    "if or while off out away look see watch ignore imagine consider note notice mind listen hear "
+    "know say call keep love enjoy admire suppose because since when whenever unless although "
+    "though until till as than where about against around despite except like outside through "
+    "toward towards unlike via within across along maybe perhaps yesterday today tomorrow tonight "
+    "sometimes often anyway still even almost nearly quite very soon meanwhile otherwise however "
+    "therefore besides who why how might shall yes yeah oh hey hi hello sorry thanks thank only "
+    "half lots"
 )
 """Words that begin a remark, not a command, even before a noun."""
 _NO_VERB_ENDINGS = ("ly", "ing", "ed")
@@ -118,5 +119,5 @@ def is_known(word: str) -> bool:
 
 
 def may_be_verb(word: str) -> bool:
-    """Return whether a word, followed by an object, may be an unknown verb of a command."""
+    """Return whether an unknown word may be the verb of a command."""
     return not (is_known(word) or word in _OPENERS or word.endswith(_NO_VERB_ENDINGS))
