@@ -21,10 +21,10 @@ BUILTIN: Mapping[str, str] = {
 }
 
 SCHEMES: Mapping[str, str] = {
-    "openpi": "roboirg.policies.remote.openpi_client:OpenpiPolicy",
-    "mme-vla": "roboirg.policies.remote.mme_vla_client:MmeVlaPolicy",
-    "challenge": "roboirg.policies.remote.challenge_client:ChallengePolicy",
-    "challenge+http": "roboirg.policies.remote.challenge_client:ChallengeHttpPolicy",
+    "openpi": "roboirg.policies.protocols.openpi:OpenpiPolicy",
+    "mme-vla": "roboirg.policies.protocols.mme_vla:MmeVlaPolicy",
+    "challenge": "roboirg.policies.protocols.challenge:ChallengePolicy",
+    "challenge+http": "roboirg.policies.protocols.challenge:ChallengeHttpPolicy",
     "lerobot": "roboirg.policies.lerobot_policy:LeRobotPolicy",
 }
 """Policies named by a URL, by its scheme: classes made with ``(url, seed=)``, without a network."""

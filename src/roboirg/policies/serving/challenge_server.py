@@ -8,7 +8,7 @@ import numpy as np
 
 from roboirg.core.observations import Observation
 from roboirg.policies.base import Policy
-from roboirg.policies.remote.challenge_client import FIELDS
+from roboirg.policies.protocols.challenge import FIELDS
 from roboirg.policies.serving.service import Answer, MakePolicy, Message, Service, act, finish
 
 
