@@ -103,7 +103,7 @@ def test_own_policies_are_named_by_import_path():
         (
             "json:loads",
             InvalidValueError,
-            "'loads' in module json is no class but of type function",
+            "'loads' in module json is of type function, not a class",
         ),
         (f"{__name__}:pytest", InvalidValueError, "'pytest' .* of type module"),
         (
@@ -111,7 +111,7 @@ def test_own_policies_are_named_by_import_path():
             InvalidValueError,
             r"Needy\(\) .* needs 'weights'; give it a default",
         ),
-        (f"{__name__}:Numb", InvalidValueError, "act of class Numb is no method"),
+        (f"{__name__}:Numb", InvalidValueError, "act of class Numb is not a method"),
         (
             "roboirg.policies.builtin.scripted:ScriptedPolicy",
             InvalidValueError,

@@ -26,10 +26,10 @@ from roboirg.policies import make_policy
 GARBAGE = [
     ("Traceback …\nValueError: the weights melted\n", "error: ValueError: the weights melted."),
     ("", "error: an empty text"),
-    (b"\xc1\xff\x00", "something else than a message: the bytes are no msgpack"),
-    (b"", "something else than a message"),
-    (pack([1, 2]), "the message is no map but of type list"),
-    (pack({b"x": 2}), "key b.x. that is no text"),
+    (b"\xc1\xff\x00", "something other than a message: the bytes are not a msgpack"),
+    (b"", "something other than a message"),
+    (pack([1, 2]), "the message is of type list, not a map"),
+    (pack({b"x": 2}), "key b.x. that is not a text"),
     (pack({1: 2}), "int is not allowed"),
     ({"action": np.zeros((20, 8))}, "without 'actions'; it holds 'action'"),
     ({}, "it holds nothing"),
@@ -193,7 +193,7 @@ def test_a_surplus_reply_is_not_taken_for_the_next():
         policy = make_policy(f"mme-vla://{server.place}", 0)
         policy.reset(INSTRUCTION, video(0))
         time.sleep(0.3)  # until the surplus has come
-        with pytest.raises(PolicyReplyError, match="nobody had asked for"):
+        with pytest.raises(PolicyReplyError, match="without a request"):
             policy.act(moment(0, history=()))
         policy.close()
 

@@ -6,9 +6,10 @@ import os
 import signal
 import sys
 from types import FrameType
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from roboirg.cli.import_path import see_working_directory
 from roboirg.core.errors import InvalidValueError
@@ -17,13 +18,35 @@ FAILED = 2
 _STOPPED = {signal.SIGINT: 130, signal.SIGTERM: 143}
 _LOOPBACK = "127.0.0.1"
 
-PolicySpec = Annotated[str, typer.Argument(help="Built-in name, package.module:Class, or a URL.")]
+_PROTOCOLS, _URL_SCHEMES = "PROTOCOLS", "SCHEMES"
+"""Stand for the protocols, and for the schemes of all policy URLs, in help texts."""
+
+PolicySpec = Annotated[
+    str,
+    typer.Argument(help=f"Built-in name, package.module:Class, or a URL ({_URL_SCHEMES})."),
+]
+
+
+class ProtocolHelpCommand(TyperCommand):
+    """A command whose help lists the protocols; they are imported only for that."""
+
+    def get_help(self, ctx: Any) -> str:  # noqa: ANN401 - typer does not export its base class
+        """Return the help text."""
+        from roboirg.policies.policy_classes import url_schemes
+        from roboirg.policies.protocols import protocols_by_scheme
+
+        urls = ", ".join(f"{scheme}://…" for scheme in url_schemes())
+        for parameter in self.params:
+            words = getattr(parameter, "help", None) or ""
+            words = words.replace(_PROTOCOLS, ", ".join(protocols_by_scheme()))
+            vars(parameter)["help"] = words.replace(_URL_SCHEMES, urls)
+        return super().get_help(ctx)
 
 
 def serve(
     policy: PolicySpec,
     protocol: Annotated[
-        str, typer.Option(help="openpi, mme-vla, challenge or challenge+http.")
+        str, typer.Option(help=f"Protocol of the clients: one of {_PROTOCOLS}.")
     ] = "mme-vla",
     host: Annotated[str, typer.Option(help="Address to listen at.")] = _LOOPBACK,
     port: Annotated[int, typer.Option(help="0 takes any that is free.")] = 8000,
@@ -34,7 +57,7 @@ def serve(
     ] = None,
 ) -> None:
     """Serve a policy to this benchmark and to any other client of the protocol."""
-    from roboirg.policies.serving import open_server
+    from roboirg.policies.serving.policy_server import open_server
 
     see_working_directory()
     key = None if api_key_env is None else os.environ.get(api_key_env)

@@ -1,4 +1,4 @@
-"""Policies named by a URL: the scheme says what kind, the query holds options."""
+"""URLs that name policies: the scheme says which kind, the query holds options."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 
-_MARK = "://"
+_SEPARATOR = "://"
 _URL = re.compile(r"[\w+.-]*://")
 
 
 class PolicyUrl(NamedTuple):
-    """A URL taken apart.
+    """The parts of a URL.
 
     Attributes:
-        text: all of it.
+        text: the whole URL.
         scheme: before ``://``.
-        place: after it, up to the query.
+        place: from there to the query.
         options: of the query.
     """
 
@@ -32,7 +32,7 @@ class PolicyUrl(NamedTuple):
 
 
 class UrlOptions(BaseModel):
-    """Options of a scheme: a field each, with its type, limits and default."""
+    """Options of a scheme: one field each, with type, limits and default."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -41,20 +41,20 @@ Options = TypeVar("Options", bound=UrlOptions)
 
 
 def is_url(spec: str) -> bool:
-    """Whether a policy's spec is a URL; one that holds a URL among its options is none."""
+    """Return whether a policy's spec is a URL; a URL among its options does not count."""
     return _URL.match(spec) is not None
 
 
 def split_url(spec: str) -> PolicyUrl:
-    """Take a URL apart.
+    """Split a URL into its parts.
 
     Raises:
-        InvalidValueError: it names nothing after the scheme, or its query is malformed.
+        InvalidValueError: there is nothing after the scheme, or the query is malformed.
     """
-    scheme, _, rest = spec.partition(_MARK)
+    scheme, _, rest = spec.partition(_SEPARATOR)
     place, _, query = rest.partition("?")
     if not place.strip("/"):
-        raise InvalidValueError(f"Policy {spec!r} names nothing after {scheme}{_MARK}.")
+        raise InvalidValueError(f"Policy {spec!r} names nothing after {scheme}{_SEPARATOR}.")
     try:
         pairs = parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query))
     except ValueError as error:
@@ -70,15 +70,15 @@ def split_url(spec: str) -> PolicyUrl:
 
 
 def read_options(url: PolicyUrl, kind: type[Options]) -> Options:
-    """The options of a URL, checked.
+    """Return the options of a URL, checked.
 
     Raises:
-        UnknownNameError: the scheme has no such option; names the nearest.
-        InvalidValueError: an option has a value that it cannot have.
+        UnknownNameError: the scheme has no such option; the message names the nearest.
+        InvalidValueError: an option has an invalid value.
     """
     for name in url.options:
         if name not in kind.model_fields:
-            raise UnknownNameError(f"option of {url.scheme}{_MARK}", name, kind.model_fields)
+            raise UnknownNameError(f"option of {url.scheme}{_SEPARATOR}", name, kind.model_fields)
     try:
         return kind.model_validate(dict(url.options))
     except ValidationError as error:

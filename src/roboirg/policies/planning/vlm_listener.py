@@ -109,7 +109,7 @@ class VLMListener(ScriptedPolicy):
         """
         self._asker.start()
         self._demonstration, self.understood, self._impossible = demonstration, None, 0
-        self._pieces = iter(())
+        self._chunks = iter(())
         try:
             super().reset(instruction, demonstration)
         except NotUnderstood:

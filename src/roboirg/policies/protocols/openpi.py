@@ -1,8 +1,9 @@
-"""openpi://host:port: servers of the openpi repository, and whatever speaks as they do.
+"""openpi://host:port: servers of the openpi repository and compatible ones.
 
-Such a server remembers nothing: there is no reset, and every request holds all that an answer
-needs. Several episodes may use it at the same time, and a request whose connection breaks is sent
-once more.
+Such a server remembers nothing: there is no reset, and every request holds all that a reply
+needs. Several episodes may use it at once, and a request whose connection breaks is sent once
+more. Our service has one policy per connection; an episode begins with the connection and when
+the prompt changes.
 """
 
 from __future__ import annotations
@@ -11,44 +12,49 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, field_validator
+from pydantic import Field
 
 from roboirg.core.actions import find_action_space
 from roboirg.core.errors import PolicyConnectionError
 from roboirg.core.observations import Demonstration, Observation
-from roboirg.policies.remote.endpoints import RemoteOptions
+from roboirg.policies.base import Policy
+from roboirg.policies.protocol import Protocol
+from roboirg.policies.remote.endpoints import ActionSpaceName, RemoteOptions
 from roboirg.policies.remote.remote_policy import RemotePolicy, proprioception
+from roboirg.policies.serving.service import (
+    Handler,
+    Message,
+    Service,
+    act,
+    end_episode,
+    read_request,
+)
 
 
 class OpenpiOptions(RemoteOptions):
     """Options of openpi://.
 
     Attributes:
-        execute: how many rows of a chunk are executed; all if it is None.
-        actions: the action space of the checkpoint.
-        front: key of the front picture; empty: not sent.
-        wrist: key of the wrist picture; empty: not sent.
-        state: key of the eight numbers that the robot feels.
+        execute: rows of a chunk that are executed; None for all.
+        actions: action space of the checkpoint.
+        front: key of the front picture; empty to leave it out.
+        wrist: key of the wrist picture; empty to leave it out.
+        state: key of the eight numbers of proprioception.
         prompt: key of the instruction.
     """
 
     timeout: float = Field(120.0, gt=0)
     shared: bool = True
     execute: int | None = Field(None, ge=1)
-    actions: str = "joint_angle"
+    actions: ActionSpaceName = "joint_angle"
     front: str = "observation/image"
     wrist: str = "observation/wrist_image"
     state: str = Field("observation/state", min_length=1)
     prompt: str = Field("prompt", min_length=1)
 
-    @field_validator("actions")
-    @classmethod
-    def _known(cls, name: str) -> str:
-        return find_action_space(name).name
-
 
 class OpenpiPolicy(RemotePolicy):
-    """A policy served by openpi."""
+    """Client of an openpi server."""
 
     options_type: ClassVar[type[RemoteOptions]] = OpenpiOptions
     options: OpenpiOptions
@@ -63,22 +69,67 @@ class OpenpiPolicy(RemotePolicy):
         self._pictures = {key: f"{camera}_rgb" for camera, key in keys.items() if key}
         self.cameras = tuple(camera for camera, key in keys.items() if key)
 
-    def begin(self, demonstration: Demonstration) -> None:
-        """Nothing: the protocol has neither a reset nor a memory."""
+    def begin_episode(self, demonstration: Demonstration) -> None:
+        """Do nothing: the protocol has neither a reset nor a memory."""
 
-    def answer(self, observation: Observation) -> NDArray[np.floating[Any]]:
-        """The rows of one reply that are to be executed."""
+    def request_actions(self, observation: Observation) -> NDArray[np.floating[Any]]:
+        """Send the observation; return the rows of the reply to execute."""
         message = {
             **{key: observation[field] for key, field in self._pictures.items()},  # type: ignore[literal-required]
             self.options.state: proprioception(
                 observation["joint_positions"], observation["gripper"]
             ),
-            self.options.prompt: self._instruction,
+            self.options.prompt: self.instruction,
         }
         try:
-            reply = self._session.ask(message)
+            reply = self.request(message)
         except PolicyConnectionError:
-            # Nothing is lost with the connection: the request says everything once more.
-            self._session.reconnect()
-            reply = self._session.ask(message)
-        return self._rows(reply)[: self.options.execute]
+            # The request is complete in itself, so a new connection can answer it.
+            self.reconnect()
+            reply = self.request(message)
+        return self.read_actions(reply)[: self.options.execute]
+
+
+class OpenpiService(Service):
+    """Answers requests for actions, with one policy per connection."""
+
+    def new_handler(self) -> Handler:
+        """Return a handler with a policy of its own."""
+        return _OpenpiConversation(self.make_policy()).handle
+
+
+class _OpenpiConversation:
+    """One connection: a policy that is reset whenever the prompt changes."""
+
+    def __init__(self, policy: Policy) -> None:
+        self._policy = policy
+        self._prompt: str | None = None
+
+    def handle(self, message: Message) -> dict[str, Any]:
+        """Return the reply to a request for actions."""
+        observation = read_request(message)
+        if observation["instruction"] != self._prompt:
+            if self._prompt is not None:
+                end_episode(self._policy)
+            self._prompt = observation["instruction"]
+            self._policy.reset(self._prompt, _empty_video(observation["front_rgb"].shape))
+        actions, milliseconds = act(self._policy, observation)
+        return {"actions": actions, "server_timing": {"infer_ms": milliseconds}}
+
+
+def _empty_video(shape: tuple[int, ...]) -> dict[str, Any]:
+    return {
+        "front_rgb": np.zeros((0, *shape), np.uint8),
+        "wrist_rgb": np.zeros((0, *shape), np.uint8),
+        "joint_positions": np.zeros((0, 7), np.float32),
+        "gripper": np.zeros((0, 2), np.float32),
+    }
+
+
+PROTOCOL = Protocol(
+    name="openpi",
+    summary="openpi servers and compatible ones",
+    memory="none",
+    clients={"openpi": OpenpiPolicy},
+    service=OpenpiService,
+)

@@ -11,7 +11,7 @@ from typing import Any
 from roboirg.policies.remote.http_connection import MSGPACK
 from roboirg.policies.remote.message_codec import pack, unpack
 from roboirg.policies.serving.service import Service
-from roboirg.policies.serving.websocket_server import LARGEST_REQUEST, knows
+from roboirg.policies.serving.websocket_server import LARGEST_REQUEST, is_authorized
 
 TEXT = "text/plain; charset=utf-8"
 PATIENCE = 60.0
@@ -68,7 +68,7 @@ class _PolicyHandler(BaseHTTPRequestHandler):
     def do_GET(self) -> None:
         if self.path == "/healthz":
             self._reply(http.HTTPStatus.OK, b"OK\n", TEXT)
-        elif not knows(self.server.key, self.headers.get("Authorization")):
+        elif not is_authorized(self.server.key, self.headers.get("Authorization")):
             self._reply(http.HTTPStatus.UNAUTHORIZED, b"The key is missing or wrong.\n", TEXT)
         elif self.path == "/metadata":
             self._reply(http.HTTPStatus.OK, pack(self.server.metadata), MSGPACK)
@@ -82,7 +82,7 @@ class _PolicyHandler(BaseHTTPRequestHandler):
             self._reply(http.HTTPStatus.REQUEST_ENTITY_TOO_LARGE, b"Too large.\n", TEXT)
             return
         body = self.rfile.read(int(length))
-        if not knows(self.server.key, self.headers.get("Authorization")):
+        if not is_authorized(self.server.key, self.headers.get("Authorization")):
             self._reply(http.HTTPStatus.UNAUTHORIZED, b"The key is missing or wrong.\n", TEXT)
         elif self.path not in ("/reset", "/infer"):
             self._reply(http.HTTPStatus.NOT_FOUND, b"There is no such page.\n", TEXT)
