@@ -83,9 +83,9 @@ def check_policy(
     from roboirg.policies.policy_check import check_policy as check
 
     see_working_directory()
-    findings = check(policy, seed=seed)
-    print_check_results(findings, Console())
-    if any(finding.verdict == FAIL for finding in findings):
+    results = check(policy, seed=seed)
+    print_check_results(results, Console())
+    if any(result.verdict == FAIL for result in results):
         raise typer.Exit(FAILED)
 
 
