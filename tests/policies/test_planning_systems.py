@@ -164,7 +164,7 @@ def test_own_systems_are_files(tmp_path):
     file.write_text('name = "mine"\nabout = "x"\npolicy = "random"\n[planner]\nkind = "oracle"\n')
     with pytest.raises(InvalidValueError, match="RandomPolicy has no method follow"):
         load_system(str(file))
-    with pytest.raises(InvalidValueError, match="no URL"):
+    with pytest.raises(InvalidValueError, match="not a URL"):
         load_system(str(file), {"server": "x:1"})
     file.write_text('name = "mine"\nabout = "x"\npolicy = "random"\n')
     assert load_system(str(file), seed=4).seed == 4

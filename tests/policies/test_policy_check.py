@@ -153,9 +153,9 @@ def test_a_sound_policy_passes_everything():
         (Videophobe, "acts with a video", "no films, please"),
     ],
 )
-def test_what_is_wrong_is_found(kind, what, words):
+def test_what_is_wrong_is_found(kind, check, words):
     failed = found(f"{__name__}:{kind.__name__}", FAIL)
-    assert words in failed[what]
+    assert words in failed[check]
 
 
 def test_what_is_allowed_is_noted():
