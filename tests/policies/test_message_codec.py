@@ -1,4 +1,4 @@
-"""The bytes of messages: what is written is read, and what is hostile is refused."""
+"""The bytes of messages: what is encoded is decoded, and hostile bytes are refused."""
 
 import contextlib
 

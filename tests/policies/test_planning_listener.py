@@ -1,4 +1,4 @@
-"""A model says what is meant, over real HTTP; what it may know, and what comes of its answers."""
+"""A model names the goal, over real HTTP: its input, its answers, and their consequences."""
 
 import contextlib
 import itertools
@@ -59,7 +59,7 @@ def heard(body):
 
 
 def hearing(episode):
-    """Answers as the resolver understands the words of the request."""
+    """Answers with the goal that the interpreter finds in the words of the request."""
 
     def answer(body):
         (goal,) = interpret(heard(body), episode.scene, episode.task).goals
@@ -293,7 +293,7 @@ def test_mishaps_have_their_own_errors(provider, mishap, error, words, monkeypat
 
 
 @pytest.mark.parametrize("provider", ["openai", "google"])
-def test_nobody_at_home_is_a_connection_error(provider):
+def test_an_absent_service_is_a_connection_error(provider):
     with fake_vlm(["{}"]) as server:
         policy = make_listener(server, provider)
     with pytest.raises(PolicyConnectionError, match="cannot be reached"):
@@ -385,7 +385,7 @@ def test_two_listeners_do_not_mix():
     ("task", "setting"),
     [("PickXtimes", "direct"), ("VideoUnmask", "spatial"), ("StopCube", "reasoning")],
 )
-def test_the_hands_do_what_the_model_understood(task, setting):
+def test_the_expert_executes_what_the_model_understood(task, setting):
     episode = get_episode(task, "test", 0)
     with fake_vlm(hearing(episode)) as server:
         policy = make_listener(server, frames=2, frames_every=20)

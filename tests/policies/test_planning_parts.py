@@ -1,4 +1,4 @@
-"""Points, key frames, forms of subgoals, pictures and what two share: without any model."""
+"""Points, key frames, forms of subgoals, pictures and merged requirements, without a model."""
 
 import itertools
 import re
@@ -194,13 +194,13 @@ def test_a_field_without_words_is_unparsable(value):
 def test_prompts_are_versioned_and_can_be_replaced(tmp_path):
     assert len({load_prompts(name).fingerprint for name in PROMPTS}) == len(PROMPTS)
     file = tmp_path / "mine.toml"
-    file.write_text('again = "no: $why"\nsystem = "x $nobody"\n')
+    file.write_text('again = "no: $why"\nsystem = "x $missing"\n')
     mine = load_prompts("qwen", str(file))
     assert mine.fill("again", why="so") == "no: so"
     assert mine.fingerprint != load_prompts("qwen").fingerprint
     with pytest.raises(InvalidValueError, match=r"'goal'"):
         mine.fill("goal", instruction="x")
-    with pytest.raises(InvalidValueError, match=r"'system' .*nobody.*\$why"):
+    with pytest.raises(InvalidValueError, match=r"'system' .*missing.*\$why"):
         mine.fill("system", why="so")
     file.write_text("= 3")
     with pytest.raises(InvalidValueError, match="not TOML"):

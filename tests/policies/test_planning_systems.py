@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from planning_fakes import KEY, fake_vlm, stand_in
@@ -105,6 +106,14 @@ def test_a_factory_has_what_a_class_would_have(spec):
     assert hasattr(factory, "attach") == hasattr(policy, "attach") == is_privileged(spec)
     assert policy_version(spec) == factory.version == policy.version != "unknown"
     assert factory.version == load_policy_class(spec).version
+
+
+def test_the_page_s_code_runs():
+    page = (Path(__file__).parents[2] / "docs" / "planners.md").read_text()
+    (block,) = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    names: dict = {}
+    exec(block, names)  # noqa: S102 - it is our own page
+    assert isinstance(names["mine"], PrivilegedPolicy)
 
 
 def test_a_listener_by_its_spec():

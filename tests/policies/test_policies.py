@@ -1,4 +1,4 @@
-"""The built-in policies, and how a name becomes one."""
+"""The built-in policies, and policies made from names."""
 
 import numpy as np
 import pytest
@@ -200,8 +200,8 @@ def test_a_policy_says_which_frames_it_wants(monkeypatch):
     assert wanted_history(make_policy(f"{__name__}:Silent", 0)) == 8
 
 
-def test_whoever_looks_behind_the_scenes_is_known():
-    assert [is_privileged(name) for name in ("oracle", "forgetful", "random", "nobody")] == [
+def test_privileged_policies_are_known_by_name():
+    assert [is_privileged(name) for name in ("oracle", "forgetful", "random", "unknown")] == [
         True, True, False, False,
     ]  # fmt: skip
 

@@ -169,7 +169,7 @@ def test_what_is_allowed_is_noted():
 @pytest.mark.parametrize(
     ("spec", "words"),
     [
-        ("nobody", "There is no policy 'nobody'"),
+        ("nothing", "There is no policy 'nothing'"),
         ("openpi://127.0.0.1:9?connect=0.1", "cannot be reached"),
         ("openpi://127.0.0.1:9?conect=0.1", "Did you mean 'connect'?"),
         (object(), "It has no reset()."),

@@ -1,4 +1,4 @@
-"""Servers that die, stall, restart, answer late or garbage: named errors, and the next episode."""
+"""Servers that die, stall, restart, or reply late or malformed: named errors, and recovery."""
 
 import socket
 import threading
@@ -23,7 +23,7 @@ from roboirg.core.errors import (
 )
 from roboirg.policies import make_policy
 
-GARBAGE = [
+MALFORMED = [
     ("Traceback …\nValueError: the weights melted\n", "error: ValueError: the weights melted."),
     ("", "error: an empty text"),
     (b"\xc1\xff\x00", "something other than a message: the bytes are not a msgpack"),
@@ -67,8 +67,8 @@ def before_inference(protocol):
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
-@pytest.mark.parametrize(("reply", "words"), GARBAGE)
-def test_garbage_is_told_and_the_next_episode_works(protocol, reply, words):
+@pytest.mark.parametrize(("reply", "words"), MALFORMED)
+def test_a_malformed_reply_is_reported_and_the_next_episode_works(protocol, reply, words):
     if protocol == "challenge+http" and isinstance(reply, str):
         pytest.skip("text comes with status 500 there")
     if protocol == "challenge+http" and reply == {}:
@@ -216,7 +216,7 @@ def test_a_server_that_starts_late_or_again_is_found():
     policy.close()
 
 
-def test_nobody_there_is_told_in_one_sentence():
+def test_an_absent_server_is_reported_in_one_sentence():
     policy = make_policy("openpi://127.0.0.1:9?connect=0.2", 0)
     with pytest.raises(
         PolicyConnectionError,

@@ -1,4 +1,4 @@
-"""One episode at a time on a server that remembers, whatever processes there are and end how."""
+"""One episode at a time on a stateful server, across processes that may be killed."""
 
 import multiprocessing
 import os

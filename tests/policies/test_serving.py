@@ -1,4 +1,4 @@
-"""Policies of this process behind real sockets: what they get, give, and how they fail."""
+"""Policies of this process behind real sockets: inputs, outputs and errors."""
 
 import os
 import signal
