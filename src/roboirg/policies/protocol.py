@@ -26,3 +26,8 @@ class Protocol:
     memory: str
     clients: Mapping[str, type[RemotePolicy]]
     service: type[Service]
+
+    @property
+    def schemes(self) -> tuple[str, ...]:
+        """The URL schemes of the clients."""
+        return tuple(self.clients)

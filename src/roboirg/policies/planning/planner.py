@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 from roboirg.core.observations import Demonstration, Observation
-
-if TYPE_CHECKING:
-    from roboirg.envs.environment import RoboIRGEnv
 
 
 @runtime_checkable
@@ -16,7 +13,8 @@ class Planner(Protocol):
 
     As for policies, the attributes ``cameras`` (default: none), ``demonstration_frames``
     (``"none"``), ``observe_every`` and ``grounded`` are its requirements, ``metadata``, ``usage()``
-    and ``version`` go into the records, and ``close()`` ends an episode; all are optional.
+    and ``version`` go into the records, ``close()`` ends an episode, and a
+    privileged planner has ``attach(env)``; all are optional.
     """
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
@@ -29,11 +27,3 @@ class Planner(Protocol):
             observation: now; its ``history`` follows the planner's own ``observe_every``.
             step: control steps of the policy in this episode so far.
         """
-
-
-@runtime_checkable
-class PrivilegedPlanner(Planner, Protocol):
-    """A planner that reads the simulator's state."""
-
-    def attach(self, env: RoboIRGEnv) -> None:
-        """Receive the environment of the next episode; called before ``reset``."""

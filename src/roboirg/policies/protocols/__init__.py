@@ -36,7 +36,7 @@ def protocols_by_scheme() -> Mapping[str, Protocol]:
     """
     found: dict[str, Protocol] = {}
     for protocol in all_protocols():
-        for scheme in protocol.clients:
+        for scheme in protocol.schemes:
             if scheme in found:
                 raise InvalidValueError(
                     f"The protocols {found[scheme].name!r} and {protocol.name!r} both have the "

@@ -110,7 +110,7 @@ class WebsocketConnection:
             status = error.response.status_code
             if status in _RETRYABLE:
                 raise RetryableError(f"HTTP status {status}") from error
-            hint = "; its key is named with api_key_env=NAME" if status in (401, 403) else ""
+            hint = "; name the key with api_key_env=NAME" if status in (401, 403) else ""
             raise PolicyConnectionError(
                 f"{spec} refused the connection with HTTP status {status}{hint}."
             ) from error

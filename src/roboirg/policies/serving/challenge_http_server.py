@@ -1,112 +1,99 @@
-"""The HTTP side of the RoboMME challenge's interface."""
+"""Serve a policy over HTTP, as the RoboMME challenge does."""
 
 from __future__ import annotations
 
-import http
 import traceback
 from collections.abc import Mapping
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from http import HTTPStatus
 from typing import Any
 
 from roboirg.policies.remote.http_connection import MSGPACK
 from roboirg.policies.remote.message_codec import pack, unpack
 from roboirg.policies.serving.service import Service
 from roboirg.policies.serving.websocket_server import LARGEST_REQUEST, is_authorized
+from roboirg.util.http_server import HTTPServerBase, RequestHandler
 
-TEXT = "text/plain; charset=utf-8"
-PATIENCE = 60.0
-"""Seconds that a client may take for a piece of its request."""
+CLIENT_TIMEOUT_S = 60.0
+"""How long a client may take for a piece of its request."""
 
 
-class _Server(ThreadingHTTPServer):
-    """Listens; every connection has a thread of its own.
+class _ChallengeHTTPServer(HTTPServerBase):
+    """Answers with a service.
 
     Args:
-        place: host and port.
-        service: answers.
-        metadata: what ``/metadata`` gives.
-        key: what clients have to know, if anything.
+        address: host and port.
+        service: answers requests.
+        metadata: response to ``/metadata``.
+        key: that clients send, or None.
     """
 
-    daemon_threads = True
-
     def __init__(
-        self, place: tuple[str, int], service: Service, metadata: Mapping[str, Any], key: str | None
+        self,
+        address: tuple[str, int],
+        service: Service,
+        metadata: Mapping[str, Any],
+        key: str | None,
     ) -> None:
-        super().__init__(place, _PolicyHandler)
+        super().__init__(address, _ChallengeRequestHandler)
         self.answer, self.metadata, self.key = service.connection(), metadata, key
 
 
 def open_http(
     service: Service, metadata: Mapping[str, Any], host: str, port: int, key: str | None
-) -> ThreadingHTTPServer:
-    """A server that listens; it answers once `serve_forever` is called.
+) -> HTTPServerBase:
+    """Return a listening server; it answers once `serve_forever` is called.
 
     Args:
-        service: answers.
-        metadata: what ``/metadata`` gives.
+        service: answers requests.
+        metadata: response to ``/metadata``.
         host: to listen at.
-        port: to listen at; 0 for any that is free.
-        key: what clients have to know, if anything.
+        port: to listen at; 0 for any free port.
+        key: that clients send, or None.
 
     Raises:
         OSError: the address is in use or is not this computer's.
     """
-    return _Server((host, port), service, metadata, key)
+    return _ChallengeHTTPServer((host, port), service, metadata, key)
 
 
-class _PolicyHandler(BaseHTTPRequestHandler):
-    """Answers one request after the other of a connection."""
+class _ChallengeRequestHandler(RequestHandler):
+    """Handle ``/healthz``, ``/metadata``, ``/reset`` and ``/infer``."""
 
-    server: _Server
-    protocol_version = "HTTP/1.1"
-    timeout = PATIENCE
-    # Head and body leave together; in two packets they would wait for each other.
-    wbufsize = -1
-    disable_nagle_algorithm = True
+    server: _ChallengeHTTPServer
+    timeout = CLIENT_TIMEOUT_S
 
-    def do_GET(self) -> None:
+    def do_GET(self) -> None:  # noqa: N802 - name of the base class
         if self.path == "/healthz":
-            self._reply(http.HTTPStatus.OK, b"OK\n", TEXT)
-        elif not is_authorized(self.server.key, self.headers.get("Authorization")):
-            self._reply(http.HTTPStatus.UNAUTHORIZED, b"The key is missing or wrong.\n", TEXT)
-        elif self.path == "/metadata":
-            self._reply(http.HTTPStatus.OK, pack(self.server.metadata), MSGPACK)
-        else:
-            self._reply(http.HTTPStatus.NOT_FOUND, b"There is no such page.\n", TEXT)
+            self.send_text("OK\n")
+        elif self._check_key():
+            if self.path == "/metadata":
+                self.send_bytes(pack(self.server.metadata), MSGPACK)
+            else:
+                self.send_refusal(HTTPStatus.NOT_FOUND, "There is no such page.")
 
-    def do_POST(self) -> None:
-        length = self.headers.get("Content-Length", "0")
-        if not length.isdecimal() or int(length) > LARGEST_REQUEST:
-            self.close_connection = True
-            self._reply(http.HTTPStatus.REQUEST_ENTITY_TOO_LARGE, b"Too large.\n", TEXT)
+    def do_POST(self) -> None:  # noqa: N802 - name of the base class
+        body = self.read_body(LARGEST_REQUEST, message="Too large.")
+        if body is None or not self._check_key():
             return
-        body = self.rfile.read(int(length))
-        if not is_authorized(self.server.key, self.headers.get("Authorization")):
-            self._reply(http.HTTPStatus.UNAUTHORIZED, b"The key is missing or wrong.\n", TEXT)
-        elif self.path not in ("/reset", "/infer"):
-            self._reply(http.HTTPStatus.NOT_FOUND, b"There is no such page.\n", TEXT)
+        if self.path not in ("/reset", "/infer"):
+            self.send_refusal(HTTPStatus.NOT_FOUND, "There is no such page.")
         elif self.path == "/infer" and not body:
-            self._reply(http.HTTPStatus.BAD_REQUEST, b"The request is empty.\n", TEXT)
+            self.send_refusal(HTTPStatus.BAD_REQUEST, "The request is empty.")
         else:
             self._answer(body)
+
+    def _check_key(self) -> bool:
+        """Return whether the client sent the key; refuse the request if not."""
+        authorized = is_authorized(self.server.key, self.headers.get("Authorization"))
+        if not authorized:
+            self.send_refusal(HTTPStatus.UNAUTHORIZED, "The key is missing or wrong.")
+        return authorized
 
     def _answer(self, body: bytes) -> None:
         try:
             request = {"reset": True} if self.path == "/reset" else unpack(body)
             reply = pack(self.server.answer(request))
-        except Exception:  # noqa: BLE001 - the boundary: the policy's author wants to see all of it
-            error = traceback.format_exc().encode()
-            self._reply(http.HTTPStatus.INTERNAL_SERVER_ERROR, error, TEXT)
+        except Exception:  # noqa: BLE001 - the boundary: the policy's author needs the traceback
+            self.send_text(traceback.format_exc(), status=HTTPStatus.INTERNAL_SERVER_ERROR)
             return
-        self._reply(http.HTTPStatus.OK, reply, MSGPACK)
-
-    def _reply(self, status: int, body: bytes, kind: str) -> None:
-        self.send_response(status)
-        self.send_header("Content-Type", kind)
-        self.send_header("Content-Length", str(len(body)))
-        self.end_headers()
-        self.wfile.write(body)
-
-    def log_message(self, format: str, *args: object) -> None:  # noqa: A002
-        """Keep quiet: a line for each request helps nobody."""
+        self.send_bytes(reply, MSGPACK)

@@ -25,7 +25,7 @@ LARGEST_REQUEST = 1024 * MIB
 _INTERNAL_ERROR = 1011
 
 
-class _Connection(ServerConnection):
+class _LargeReadConnection(ServerConnection):
     """Reads large pieces, as requests hold up to hundreds of megabytes of pictures."""
 
     # A still larger buffer is allocated by the system at every read, which costs more.
@@ -80,7 +80,7 @@ def open_websocket(
         max_size=LARGEST_REQUEST,
         process_request=check_request,
         ping_interval=None,
-        create_connection=_Connection,
+        create_connection=_LargeReadConnection,
     )
 
 
