@@ -90,7 +90,9 @@ def test_the_first_seed_that_can_be_taken_is_found_with_what_was_amiss_before():
 
 def test_reasons_are_told_apart():
     assert check_words(EpisodeSlot("VideoUnmask", "val", 15), 1_061_500) == Rejection(
-        1_061_500, "not expressible", "spatial"
+        1_061_500,
+        "not expressible",
+        "spatial: no landmark singles out a target",
     )
     rejections = find_seed(EpisodeSlot("VideoPlaceOrder", "train", 3), check_words).rejections
     assert {one.reason for one in rejections} == {"no room"}

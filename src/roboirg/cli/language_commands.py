@@ -37,7 +37,7 @@ _LINE_EVERY = 200
 
 Name = TypeVar("Name", bound=str)
 
-language_app = typer.Typer(no_args_is_help=True, help="Count, prove and show the words.")
+language_app = typer.Typer(no_args_is_help=True, help="Count, validate and show the instructions.")
 export_app = typer.Typer(no_args_is_help=True, help="Write data for other programs.")
 
 
@@ -60,6 +60,7 @@ def export_instructions(
     frame: Frame = "robot",
 ) -> None:
     """Write a row for each episode, setting and form; docs/language.md explains the columns."""
+    from roboirg.core.instruction_options import InstructionOptions
     from roboirg.evaluation.plan_parsing import parse_names, parse_stages
     from roboirg.language import FORMS
     from roboirg.language.export import EXPORT_FORMATS, check_export_support, row, write_rows
@@ -78,9 +79,7 @@ def export_instructions(
         episodes,
         chosen,
         spoken,
-        stages=parse_stages(stages),
-        distractor=distractor,
-        frame=frame,
+        InstructionOptions(stages=parse_stages(stages), distractor=distractor, frame=frame),
     )
     rows = [row(episode, instruction) for episode, instruction in said]
     if not rows:
@@ -118,8 +117,8 @@ def stats(
             typer.echo(path)
 
 
-@language_app.command()
-def prove(
+@language_app.command("validate")
+def validate_instructions(
     seeds: Annotated[
         int, typer.Option(help="Random scenes for each task, beyond the splits.")
     ] = 100,
@@ -127,17 +126,16 @@ def prove(
     split: Annotated[str, typer.Option(help="train, val, test, all or none.")] = "all",
     workers: Workers = None,
 ) -> None:
-    """Read all words back: one goal, none without context, no leak, paired; exit code 2 if not."""
+    """Read all instructions back and check their rules; exit code 2 if one is broken."""
     from roboirg.evaluation.executors.executor import core_count
-    from roboirg.language.validation import ValidationResults, batches
-    from roboirg.language.validation import validate as examine_all
+    from roboirg.language.validation import ValidationResults, batches, validate
     from roboirg.language.validation.validation_tables import validation_tables
 
     names = _tasks(tasks)
     work = batches(names, () if split.strip().lower() == "none" else _splits(split), seeds)
     count = core_count() if workers is None else workers
     found = ValidationResults()
-    for evidence in _followed(examine_all(work, count), work):
+    for evidence in _followed(validate(work, count), work):
         found.add(evidence)
     console = _console()
     for table in validation_tables(found):

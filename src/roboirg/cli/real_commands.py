@@ -117,23 +117,23 @@ def run(
 ) -> None:
     """Play the trials of a plan on a robot or its twin, in order."""
     from roboirg.real.control.limits import read_limits
-    from roboirg.real.control.robot_specs import check_scorer, make_robot
+    from roboirg.real.control.robot_loading import make_robot
     from roboirg.real.pages.operator_console import OperatorConsole
     from roboirg.real.study.study_plan import read_study
-    from roboirg.real.study.study_run import Study
+    from roboirg.real.study.study_run import Study, select_scorer
 
     path = Path(folder)
     made = read_study(path)
     console = OperatorConsole(made)
-    device = make_robot(robot, real_time=real_time, arrange=console.arrange)
+    device = make_robot(robot, real_time=real_time, arrange=console.request_arrangement)
     study = Study(
         made,
         path,
         device,
         read_limits(limits),
-        check_scorer(score, device),
-        console.ended if robot != "twin" else lambda: False,
-        console.tell,
+        select_scorer(score, device),
+        console.stop_requested if robot != "twin" else lambda: False,
+        console.report,
     )
     _play(study, console, policy or [], retry=retry_errors)
 
@@ -150,7 +150,7 @@ def score(
 
     path = Path(folder)
     server = ScoreServer(read_study(path), path, operator, port)
-    server.ledger()  # complain now if the records cannot be read
+    server.read_trial_log()  # complain now if the records cannot be read
     typer.echo(f"Open {server.url}")
     typer.echo("Ctrl-C ends it; everything is stored.")
     sys.stdout.flush()
@@ -187,7 +187,7 @@ def _play(study: Study, console: OperatorConsole, policies: list[str], *, retry:
     except KeyboardInterrupt:
         typer.echo(f"Stopped; {study.folder} keeps what ended. The same command goes on.", err=True)
         sys.exit(INTERRUPTED)
-    faulty = console.faulty
+    faulty = console.errors
     typer.echo(f"{len(records)} trials were played, {len(faulty)} of them ended in an error.")
     if faulty:
         typer.echo(f"roboirg: the first error: {faulty[0]}", err=True)

@@ -300,15 +300,8 @@ def instruct_job(job: Job) -> Instruction:
     Raises:
         InvalidValueError: it cannot be said so.
     """
-    return language.instruct(
-        splits.get_episode(job.task, job.split, job.episode),
-        job.setting,
-        job.form,
-        stages=job.stages,
-        distractor=job.distractor,
-        distractors=job.distractors,
-        frame=job.frame,
-    )
+    episode = splits.get_episode(job.task, job.split, job.episode)
+    return language.instruct_with(episode, job.options)
 
 
 def _task_names(text: str) -> tuple[str, ...]:

@@ -24,7 +24,8 @@ from roboirg.episodes.splits import (
     slot_key,
     slot_seed,
 )
-from roboirg.language import expressible, settings_of
+from roboirg.language import find_refusals
+from roboirg.language.settings import all_settings
 from roboirg.policies import make_policy, play
 from roboirg.tasks import every_task, get_task
 from roboirg.util.parallel_map import parallel_map
@@ -95,9 +96,12 @@ def check_words(slot: EpisodeSlot, seed: int) -> Rejection | None:
         episode = _episode(slot, seed)
     except SceneRejectedError as error:
         return Rejection(seed, "no room", str(error))
-    sayable = expressible(episode)
-    unsaid = [name for name in settings_of(get_task(slot.task)) if name not in sayable]
-    return Rejection(seed, "not expressible", ", ".join(unsaid)) if unsaid else None
+    refusals = [
+        f"{name}: {reason}"
+        for name, reason in find_refusals(episode).items()
+        if all_settings()[name].selects_seeds
+    ]
+    return Rejection(seed, "not expressible", "; ".join(refusals)) if refusals else None
 
 
 def check_seed(slot: EpisodeSlot, seed: int) -> Rejection | None:

@@ -14,7 +14,7 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import Episode, Scene, SceneObject
 from roboirg.core.motions import Away, Glow, Motion, Point, Shuttle, Swap, Vanish
 from roboirg.judging import plain_subgoal
-from roboirg.language import expressible, instruct, settings_of
+from roboirg.language import find_refusals, instruct, settings_of
 from roboirg.tasks import get_task
 
 MINIMUM_WIDTH = 100
@@ -82,10 +82,10 @@ def instructions_table(episode: Episode) -> Table:
     table.add_column("setting", style="bold")
     table.add_column("form", style="dim")
     table.add_column("instruction", overflow="fold")
-    sayable = expressible(episode)
+    refusals = find_refusals(episode)
     for setting in settings_of(get_task(episode.task)):
-        if setting not in sayable:
-            table.add_row(setting, "", "cannot be expressed")
+        if setting in refusals:
+            table.add_row(setting, "", f"cannot express the episode: {escape(refusals[setting])}")
             continue
         for form in ("implicit",) if setting == "explicit" else ("implicit", "resolved"):
             text = instruct(episode, setting, form).text
