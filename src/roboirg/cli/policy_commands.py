@@ -1,4 +1,4 @@
-"""The commands about policies: serve one, and check one."""
+"""Commands that serve and check a policy."""
 
 from __future__ import annotations
 
@@ -49,14 +49,14 @@ def serve(
         str, typer.Option(help=f"Protocol of the clients: one of {_PROTOCOLS}.")
     ] = "mme-vla",
     host: Annotated[str, typer.Option(help="Address to listen at.")] = _LOOPBACK,
-    port: Annotated[int, typer.Option(help="0 takes any that is free.")] = 8000,
+    port: Annotated[int, typer.Option(help="0 for any free port.")] = 8000,
     seed: Annotated[int, typer.Option(help="Of the policy's random choices.")] = 0,
     api_key_env: Annotated[
         str | None,
-        typer.Option(help="Environment variable with the key that clients have to send."),
+        typer.Option(help="Environment variable with the key that clients must send."),
     ] = None,
 ) -> None:
-    """Serve a policy to this benchmark and to any other client of the protocol."""
+    """Serve a policy to this benchmark and other clients of a protocol."""
     from roboirg.policies.serving.policy_server import open_server
 
     see_working_directory()
@@ -67,7 +67,9 @@ def serve(
     for number in _STOPPED:
         signal.signal(number, _stop)
     if host not in (_LOOPBACK, "localhost", "::1") and key is None:
-        typer.echo(f"Whoever reaches {host} can use it: there is no --api-key-env.", err=True)
+        typer.echo(
+            f"Every client that reaches {host} can use it, as there is no --api-key-env.", err=True
+        )
     typer.echo(f"{policy} at {server.url}; Ctrl-C stops.")
     server.listening.serve_forever()
 
@@ -76,7 +78,7 @@ def check_policy(
     policy: PolicySpec,
     seed: Annotated[int, typer.Option(help="Of the policy's random choices.")] = 0,
 ) -> None:
-    """Check that a policy keeps the contract, on made-up observations; needs no simulator."""
+    """Check a policy on synthetic episodes, without a simulator."""
     from rich.console import Console
 
     from roboirg.policies.policy_check import FAIL, print_check_results
@@ -91,6 +93,6 @@ def check_policy(
 
 def _stop(number: int, frame: FrameType | None) -> None:
     del frame
-    # Connections may be in the middle of something that takes long; there is nothing to save.
+    # A connection may be in the middle of a long call; there is nothing to save.
     sys.stdout.flush()
     os._exit(_STOPPED[signal.Signals(number)])
