@@ -63,3 +63,10 @@ class PrivilegedPolicy(Policy, Protocol):
 
     def attach(self, env: RoboIRGEnv) -> None:
         """Receive the environment of the next episode; called before ``reset``."""
+
+
+def close_policy(policy: object) -> None:
+    """Call the ``close`` of a policy or planner, if it has one."""
+    close = getattr(policy, "close", None)
+    if callable(close):
+        close()

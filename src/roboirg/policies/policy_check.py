@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from roboirg.core.actions import ActionSpace, check_chunk
 from roboirg.core.errors import MissingDependencyError, RoboIRGError
-from roboirg.policies.base import Policy
+from roboirg.policies.base import Policy, close_policy
 from roboirg.policies.loading import make_policy
 from roboirg.policies.requirements import (
     wanted_actions,
@@ -307,9 +307,7 @@ class _PolicyChecker:
 
     def _close(self) -> None:
         policy, self._policy = self._policy, None
-        close = getattr(policy, "close", None)
-        if callable(close):
-            close()
+        close_policy(policy)
 
 
 def _equal(one: _SyntheticRollout, other: _SyntheticRollout) -> bool:

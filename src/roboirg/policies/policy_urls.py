@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from typing import NamedTuple, TypeVar
 from urllib.parse import parse_qsl, unquote
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.policies.option_checking import check_options
 
 _SEPARATOR = "://"
 _URL = re.compile(r"[\w+.-]*://")
@@ -55,18 +56,26 @@ def split_url(spec: str) -> PolicyUrl:
     place, _, query = rest.partition("?")
     if not place.strip("/"):
         raise InvalidValueError(f"Policy {spec!r} names nothing after {scheme}{_SEPARATOR}.")
+    return PolicyUrl(spec, scheme, unquote(place), parse_query(spec, query))
+
+
+def parse_query(spec: str, query: str) -> dict[str, str]:
+    """Return the options in the query of a policy's spec.
+
+    Raises:
+        InvalidValueError: the query is malformed, or gives an option twice.
+    """
     try:
         pairs = parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query))
     except ValueError as error:
         raise InvalidValueError(
             f"Policy {spec!r}: options are written ?name=value&name=value, not {query!r}."
         ) from error
-    options = dict(pairs)
-    if len(options) < len(pairs):
-        names = [name for name, _ in pairs]
-        twice = next(name for name in names if names.count(name) > 1)
-        raise InvalidValueError(f"Policy {spec!r} gives the option {twice!r} twice.")
-    return PolicyUrl(spec, scheme, unquote(place), options)
+    names = [name for name, _ in pairs]
+    for name in names:
+        if names.count(name) > 1:
+            raise InvalidValueError(f"Policy {spec!r} gives the option {name!r} twice.")
+    return dict(pairs)
 
 
 def read_options(url: PolicyUrl, kind: type[Options]) -> Options:
@@ -79,13 +88,4 @@ def read_options(url: PolicyUrl, kind: type[Options]) -> Options:
     for name in url.options:
         if name not in kind.model_fields:
             raise UnknownNameError(f"option of {url.scheme}{_SEPARATOR}", name, kind.model_fields)
-    try:
-        return kind.model_validate(dict(url.options))
-    except ValidationError as error:
-        first = error.errors()[0]
-        name = str(first["loc"][0])
-        message = first["msg"].removeprefix("Value error, ")
-        end = "" if message.endswith((".", "?")) else "."
-        raise InvalidValueError(
-            f"Policy {url.text!r}: option {name} is {url.options[name]!r}: {message}{end}"
-        ) from error
+    return check_options(kind, url.options, f"Policy {url.text!r}")

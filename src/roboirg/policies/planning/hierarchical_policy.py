@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from roboirg.core.actions import WAYPOINT
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Demonstration, DemonstrationFrames, Observation
-from roboirg.policies.base import Policy, SubgoalFollower
+from roboirg.policies.base import Policy, SubgoalFollower, close_policy
 from roboirg.policies.planning.observation_merging import (
     DemonstrationSubset,
     merge_cameras,
@@ -128,9 +128,9 @@ class HierarchicalPolicy:
     def close(self) -> None:
         """Close both, the second even if closing the first fails."""
         try:
-            _close(self.planner)
+            close_policy(self.planner)
         finally:
-            _close(self.policy)
+            close_policy(self.policy)
 
 
 class PrivilegedHierarchicalPolicy(HierarchicalPolicy):
@@ -166,9 +166,3 @@ def _frames(planner: Planner) -> DemonstrationFrames:
 def _observe_every(planner: Planner) -> int | None:
     every: int | None = getattr(planner, "observe_every", None)
     return every
-
-
-def _close(one: object) -> None:
-    close = getattr(one, "close", None)
-    if close is not None:
-        close()

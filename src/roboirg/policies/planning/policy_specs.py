@@ -12,13 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
-from urllib.parse import parse_qsl
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.policies.base import Policy
+from roboirg.policies.option_checking import check_options
 from roboirg.policies.planning.models import ModelOptions
-from roboirg.policies.planning.option_checking import check_options
 from roboirg.policies.planning.vlm_listener import ListenerOptions, VLMListener
+from roboirg.policies.policy_urls import parse_query
 from roboirg.policies.requirements import (
     wanted_actions,
     wanted_cameras,
@@ -82,7 +82,7 @@ def find_policy_factory(spec: str) -> PolicyFactory | None:
     if not colon or kind not in BUILDERS:
         return None
     name, _, query = rest.partition("?")
-    build = BUILDERS[kind](spec, name, _options(spec, query))
+    build = BUILDERS[kind](spec, name, parse_query(spec, query))
     sample = build(0)
     made = PrivilegedPolicyFactory if hasattr(sample, "attach") else PolicyFactory
     return made(spec, build, sample)
@@ -116,17 +116,3 @@ BUILDERS: Mapping[str, Callable[[str, str, Mapping[str, str]], Build]] = {
     SYSTEM: _system,
     LISTENER: _listener,
 }
-
-
-def _options(spec: str, query: str) -> dict[str, str]:
-    try:
-        pairs = parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query))
-    except ValueError as error:
-        raise InvalidValueError(
-            f"Policy {spec!r}: options are written ?name=value&name=value, not {query!r}."
-        ) from error
-    names = [name for name, _ in pairs]
-    for name in names:
-        if names.count(name) > 1:
-            raise InvalidValueError(f"Policy {spec!r} gives the option {name!r} twice.")
-    return dict(pairs)

@@ -13,8 +13,8 @@ from pydantic import BaseModel, ConfigDict
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.policies.base import Policy
+from roboirg.policies.option_checking import check_options
 from roboirg.policies.planning.hierarchical_policy import with_planner
-from roboirg.policies.planning.option_checking import check_options
 from roboirg.policies.planning.planners import make_planner
 from roboirg.policies.policy_classes import find_class, make_from_class
 from roboirg.policies.policy_urls import is_url, split_url

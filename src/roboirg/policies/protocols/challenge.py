@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from roboirg.core.actions import find_action_space
 from roboirg.core.observations import Demonstration, Observation
-from roboirg.policies.base import Policy
+from roboirg.policies.base import Policy, close_policy
 from roboirg.policies.protocol import Protocol
 from roboirg.policies.remote.endpoints import ActionSpaceName, RemoteOptions
 from roboirg.policies.remote.remote_policy import RemotePolicy
@@ -25,7 +24,6 @@ from roboirg.policies.serving.service import (
     Message,
     Service,
     act,
-    end_episode,
 )
 from roboirg.policies.transport import HTTP, Transport
 
@@ -59,8 +57,6 @@ class ChallengePolicy(RemotePolicy):
 
     def __init__(self, url: str, seed: int = 0) -> None:
         super().__init__(url, seed)
-        self._space = find_action_space(self.options.actions)
-        self.actions = self._space.name
         self._demonstration: Demonstration | None = None
 
     def begin_episode(self, demonstration: Demonstration) -> None:
@@ -100,7 +96,7 @@ class ChallengeService(Service):
 
     def _handle(self, message: Message) -> dict[str, Any]:
         if message.get("reset"):
-            end_episode(self._policy)
+            close_policy(self._policy)
             self._policy = None
             return {"reset_finished": True}
         observations = _read_observations(message)

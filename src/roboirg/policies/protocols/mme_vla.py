@@ -23,7 +23,7 @@ from pydantic import Field
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Demonstration, Observation
-from roboirg.policies.base import Policy
+from roboirg.policies.base import Policy, close_policy
 from roboirg.policies.protocol import Protocol
 from roboirg.policies.remote.endpoints import RemoteOptions
 from roboirg.policies.remote.remote_policy import RemotePolicy, proprioception
@@ -33,7 +33,6 @@ from roboirg.policies.serving.service import (
     Message,
     Service,
     act,
-    end_episode,
     read_request,
     read_state,
 )
@@ -191,7 +190,7 @@ class MmeVlaService(Service):
         return {"actions": actions, "infer_time_ms": milliseconds}
 
     def _clear(self) -> None:
-        end_episode(self._policy)
+        close_policy(self._policy)
         self._policy = None
         self._frames: list[dict[str, NDArray[Any]]] = []
         self._count = self._turn_start = 0

@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from roboirg.core.actions import find_action_space
 from roboirg.core.errors import PolicyConnectionError
 from roboirg.core.observations import Demonstration, Observation
-from roboirg.policies.base import Policy
+from roboirg.policies.base import Policy, close_policy
 from roboirg.policies.protocol import Protocol
 from roboirg.policies.remote.endpoints import ActionSpaceName, RemoteOptions
 from roboirg.policies.remote.remote_policy import RemotePolicy, proprioception
@@ -26,7 +25,6 @@ from roboirg.policies.serving.service import (
     Message,
     Service,
     act,
-    end_episode,
     read_request,
 )
 
@@ -63,8 +61,6 @@ class OpenpiPolicy(RemotePolicy):
 
     def __init__(self, url: str, seed: int = 0) -> None:
         super().__init__(url, seed)
-        self._space = find_action_space(self.options.actions)
-        self.actions = self._space.name
         keys = {"front": self.options.front, "wrist": self.options.wrist}
         self._pictures = {key: f"{camera}_rgb" for camera, key in keys.items() if key}
         self.cameras = tuple(camera for camera, key in keys.items() if key)
@@ -110,7 +106,7 @@ class _OpenpiConversation:
         observation = read_request(message)
         if observation["instruction"] != self._prompt:
             if self._prompt is not None:
-                end_episode(self._policy)
+                close_policy(self._policy)
             self._prompt = observation["instruction"]
             self._policy.reset(self._prompt, _empty_video(observation["front_rgb"].shape))
         actions, milliseconds = act(self._policy, observation)

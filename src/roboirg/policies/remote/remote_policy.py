@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.core.actions import JOINT_ANGLE, ActionSpace, check_chunk
+from roboirg.core.actions import JOINT_ANGLE, check_chunk, find_action_space
 from roboirg.core.errors import InvalidActionError, PolicyReplyError
 from roboirg.core.observations import CAMERAS, Demonstration, Observation
 from roboirg.policies.policy_urls import read_options, split_url
@@ -36,7 +36,7 @@ class RemotePolicy(ABC):
         seed: not sent; servers have seeds of their own.
 
     Attributes:
-        options: of the URL.
+        options: of the URL; one named ``actions`` selects the action space.
         metadata: of the server, as JSON values, from `reset` on.
         instruction: of the current episode.
 
@@ -56,7 +56,8 @@ class RemotePolicy(ABC):
         parts = split_url(url)
         self.options = read_options(parts, self.options_type)
         self.metadata: dict[str, Any] = {}
-        self._space: ActionSpace = JOINT_ANGLE
+        self._space = find_action_space(getattr(self.options, "actions", self.actions))
+        self.actions = self._space.name
         self.instruction = ""
         self._session = ServerSession(
             parts.scheme, read_endpoints(parts), self.options, self.transport.load_client()

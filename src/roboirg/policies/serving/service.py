@@ -66,13 +66,6 @@ def act(policy: Policy, observation: Observation) -> tuple[NDArray[np.float64], 
     return actions, 1000 * (time.perf_counter() - start)
 
 
-def end_episode(policy: Policy | None) -> None:
-    """Call the policy's ``close``, if it has one."""
-    close = getattr(policy, "close", None)
-    if callable(close):
-        close()
-
-
 def read_picture(message: Message, key: str) -> NDArray[np.uint8]:
     """Return a picture (H, W, 3) of a message.
 

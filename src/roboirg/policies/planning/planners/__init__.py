@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from roboirg.core.errors import UnknownNameError
-from roboirg.policies.planning.option_checking import check_options
+from roboirg.policies.option_checking import check_options
 from roboirg.policies.planning.planner import Planner
 
 PLANNERS: Mapping[str, str] = {
