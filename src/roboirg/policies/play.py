@@ -7,12 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Observation
 from roboirg.policies.base import Policy, PrivilegedPolicy
-from roboirg.policies.requirements import (
-    wanted_actions,
-    wanted_demonstration_frames,
-    wanted_history,
-    wanted_history_cameras,
-)
+from roboirg.policies.requirements import REQUIREMENTS, wanted_actions
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -48,13 +43,8 @@ def _check(env: RoboIRGEnv, policy: Policy) -> None:
             f"{type(policy).__name__} acts in {wanted!r}, but the environment takes "
             f"{env.actions!r}; make it with actions={wanted!r}."
         )
-    requirements: dict[str, object] = {
-        "demonstration_frames": wanted_demonstration_frames(policy),
-        "observe_every": wanted_history(policy),
-        "history_cameras": wanted_history_cameras(policy),
-    }
-    for attribute, value in requirements.items():
-        given = getattr(env, attribute)
+    for attribute in ("demonstration_frames", "observe_every", "history_cameras"):
+        value, given = REQUIREMENTS[attribute](policy), getattr(env, attribute)
         if hasattr(policy, attribute) and value != given:
             raise InvalidValueError(
                 f"{type(policy).__name__} needs {attribute}={value!r}, but the environment has "
