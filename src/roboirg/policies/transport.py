@@ -69,4 +69,4 @@ HTTP = Transport(
     "roboirg.policies.remote.http_connection:HttpConnection",
     "roboirg.policies.serving.challenge_http_server:open_http",
 )
-"""The same messages as bodies of ``/infer`` and ``/reset``; metadata at ``/metadata``."""
+"""The same messages as bodies of ``/infer``, ``{"reset": True}`` as ``/reset``; ``/metadata``."""
