@@ -217,9 +217,9 @@ def env_requirements(policy: Policy, job: Job) -> EnvRequirements:
 
 def make_env(job: Job, needs: EnvRequirements) -> RoboIRGEnv:
     """The environment of a job, for a policy that needs it so."""
-    import roboirg
+    from roboirg.envs.factory import make
 
-    return roboirg.make(
+    return make(
         job.task,
         setting=job.setting,
         form=job.form,

@@ -7,18 +7,17 @@ import importlib.metadata
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, cast
+from typing import Any
 
 from pydantic import JsonValue
 
 from roboirg import language
-from roboirg.core.conditions import Fact, FactKind
+from roboirg.core.conditions import Fact
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.code_fingerprint import code_fingerprint
 from roboirg.evaluation.plan import instruct_job
-from roboirg.judging import Event
-from roboirg.judging.attribution import attribute_failure
+from roboirg.judging import Event, attribute_failure
 from roboirg.policies.loading import is_privileged, policy_version
 from roboirg.records.record import (
     Attribution,
@@ -170,17 +169,16 @@ def _attribution(episode: Episode, course: RolloutResult) -> Attribution | None:
     found = attribute_failure(
         episode,
         [
-            # The kinds are those that the world reported.
             Event(
                 event.step + course.turn,
-                Fact(cast("FactKind", event.kind), event.subject, event.place),
+                Fact(event.kind, event.subject, event.place),
                 event.holds,
             )
             for event in course.events
         ],
         timed_out=course.timed_out,
-        turn=course.turn,
-        elapsed=course.elapsed,
+        policy_start_step=course.turn,
+        elapsed_steps=course.elapsed,
         cause=course.cause,
     )
     return None if found is None else Attribution(**found._asdict())

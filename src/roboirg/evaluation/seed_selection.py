@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-import roboirg
 from roboirg.core.episode import SPLITS, Difficulty, Episode, Split, episode_key
 from roboirg.core.errors import (
     InvalidValueError,
     MotionPlanningError,
     SceneRejectedError,
 )
+from roboirg.envs.factory import make
 from roboirg.episodes.splits import (
     MAX_REJECTED,
     SIZES,
@@ -115,7 +115,7 @@ def check_seed(slot: EpisodeSlot, seed: int) -> Rejection | None:
 
 def oracle_failure(episode: Episode) -> str | None:
     """Why the oracle does not solve an episode, played without pictures; None if it does."""
-    env = roboirg.make(episode, cameras=())
+    env = make(episode, cameras=())
     try:
         info = play(env, make_policy("oracle", 0))
     except MotionPlanningError as error:

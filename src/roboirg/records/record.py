@@ -183,7 +183,7 @@ class Attribution(_RecordModel):
     Attributes:
         kind: ``grounding`` (the wrong thing was done) or ``execution`` (the right thing was not
             brought off).
-        failure: which of the kind, as in `roboirg.judging.attribution`.
+        failure: which of the kind, as in `roboirg.judging.failure_attribution`.
         subject: name of the object that it is about, if there is one.
         step: control step of the policy's turn at which it showed, if there is one.
         sentence: the same in words.
