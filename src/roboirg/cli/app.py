@@ -72,8 +72,8 @@ app.command()(report_commands.view)
 app.command()(report_commands.tables)
 app.command()(report_commands.figures)
 app.command()(report_commands.compare)
-app.command()(policy_commands.serve)
-app.command("check-policy")(policy_commands.check_policy)
+app.command(cls=policy_commands.ProtocolHelpCommand)(policy_commands.serve)
+app.command("check-policy", cls=policy_commands.ProtocolHelpCommand)(policy_commands.check_policy)
 language_commands.export_app.command("records")(run_commands.export_records)
 
 

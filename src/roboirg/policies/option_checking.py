@@ -1,4 +1,4 @@
-"""Options from files and command lines, checked; complaints in one sentence."""
+"""Check options from files and command lines; errors are one sentence."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ Options = TypeVar("Options", bound=BaseModel)
 
 
 def check_options(kind: type[Options], values: Mapping[str, Any], origin: str) -> Options:
-    """Options of a kind. Texts stand for the numbers and truth values that they spell.
+    """Return checked options; texts are converted to numbers and booleans.
 
     Args:
-        kind: which options there are.
+        kind: model of the options.
         values: by name, tables nested.
-        origin: where they are from, for complaints.
+        origin: of the values, for error messages.
 
     Raises:
-        UnknownNameError: there is no such option; names the nearest.
-        InvalidValueError: an option is missing or has a value that it cannot have.
+        UnknownNameError: there is no such option; the message names the nearest.
+        InvalidValueError: an option is missing or has an invalid value.
     """
     try:
         return kind.model_validate(dict(values))
@@ -38,22 +38,22 @@ def check_options(kind: type[Options], values: Mapping[str, Any], origin: str) -
         message = first["msg"].removeprefix("Value error, ")
         end = "" if message.endswith((".", "?")) else "."
         raise InvalidValueError(
-            f"{origin}: option {name} is {_shown(first['input'])}: {message}{end}"
+            f"{origin}: option {name} is {_quoted(first['input'])}: {message}{end}"
         ) from None
 
 
-def _shown(value: object) -> str:
-    """A value as it is quoted, without the password of a URL."""
+def _quoted(value: object) -> str:
+    """Return the repr of a value, without the password of a URL."""
     return re.sub(r"//[^/@]*@", "//…@", repr(value))
 
 
 def _names(kind: type[BaseModel], before: str = "") -> list[str]:
-    """All options, those of tables with dots."""
+    """Return the names of all options, those in tables with dots."""
     names: list[str] = []
     for name, field in kind.model_fields.items():
-        held = field.annotation
-        if isinstance(held, type) and issubclass(held, BaseModel):
-            names += _names(held, f"{before}{name}.")
+        annotation = field.annotation
+        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+            names += _names(annotation, f"{before}{name}.")
         else:
             names.append(f"{before}{name}")
     return names

@@ -1,4 +1,4 @@
-"""The bytes of messages: what is written is read, and what is hostile is refused."""
+"""The bytes of messages: what is encoded is decoded, and hostile bytes are refused."""
 
 import contextlib
 
@@ -96,7 +96,7 @@ def test_numpy_scalars_keep_their_type():
     ],
 )
 def test_what_must_not_be_sent_is_refused(value):
-    with pytest.raises(CodecError, match="cannot be written"):
+    with pytest.raises(CodecError, match="cannot be encoded"):
         pack({"x": value})
 
 

@@ -114,62 +114,62 @@ class Reckless(Sound):
 
 
 def found(policy, verdict):
-    return {f.what: f.sentence for f in check_policy(policy) if f.verdict == verdict}
+    return {f.check: f.message for f in check_policy(policy) if f.verdict == verdict}
 
 
 def test_a_sound_policy_passes_everything():
-    findings = check_policy(f"{__name__}:Sound", seed=3)
-    assert {finding.verdict for finding in findings} == {PASS, NOTE}
-    assert [finding.what for finding in findings] == [
+    results = check_policy(f"{__name__}:Sound", seed=3)
+    assert {result.verdict for result in results} == {PASS, NOTE}
+    assert [result.check for result in results] == [
         "loads",
-        "asks for",
+        "requirements",
         "acts without a video",
         "time",
         "acts with a video",
-        "leaves its inputs alone",
-        "is the same with the same seed",
+        "inputs unchanged",
+        "deterministic",
         "reset forgets",
         "broken sensors",
     ]
-    assert all(finding.sentence.endswith(".") for finding in findings)
-    assert "made with seed 3" in findings[0].sentence
-    assert "5, 5, 5 actions of 8 numbers, float64" in findings[2].sentence
+    assert all(result.message.endswith(".") for result in results)
+    assert "made with seed 3" in results[0].message
+    assert "5, 5, 5 actions of 8 numbers, float64" in results[2].message
     assert found(Sound(), FAIL) == {}
 
 
 @pytest.mark.parametrize(
-    ("kind", "what", "words"),
+    ("kind", "check", "words"),
     [
         (Shapeless, "acts without a video", "got shape (3, 7)"),
         (NotFinite, "acts without a video", "finite number"),
         (Textual, "acts without a video", "got str"),
         (Raising, "acts without a video", "act(): KeyError: 'depth'"),
-        (Vandal, "leaves its inputs alone", "changed front_rgb in place"),
-        (Sneaky, "leaves its inputs alone", "changed joint_positions in place"),
+        (Vandal, "inputs unchanged", "changed front_rgb in place"),
+        (Sneaky, "inputs unchanged", "changed joint_positions in place"),
         (Elephant, "reset forgets", "differs by up to 0.3"),
-        (Dice, "is the same with the same seed", "Two equal episodes differ by up to"),
-        (Growing, "is the same with the same seed", "the number of actions"),
+        (Dice, "deterministic", "Two equal episodes differ by up to"),
+        (Growing, "deterministic", "the number of actions"),
         (Poisoned, "broken sensors", "finite number"),
         (Videophobe, "acts with a video", "no films, please"),
     ],
 )
-def test_what_is_wrong_is_found(kind, what, words):
+def test_what_is_wrong_is_found(kind, check, words):
     failed = found(f"{__name__}:{kind.__name__}", FAIL)
-    assert words in failed[what]
+    assert words in failed[check]
 
 
 def test_what_is_allowed_is_noted():
     notes = found(f"{__name__}:HonestDice", NOTE)
-    assert "as it says of itself" in notes["is the same with the same seed"]
+    assert "as the policy declares" in notes["deterministic"]
     assert found(f"{__name__}:HonestDice", FAIL) == {}
     assert "12 of 12 actions" in found(f"{__name__}:Reckless", NOTE)["range without a video"]
-    assert "looks behind the scenes" in found("oracle", NOTE)["loads"]
+    assert "It is privileged" in found("oracle", NOTE)["loads"]
 
 
 @pytest.mark.parametrize(
     ("spec", "words"),
     [
-        ("nobody", "There is no policy 'nobody'"),
+        ("nothing", "There is no policy 'nothing'"),
         ("openpi://127.0.0.1:9?connect=0.1", "cannot be reached"),
         ("openpi://127.0.0.1:9?conect=0.1", "Did you mean 'connect'?"),
         (object(), "It has no reset()."),
@@ -217,5 +217,5 @@ def test_the_command_prints_a_table_and_an_exit_code(name, code, tmp_path, monke
     app.command()(command)
     result = CliRunner().invoke(app, [f"my_policy:{name}"])
     assert result.exit_code == code, result.output
-    assert ("All is well." if code == 0 else "1 of 3 checks failed.") in result.output
+    assert ("11 checks, none failed." if code == 0 else "1 of 3 checks failed.") in result.output
     assert "Actions joint_angle" in result.output

@@ -1,4 +1,4 @@
-"""One episode at a time on a server that remembers, whatever processes there are and end how."""
+"""One episode at a time on a stateful server, across processes that may be killed."""
 
 import multiprocessing
 import os
@@ -20,10 +20,10 @@ ONE, TWO = Endpoint("h", 8001), Endpoint("h", 8002)
 
 
 def hold(folder, endpoint, ready, seconds):
-    lease = lock_server([endpoint], wait=5, folder=folder)
+    lock = lock_server([endpoint], wait=5, folder=folder)
     ready.set()
     time.sleep(seconds)
-    lease.release()
+    lock.release()
 
 
 @pytest.fixture
@@ -43,30 +43,30 @@ def test_another_process_waits_takes_another_server_or_inherits(holder, tmp_path
     with pytest.raises(PolicyTimeoutError, match=r"h:8001 was used by other .* for 0\.2 s"):
         lock_server([ONE], wait=0.2, folder=tmp_path)
     assert 0.2 <= time.monotonic() - start < 30
-    lease = lock_server([ONE, TWO], wait=0, folder=tmp_path)
-    assert lease.endpoint == TWO
+    lock = lock_server([ONE, TWO], wait=0, folder=tmp_path)
+    assert lock.endpoint == TWO
     with pytest.raises(PolicyTimeoutError, match="h:8001, h:8002 were"):
         lock_server([ONE, TWO], wait=0, folder=tmp_path, shared=True)
     os.kill(holder.pid, signal.SIGKILL)
     assert lock_server([ONE, TWO], wait=10, folder=tmp_path).endpoint == ONE
-    lease.release()
+    lock.release()
 
 
 def test_those_who_share_do_not_exclude_each_other(tmp_path):
-    leases = [lock_server([ONE], wait=0, folder=tmp_path, shared=True) for _ in range(3)]
+    locks = [lock_server([ONE], wait=0, folder=tmp_path, shared=True) for _ in range(3)]
     with pytest.raises(PolicyTimeoutError):
         lock_server([ONE], wait=0, folder=tmp_path)
-    for lease in leases:
-        lease.release()
-        lease.release()
+    for lock in locks:
+        lock.release()
+        lock.release()
     lock_server([ONE], wait=0, folder=tmp_path).release()
 
 
 def test_names_of_this_computer_are_one_server(tmp_path):
-    lease = lock_server([Endpoint("localhost", 1)], wait=0, folder=tmp_path)
+    lock = lock_server([Endpoint("localhost", 1)], wait=0, folder=tmp_path)
     with pytest.raises(PolicyConnectionError):
         lock_server([Endpoint("127.0.0.1", 1)], wait=0, folder=tmp_path)
-    lease.release()
+    lock.release()
 
 
 def test_a_thread_does_not_wait_for_itself():
