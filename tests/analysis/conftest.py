@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from roboirg.analysis.published import TRIALS, published_rows
-from roboirg.analysis.stats.success_rates import SettingColumn
+from roboirg.analysis.stats.success_rates import InstructionOptions
 from roboirg.records.record import Result
 
 MakeResult = Callable[..., Result]
@@ -38,7 +38,7 @@ def with_rate(
     episodes: int,
     seeds: int,
     rng: np.random.Generator,
-    variant: SettingColumn,
+    options: InstructionOptions,
     **fields: object,
 ) -> Iterable[Result]:
     """A cell with exactly so many successes, on trials drawn by a generator."""
@@ -49,7 +49,7 @@ def with_rate(
             "success" if success else "failure",
             number // seeds,
             policy_seed=number % seeds,
-            **variant._asdict(),
+            **options._asdict(),
             **fields,
         )
 
@@ -69,7 +69,7 @@ def like_published(table: str, only: str | None = None) -> list[Result]:
             episodes,
             seeds,
             rng,
-            row.variant,
+            row.options,
             policy=row.model,
             task=task,
         )

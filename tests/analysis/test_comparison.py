@@ -9,7 +9,7 @@ import pytest
 
 from roboirg.analysis.stats.comparison import compare
 from roboirg.analysis.stats.comparison_text import sentences
-from roboirg.analysis.stats.samples import gather
+from roboirg.analysis.stats.cells import gather
 from roboirg.core.errors import InvalidValueError
 
 GOOD, POOR = "listener", "forgetful"
@@ -81,7 +81,7 @@ def test_what_has_no_counterpart_or_no_verdict_is_left_out_and_counted(result) -
     first = play(result, GOOD, "1111!1") + play(result, GOOD, "11", setting="direct")
     second = play(result, POOR, "0000-")
     found = compared(first, second)
-    assert [finding.where.variant.setting for finding in found.averages] == ["explicit"]
+    assert [finding.where.options.setting for finding in found.averages] == ["explicit"]
     assert found.averages[0].gap.episodes == 4
     words = text(first, second)
     assert "1 trial of one without counterpart" in words

@@ -17,7 +17,7 @@ from roboirg.analysis.stats.intervals import (
     without_spread,
 )
 from roboirg.analysis.stats.paired_tests import Pairs, measure_gap, sign_flip_test
-from roboirg.analysis.stats.samples import (
+from roboirg.analysis.stats.cells import (
     CellResults,
     Trial,
     clustered_interval,

@@ -18,7 +18,7 @@ from roboirg.analysis.stats.paired_tests import (
     measure_gap,
     sign_flip_test,
 )
-from roboirg.analysis.stats.samples import CellResults, Trial
+from roboirg.analysis.stats.cells import CellResults, Trial
 
 
 def sample(*won: str) -> CellResults:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from roboirg.analysis.stats.rates import change, mean_percent, percent
-from roboirg.analysis.stats.samples import gather
+from roboirg.analysis.stats.cells import gather
 from roboirg.analysis.tables.paper_tables import has_something_to_say, make_table
 from roboirg.analysis.tables.rendering import FORMATS, get_format
 from roboirg.analysis.tables.rendering.terminal import renderable
@@ -153,10 +153,10 @@ def test_what_is_told_otherwise_is_in_no_cell_and_named(result) -> None:
 
 
 def test_only_tables_with_something_to_say_are_wanted(result) -> None:
-    samples = gather([("run", whole(result, settings=("explicit", "contextual")))])
-    assert has_something_to_say("main", samples)
-    assert has_something_to_say("coverage", samples)
-    assert not any(has_something_to_say(one, samples) for one in ("planner", "context", "real"))
+    cells = gather([("run", whole(result, settings=("explicit", "contextual")))])
+    assert has_something_to_say("main", cells)
+    assert has_something_to_say("coverage", cells)
+    assert not any(has_something_to_say(one, cells) for one in ("planner", "context", "real"))
     short = whole(result, settings=("contextual",), stages=(1, 5))
     both = gather([("run", [*whole(result, settings=("contextual",)), *short])])
     assert has_something_to_say("context", both)
@@ -218,8 +218,8 @@ def test_csv_has_every_entry_with_its_counts(result) -> None:
 
 def test_latex_is_balanced_and_markdown_rectangular(result) -> None:
     odd = "my_pkg:Net & 50% #1|{x}\\*"
-    samples = gather([("run", [*whole(result, odd), *whole(result, "b", settings=("spatial",))])])
-    table = make_table("main", samples, published=True)
+    cells = gather([("run", [*whole(result, odd), *whole(result, "b", settings=("spatial",))])])
+    table = make_table("main", cells, published=True)
     latex = FORMATS["latex"].draw(table)
     rows = [
         line for line in latex.splitlines() if line.endswith(r"\\") and "multicolumn" not in line

@@ -13,7 +13,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from roboirg.analysis.page import films
+from roboirg.analysis.page import episode_videos
 from roboirg.analysis.page.columns import UNATTRIBUTED
 from roboirg.analysis.page.entries import Run
 from roboirg.analysis.page.report import make_view, render, render_runs, write_report
@@ -294,7 +294,7 @@ def test_films_are_inside_or_beside(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert "but beside it" not in page.text
     assert not [name for name in Page(render([filmed])).scripts if name.startswith("film")]
 
-    monkeypatch.setattr(films, "MOST_FILM_BYTES", 3)
+    monkeypatch.setattr(episode_videos, "MAX_EMBEDDED_BYTES", 3)
     page = Page(render([filmed, lost], tmp_path))
     assert page.details[0]["film"] == "videos/a%20b.mp4"
     assert page.details[0]["poster"] == "videos/a%20b.jpg"
@@ -343,7 +343,7 @@ def test_two_runs_are_held_against_each_other(tmp_path: Path) -> None:
 def test_films_of_another_run_are_found_from_the_page(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(films, "MOST_FILM_BYTES", 0)
+    monkeypatch.setattr(episode_videos, "MAX_EMBEDDED_BYTES", 0)
     (tmp_path / "b" / "videos").mkdir(parents=True)
     (tmp_path / "b" / "videos" / "x.mp4").write_bytes(b"film")
     store(tmp_path / "a", [records()[0]])

@@ -7,14 +7,14 @@ import pytest
 from roboirg.analysis.stats.success_rates import (
     EXPLICIT,
     Cell,
-    SettingColumn,
+    InstructionOptions,
     make_panels,
     wilson_interval,
 )
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.records.record import Job, Record
 
-DIRECT = SettingColumn("direct")
+DIRECT = InstructionOptions("direct")
 
 
 def record(outcome: str, episode: int = 0, setting: str = "explicit", **fields: object) -> Record:
@@ -113,7 +113,7 @@ def test_unusual_tellings_have_columns_of_their_own() -> None:
         record("success"),
     ]
     (panel,) = make_panels(records)
-    assert [variant.label for variant in panel.variants] == [
+    assert [options_label(options) for options in panel.columns] == [
         "explicit",
         "contextual",
         "contextual (stages 1,5)",
@@ -156,7 +156,7 @@ def test_cells_stand_in_the_order_of_the_table() -> None:
     ]
     planned = [record("success", task="VideoUnmask").identity]
     (panel,) = make_panels(records, planned)
-    assert [(task, variant.label) for task, variant in panel.cells] == [
+    assert [(task, options_label(options)) for task, options in panel.cells] == [
         ("VideoUnmask", "explicit"),
         ("VideoUnmask", "direct"),
         ("PickXtimes", "direct"),

@@ -1,4 +1,4 @@
-"""Samples and the figures made of them."""
+"""Cells and the figures made of them."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from roboirg.analysis.stats.run_summary import ALL, Scope, summarize
-from roboirg.analysis.stats.samples import CellResults, Trial, gather, labels, wilson
-from roboirg.analysis.stats.success_rates import EXPLICIT, SettingColumn
+from roboirg.analysis.stats.cells import CellResults, Trial, gather, labels, wilson
+from roboirg.analysis.stats.success_rates import EXPLICIT, InstructionOptions
 
-DIRECT = SettingColumn("direct")
+DIRECT = InstructionOptions("direct")
 
 
 def figures(results, planned=()):
-    samples = gather([("run", results)], planned)
-    found = summarize(samples, np.random.default_rng(0))
-    return {(one.contestant.policy, one.scope, one.variant): one for one in found}
+    cells = gather([("run", results)], planned)
+    found = summarize(cells, np.random.default_rng(0))
+    return {(one.policy_run.policy, one.scope, one.options): one for one in found}
 
 
 def test_errors_and_what_is_missing_are_in_no_rate(result) -> None:
@@ -42,16 +42,16 @@ def test_errors_and_what_is_missing_are_in_no_rate(result) -> None:
     ],
 )
 def test_what_is_not_alike_is_not_averaged(result, changes, label) -> None:
-    samples = gather([("run", [result("success", 0), result("failure", 1, **changes)])])
-    assert [float(sample.rate) for sample in samples.values()] == [1.0, 0.0]
-    assert list(labels(samples).values())[1] == label
+    cells = gather([("run", [result("success", 0), result("failure", 1, **changes)])])
+    assert [float(sample.rate) for sample in cells.values()] == [1.0, 0.0]
+    assert list(labels(cells).values())[1] == label
 
 
 def test_policies_of_their_own_versions_are_called_by_their_names(result) -> None:
-    samples = gather(
+    cells = gather(
         [("run", [result(policy="a", policy_version="1"), result(policy="b", policy_version="2")])]
     )
-    assert list(labels(samples).values()) == ["a", "b"]
+    assert list(labels(cells).values()) == ["a", "b"]
 
 
 def test_runs_complete_each_other_or_stand_apart(result) -> None:
@@ -101,7 +101,7 @@ def test_gaps_are_paired_and_corrected_and_forms_compared(result) -> None:
     assert cell.p_holm == pytest.approx(3 * 2 / 2**20)
     assert cell.form_gap.value == -0.75
     assert cell.form_gap.overlap == (0, 0, 15, 5)
-    reasoning = found["listener", Scope(task="PickXtimes"), SettingColumn("reasoning")]
+    reasoning = found["listener", Scope(task="PickXtimes"), InstructionOptions("reasoning")]
     assert (reasoning.gap.p_value, reasoning.p_holm) == (1.0, 1.0)
     assert reasoning.gap.retention == 0.95
     explicit = found["listener", Scope(task="PickXtimes"), EXPLICIT]

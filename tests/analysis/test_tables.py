@@ -4,7 +4,7 @@ import io
 
 from rich.console import Console
 
-from roboirg.analysis.stats.success_rates import EXPLICIT, Cell, Condition, Panel, SettingColumn
+from roboirg.analysis.stats.success_rates import EXPLICIT, Cell, Condition, Panel, InstructionOptions
 from roboirg.analysis.tables.run_tables import (
     NO_GAP,
     gap_text,
@@ -57,7 +57,7 @@ def test_many_failures_are_counted_and_none_is_not_told() -> None:
 
 
 def test_the_table_says_rates_gaps_and_what_is_amiss() -> None:
-    direct, spatial = SettingColumn("direct"), SettingColumn("spatial")
+    direct, spatial = InstructionOptions("direct"), InstructionOptions("spatial")
     panel = Panel(
         "listener",
         Condition("listener", "test", 1300),
@@ -113,10 +113,10 @@ def test_the_floor_has_no_gap() -> None:
         "random",
         Condition("random", "test", 1300),
         ("PickXtimes", "VideoUnmask"),
-        (EXPLICIT, SettingColumn("direct")),
+        (EXPLICIT, InstructionOptions("direct")),
         {
             ("PickXtimes", EXPLICIT): Cell(0, 4, pairs=4, gap=0.0, explicit=0.0),
-            ("PickXtimes", SettingColumn("direct")): Cell(0, 4, pairs=4, gap=0.0, explicit=0.0),
+            ("PickXtimes", InstructionOptions("direct")): Cell(0, 4, pairs=4, gap=0.0, explicit=0.0),
             (None, EXPLICIT): Cell(0, 4, pairs=4, gap=0.0, explicit=0.0),
         },
     )
