@@ -11,7 +11,7 @@ import pytest
 from roboirg.analysis.stats.chance import chance_level, chance_of
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.plan import instruct_job
-from roboirg.language.columns import all_variants
+from roboirg.language.variants import all_variants
 from roboirg.policies.builtin.listeners import ForgetfulPolicy
 from roboirg.records.record import Job
 from roboirg.tasks import all_tasks, get_task
@@ -27,9 +27,9 @@ def test_explicit_commands_leave_nothing_to_chance(task: str) -> None:
     assert chance_level(job(task, "explicit", episode) for episode in range(10)) == 1
 
 
-@pytest.mark.parametrize("options", all_variants(), ids="-".join)
-def test_implicit_commands_do(options) -> None:
-    level = chance_level(job(*options, episode) for episode in range(10))
+@pytest.mark.parametrize("variant", all_variants(), ids="-".join)
+def test_implicit_commands_do(variant) -> None:
+    level = chance_level(job(*variant, episode) for episode in range(10))
     assert 0 < level < 1
 
 

@@ -14,9 +14,9 @@ from roboirg.analysis.figures.failures import COLORS, UNKNOWN, draw_failures
 from roboirg.analysis.figures.forms import PARTS, draw_forms
 from roboirg.analysis.published import published_rows
 from roboirg.analysis.stats.run_summary import ALL
-from roboirg.analysis.stats.success_rates import InstructionOptions
 from roboirg.cli.report_commands import figures
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan import Plan
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING

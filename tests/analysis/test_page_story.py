@@ -13,7 +13,7 @@ from roboirg.analysis.page.report import write_report
 from roboirg.analysis.stats.chance import chance_of
 from roboirg.analysis.stats.comparison import compare
 from roboirg.analysis.stats.run_summary import ALL
-from roboirg.analysis.stats.success_rates import InstructionOptions
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.executors.executor import choose_executor
 from roboirg.evaluation.plan import make_plan
 from roboirg.evaluation.rollout import EpisodeRunner
@@ -84,12 +84,16 @@ def test_the_whole_report_follows(run: Path, tmp_path: Path) -> None:
     assert told.form_gap.value < -0.3
     assert told.form_gap.overlap.only_first == told.form_gap.overlap.neither == 0
     found = compare(
-        *({key: one for key, one in content.cells.items() if key[0] == who}
-          for who in (listener, forgetful)),
+        *({key: one for key, one in content.cells.items() if key.policy_run == policy_run}
+          for policy_run in (listener, forgetful)),
         np.random.default_rng(0),
     )  # fmt: skip
     verdicts = {finding.where.options: finding.gap.value for finding in found.averages}
-    assert verdicts[InstructionOptions("explicit")] == verdicts[InstructionOptions("direct", "resolved")] == 0
+    assert (
+        verdicts[InstructionOptions("explicit")]
+        == verdicts[InstructionOptions("direct", "resolved")]
+        == 0
+    )
     assert verdicts[InstructionOptions("direct")] > 0
     paths = write_figures(content, tmp_path)
     assert {path.stem for path in paths} == {"averages", "forms", "expressions", "failures"}

@@ -16,8 +16,8 @@ from roboirg.analysis.published import (
     published_rows,
     published_tasks,
 )
-from roboirg.analysis.stats.rates import mean_percent, percent
 from roboirg.analysis.stats.cells import gather
+from roboirg.analysis.stats.rates import mean_percent, percent
 from roboirg.analysis.tables.paper_tables import WHICH, make_table
 from roboirg.analysis.tables.rendering import FORMATS
 from roboirg.analysis.tables.table import Row, Table
