@@ -27,7 +27,7 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
 def make_result(outcome: str = "success", episode: int = 0, **fields: object) -> Result:
-    told = {
+    usual = {
         "policy": "listener",
         "task": "PickXtimes",
         "split": "test",
@@ -41,7 +41,7 @@ def make_result(outcome: str = "success", episode: int = 0, **fields: object) ->
         **fields,
     }
     error = {"error": "policy"} if outcome == "error" else {}
-    return Result(outcome=outcome, episode=episode, **error, **told)  # type: ignore[arg-type]
+    return Result(outcome=outcome, episode=episode, **error, **usual)  # type: ignore[arg-type]
 
 
 def with_rate(

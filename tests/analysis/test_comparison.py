@@ -1,4 +1,4 @@
-"""Comparisons of two policies: who is better, what cannot be told, what is unfair."""
+"""Comparisons of two policies: which is better, what stays open, what is refused."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def text(first: list, second: list) -> str:
     return "\n".join(sentences(compared(first, second), GOOD, POOR))
 
 
-def test_who_is_better_is_said_in_words(result) -> None:
+def test_the_better_policy_is_named(result) -> None:
     first = play(result, GOOD, "1" * 20) + play(result, GOOD, "1" * 20, setting="direct")
     second = play(result, POOR, "1" * 20) + play(result, POOR, "1" * 5 + "0" * 15, setting="direct")
     found = compared(first, second)
@@ -116,7 +116,7 @@ def test_what_cannot_be_compared_is_refused(result, changes, words) -> None:
         compared(play(result, GOOD, "11"), play(result, POOR, "11", **changes))
 
 
-def test_a_side_has_to_be_one_policy_of_one_version(result) -> None:
+def test_a_side_is_one_policy_of_one_version(result) -> None:
     one = play(result, GOOD, "11")
     with pytest.raises(InvalidValueError, match="name one as RUN:listener"):
         compared([*one, *play(result, POOR, "11")], one)

@@ -37,7 +37,7 @@ PLAN = Plan(
 
 
 def results() -> list[Result]:
-    """The listener succeeds; the forgetful fails where it has to remember."""
+    """The listener succeeds; the forgetful fails where it must remember."""
     found = []
     for number, job in enumerate(PLAN.jobs()):
         lost = job.policy == "forgetful" and job.form == "implicit" and job.setting != "explicit"

@@ -37,11 +37,11 @@ TRACEBACK = "Traceback <script>alert(1)</script>"
 
 
 def records() -> list[Record]:
-    """The listener succeeds, the forgetful fails where it has to remember; one error."""
+    """The listener succeeds, the forgetful fails where it must remember; one error."""
     found = []
     for index, job in enumerate(PLAN.jobs()):
-        told = make_record(job, RolloutResult("success", cause=None), started_at="now")
-        subject = f"cube_{told.goal.get('color', 'red')}"
+        success = make_record(job, RolloutResult("success", cause=None), started_at="now")
+        subject = f"cube_{success.goal.get('color', 'red')}"
         events = [
             EventRecord(step=-20, kind="still", subject="robot"),
             EventRecord(step=-10, kind="over", subject=subject, place="target"),
@@ -167,7 +167,7 @@ def test_words_are_searched_in_utterances_and_causes(page: Any) -> None:
         for one in records()
     )
     assert shown(page) == some
-    search.fill("nobody says this")
+    search.fill("words in no record")
     assert shown(page) == 0
     assert page.locator("#nothing").is_visible()
 
@@ -449,7 +449,7 @@ def test_ten_thousand_episodes_cost_no_more_than_a_page_of_them(
         assert shown(page) == 10_000
         elements = "document.querySelectorAll('*').length"
         assert page.evaluate(elements) < MOST_ELEMENTS
-        for words in ("cube", "nobody says this", ""):
+        for words in ("cube", "words in no record", ""):
             page.fill("[name=words]", words)
             counters = page.evaluate("roboirg.counters")
             assert counters["scanned"] == 10_000

@@ -1,4 +1,4 @@
-"""A run of the listener and the forgetful policy tells the story it should, all the way."""
+"""A run of the listener and the forgetful policy, from records to page."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ PLAN = make_plan(
     forms="implicit,resolved",
     episodes="3",
 )
-"""A task of each suite, told in all its ways."""
+"""A task of each suite, in all settings and forms."""
 MOST_DEVIATIONS = 4
 """Standard deviations between what came of guessing and what is expected."""
 
@@ -79,10 +79,10 @@ def test_the_whole_report_follows(run: Path, tmp_path: Path) -> None:
     content = FigureData.of([("story", read_records(run))], PLAN.jobs())
     listener, forgetful = content.names
     assert (listener.policy, forgetful.policy) == ("listener", "forgetful")
-    told = content.summaries[forgetful, ALL, InstructionOptions("direct")]
-    assert told.form_gap is not None
-    assert told.form_gap.value < -0.3
-    assert told.form_gap.overlap.only_first == told.form_gap.overlap.neither == 0
+    direct = content.summaries[forgetful, ALL, InstructionOptions("direct")]
+    assert direct.form_gap is not None
+    assert direct.form_gap.value < -0.3
+    assert direct.form_gap.overlap.only_first == direct.form_gap.overlap.neither == 0
     found = compare(
         *({key: one for key, one in content.cells.items() if key.policy_run == policy_run}
           for policy_run in (listener, forgetful)),

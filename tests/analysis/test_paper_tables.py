@@ -1,4 +1,4 @@
-"""What is amiss with a run is shown: incomplete, in error, alone, of several versions."""
+"""Tables mark incomplete cells, errors, single policies and several versions."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def test_versions_stand_apart_and_are_named(result) -> None:
     }
 
 
-def test_what_is_told_otherwise_is_in_no_cell_and_named(result) -> None:
+def test_other_options_are_in_no_cell_and_named(result) -> None:
     results = [
         *whole(result),
         result("failure", 0, policy="a", task="BinFill", setting="direct", form="resolved"),
@@ -152,7 +152,7 @@ def test_what_is_told_otherwise_is_in_no_cell_and_named(result) -> None:
     assert "direct (resolved)" in notes(table)
 
 
-def test_only_tables_with_something_to_say_are_wanted(result) -> None:
+def test_only_informative_tables_are_wanted(result) -> None:
     cells = gather([("run", whole(result, settings=("explicit", "contextual")))])
     assert is_informative("main", cells)
     assert is_informative("coverage", cells)

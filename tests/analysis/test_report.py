@@ -77,7 +77,7 @@ class Page(HTMLParser):
         known = {choice["name"]: choice["values"] for choice in self.data["choices"]}
         return [known[name][value] if value >= 0 else None for value in values]
 
-    def said(self, place: int) -> str:
+    def string(self, place: int) -> str:
         return str(self.data["strings"][place])
 
     def notes(self, *words: str) -> list[str]:
@@ -182,7 +182,7 @@ def test_mentions_explicit_and_resolved_form_are_there() -> None:
         for (at, start, end, *_), mention in zip(
             details.get("mentions", []), record.mentions, strict=True
         ):
-            text = page.said(details["turns"][at][1])
+            text = page.string(details["turns"][at][1])
             assert text[start:end] == record.instruction[mention.utterance].text[start:end]
         assert ("command" in details) == (record.setting != "explicit")
         implicit = record.setting != "explicit" and record.form == "implicit"
@@ -191,8 +191,8 @@ def test_mentions_explicit_and_resolved_form_are_there() -> None:
             twin = next(
                 one for one in found if one.setting == record.setting and one.form == "resolved"
             )
-            said = " ".join(turn.text for turn in twin.instruction)
-            assert page.said(details["resolved"]) == said
+            words = " ".join(turn.text for turn in twin.instruction)
+            assert page.string(details["resolved"]) == words
 
 
 def test_the_resolved_form_is_said_again_where_it_was_not_played() -> None:
@@ -200,9 +200,9 @@ def test_the_resolved_form_is_said_again_where_it_was_not_played() -> None:
     (record,) = records(plan)
     (details,) = Page(page := render([record])).details
     assert "resolved" in details
-    resolved = Page(page).said(details["resolved"])
+    resolved = Page(page).string(details["resolved"])
     assert resolved != " ".join(turn.text for turn in record.instruction)
-    # Another version of the language may have said something else.
+    # Another version of the language may have other words.
     (other,) = Page(render([record.model_copy(update={"language_version": "0.1"})])).details
     assert "resolved" not in other
 
@@ -292,7 +292,7 @@ def test_films_are_inside_or_beside(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert page.scripts[f"film-{key}"] == "data:video/mp4;base64,ZmlsbQ=="
     assert page.scripts[f"poster-{key}"] == "data:image/jpeg;base64,cG9zdGVy"
     assert [details.get("film") for details in page.details] == ["#", None]
-    assert page.said(page.details[1]["lost"]) == "no room"
+    assert page.string(page.details[1]["lost"]) == "no room"
     assert "plays them from the folder" not in page.text
     assert not [name for name in Page(render([filmed])).scripts if name.startswith("film")]
 
@@ -338,8 +338,8 @@ def test_two_runs_are_held_against_each_other(tmp_path: Path) -> None:
     # Both policies of both runs, but for the last four.
     assert sorted(map(pairs.count, set(pairs))) == [3] * 4 + [4] * (len(found) // 2 - 4)
     assert any("Incomplete: 4 of" in words for _, words in page.warnings)
-    said = next(one for one in page.data["comparisons"] if [one["left"], one["right"]] == [0, 2])
-    assert "listener, ours (privileged) against listener, theirs" in said["sentences"][0]
+    found = next(one for one in page.data["comparisons"] if [one["left"], one["right"]] == [0, 2])
+    assert "listener, ours (privileged) against listener, theirs" in found["sentences"][0]
 
 
 def test_films_of_another_run_are_found_from_the_page(
@@ -377,8 +377,8 @@ def test_the_command_prints_the_table_and_writes_the_page(tmp_path: Path) -> Non
 def test_what_cannot_be_compared_says_why() -> None:
     (one, *_), (_, other, *_) = records(), records()
     runs = [Run("a", [one]), Run("b", [other.model_copy(update={"language_version": "9"})])]
-    (said,) = Page(render_runs(runs)).data["comparisons"]
-    assert "same version can be compared" in said["sentences"][0]
+    (found,) = Page(render_runs(runs)).data["comparisons"]
+    assert "same version can be compared" in found["sentences"][0]
 
 
 def test_the_head_says_which_run_it_was(tmp_path: Path) -> None:

@@ -88,7 +88,7 @@ class PolicyRun(NamedTuple):
 
 
 class CellKey(NamedTuple):
-    """What a cell is about."""
+    """Policy run, task and instruction options of a cell."""
 
     policy_run: PolicyRun
     task: str

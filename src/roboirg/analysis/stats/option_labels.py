@@ -16,7 +16,7 @@ _DEFAULTS = InstructionOptions()
 
 
 def options_label(options: InstructionOptions) -> str:
-    """Return the setting, followed by the options that differ from the defaults in brackets."""
+    """Return the setting and, in brackets, the options that differ from the defaults."""
     changed = []
     if options.form != _DEFAULTS.form:
         changed.append(options.form)

@@ -1,4 +1,4 @@
-"""Two cells on the same episodes: gap, tests, retention, overlap."""
+"""Paired comparison of two cells on the same episodes: gap, test, retention, overlap."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from roboirg.analysis.stats.intervals import (
 
 
 class Overlap(NamedTuple):
-    """What two cells did in the same trials (episode and policy seed).
+    """Outcomes of two cells in the trials (episode and policy seed) that they share.
 
     Attributes:
-        both: trials solved in both.
-        only_first: in the first alone.
-        only_second: in the second alone.
-        neither: in neither.
+        both: trials that succeed in both cells.
+        only_first: trials that succeed in the first cell alone.
+        only_second: trials that succeed in the second cell alone.
+        neither: trials that succeed in neither cell.
     """
 
     both: int
@@ -48,13 +48,13 @@ class Overlap(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Pairs:
-    """Two cells of one task, episode by episode.
+    """Two cells of one task, paired by episode.
 
     Attributes:
-        rows: for each episode that has verdicts in both: successes and trials of the first, then
-            of the second; shape (episodes, 4). Of the policy seeds those that both have, or all
-            where they share none.
-        overlap: over the trials that both have.
+        rows: for each episode with verdicts in both cells, successes and trials of the first,
+            then of the second; shape (episodes, 4). Counts the policy seeds that both cells have,
+            or all seeds if they share none.
+        overlap: of the trials that both cells have.
     """
 
     rows: Rows

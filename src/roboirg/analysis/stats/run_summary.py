@@ -40,7 +40,7 @@ ALL = Scope()
 
 
 class ScopeKey(NamedTuple):
-    """What a row of a summary is about."""
+    """Policy run, scope and instruction options of a row."""
 
     policy_run: PolicyRun
     scope: Scope

@@ -93,7 +93,7 @@ def make_table(which: str, cells: Cells, *, published: bool = False, chance: boo
 
 
 def is_informative(which: Which, cells: Cells) -> bool:
-    """Return whether a run gives a table of context or planners several rows, or another any."""
+    """Return whether a run has rows for a table; context and planners need several."""
     if which == "coverage":
         return True
     rows = list(_positions(which, cells))
@@ -149,7 +149,7 @@ def _columns(which: RateTable) -> tuple[Column, ...]:
 
 
 def _positions(which: RateTable, cells: Cells) -> Iterator[tuple[PolicyRun, Position]]:
-    """Yield the rows of a run: for each policy run its instruction options, in order."""
+    """Yield the position of each row, by policy run and instruction options."""
     tasks = set(published_tasks(which))
     played = {(key.policy_run, key.options) for key in cells if key.task in tasks}
     shown = _shown_options(which, (options for _, options in played))

@@ -40,7 +40,7 @@ const factsOf = (row, details) => {
   if (details.cause !== undefined && !details.attribution) facts.push(entry("verdict", strings[details.cause]));
   if (details.lost !== undefined) facts.push(entry("video", `lost: ${strings[details.lost]}`));
   const before = details.shown ? `; before that a video of ${seconds(details.shown)} s` : "";
-  facts.push(entry("played", `${columns.steps[row]} steps, ${seconds(columns.steps[row])} s${before}`));
+  facts.push(entry("played", `${counted(columns.steps[row], "step")}, ${seconds(columns.steps[row])} s${before}`));
   facts.push(entry("conditions", strings[details.conditions]));
   return h("dl", { class: "episode-facts" }, facts);
 };
