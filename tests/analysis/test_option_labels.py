@@ -14,8 +14,6 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import STAGE_SETS
 from roboirg.language.settings import setting_names
 
-FORMS = ("resolved", "implicit")
-
 
 def test_labels_name_what_differs_from_the_defaults() -> None:
     options = InstructionOptions("contextual", "resolved", (1, 5), "competing", 3, "camera")
