@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 MINIMUM_WIDTH = 120
 """Columns to use if the output is not a terminal."""
-SEED = 20_240_607
-"""Of the bootstrap; the same records give the same sentences."""
 _ALL = "all"
 
 
@@ -138,6 +136,7 @@ def compare(
 
     from roboirg.analysis.stats.comparison import compare as compare_cells
     from roboirg.analysis.stats.comparison_text import sentences
+    from roboirg.analysis.stats.intervals import SEED
 
     ours, theirs = _one_policy(first), _one_policy(second)
     found = compare_cells(ours, theirs, np.random.default_rng(SEED))

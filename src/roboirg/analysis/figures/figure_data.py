@@ -15,11 +15,9 @@ from roboirg.analysis.stats.cells import (
     policy_order,
     sort_cells,
 )
+from roboirg.analysis.stats.intervals import SEED
 from roboirg.analysis.stats.run_summary import ScopeKey, SummaryRow, summarize
 from roboirg.records.record import Job, Result
-
-SEED = 20_240_607
-"""Of the bootstrap; the same records give the same figures."""
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ from roboirg.analysis.stats.cells import PolicyRun
 from roboirg.analysis.stats.option_labels import default_settings
 from roboirg.analysis.stats.paired_tests import Gap
 from roboirg.analysis.stats.rates import points
-from roboirg.analysis.stats.run_summary import ALL, Scope, ScopeKey
-from roboirg.analysis.tables.run_tables import ALL_TASKS
+from roboirg.analysis.stats.run_summary import ALL, ALL_TASKS, Scope, ScopeKey
 from roboirg.core.instruction_options import InstructionOptions
 
 if TYPE_CHECKING:

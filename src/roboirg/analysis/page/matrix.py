@@ -10,20 +10,14 @@ import numpy as np
 from roboirg.analysis.page.columns import setting_label
 from roboirg.analysis.page.entries import EpisodeEntries, gather_run
 from roboirg.analysis.stats.cells import CellKey, CellResults, Cells, sort_cells, task_order
-from roboirg.analysis.stats.intervals import Interval
+from roboirg.analysis.stats.intervals import SEED, Interval
 from roboirg.analysis.stats.option_labels import options_label, options_sort_key
-from roboirg.analysis.stats.rates import points, whole_percent
-from roboirg.analysis.stats.run_summary import ALL, Scope, SummaryRow, summarize
-from roboirg.analysis.tables.run_tables import ALL_TASKS
+from roboirg.analysis.stats.rates import p_text, points, whole_percent
+from roboirg.analysis.stats.run_summary import ALL, ALL_TASKS, Scope, SummaryRow, summarize
 from roboirg.core.episode import DIFFICULTIES
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.tasks import all_tasks
 from roboirg.util.plurals import counted
-
-SEED = 20_240_607
-"""Of the bootstrap; the same records give the same page."""
-
-_SMALLEST_P = 0.001
 
 
 class MatrixRow(NamedTuple):
@@ -151,9 +145,10 @@ def _gap_notes(one: SummaryRow) -> list[str]:
     if one.gap is not None:
         gap = f"{points(one.gap.value)} points to explicit"
         if one.gap.retention is not None:
+            tested = "not tested" if one.p_holm is None else f"corrected {p_text(one.p_holm)}"
             lines.append(
                 f"{gap} on the same {counted(one.gap.episodes, 'episode')}"
-                f"{_ends(one.gap.interval)}, {_p_text(one.p_holm)}"
+                f"{_ends(one.gap.interval)}, {tested}"
             )
         elif one.gap.value:
             lines.append(f"{gap}, which has no success")
@@ -169,9 +164,3 @@ def _gap_notes(one: SummaryRow) -> list[str]:
 
 def _ends(interval: Interval | None) -> str:
     return "" if interval is None else f" ({points(interval.low)} to {points(interval.high)})"
-
-
-def _p_text(p_value: float | None) -> str:
-    if p_value is None:
-        return "not tested"
-    return "corrected p < 0.001" if p_value < _SMALLEST_P else f"corrected p = {p_value:.3f}"

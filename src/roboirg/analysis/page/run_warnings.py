@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from roboirg.analysis.page.entries import EpisodeEntries, Run
-from roboirg.analysis.page.matrix import SEED
 from roboirg.analysis.stats.cells import PolicyRun, Versions
 from roboirg.analysis.stats.comparison import compare
 from roboirg.analysis.stats.comparison_text import sentences
+from roboirg.analysis.stats.intervals import SEED
 from roboirg.core.errors import InvalidValueError
 from roboirg.language.settings import EXPLICIT
 from roboirg.util.plurals import counted

@@ -7,10 +7,8 @@ from collections.abc import Iterator
 from roboirg.analysis.stats.comparison import Comparison, ComparisonResult
 from roboirg.analysis.stats.option_labels import options_label
 from roboirg.analysis.stats.power import MAX_EPISODES, POWER
-from roboirg.analysis.stats.rates import points
+from roboirg.analysis.stats.rates import p_text, points
 from roboirg.util.plurals import counted
-
-_SMALLEST_P = 0.001
 
 
 def sentences(comparison: Comparison, first: str, second: str) -> Iterator[str]:
@@ -64,7 +62,7 @@ def _figures(result: ComparisonResult) -> str:
         low, high = (points(end, 1) for end in gap.interval)
         words += f" (95 % interval {low} to {high})"
     tasks = "" if len(result.tasks) == 1 else f" of {len(result.tasks)} tasks"
-    return f"{words}, {_p(result.p_holm)}, {counted(gap.episodes, 'episode')}{tasks}"
+    return f"{words}, {p_text(result.p_holm)}, {counted(gap.episodes, 'episode')}{tasks}"
 
 
 def _outlook(result: ComparisonResult) -> str:
@@ -99,7 +97,3 @@ def _caveats(comparison: Comparison) -> Iterator[str]:
             f"Incomplete: {counted(unjudged, 'trial')} without a verdict (an error, or still to be "
             f"played) {verb} left out."
         )
-
-
-def _p(value: float) -> str:
-    return f"p < {_SMALLEST_P}" if value < _SMALLEST_P else f"p = {value:.3f}"

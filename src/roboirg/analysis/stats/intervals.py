@@ -17,6 +17,8 @@ Z_95 = 1.959963984540054
 """Two-sided 95 % quantile of the normal distribution."""
 ALPHA = 0.05
 """Share of intervals that may miss the true value, and of tests that may raise a false alarm."""
+SEED = 20_240_607
+"""Of all bootstraps that are shown; the same records give the same numbers."""
 DRAWS = 4000
 """Bootstrap resamples; the ends of an interval then vary by about 3 % of its length."""
 

@@ -14,6 +14,8 @@ from typing import Literal
 
 DIGITS = Decimal("0.01")
 
+_SMALLEST_P = 0.001
+
 Change = Literal["up", "down", "same"]
 
 
@@ -41,6 +43,11 @@ def points(gap: float, decimals: int = 0) -> str:
     """Return a gap in signed percentage points, with a proper minus: ``−12``, ``+3``, ``±0``."""
     text = f"{100 * gap:+.{decimals}f}".replace("-", "−")
     return f"±{text[1:]}" if not text.strip("+−0.") else text
+
+
+def p_text(p_value: float) -> str:
+    """Return a p-value with its sign: ``p = 0.012``, ``p < 0.001``."""
+    return f"p < {_SMALLEST_P}" if p_value < _SMALLEST_P else f"p = {p_value:.3f}"
 
 
 def _rounded(value: Fraction) -> Decimal:

@@ -37,6 +37,8 @@ class Scope(NamedTuple):
 
 
 ALL = Scope()
+ALL_TASKS = "all tasks"
+"""Label of `ALL`."""
 
 
 class ScopeKey(NamedTuple):

@@ -25,6 +25,7 @@ from roboirg.analysis.stats.cells import (
     labels,
 )
 from roboirg.analysis.stats.chance import chance_level
+from roboirg.analysis.stats.intervals import SEED
 from roboirg.analysis.stats.option_labels import setting_sort_key, staged_options
 from roboirg.analysis.stats.rates import percent
 from roboirg.analysis.tables.table import (
@@ -52,8 +53,6 @@ WHICH: tuple[Which, ...] = get_args(Which)
 OVERALL = AVERAGE
 OWN_NAME = "RoboIRGBench"
 CHANCE = "chance"
-SEED = 20_240_607
-"""Of the bootstrap behind the intervals; the same records give the same tables."""
 
 TITLES: Mapping[Which, str] = {
     "main": "Success by task and setting",

@@ -13,7 +13,14 @@ from roboirg.analysis.stats.cells import PolicyRun, gather, labels, policy_order
 from roboirg.analysis.stats.option_labels import options_label, options_sort_key
 from roboirg.analysis.stats.paired_tests import Overlap
 from roboirg.analysis.stats.rates import points, whole_percent
-from roboirg.analysis.stats.run_summary import ALL, Scope, ScopeKey, ScopeResults, group_by_scope
+from roboirg.analysis.stats.run_summary import (
+    ALL,
+    ALL_TASKS,
+    Scope,
+    ScopeKey,
+    ScopeResults,
+    group_by_scope,
+)
 from roboirg.analysis.tables.table import ERROR_MARK, MISSING_MARK
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.records.record import Job, Result
@@ -22,7 +29,6 @@ from roboirg.util.plurals import counted
 MINIMUM_WIDTH = 100
 """Columns to use if the output is not a terminal."""
 
-ALL_TASKS = "all tasks"
 NO_GAP = "–"
 
 MAX_FAILURES = 10

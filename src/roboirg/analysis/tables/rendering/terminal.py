@@ -9,6 +9,7 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table as Grid
 from rich.text import Text
 
+from roboirg.analysis.stats.run_summary import ALL_TASKS
 from roboirg.analysis.tables.table import Entry, Row, Table
 from roboirg.analysis.tables.table_notes import ARROWS
 
@@ -18,7 +19,6 @@ _NARROWEST = 9
 """Characters of a rate with its arrow and mark."""
 _BORDERS = 3
 """Characters of a line and two blanks."""
-_NO_GROUP = "all tasks"
 
 
 def renderable(table: Table, console: Console) -> RenderableType:
@@ -67,7 +67,7 @@ def _parts(table: Table, width: int) -> list[list[int]]:
 
 
 def _title(table: Table, indices: Sequence[int]) -> str:
-    groups = dict.fromkeys(table.columns[index].group or _NO_GROUP for index in indices)
+    groups = dict.fromkeys(table.columns[index].group or ALL_TASKS for index in indices)
     return f"{table.title}: {', '.join(groups)}"
 
 
