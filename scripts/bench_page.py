@@ -1,4 +1,4 @@
-"""Time creating, opening and filtering a page of many episodes.
+"""Measure how long a page of many episodes takes to make, open and filter.
 
 python scripts/bench_page.py RUN [--episodes 10000] [--browser /usr/bin/chromium]
 
@@ -39,11 +39,11 @@ FILTER = """async (hash) => {
   await new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
   return performance.now() - begun;
 }"""
-"""Filters, and returns the milliseconds until the next frame is painted."""
+"""Filter and return the milliseconds until the next frame is painted."""
 
 
-def repeat_records(records: tuple[Record, ...], number: int) -> list[Record]:
-    """Return copies of the records, each with a different policy seed."""
+def repeated(records: tuple[Record, ...], number: int) -> list[Record]:
+    """Return a number of copies of records; each round has another policy seed."""
     copies = (
         record.model_copy(update={"policy_seed": seed, "video": None})
         for seed in itertools.count()
@@ -53,7 +53,7 @@ def repeat_records(records: tuple[Record, ...], number: int) -> list[Record]:
 
 
 def measure(page: Any, path: Path) -> None:  # noqa: ANN401 - Playwright may be missing
-    """Open and filter several times; print the medians in milliseconds."""
+    """Open and filter a page several times; print the medians in milliseconds."""
     opened = []
     for _ in range(REPEATS):
         start = time.perf_counter()
@@ -61,7 +61,7 @@ def measure(page: Any, path: Path) -> None:  # noqa: ANN401 - Playwright may be 
         page.wait_for_selector("#rows li")
         opened.append(1000 * (time.perf_counter() - start))
     print(f"open, until the list appears: {statistics.median(opened):.0f} ms")
-    print(f"open, by the page's own clock: {page.evaluate('roboirg.counters.openMs'):.0f} ms")
+    print(f"open, by the page's clock: {page.evaluate('roboirg.counters.openMs'):.0f} ms")
     for name, filters in FILTERS.items():
         words = "&".join(f"{key}={value}" for key, value in filters.items())
         times = [page.evaluate(FILTER, f"#?{words}") for _ in range(REPEATS)]
@@ -81,7 +81,7 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=10_000)
     parser.add_argument("--browser", default=next(filter(None, map(shutil.which, BROWSERS)), None))
     arguments = parser.parse_args()
-    records = repeat_records(read_records(arguments.run), arguments.episodes)
+    records = repeated(read_records(arguments.run), arguments.episodes)
     start = time.perf_counter()
     text = render(records)
     print(f"{len(records)} episodes, {len(text) / 1e6:.1f} MB, created in "

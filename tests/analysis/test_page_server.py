@@ -25,6 +25,8 @@ from roboirg.records.record import Record
 from roboirg.records.store import RecordStore
 from roboirg.util.http_server import ByteRange, parse_range
 
+pytestmark = pytest.mark.usefixtures("patient_sockets")
+
 FILM = bytes(range(256)) * 1000
 
 
@@ -61,7 +63,7 @@ def server(run: Path) -> Iterator[PageServer]:
 def ask(
     server: PageServer, path: str, method: str = "GET", **headers: str
 ) -> tuple[http.client.HTTPResponse, bytes]:
-    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=10)
+    connection = http.client.HTTPConnection("127.0.0.1", server.port)
     connection.request(method, path, headers=headers)
     response = connection.getresponse()
     body = response.read()
@@ -131,7 +133,7 @@ def test_no_header_leads_outside_of_the_file(size: int, header: str | None) -> N
 )  # fmt: skip
 def test_nothing_outside_of_the_run_is_served(server: PageServer, path: str) -> None:
     # A raw socket: clients would tidy up the path.
-    with socket.create_connection(("127.0.0.1", server.port), timeout=10) as raw:
+    with socket.create_connection(("127.0.0.1", server.port)) as raw:
         host = f"127.0.0.1:{server.port}"
         raw.sendall(f"GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n".encode())
         answer = b"".join(iter(lambda: raw.recv(65536), b""))
@@ -161,9 +163,9 @@ def test_the_page_is_made_anew_when_the_run_goes_on(server: PageServer, run: Pat
     assert ask(server, "/")[1] == b"<p>page 1</p>"
 
 
-def test_who_hangs_up_disturbs_nobody(server: PageServer) -> None:
+def test_a_client_that_hangs_up_disturbs_no_other(server: PageServer) -> None:
     for _ in range(3):
-        raw = socket.create_connection(("127.0.0.1", server.port), timeout=10)
+        raw = socket.create_connection(("127.0.0.1", server.port))
         head = f"GET /videos/a%20b.mp4 HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n\r\n"
         raw.sendall(head.encode())
         raw.recv(10)
@@ -177,7 +179,7 @@ def test_a_port_that_is_taken_or_is_none_is_one_sentence(server: PageServer, run
             PageServer(run, str, port)
 
 
-def test_the_command_says_where_and_ends_with_ctrl_c(run: Path) -> None:
+def test_the_command_says_where_and_ends_with_ctrl_c(run: Path, wait_s: float) -> None:
     pytest.importorskip("jinja2")
     code = "import typer; from roboirg.cli.report_commands import view; typer.run(view)"
     with subprocess.Popen(
@@ -188,10 +190,10 @@ def test_the_command_says_where_and_ends_with_ctrl_c(run: Path) -> None:
         line = process.stdout.readline()
         found = re.match(r"http://127\.0\.0\.1:(\d+)/", line)
         assert found is not None, line
-        connection = http.client.HTTPConnection("127.0.0.1", int(found[1]), timeout=10)
+        connection = http.client.HTTPConnection("127.0.0.1", int(found[1]))
         connection.request("GET", "/")
         text = connection.getresponse().read().decode()
         connection.close()
         assert "<title>run – RoboIRGBench</title>" in text
         process.send_signal(signal.SIGINT)
-        assert process.wait(timeout=20) == 0
+        assert process.wait(timeout=wait_s) == 0

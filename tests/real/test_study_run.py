@@ -9,7 +9,7 @@ import time
 import pytest
 from real_start import start
 
-from roboirg.analysis.stats.samples import gather
+from roboirg.analysis.stats.cells import gather
 from roboirg.analysis.tables.paper_tables import make_table
 from roboirg.real.pages.study_figure import bar_series, write_figure
 from roboirg.real.study.failure_choices import failure_choices

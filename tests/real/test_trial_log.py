@@ -3,7 +3,7 @@
 import pytest
 
 from roboirg.analysis.page.report import render
-from roboirg.analysis.stats.samples import gather
+from roboirg.analysis.stats.cells import gather
 from roboirg.analysis.tables.paper_tables import make_table
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.rollout_result import RolloutResult, make_record

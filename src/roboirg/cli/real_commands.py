@@ -169,7 +169,7 @@ def figure(
     published: Annotated[bool, typer.Option(help="Put the paper's own bars beside these.")] = True,
 ) -> None:
     """Draw success by setting, with 95 % intervals, as PNG and SVG."""
-    from roboirg.analysis.stats.samples import gather
+    from roboirg.analysis.stats.cells import gather
     from roboirg.real.pages.study_figure import write_figure
     from roboirg.records.store import read_results
 

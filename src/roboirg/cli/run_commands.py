@@ -180,11 +180,14 @@ def print_tables_of(folder: Path) -> None:
     """Print the table of a run, and the episodes that did not succeed."""
     from rich.console import Console
 
-    from roboirg.analysis.stats.success_rates import make_panels
-    from roboirg.analysis.tables.run_tables import print_failures, print_tables
+    from roboirg.analysis.tables.run_tables import (
+        make_run_tables,
+        print_failures,
+        print_run_tables,
+    )
 
     results, console = _results(folder), Console()
-    print_tables(make_panels(results, planned_jobs(folder)), console)
+    print_run_tables(make_run_tables(results, planned_jobs(folder)), console)
     print_failures(results, console)
 
 

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from roboirg.analysis.published import TRIALS
+from roboirg.analysis.stats.cells import Cells
 from roboirg.analysis.stats.intervals import wilson_interval
-from roboirg.analysis.stats.samples import Samples
+from roboirg.analysis.stats.option_labels import setting_sort_key
 from roboirg.analysis.tables.paper_tables import make_table
 from roboirg.analysis.tables.table import Row, Table
 from roboirg.core.errors import InvalidValueError
-from roboirg.language.settings import setting_names
 from roboirg.real.pages.trial_sheet import check_sheet_support
 from roboirg.records.store import StoreError
 
@@ -73,7 +73,7 @@ def bar_series(table: Table) -> tuple[Series, ...]:
     return tuple(sorted(found.values(), key=lambda one: one.published))
 
 
-def write_figure(samples: Samples, folder: Path, *, published: bool = True) -> tuple[Path, ...]:
+def write_figure(samples: Cells, folder: Path, *, published: bool = True) -> tuple[Path, ...]:
     """Draw success by setting, a panel for each task, as PNG and SVG.
 
     Args:
@@ -135,7 +135,8 @@ def _bars(table: Table, row: Row, *, published: bool) -> list[tuple[str, Bar]]:
 
 
 def _draw(axes: Axes, task: str, series: Sequence[Series]) -> None:
-    settings = [one for one in setting_names() if any((task, one) in each.bars for each in series)]
+    found = {setting for each in series for name, setting in each.bars if name == task}
+    settings = sorted(found, key=setting_sort_key)
     width = 0.8 / len(series)
     colors = {True: iter(PUBLISHED_COLORS * len(series)), False: iter(COLORS * len(series))}
     for number, one in enumerate(series):

@@ -72,7 +72,7 @@ def test_tables_are_written(run: Path, tmp_path: Path, name: str, suffix: str) -
 def test_published_tables_need_no_run() -> None:
     assert "51.34" in call("tables", "--which", "planner", "--published", "--format", "markdown")
     assert call("tables", "--format", "csv").startswith("table,source")
-    with pytest.raises(InvalidValueError, match="no run to make the table 'main' of"):
+    with pytest.raises(InvalidValueError, match="The table 'main' needs a run"):
         call("tables", "--which", "main")
     with pytest.raises(UnknownNameError, match="Did you mean 'planner'"):
         call("tables", "--which", "planer")
@@ -85,7 +85,7 @@ def test_what_the_run_lacks_is_said(run: Path, tmp_path: Path) -> None:
     output = call("tables", tmp_path / "part", "--which", "main", "--format", "markdown")
     assert "100.00 …" in output
     assert "3 trials of the plan are still to be played" in output
-    with pytest.raises(InvalidValueError, match="nothing that belongs into the table 'real'"):
+    with pytest.raises(InvalidValueError, match="no results for the table 'real'"):
         call("tables", run, "--which", "real")
     with pytest.raises(StoreError, match="no records in"):
         call("tables", tmp_path)
@@ -97,7 +97,7 @@ def test_what_the_run_lacks_is_said(run: Path, tmp_path: Path) -> None:
 def test_two_policies_of_a_run_are_compared(run: Path) -> None:
     output = call("compare", f"{run}:listener", f"{run}:forgetful")
     assert "direct: listener is better, +100.0 points" in output
-    assert "explicit: cannot tell" in output
+    assert "explicit: no clear difference" in output
     assert call("compare", f"{run}:listener", f"{run}:forgetful") == output
     with pytest.raises(UnknownNameError, match="Did you mean 'listener'"):
         call("compare", f"{run}:listner", f"{run}:forgetful")

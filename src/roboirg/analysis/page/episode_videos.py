@@ -1,4 +1,4 @@
-"""How films get onto the page: in it, or beside it."""
+"""Videos of the page: embedded in it, or linked to."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from urllib.parse import quote
 
 from roboirg.analysis.page.entries import EpisodeEntry
 
-MOST_FILM_BYTES = 60_000_000
-"""Films that weigh more together stay beside the page."""
+MAX_EMBEDDED_BYTES = 60_000_000
+"""Larger videos, taken together, are linked to."""
 POSTER_SUFFIX = ".jpg"
 
 
 class EpisodeVideo(NamedTuple):
-    """A film and its last picture, as data URIs or as paths from the page."""
+    """A video and its last frame, as data URIs or as paths from the page."""
 
     source: str
     poster: str | None
@@ -25,11 +25,11 @@ class EpisodeVideo(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class EpisodeVideos:
-    """Which films there are.
+    """The videos of a page.
 
     Attributes:
-        embeds: whether they become part of the page.
-        count: how many there are.
+        embeds: whether they are part of the page.
+        count: number of videos.
     """
 
     embeds: bool
@@ -37,17 +37,17 @@ class EpisodeVideos:
 
     @classmethod
     def of(cls, entries: Iterable[EpisodeEntry], *, embed: bool = True) -> EpisodeVideos:
-        """Into the page, if that is wanted and they are not too much together."""
-        weights = [
+        """Embed the videos if wanted and not too large."""
+        sizes = [
             path.stat().st_size
             for one in entries
             if one.run.folder is not None and one.record.video is not None
             if (path := one.run.folder / one.record.video).is_file()
         ]
-        return cls(embed and sum(weights) <= MOST_FILM_BYTES, len(weights))
+        return cls(embed and sum(sizes) <= MAX_EMBEDDED_BYTES, len(sizes))
 
-    def film(self, entry: EpisodeEntry) -> EpisodeVideo | None:
-        """The film of an episode; None without one."""
+    def video(self, entry: EpisodeEntry) -> EpisodeVideo | None:
+        """Return the video of an episode, or None."""
         name = entry.record.video
         source = None if name is None else self._link(entry, name, "video/mp4")
         if name is None or source is None:
