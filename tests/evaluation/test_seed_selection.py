@@ -4,8 +4,8 @@ import io
 from collections import Counter
 
 import pytest
-from acceptance_fakes import die, refuse, take_the_third
 from rich.console import Console
+from seed_selection_fakes import die, refuse, take_the_third
 
 from roboirg.core.episode import SPLITS
 from roboirg.core.errors import InvalidValueError, RoboIRGError, SceneRejectedError

@@ -10,7 +10,7 @@ import time
 from collections import Counter
 from pathlib import Path
 
-import chaos
+import chaos_policy
 import pytest
 from evaluation_fakes import FakePlay, small_plan
 
@@ -30,7 +30,7 @@ TIMEOUT_S = 3.0
 def plan_of_chaos() -> Plan:
     """Enough episodes for every misdeed to happen, and twice as many good ones."""
     plan = Plan(
-        policies=(chaos.SPEC,),
+        policies=(chaos_policy.SPEC,),
         tasks=("PickXtimes",),
         settings=("direct",),
         episodes=tuple(range(50)),
@@ -42,10 +42,10 @@ def plan_of_chaos() -> Plan:
     jobs, chosen, met = plan.jobs(), [], Counter[str | None]()
     for job in jobs:
         misdeed = load_policy(job).misdeed  # type: ignore[attr-defined]
-        if met[misdeed] < (1 if misdeed else 2 * len(chaos.KINDS)):
+        if met[misdeed] < (1 if misdeed else 2 * len(chaos_policy.KINDS)):
             met[misdeed] += 1
             chosen.append(job)
-    assert set(met) == {None, *chaos.KINDS}
+    assert set(met) == {None, *chaos_policy.KINDS}
 
     class Chosen(Plan):
         def jobs(self) -> tuple[Job, ...]:
@@ -62,7 +62,7 @@ def play(plan: Plan, folder: Path) -> tuple[RunSummary, dict[Job, Record]]:
 
 @pytest.fixture
 def plan(monkeypatch: pytest.MonkeyPatch) -> Plan:
-    monkeypatch.syspath_prepend(Path(chaos.__file__).parent)
+    monkeypatch.syspath_prepend(Path(chaos_policy.__file__).parent)
     return plan_of_chaos()
 
 
@@ -71,13 +71,13 @@ def test_a_policy_of_chaos_costs_its_own_episodes_and_nothing_else(
     plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     summary, wild = play(plan, tmp_path / "wild")
-    monkeypatch.setenv(chaos.CALM, "1")
+    monkeypatch.setenv(chaos_policy.CALM, "1")
     _, calm = play(plan, tmp_path / "calm")
 
     assert (summary.missing, summary.total) == (0, len(plan.jobs()))
-    assert len(summary.errors) == len(chaos.KINDS)
+    assert len(summary.errors) == len(chaos_policy.KINDS)
     for job, record in wild.items():
-        misdeed = chaos.misdeed(record.policy_metadata.get("seed", _seed(job)))  # type: ignore[arg-type]
+        misdeed = chaos_policy.misdeed(record.policy_metadata.get("seed", _seed(job)))  # type: ignore[arg-type]
         if misdeed is None:
             assert record.comparable() == calm[job].comparable()
             assert record.usage == {"calls": 3.0}
@@ -85,10 +85,10 @@ def test_a_policy_of_chaos_costs_its_own_episodes_and_nothing_else(
             assert (misdeed, record.outcome, record.error) == (
                 misdeed,
                 "error",
-                chaos.KINDS[misdeed],
+                chaos_policy.KINDS[misdeed],
             )
             assert record.cause is not None
-            assert record.cause.startswith(chaos.KINDS[misdeed].replace("_", " ") + ": ")
+            assert record.cause.startswith(chaos_policy.KINDS[misdeed].replace("_", " ") + ": ")
             assert "\n" not in record.cause
     causes = {misdeed: wild[job].cause for job, misdeed in _misdeeds(plan).items()}
     assert causes["hang"] == "timeout: the policy's act() did not come back in time"
@@ -103,7 +103,7 @@ def test_a_policy_of_chaos_costs_its_own_episodes_and_nothing_else(
 
 
 def _misdeeds(plan: Plan) -> dict[Job, str]:
-    found = {job: chaos.misdeed(_seed(job)) for job in plan.jobs()}
+    found = {job: chaos_policy.misdeed(_seed(job)) for job in plan.jobs()}
     return {job: misdeed for job, misdeed in found.items() if misdeed is not None}
 
 
