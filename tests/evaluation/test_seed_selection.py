@@ -14,13 +14,13 @@ from roboirg.evaluation.seed_selection import (
     EpisodeSlot,
     Rejection,
     SelectedSeed,
-    check_kept,
+    check_kept_splits,
     check_seed,
     check_words,
     episode_slots,
     find_seed,
     find_seeds,
-    merged,
+    merge_splits,
 )
 from roboirg.evaluation.seed_summary import cause_lines, follow_progress, print_summary
 from roboirg.language import expressible
@@ -120,11 +120,11 @@ def test_what_ends_a_search_is_named():
 def test_what_was_not_built_again_stays():
     slots = episode_slots(["VideoUnmask"], ["test"])
     built = [SelectedSeed(slot, ()) for slot in slots]
-    now = merged(built, shipped_splits())
+    now = merge_splits(built, shipped_splits())
     assert now == dict(shipped_splits())
     assert list(now) == list(TASKS)
     three = (Rejection(0, "no room", "no place"),) * 3
-    now = merged([SelectedSeed(slots[7], three), *built[:7], *built[8:]], shipped_splits())
+    now = merge_splits([SelectedSeed(slots[7], three), *built[:7], *built[8:]], shipped_splits())
     assert now["VideoUnmask"].passed_over == {
         **shipped_splits()["VideoUnmask"].passed_over,
         "test/7": 3,
@@ -134,14 +134,14 @@ def test_what_was_not_built_again_stays():
 
 
 def test_only_what_is_valid_can_stay():
-    check_kept(["VideoUnmask"], ["test"], shipped_splits())
-    check_kept(["VideoUnmask"], SPLITS, {})
+    check_kept_splits(["VideoUnmask"], ["test"], shipped_splits())
+    check_kept_splits(["VideoUnmask"], SPLITS, {})
     with pytest.raises(
         InvalidValueError, match=r"VideoUnmask/train/0 .* all splits of VideoUnmask"
     ):
-        check_kept(["VideoUnmask"], ["test"], {})
+        check_kept_splits(["VideoUnmask"], ["test"], {})
     with pytest.raises(InvalidValueError, match=r"VideoUnmask/val/15"):
-        check_kept(["VideoUnmask"], ["train", "test"], {"VideoUnmask": TaskSplits("", {})})
+        check_kept_splits(["VideoUnmask"], ["train", "test"], {"VideoUnmask": TaskSplits("", {})})
 
 
 def test_the_summary_tells_how_many_and_why():

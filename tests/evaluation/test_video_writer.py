@@ -10,7 +10,7 @@ from roboirg.evaluation.video_writer import (
     GAP,
     VideoOptions,
     VideoWriter,
-    compose,
+    compose_frame,
 )
 
 av = pytest.importorskip("av")
@@ -66,12 +66,14 @@ def test_throwing_away_never_raises(tmp_path: Path) -> None:
 
 def test_only_the_demonstration_has_a_border() -> None:
     pictures = [Grey().picture("front"), Grey().picture("wrist")]
-    assert tuple(compose(pictures, is_demonstration=True)[0, 0]) == DEMONSTRATION_COLOR
-    assert tuple(compose(pictures, is_demonstration=False)[0, 0]) == (90, 90, 90)
+    assert tuple(compose_frame(pictures, is_demonstration=True)[0, 0]) == DEMONSTRATION_COLOR
+    assert tuple(compose_frame(pictures, is_demonstration=False)[0, 0]) == (90, 90, 90)
 
 
 def test_a_black_line_parts_the_pictures() -> None:
-    frame = compose([Grey().picture("front"), Grey().picture("wrist")], is_demonstration=False)
+    frame = compose_frame(
+        [Grey().picture("front"), Grey().picture("wrist")], is_demonstration=False
+    )
     assert frame.shape == (256, 512 + GAP, 3)
     assert not frame[:, 256 : 256 + GAP].any()
     assert frame[:, :256].min() == frame[:, :256].max() == 90

@@ -28,7 +28,7 @@ _WrongUsage: type[Exception] = next(
     for kind in typer.BadParameter.__mro__
     if kind.__name__ == "ClickException" and issubclass(kind, Exception)
 )
-_LONGEST_COMPLAINT = 300
+_MAX_MESSAGE_LENGTH = 300
 
 DEMO_POLICIES = ("oracle", "listener", "forgetful")
 
@@ -47,7 +47,7 @@ app.add_typer(real_app, name="real")
 app.command()(bench)
 
 
-def _say_version(wanted: bool) -> None:
+def _print_version(wanted: bool) -> None:
     if wanted:
         typer.echo(f"roboirg {roboirg.__version__}")
         raise typer.Exit
@@ -56,7 +56,7 @@ def _say_version(wanted: bool) -> None:
 # Eager: asked for the version, the command wants no subcommand.
 _Version = Annotated[
     bool,
-    typer.Option("--version", callback=_say_version, is_eager=True, help="Say the version."),
+    typer.Option("--version", callback=_print_version, is_eager=True, help="Say the version."),
 ]
 
 
@@ -95,7 +95,7 @@ def demo(
     summary = run_commands.play(plan, folder, choose_executor(workers), retry=True)
     run_commands.print_tables_of(folder)
     typer.echo(_write_page(folder, videos=True))
-    run_commands.complain(summary, folder)
+    run_commands.report_problems(summary, folder)
 
 
 @app.command()
@@ -129,15 +129,20 @@ def build_splits(
     from roboirg.core.episode import SPLITS
     from roboirg.episodes import splits
     from roboirg.evaluation.executors.executor import core_count
-    from roboirg.evaluation.plan_parsing import parse_names, says_all
-    from roboirg.evaluation.seed_selection import check_kept, episode_slots, find_seeds, merged
+    from roboirg.evaluation.plan_parsing import means_all, parse_names
+    from roboirg.evaluation.seed_selection import (
+        check_kept_splits,
+        episode_slots,
+        find_seeds,
+        merge_splits,
+    )
     from roboirg.evaluation.seed_summary import follow_progress, print_summary
     from roboirg.records.store import write_atomically
     from roboirg.tasks import find_tasks
 
     names = find_tasks(parse_names("task", tasks))
-    wanted = SPLITS if says_all(split) else (splits.check_split(split),)
-    check_kept(names, wanted, splits.shipped_splits())
+    wanted = SPLITS if means_all(split) else (splits.check_split(split),)
+    check_kept_splits(names, wanted, splits.shipped_splits())
     if out is not None and not Path(out).parent.is_dir():
         raise InvalidValueError(f"There is no folder for {out!r}; make it first.")
     slots = episode_slots(names, wanted)
@@ -145,7 +150,7 @@ def build_splits(
     count = core_count() if workers is None else workers
     found = follow_progress(find_seeds(slots, count), slots, console)
     print_summary(found, console)
-    text = splits.splits_text(merged(found, splits.shipped_splits()))
+    text = splits.splits_text(merge_splits(found, splits.shipped_splits()))
     if out is None:
         typer.echo(text, nl=False)
     else:
@@ -192,14 +197,14 @@ def instruct(
 ) -> None:
     """Print what is said to the robot, turn by turn."""
     from roboirg.episodes.splits import get_episode
-    from roboirg.evaluation.plan_parsing import parse_stages, says_all
+    from roboirg.evaluation.plan_parsing import means_all, parse_stages
     from roboirg.language import instruct as make_instruction
     from roboirg.language import settings_of
     from roboirg.tasks import get_task
 
     spoken = parse_stages(stages)
     found = get_episode(task, split, episode)
-    for name in settings_of(get_task(task)) if says_all(setting) else (setting,):
+    for name in settings_of(get_task(task)) if means_all(setting) else (setting,):
         instruction = make_instruction(
             found, name, form, stages=spoken, distractor=distractor, frame=frame
         )
@@ -216,14 +221,14 @@ def main() -> None:
         typer.echo(f"roboirg: {error}", err=True)
         sys.exit(USAGE_ERROR)
     except _WrongUsage as error:
-        sys.exit(_explain(error))
+        sys.exit(_print_usage_error(error))
     except typer.Abort:
         sys.exit(INTERRUPTED)
     # What `typer.Exit` was raised with; commands themselves return nothing.
     sys.exit(code)
 
 
-def _explain(error: Exception) -> int:
+def _print_usage_error(error: Exception) -> int:
     """Tell what was wrong with the words of the command line; the exit code."""
     # By name, for the same reason.
     message = str(getattr(error, "format_message", error.__str__)())
@@ -231,8 +236,8 @@ def _explain(error: Exception) -> int:
         typer.echo(message.rstrip(), err=True)
         return USAGE_ERROR
     words = " ".join(message.split()).rstrip(".")
-    if len(words) > _LONGEST_COMPLAINT:
-        words = f"{words[:_LONGEST_COMPLAINT]}…"
+    if len(words) > _MAX_MESSAGE_LENGTH:
+        words = f"{words[:_MAX_MESSAGE_LENGTH]}…"
     context = getattr(error, "ctx", None)
     command = getattr(context, "command_path", "roboirg")
     typer.echo(f"roboirg: {words}; see {command} --help.", err=True)

@@ -6,6 +6,6 @@ import sys
 from pathlib import Path
 
 
-def see_working_directory() -> None:
+def add_working_directory() -> None:
     """As `python -m` has it: policies in the working directory can be named."""
     sys.path.insert(0, str(Path.cwd()))

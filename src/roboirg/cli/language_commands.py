@@ -198,10 +198,10 @@ def _tasks(text: str) -> tuple[str, ...]:
 
 
 def _settings(text: str) -> tuple[str, ...]:
-    from roboirg.evaluation.plan_parsing import parse_names, says_all
+    from roboirg.evaluation.plan_parsing import means_all, parse_names
     from roboirg.language import setting_names
 
-    if says_all(text):
+    if means_all(text):
         return setting_names()
     return tuple(_known("setting", name, setting_names()) for name in parse_names("setting", text))
 
@@ -209,9 +209,9 @@ def _settings(text: str) -> tuple[str, ...]:
 def _splits(text: str) -> tuple[Split, ...]:
     from roboirg.core.episode import SPLITS
     from roboirg.episodes.splits import check_split
-    from roboirg.evaluation.plan_parsing import says_all
+    from roboirg.evaluation.plan_parsing import means_all
 
-    return SPLITS if says_all(text) else (check_split(text),)
+    return SPLITS if means_all(text) else (check_split(text),)
 
 
 def _known(kind: str, name: str, known: Sequence[Name]) -> Name:

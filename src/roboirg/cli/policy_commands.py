@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from roboirg.cli.import_path import see_working_directory
+from roboirg.cli.import_path import add_working_directory
 from roboirg.core.errors import InvalidValueError
 
 FAILED = 2
@@ -36,7 +36,7 @@ def serve(
     """Serve a policy to this benchmark and to any other client of the protocol."""
     from roboirg.policies.serving import open_server
 
-    see_working_directory()
+    add_working_directory()
     key = None if api_key_env is None else os.environ.get(api_key_env)
     if api_key_env is not None and not key:
         raise InvalidValueError(f"The environment variable {api_key_env} holds no key.")
@@ -59,7 +59,7 @@ def check_policy(
     from roboirg.policies.policy_check import FAIL, print_check_results
     from roboirg.policies.policy_check import check_policy as check
 
-    see_working_directory()
+    add_working_directory()
     findings = check(policy, seed=seed)
     print_check_results(findings, Console())
     if any(finding.verdict == FAIL for finding in findings):

@@ -43,7 +43,7 @@ def plan(
     sheet: Annotated[bool, typer.Option(help="Draw the printable sheet.")] = True,
 ) -> None:
     """Write a study's plan: plan.json, CSV, and a sheet to print."""
-    from roboirg.evaluation.plan_parsing import parse_names, says_all
+    from roboirg.evaluation.plan_parsing import means_all, parse_names
     from roboirg.real.pages.trial_sheet import check_sheet_support
     from roboirg.real.study.study_plan import make_study
     from roboirg.tasks import find_tasks
@@ -53,7 +53,7 @@ def plan(
     made = make_study(
         policy,
         tasks=find_tasks(parse_names("task", tasks)),
-        settings=None if says_all(settings) else parse_names("setting", settings),
+        settings=None if means_all(settings) else parse_names("setting", settings),
         trials=trials,
         demonstrations=demonstrations,
         seed=seed,

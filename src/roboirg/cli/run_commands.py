@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from roboirg.cli import plan_options as options
-from roboirg.cli.import_path import see_working_directory
+from roboirg.cli.import_path import add_working_directory
 from roboirg.cli.options import Workers
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 
@@ -74,7 +74,7 @@ def run(
     dry_run: Annotated[bool, typer.Option(help="Print the cells and how long they take.")] = False,
 ) -> None:
     """Play episodes and append one record for each to OUT/records.jsonl; resumes by itself."""
-    typed = _given(
+    typed = _typed_options(
         policies=policy,
         tasks=tasks,
         settings=settings,
@@ -98,14 +98,14 @@ def run(
         retry_on=retry_on,
     )
     folder = folder_of(out)
-    see_working_directory()
+    add_working_directory()
     made = _plan(plan, typed)
     if dry_run:
         _print_estimate(made, folder, workers)
         return
     summary = play(made, folder, _executor(made, executor, address, workers), retry=retry_errors)
     print_tables_of(folder)
-    complain(summary, folder)
+    report_problems(summary, folder)
 
 
 def merge(
@@ -196,7 +196,7 @@ def planned_jobs(folder: Path) -> tuple[Job, ...]:
     return plan.jobs() if plan else ()
 
 
-def complain(summary: RunSummary, folder: Path) -> None:
+def report_problems(summary: RunSummary, folder: Path) -> None:
     """Say on stderr what is lacking in a run; a run that lacks something exits with 2."""
     if summary.unfilmed:
         typer.echo(
@@ -222,7 +222,7 @@ def complain(summary: RunSummary, folder: Path) -> None:
         sys.exit(USAGE_ERROR)
 
 
-def _given(**options: object) -> dict[str, Any]:
+def _typed_options(**options: object) -> dict[str, Any]:
     """The options that were typed."""
     return {name: value for name, value in options.items() if value not in (None, [])}
 

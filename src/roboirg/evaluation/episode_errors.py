@@ -18,7 +18,7 @@ from roboirg.records.record import ErrorKind
 
 ErrorSource = Literal["policy", "environment"]
 
-LONGEST_CAUSE = 400
+MAX_CAUSE_LENGTH = 400
 
 
 class EpisodeError(Exception):
@@ -75,4 +75,4 @@ def one_line(error: BaseException) -> str:
     """An exception as one line that is the same in every process."""
     words = str(error) if isinstance(error, RoboIRGError) else f"{type(error).__name__}: {error}"
     words = re.sub(r"0x[0-9a-fA-F]{6,}", "0x…", " ".join(words.split())).rstrip(": ")
-    return words.encode("utf-8", "replace").decode()[:LONGEST_CAUSE]
+    return words.encode("utf-8", "replace").decode()[:MAX_CAUSE_LENGTH]

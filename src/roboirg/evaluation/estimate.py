@@ -52,12 +52,12 @@ def estimate(jobs: Iterable[Job], played: Iterable[RecordIndexEntry], workers: i
         played: episodes whose durations are known; those of the same policy and task count most.
         workers: how many processes.
     """
-    durations = _Durations(played)
+    durations = _MeanDurations(played)
     total, known, steps, count = 0.0, True, 0, 0
     for job in jobs:
         duration = durations.of(job)
         known = known and duration is not None
-        total += _assumed(job) if duration is None else duration
+        total += _assumed_duration(job) if duration is None else duration
         steps += job.max_steps
         count += 1
     return Estimate(count, total / max(workers, 1), steps, known and count > 0)
@@ -87,7 +87,7 @@ def _clock(seconds: float) -> str:
     return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"  # noqa: PLR2004
 
 
-class _Durations:
+class _MeanDurations:
     """Mean durations of episodes that have been played."""
 
     def __init__(self, played: Iterable[RecordIndexEntry]) -> None:
@@ -105,5 +105,5 @@ class _Durations:
         return None
 
 
-def _assumed(job: Job) -> float:
+def _assumed_duration(job: Job) -> float:
     return STEP_S * min(job.max_steps, ASSUMED_STEPS)

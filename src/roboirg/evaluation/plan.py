@@ -25,14 +25,14 @@ from roboirg.core.observations import (
 )
 from roboirg.episodes import splits
 from roboirg.evaluation.plan_parsing import (
-    WHOLE,
+    ALL,
+    means_all,
+    name_and_spec,
     parse_episodes,
     parse_names,
     parse_numbers,
     parse_policies,
     parse_stage_sets,
-    says_all,
-    split_name,
 )
 from roboirg.language.instruction import FORMS, Instruction
 from roboirg.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, ERROR_KINDS, ErrorKind, Job
@@ -112,7 +112,7 @@ class Plan(BaseModel):
             InvalidValueError: two policies have the same name.
         """
         specs: dict[str, str] = {}
-        for name, spec in map(split_name, self.policies):
+        for name, spec in map(name_and_spec, self.policies):
             if specs.setdefault(name, spec) != spec:
                 raise InvalidValueError(
                     f"Two policies are named {name!r}: {specs[name]} and {spec}."
@@ -233,8 +233,8 @@ class Plan(BaseModel):
 def make_plan(
     policies: Iterable[str],
     *,
-    tasks: str = WHOLE,
-    settings: str = WHOLE,
+    tasks: str = ALL,
+    settings: str = ALL,
     forms: str = "implicit",
     episodes: str = "4",
     policy_seeds: str = "0",
@@ -266,7 +266,7 @@ def make_plan(
         plan = Plan(
             policies=parse_policies(policies),
             tasks=_task_names(tasks),
-            settings="all" if says_all(settings) else parse_names("setting", settings),
+            settings="all" if means_all(settings) else parse_names("setting", settings),
             forms=parse_names("form", forms),
             episodes=parse_episodes(episodes, split),
             policy_seeds=parse_numbers("policy seed", policy_seeds),

@@ -9,12 +9,12 @@ from roboirg import language
 from roboirg.core.errors import InvalidValueError
 from roboirg.episodes import splits
 
-WHOLE = "all"
+ALL = "all"
 """The word for all of them."""
 
-_MOST_NUMBERS = 10_000
-_MOST_DIGITS = 18
-_LONGEST_WORD = 40
+_MAX_NUMBERS = 10_000
+_MAX_DIGITS = 18
+_MAX_QUOTED_LENGTH = 40
 _NUMBERS_HINT = "write numbers and ranges such as 0,3,5-9"
 
 
@@ -47,15 +47,15 @@ def parse_policies(specs: Iterable[str]) -> tuple[str, ...]:
     return policies
 
 
-def split_name(policy: str) -> tuple[str, str]:
+def name_and_spec(policy: str) -> tuple[str, str]:
     """A policy's name and its spec; without a name of its own, that is the spec."""
     found = re.fullmatch(r"([\w.+ -]+)=(.+)", policy)
     return (policy, policy) if found is None else (found[1].strip(), found[2].strip())
 
 
-def says_all(text: str) -> bool:
+def means_all(text: str) -> bool:
     """Whether a list of names is, or contains, the word for all of them."""
-    return WHOLE in (word.strip().lower() for word in text.split(","))
+    return ALL in (word.strip().lower() for word in text.split(","))
 
 
 def parse_episodes(text: str, split: str = "test") -> tuple[int, ...]:
@@ -119,7 +119,7 @@ def _parse_ranges(kind: str, text: str, hint: str) -> list[range]:
         found = re.fullmatch(r"(\d+)(?:\s*-\s*(\d+))?", part)
         first, last = (-1, -2) if found is None else _ends(kind, found[1], found[2])
         if last < first:
-            raise InvalidValueError(f"{_short(part)!r} is no {kind}; {hint}.")
+            raise InvalidValueError(f"{_shorten(part)!r} is no {kind}; {hint}.")
         ranges.append(range(first, last + 1))
     return ranges
 
@@ -129,22 +129,22 @@ def _ends(kind: str, first: str, last: str | None) -> tuple[int, int]:
 
 
 def _number(kind: str, digits: str) -> int:
-    if len(digits) > _MOST_DIGITS:
+    if len(digits) > _MAX_DIGITS:
         raise InvalidValueError(
-            f"The {kind} {_short(digits)} has {len(digits)} digits; "
-            f"it must have at most {_MOST_DIGITS}."
+            f"The {kind} {_shorten(digits)} has {len(digits)} digits; "
+            f"it must have at most {_MAX_DIGITS}."
         )
     return int(digits)
 
 
 def _union(ranges: Sequence[range]) -> tuple[int, ...]:
     count = sum(map(len, ranges))
-    if count > _MOST_NUMBERS:
+    if count > _MAX_NUMBERS:
         raise InvalidValueError(
-            f"A list of {count} numbers is too long; at most {_MOST_NUMBERS} are allowed."
+            f"A list of {count} numbers is too long; at most {_MAX_NUMBERS} are allowed."
         )
     return tuple(dict.fromkeys(number for numbers in ranges for number in numbers))
 
 
-def _short(text: str) -> str:
-    return text if len(text) <= _LONGEST_WORD else f"{text[:_LONGEST_WORD]}…"
+def _shorten(text: str) -> str:
+    return text if len(text) <= _MAX_QUOTED_LENGTH else f"{text[:_MAX_QUOTED_LENGTH]}…"

@@ -53,11 +53,11 @@ PlayJob = Callable[[Job], Record]
 """Plays one job. Executors send it to other processes, so it must pickle."""
 
 VIDEO_FOLDER = "videos"
-NOTHING_DRAWN = "none"
+NO_RENDER_DEVICE = "none"
 
-MOST_ROWS = 10_000
+MAX_ROWS = 10_000
 """Actions that a policy may give at once; an episode has 1300 steps."""
-MOST_METADATA = 65_536
+MAX_METADATA_LENGTH = 65_536
 """Characters of JSON that a policy may say of itself."""
 
 
@@ -137,7 +137,7 @@ class EnvRequirements(NamedTuple):
     grounded: bool = False
 
 
-class _Phases:
+class _CallGuard:
     """Calls of policy and world: blamed, watched and timed."""
 
     def __init__(self, course: RolloutResult, policy_timeout_s: float | None) -> None:
@@ -174,7 +174,7 @@ def play_episode(
         MissingDependencyError: something has to be installed first.
     """
     course = RolloutResult()
-    phases = _Phases(course, policy_timeout_s)
+    phases = _CallGuard(course, policy_timeout_s)
     policy, env = None, None
     try:
         with phases.policy("policy's constructor", "policy_load"):
@@ -182,12 +182,12 @@ def play_episode(
             needs = env_requirements(policy, job)
         with phases.world("env_reset"):
             env = make_env(job, needs)
-        _play(job, env, policy, needs.actions, film, course, phases)
+        _play_in(job, env, policy, needs.actions, film, course, phases)
     except EpisodeError as fault:
         course.fail(fault.kind, fault.cause, fault.details)
     finally:
         if policy is not None:
-            _say_goodbye(policy, course, phases)
+            _close_policy(policy, course, phases)
         if env is not None:
             env.close()
     return course
@@ -251,14 +251,14 @@ def load_policy(job: Job) -> Policy:
     return policies.make_policy(job.policy_spec, seed=int(seeds.generate_state(1)[0]))
 
 
-def _play(
+def _play_in(
     job: Job,
     env: RoboIRGEnv,
     policy: Policy,
     actions: ActionSpace,
     film: VideoWriter | None,
     course: RolloutResult,
-    phases: _Phases,
+    phases: _CallGuard,
 ) -> None:
     with phases.world("env_reset"):
         if film is not None:
@@ -268,7 +268,7 @@ def _play(
         if film is not None:
             film.shoot(env)  # what the policy sees first
         device = str(env.render_device)
-        course.render_device = None if device == NOTHING_DRAWN else device
+        course.render_device = None if device == NO_RENDER_DEVICE else device
         course.demonstration_steps = len(info["demonstration"]["joint_positions"])
         course.turn = int(info["elapsed_steps"])
         course.note(info)
@@ -277,7 +277,7 @@ def _play(
         if isinstance(policy, PrivilegedPolicy):
             policy.attach(env)
         policy.reset(instruction, info["demonstration"])
-        course.policy_metadata = _metadata_of(policy)
+        course.policy_metadata = _policy_metadata(policy)
     status, cause = "ongoing", None
     while status == "ongoing":
         with phases.policy("policy's act()", "policy_act"):
@@ -301,22 +301,22 @@ def _next_actions(
     """
     rows = policy.act(cast("Observation", observation))
     count = len(rows) if hasattr(rows, "__len__") else 0
-    if count > MOST_ROWS:
-        raise InvalidActionError(f"{count} actions at once are too many; at most {MOST_ROWS}.")
+    if count > MAX_ROWS:
+        raise InvalidActionError(f"{count} actions at once are too many; at most {MAX_ROWS}.")
     return check_chunk(rows, space)
 
 
-def _metadata_of(policy: Policy) -> dict[str, JsonValue]:
+def _policy_metadata(policy: Policy) -> dict[str, JsonValue]:
     """What a policy says of itself, as a reader of the record will find it."""
     text = json.dumps(dict(getattr(policy, "metadata", {})), allow_nan=False)
-    if len(text) > MOST_METADATA:
+    if len(text) > MAX_METADATA_LENGTH:
         raise InvalidValueError(
-            f"the policy's metadata are {len(text)} characters of JSON; at most {MOST_METADATA}."
+            f"the policy's metadata are {len(text)} characters of JSON; at most {MAX_METADATA_LENGTH}."
         )
     return cast("dict[str, JsonValue]", json.loads(text))
 
 
-def _say_goodbye(policy: Policy, course: RolloutResult, phases: _Phases) -> None:
+def _close_policy(policy: Policy, course: RolloutResult, phases: _CallGuard) -> None:
     """Ask what it cost and close it; trouble with that leaves the verdict as it is."""
     try:
         with phases.policy("policy's close()", "policy_close"):

@@ -85,7 +85,7 @@ def run_plan(
     listener = reporter or SilentReporter()
     jobs = plan.jobs()
     with _sigterm_interrupts(), RecordStore(folder) as store:
-        _tell_damage(store, listener)
+        _report_damage(store, listener)
         _check_versions(store.stored.values(), folder)
         _check_policies(plan, store.stored.values(), folder)
         write_plan(plan, folder)
@@ -93,10 +93,10 @@ def run_plan(
         todo = [
             job
             for job, key in zip(jobs, keys, strict=True)
-            if _is_due(store.stored.get(key), retry_errors=retry_errors)
+            if _should_play(store.stored.get(key), retry_errors=retry_errors)
         ]
         listener.begin(len(jobs), len(jobs) - len(todo))
-        course = _Run(plan, store, listener)
+        course = _RunLoop(plan, store, listener)
         course.play(todo, play, executor)
         found = [store.stored.get(key) for key in keys]
         return RunSummary(
@@ -110,7 +110,7 @@ def run_plan(
         )
 
 
-class _Run:
+class _RunLoop:
     """What a run has done so far.
 
     Attributes:
@@ -175,11 +175,11 @@ class _Run:
         )
 
 
-def _is_due(stored: RecordIndexEntry | None, *, retry_errors: bool) -> bool:
+def _should_play(stored: RecordIndexEntry | None, *, retry_errors: bool) -> bool:
     return stored is None or (retry_errors and stored.outcome == "error")
 
 
-def _tell_damage(store: RecordStore, listener: Reporter) -> None:
+def _report_damage(store: RecordStore, listener: Reporter) -> None:
     if store.torn:
         listener.notice(
             f"An earlier run was stopped in the middle of a line; its {len(store.torn)} bytes "

@@ -73,7 +73,7 @@ class SelectedSeed(NamedTuple):
     rejections: tuple[Rejection, ...]
 
 
-Judge = Callable[[EpisodeSlot, int], Rejection | None]
+SeedCheck = Callable[[EpisodeSlot, int], Rejection | None]
 """Says why a seed cannot be taken for a slot; None if it can."""
 
 
@@ -119,7 +119,7 @@ def oracle_failure(episode: Episode) -> str | None:
     return None if info["status"] == "success" else str(info["cause"] or info["status"])
 
 
-def find_seed(slot: EpisodeSlot, judge: Judge = check_seed) -> SelectedSeed:
+def find_seed(slot: EpisodeSlot, judge: SeedCheck = check_seed) -> SelectedSeed:
     """The first seed of a slot that can be taken.
 
     Raises:
@@ -139,7 +139,7 @@ def find_seed(slot: EpisodeSlot, judge: Judge = check_seed) -> SelectedSeed:
 
 
 def find_seeds(
-    slots: Sequence[EpisodeSlot], workers: int, judge: Judge = check_seed
+    slots: Sequence[EpisodeSlot], workers: int, judge: SeedCheck = check_seed
 ) -> Iterator[SelectedSeed]:
     """`find_seed` for every slot, as they end, in so many processes; 0 for this one.
 
@@ -152,7 +152,7 @@ def find_seeds(
     yield from (outcome for _, outcome in found)
 
 
-def check_kept(
+def check_kept_splits(
     tasks: Sequence[str], splits: Sequence[Split], known: Mapping[str, TaskSplits]
 ) -> None:
     """See that the splits that are not built again can be kept.
@@ -171,7 +171,9 @@ def check_kept(
             )
 
 
-def merged(found: Sequence[SelectedSeed], known: Mapping[str, TaskSplits]) -> dict[str, TaskSplits]:
+def merge_splits(
+    found: Sequence[SelectedSeed], known: Mapping[str, TaskSplits]
+) -> dict[str, TaskSplits]:
     """What is to be shipped: what was found, and what is known about everything else."""
     splits = {task: known[task] for task in every_task() if task in known}
     for task in dict.fromkeys(one.slot.task for one in found):

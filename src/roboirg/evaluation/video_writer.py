@@ -34,7 +34,7 @@ LAST_FRAME_REPEATS = 8
 POSTER_SUFFIX = ".jpg"
 
 _TEXT_SCALE, _TEXT_LINE, _TEXT_MARGIN = 0.4, 16, 6
-_MOST_LINES = 12
+_MAX_LINES = 12
 _INK, _PAPER = (31, 35, 40), 255
 
 
@@ -77,7 +77,7 @@ def check_video_support() -> None:
         ) from error
 
 
-def compose(
+def compose_frame(
     pictures: Sequence[Frame], caption: str = "", *, is_demonstration: bool = False
 ) -> Frame:
     """Pictures side by side, a line between them; what was shown before has a colored border.
@@ -94,13 +94,13 @@ def compose(
         color = np.array(DEMONSTRATION_COLOR, np.uint8)
         frame[:BORDER] = frame[-BORDER:] = color
         frame[:, :BORDER] = frame[:, -BORDER:] = color
-    return np.concatenate([frame, _bar(caption, frame.shape[1])]) if caption else frame
+    return np.concatenate([frame, _caption_bar(caption, frame.shape[1])]) if caption else frame
 
 
 @functools.lru_cache(maxsize=8)
-def _bar(caption: str, width: int) -> Frame:
+def _caption_bar(caption: str, width: int) -> Frame:
     """A caption on paper; its height is even, as H.264 wants it."""
-    lines = wrap_text(caption, width - 2 * _TEXT_MARGIN, _TEXT_SCALE)[:_MOST_LINES]
+    lines = wrap_text(caption, width - 2 * _TEXT_MARGIN, _TEXT_SCALE)[:_MAX_LINES]
     height = len(lines) * _TEXT_LINE + 2 * _TEXT_MARGIN
     bar: Frame = np.full((height, width, 3), _PAPER, np.uint8)
     for number, text in enumerate(lines, start=1):
@@ -148,7 +148,7 @@ class VideoWriter:
             return
         try:
             pictures = [world.picture(camera) for camera in self.options.cameras]
-            self._add(compose(pictures, self.caption, is_demonstration=is_demonstration))
+            self._add(compose_frame(pictures, self.caption, is_demonstration=is_demonstration))
         except (RenderDeviceError, MissingDependencyError):
             raise
         except Exception as error:  # noqa: BLE001 - see the class

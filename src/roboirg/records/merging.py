@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.records.record import Record
-from roboirg.records.record_codec import Key, StoreError, identity_key
+from roboirg.records.record_codec import RecordKey, StoreError, identity_key
 from roboirg.records.store import RecordStore, read_records
 
 
-class Merged(NamedTuple):
+class MergeSummary(NamedTuple):
     """What came of merging.
 
     Attributes:
@@ -29,7 +29,7 @@ class Merged(NamedTuple):
     disputed: tuple[Record, ...]
 
 
-def merge_runs(folders: Sequence[Path], out: Path) -> Merged:
+def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
     """Put the records of several runs, and their films, into one folder.
 
     An episode that several of them have keeps the first verdict; an error gives way to a verdict.
@@ -48,7 +48,7 @@ def merge_runs(folders: Sequence[Path], out: Path) -> Merged:
     _check_versions(runs)
     added, doubled, disputed = 0, 0, []
     with RecordStore(out) as store:
-        kept: dict[Key, Record] = {}
+        kept: dict[RecordKey, Record] = {}
         if store.stored:
             runs_so_far = read_records(out)
             _check_versions([(out, runs_so_far), *runs])
@@ -64,10 +64,10 @@ def merge_runs(folders: Sequence[Path], out: Path) -> Merged:
                         continue
                     if record.outcome == "error":
                         continue
-                store.append(_with_film(record, folder, out))
+                store.append(_copy_video(record, folder, out))
                 kept[identity_key(record)] = record
                 added += before is None
-    return Merged(added, doubled, tuple(disputed))
+    return MergeSummary(added, doubled, tuple(disputed))
 
 
 def _check_versions(runs: Sequence[tuple[Path, Sequence[Record]]]) -> None:
@@ -89,7 +89,7 @@ def _check_versions(runs: Sequence[tuple[Path, Sequence[Record]]]) -> None:
                     )
 
 
-def _with_film(record: Record, source: Path, target: Path) -> Record:
+def _copy_video(record: Record, source: Path, target: Path) -> Record:
     """The record, after its film has come along; without a film if that is gone."""
     if record.video is None:
         return record

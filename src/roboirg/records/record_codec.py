@@ -29,7 +29,7 @@ from roboirg.records.record import (
 
 OLDEST_SCHEMA = 1
 
-Kind = TypeVar("Kind", bound=Result)
+ResultType = TypeVar("ResultType", bound=Result)
 
 
 class StoreError(RoboIRGError):
@@ -78,7 +78,7 @@ class _Version(msgspec.Struct):
     schema_version: int
 
 
-Key = tuple[object, ...]
+RecordKey = tuple[object, ...]
 """A job's identity: the values of its fields."""
 
 _identity = operator.attrgetter(*IDENTITY)
@@ -86,9 +86,9 @@ _decoder = msgspec.json.Decoder(RecordIndexEntry)
 _version_decoder = msgspec.json.Decoder(_Version)
 
 
-def identity_key(one: Job | RecordIndexEntry) -> Key:
+def identity_key(one: Job | RecordIndexEntry) -> RecordKey:
     """The identity of a job, a record, or what is read of one."""
-    key: Key = _identity(one)
+    key: RecordKey = _identity(one)
     return key
 
 
@@ -115,7 +115,7 @@ def read_index_entry(line: bytes, path: Path, number: int) -> RecordIndexEntry:
     return stored
 
 
-def read_line(line: bytes, path: Path, number: int, kind: type[Kind]) -> Kind:
+def read_line(line: bytes, path: Path, number: int, kind: type[ResultType]) -> ResultType:
     """A line as a whole record, or as its result alone.
 
     Raises:

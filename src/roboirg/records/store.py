@@ -28,8 +28,8 @@ from typing import NamedTuple, Self, TypeVar
 from roboirg.records.record import Record, Result
 from roboirg.records.record_codec import (
     DamagedLineError,
-    Key,
     RecordIndexEntry,
+    RecordKey,
     StoreError,
     identity_key,
     read_index_entry,
@@ -52,7 +52,7 @@ LOCK_FILE = ".lock"
 _BUFFER = 1 << 20
 """Bytes that are read at once."""
 
-Kind = TypeVar("Kind", bound=Result)
+ResultType = TypeVar("ResultType", bound=Result)
 Parsed = TypeVar("Parsed")
 
 
@@ -97,14 +97,14 @@ class RecordStore:
                 self._lock = os.open(folder / LOCK_FILE, os.O_RDWR | os.O_CREAT, 0o644)
                 undo.callback(os.close, self._lock)
                 self._take_lock()
-                lines = _Lines(self.path)
-                self.stored: dict[Key, RecordIndexEntry] = {
+                lines = _RecordsFile(self.path)
+                self.stored: dict[RecordKey, RecordIndexEntry] = {
                     identity_key(one): one for one in lines.parsed(read_index_entry)
                 }
                 self.torn, self.damaged = lines.torn, tuple(lines.damaged)
                 self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
                 undo.callback(os.close, self._file)
-                self._mend()
+                self._repair_tail()
                 _sync_folder(folder)
             except OSError as error:
                 raise StoreError(f"Cannot write to {folder}: {error.strerror}.") from error
@@ -149,7 +149,7 @@ class RecordStore:
         os.ftruncate(self._lock, 0)
         os.pwrite(self._lock, f"{os.getpid()}\n".encode(), 0)
 
-    def _mend(self) -> None:
+    def _repair_tail(self) -> None:
         """Leave the file empty or ending in a newline, losing nothing."""
         size = os.fstat(self._file).st_size
         if self.torn:
@@ -172,7 +172,7 @@ def read_contents(path: Path) -> StoreContents:
     Raises:
         StoreError: a line is a record of a version that cannot be read, or no record.
     """
-    lines = _Lines(path)
+    lines = _RecordsFile(path)
     records = tuple(lines.parsed(partial(read_line, kind=Record)))
     return StoreContents(records, lines.torn, tuple(lines.damaged))
 
@@ -183,7 +183,7 @@ def read_records(folder: Path) -> tuple[Record, ...]:
     Raises:
         StoreError: there are none, or a line is no record of a version that can be read.
     """
-    return _newest(folder, Record)
+    return _read_newest(folder, Record)
 
 
 def read_results(folder: Path) -> tuple[Result, ...]:
@@ -192,17 +192,18 @@ def read_results(folder: Path) -> tuple[Result, ...]:
     Raises:
         StoreError: there are none, or a line is no record of a version that can be read.
     """
-    return _newest(folder, Result)
+    return _read_newest(folder, Result)
 
 
-def read_index(folder: Path) -> dict[Key, RecordIndexEntry]:
+def read_index(folder: Path) -> dict[RecordKey, RecordIndexEntry]:
     """What is stored in a run's folder, the newest of each identity; empty if there is no run.
 
     Raises:
         StoreError: the file cannot be read, or a line is no record of a version that can be read.
     """
     return {
-        identity_key(one): one for one in _Lines(folder / RECORDS_FILE).parsed(read_index_entry)
+        identity_key(one): one
+        for one in _RecordsFile(folder / RECORDS_FILE).parsed(read_index_entry)
     }
 
 
@@ -224,7 +225,7 @@ def write_atomically(path: Path, text: str) -> None:
         raise StoreError(f"Cannot write {path}: {error.strerror}.") from error
 
 
-class _Lines:
+class _RecordsFile:
     """A file of records, line by line.
 
     Attributes:
@@ -270,9 +271,9 @@ def _is_json(line: bytes) -> bool:
     return True
 
 
-def _newest(folder: Path, kind: type[Kind]) -> tuple[Kind, ...]:
-    lines = _Lines(folder / RECORDS_FILE)
-    newest: dict[Key, Kind] = {}
+def _read_newest(folder: Path, kind: type[ResultType]) -> tuple[ResultType, ...]:
+    lines = _RecordsFile(folder / RECORDS_FILE)
+    newest: dict[RecordKey, ResultType] = {}
     for one in lines.parsed(partial(read_line, kind=kind)):
         newest[identity_key(one)] = one
     if not newest:

@@ -20,7 +20,7 @@ from roboirg.evaluation.executors.workers import MAX_FAILED_STARTS, POLL_S, Work
 from roboirg.evaluation.rollout import PlayJob
 from roboirg.records.record import Job, Record
 
-NO_LIMIT_S = float("inf")
+NO_TIMEOUT_S = float("inf")
 
 
 class Executor(Protocol):
@@ -62,7 +62,7 @@ class LocalProcesses:
     """
 
     workers: int
-    episode_timeout_s: float = NO_LIMIT_S
+    episode_timeout_s: float = NO_TIMEOUT_S
 
     def __post_init__(self) -> None:
         if self.workers < 1:
@@ -112,7 +112,7 @@ class LocalProcesses:
                 yield worker, record
 
 
-def choose_executor(workers: int | None, episode_timeout_s: float = NO_LIMIT_S) -> Executor:
+def choose_executor(workers: int | None, episode_timeout_s: float = NO_TIMEOUT_S) -> Executor:
     """The executor for a number of workers: None for one per core, 0 for this process.
 
     Raises:

@@ -24,14 +24,14 @@ from typing import Any, NamedTuple, Protocol, Self, cast, runtime_checkable
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, RoboIRGError
 from roboirg.evaluation.episode_errors import format_cause
-from roboirg.evaluation.executors.executor import NO_LIMIT_S
+from roboirg.evaluation.executors.executor import NO_TIMEOUT_S
 from roboirg.evaluation.executors.workers import MAX_FAILED_STARTS, WorkerSlot
 from roboirg.evaluation.rollout import PlayJob
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.records.record import Job, Record
 
 POLL_S = 1.0
-PATIENCE_S = 300.0
+NO_CPU_TIMEOUT_S = 300.0
 """How long a cluster may have no free CPU at all before the run gives up."""
 CONNECT_S = 10.0
 
@@ -46,7 +46,7 @@ class VideoRecorder(Protocol):
         """The same, for another folder."""
 
 
-class _Played(NamedTuple):
+class _RemoteResult(NamedTuple):
     """What comes back from another machine.
 
     Attributes:
@@ -75,7 +75,7 @@ class RayCluster:
 
     workers: int | None = None
     address: str | None = None
-    episode_timeout_s: float = NO_LIMIT_S
+    episode_timeout_s: float = NO_TIMEOUT_S
 
     def __post_init__(self) -> None:
         if self.workers is not None and self.workers < 1:
@@ -129,13 +129,13 @@ def _connected(ray: ModuleType, address: str | None) -> Iterator[None]:
         ray.shutdown()
 
 
-def _own_paths() -> list[str]:
+def _user_paths() -> list[str]:
     """Where modules are found here that are not installed, such as policies of the user's."""
     prefixes = tuple({sys.prefix, sys.base_prefix})
     return [path for path in sys.path if path and not path.startswith(prefixes)]
 
 
-def _filming(play: object) -> VideoRecorder | None:
+def _video_recorder(play: object) -> VideoRecorder | None:
     return play if isinstance(play, VideoRecorder) else None
 
 
@@ -157,7 +157,7 @@ class _RemoteWorker:
 
     def __init__(self, play: PlayJob, episode_timeout_s: float) -> None:
         self._folder = Path(tempfile.mkdtemp(prefix="roboirg-"))
-        filming = _filming(play)
+        filming = _video_recorder(play)
         # A `VideoRecorder` play stays one wherever it films.
         moved = play if filming is None else cast("PlayJob", filming.in_folder(self._folder))
         self._seat = WorkerSlot(moved, episode_timeout_s)
@@ -165,7 +165,7 @@ class _RemoteWorker:
     def begin(self) -> None:
         """Answers as soon as the seat has found a place."""
 
-    def play(self, job: Job) -> _Played:
+    def play(self, job: Job) -> _RemoteResult:
         """Play a job."""
         record = self._seat.play(job)
         films = {}
@@ -173,7 +173,7 @@ class _RemoteWorker:
             if path.is_file():
                 films[path.relative_to(self._folder).as_posix()] = path.read_bytes()
                 path.unlink()
-        return _Played(record, films)
+        return _RemoteResult(record, films)
 
 
 class _WorkerPool:
@@ -185,7 +185,7 @@ class _WorkerPool:
             num_cpus=1,
             max_restarts=0,
             scheduling_strategy="SPREAD",
-            runtime_env={"env_vars": {"PYTHONPATH": os.pathsep.join(_own_paths())}},
+            runtime_env={"env_vars": {"PYTHONPATH": os.pathsep.join(_user_paths())}},
         )(_RemoteWorker)
         # What is awaited, with the seat it comes from and the job; None while it finds a place.
         self._awaited: dict[Any, tuple[Any, Job | None]] = {}
@@ -209,9 +209,9 @@ class _WorkerPool:
                     yield record
             if ready or any(job is not None for _, job in self._awaited.values()):
                 lively = time.monotonic()
-            elif time.monotonic() - lively > PATIENCE_S:
+            elif time.monotonic() - lively > NO_CPU_TIMEOUT_S:
                 raise RoboIRGError(
-                    f"The Ray cluster had no free CPU for {PATIENCE_S:g} s; {left} episodes are "
+                    f"The Ray cluster had no free CPU for {NO_CPU_TIMEOUT_S:g} s; {left} episodes are "
                     "left, and the same command goes on with them."
                 )
 
@@ -232,7 +232,7 @@ class _WorkerPool:
             if job is None:
                 self._bear(error)
             self._open_seat()
-            return None if job is None else _lost(job, error)
+            return None if job is None else _lost_worker_record(job, error)
         self._idle.append(seat)
         if job is None:
             self._stillborn = 0
@@ -252,8 +252,8 @@ class _WorkerPool:
                 "and whatever the policies import."
             ) from error
 
-    def _keep_films(self, played: _Played) -> None:
-        filming = _filming(self._play)
+    def _keep_films(self, played: _RemoteResult) -> None:
+        filming = _video_recorder(self._play)
         if filming is None:
             return
         for name, data in played.films.items():
@@ -262,7 +262,7 @@ class _WorkerPool:
             path.write_bytes(data)
 
 
-def _lost(job: Job, error: BaseException) -> Record:
+def _lost_worker_record(job: Job, error: BaseException) -> Record:
     course = RolloutResult()
     name = type(error).__name__
     what = f"the machine or process that played it is gone ({name})"

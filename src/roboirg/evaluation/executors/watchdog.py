@@ -59,22 +59,22 @@ class Watchdog:
         return 0.0 < self._note[1] < time.monotonic()
 
 
-_boards: list[Watchdog] = []
+_watchdogs: list[Watchdog] = []
 """That of this process, if it is supervised."""
 
 
 def use_watchdog(board: Watchdog) -> None:
     """From now on this process is supervised by means of this board."""
-    _boards[:] = [board]
+    _watchdogs[:] = [board]
 
 
 @contextlib.contextmanager
 def watched(phase: Phase, limit_s: float | None = None) -> Iterator[None]:
     """Note that a phase begins, and afterwards that its limit is over."""
-    for board in _boards:
+    for board in _watchdogs:
         board.write(phase, limit_s)
     try:
         yield
     finally:
-        for board in _boards:
+        for board in _watchdogs:
             board.write("world")

@@ -37,10 +37,10 @@ POLL_S = 0.25
 """How often a supervisor looks whether somebody is overdue."""
 
 _PR_SET_PDEATHSIG = 1
-_FATAL = {error.__name__: error for error in (RenderDeviceError, MissingDependencyError)}
+_FATAL_ERRORS = {error.__name__: error for error in (RenderDeviceError, MissingDependencyError)}
 
 
-class _Fatal(NamedTuple):
+class _FatalError(NamedTuple):
     kind: str
     sentence: str
 
@@ -79,7 +79,9 @@ class Worker:
         ours, theirs = context.Pipe()
         board = Watchdog(context)
         # Not a daemon in multiprocessing's sense: policies may have processes of their own.
-        process = context.Process(target=_work, args=(theirs, board, play, crowded, os.getpid()))
+        process = context.Process(
+            target=_worker_main, args=(theirs, board, play, crowded, os.getpid())
+        )
         process.start()
         # Ours must be the only other end, so that its death reads as the end of the file.
         theirs.close()
@@ -105,10 +107,10 @@ class Worker:
         except (EOFError, ConnectionResetError):
             self.process.join()
             self.connection.close()
-            kind, what = _death(self.board.phase, self.process.exitcode)
+            kind, what = _explain_exit(self.board.phase, self.process.exitcode)
             return self._error(kind, what)
-        if isinstance(reply, _Fatal):
-            raise _FATAL.get(reply.kind, RoboIRGError)(reply.sentence)
+        if isinstance(reply, _FatalError):
+            raise _FATAL_ERRORS.get(reply.kind, RoboIRGError)(reply.sentence)
         if not isinstance(reply, Record):
             raise TypeError(f"a worker sent {type(reply).__name__}, not a Record")
         return reply
@@ -184,7 +186,7 @@ class WorkerSlot:
             self._worker = Worker.hire(self._play, job, crowded=True)
         else:
             self._worker.assign(job)
-        record = _await(self._worker, self._episode_timeout_s)
+        record = _wait_for_record(self._worker, self._episode_timeout_s)
         if self._worker.is_gone:
             self._worker = None
         return record
@@ -197,7 +199,7 @@ class WorkerSlot:
             self._worker = None
 
 
-def _await(worker: Worker, episode_timeout_s: float) -> Record:
+def _wait_for_record(worker: Worker, episode_timeout_s: float) -> Record:
     while True:
         if wait([worker.connection], POLL_S):
             return worker.receive()
@@ -206,7 +208,7 @@ def _await(worker: Worker, episode_timeout_s: float) -> Record:
             return record
 
 
-def _death(phase: Phase, exit_code: int | None) -> tuple[ErrorKind, str]:
+def _explain_exit(phase: Phase, exit_code: int | None) -> tuple[ErrorKind, str]:
     """Whose fault it is that a process died, and how it did."""
     if exit_code is not None and exit_code < 0:
         how = f"the process died of signal {-exit_code}"
@@ -220,14 +222,14 @@ def _death(phase: Phase, exit_code: int | None) -> tuple[ErrorKind, str]:
     return "environment", f"{how} in the {phase}"
 
 
-def _work(
+def _worker_main(
     connection: Connection, board: Watchdog, play: PlayJob, crowded: bool, parent: int
 ) -> None:
     """The life of a worker process."""
     # Ctrl-C reaches the whole process group; the parent decides what it means.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    _die_with(parent)
+    _exit_with_parent(parent)
     use_watchdog(board)
     if crowded:
         # Read by lavapipe when it is loaded, which is later than this.
@@ -239,16 +241,16 @@ def _work(
             return
         try:
             with watched("world"):
-                reply: Record | _Fatal = play(job)
+                reply: Record | _FatalError = play(job)
         except RoboIRGError as error:
-            reply = _Fatal(type(error).__name__, str(error))
+            reply = _FatalError(type(error).__name__, str(error))
         try:
             connection.send(reply)
         except BrokenPipeError:
             return
 
 
-def _die_with(parent: int) -> None:
+def _exit_with_parent(parent: int) -> None:
     """See to it that this process does not outlive the one that made it."""
     if sys.platform == "linux":
         # Even when this process hangs in native code. Tied to the thread that made it, which
