@@ -46,7 +46,7 @@ class FakePlay:
         if job.episode == self.deadly and self._dies(job):
             os.kill(os.getpid(), signal.SIGKILL)
         time.sleep(self.seconds)
-        return make_record(job, fake_course(job), started_at=started_at, duration_s=self.seconds)
+        return make_record(job, fake_result(job), started_at=started_at, duration_s=self.seconds)
 
     def _dies(self, job: Job) -> bool:
         return self.folder is None or len(starts(self.folder, job)) <= self.deaths
@@ -54,7 +54,7 @@ class FakePlay:
 
 @dataclass(frozen=True)
 class FakePlayer:
-    """Plays nothing, and films it."""
+    """Plays nothing and writes a video of it."""
 
     folder: Path
     seconds: float = 0.0
@@ -65,13 +65,13 @@ class FakePlayer:
 
     def __call__(self, job: Job) -> Record:
         record = FakePlay(seconds=self.seconds, fatal=self.fatal)(job)
-        film = self.folder / "videos" / f"{job.slug}.mp4"
-        film.parent.mkdir(exist_ok=True)
-        film.write_text(job.slug)
-        return record.model_copy(update={"video": f"videos/{film.name}"})
+        video = self.folder / "videos" / f"{job.slug}.mp4"
+        video.parent.mkdir(exist_ok=True)
+        video.write_text(job.slug)
+        return record.model_copy(update={"video": f"videos/{video.name}"})
 
 
-def fake_course(job: Job) -> RolloutResult:
+def fake_result(job: Job) -> RolloutResult:
     luck = hashlib.sha256(job.slug.encode()).digest()[0]
     events = [EventRecord(step=luck, kind="picked", subject="cube_red")]
     if luck % 2 or job.setting == "explicit":

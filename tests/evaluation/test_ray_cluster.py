@@ -92,7 +92,7 @@ class Homebound:
 
 def test_what_the_machines_do_not_have_is_told(tmp_path: Path) -> None:
     with pytest.raises(
-        RoboIRGError, match=r"No worker of the Ray cluster can begin \(.*only_at_home"
+        RoboIRGError, match=r"No worker of the Ray cluster can start \(.*only_at_home"
     ):
         run_plan(PLAN, tmp_path, Homebound(), RayCluster(1))  # type: ignore[arg-type]
 

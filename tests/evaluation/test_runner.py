@@ -156,7 +156,9 @@ def test_words_of_two_versions_are_not_mixed(
 ) -> None:
     run_plan(small_plan(1), tmp_path, FakePlay(), InProcess())
     monkeypatch.setattr("roboirg.evaluation.runner.LANGUAGE_VERSION", "99.0")
-    with pytest.raises(StoreError, match=r"language version .*, but this roboirg speaks 99\.0"):
+    with pytest.raises(
+        StoreError, match=r"language version .*, but this roboirg has version 99\.0"
+    ):
         run_plan(small_plan(2), tmp_path, FakePlay(), InProcess())
     assert len(read_records(tmp_path)) == 2
 
@@ -164,10 +166,10 @@ def test_words_of_two_versions_are_not_mixed(
 @pytest.mark.parametrize(
     ("name", "value", "sentence"),
     [
-        ("seed", 7, r"PickXtimes test/0 with the scene of seed 7, but .* has \d+; choose another"),
+        ("seed", 7, r"PickXtimes test/0 with scene seed 7, but .* has \d+; choose another"),
         ("environment_version", 99, "of environment version 99, but this roboirg has version 0;"),
         ("task", "Gone", r"Gone test/0 .* no such episode"),
-        ("policy_version", "old", r"version old, but it has changed since \(now built-in\)"),
+        ("policy_version", "old", r"version old, but the policy is now version built-in"),
     ],
 )
 def test_worlds_of_two_versions_are_not_mixed(
@@ -183,7 +185,7 @@ def test_worlds_of_two_versions_are_not_mixed(
 
 
 class Ears(SilentReporter):
-    """Hears notices, and how many episodes had been played before the last one."""
+    """Hears warnings, and how many episodes had been played before the last one."""
 
     def __init__(self) -> None:
         self.notices: list[str] = []
@@ -192,7 +194,7 @@ class Ears(SilentReporter):
     def advance(self, record: Record, *, is_new: bool = True) -> None:
         self.played += 1
 
-    def notice(self, text: str) -> None:
+    def warn(self, text: str) -> None:
         assert self.played == 0
         self.notices.append(text)
 
@@ -202,18 +204,18 @@ def test_a_torn_line_is_told_before_anything_is_played(tmp_path: Path) -> None:
     ears = Ears()
     run_plan(small_plan(1), tmp_path, FakePlay(), InProcess(), reporter=ears)
     (notice,) = ears.notices
-    assert "22 bytes were moved to" in notice
+    assert "(22 bytes) to" in notice
     assert "again" not in notice
     assert ears.played == 2
 
 
-def test_films_that_were_lost_are_counted(tmp_path: Path) -> None:
+def test_lost_videos_are_counted(tmp_path: Path) -> None:
     def play(job: Job) -> Record:
-        return FakePlay()(job).model_copy(update={"film_lost": "OSError: disk full"})
+        return FakePlay()(job).model_copy(update={"video_error": "OSError: disk full"})
 
     summary = run_plan(small_plan(1), tmp_path, play, InProcess())
-    assert len(summary.unfilmed) == 2
-    assert not run_plan(small_plan(1), tmp_path, play, InProcess()).unfilmed
+    assert len(summary.video_errors) == 2
+    assert not run_plan(small_plan(1), tmp_path, play, InProcess()).video_errors
 
 
 def test_workers_are_counted() -> None:

@@ -49,7 +49,7 @@ def test_an_invalid_action_is_recorded_and_told(tmp_path: Path) -> None:
         assert (record.outcome, record.steps) == ("error", 3)
 
 
-def test_a_film_of_a_real_episode(tmp_path: Path) -> None:
+def test_a_video_of_a_real_episode(tmp_path: Path) -> None:
     words = ("--policy", "oracle", "--tasks", "VideoUnmask", "--settings", "direct")
     said = command("run", *words, "--episodes", "1", "--video", "all", "--out", "o", cwd=tmp_path)
     assert said.returncode == 0, said.stderr

@@ -1,5 +1,6 @@
 """The shipped splits are what the rule gives: scene, words and oracle agree."""
 
+import dataclasses
 import io
 from collections import Counter
 
@@ -11,6 +12,7 @@ from roboirg.core.episode import SPLITS
 from roboirg.core.errors import InvalidValueError, RoboIRGError, SceneRejectedError
 from roboirg.episodes.splits import SIZES, TaskSplits, get_episode, shipped_splits, slot_seed
 from roboirg.evaluation.seed_selection import (
+    ACCEPTANCE_SETTINGS,
     EpisodeSlot,
     Rejection,
     SelectedSeed,
@@ -24,7 +26,8 @@ from roboirg.evaluation.seed_selection import (
 )
 from roboirg.evaluation.seed_summary import cause_lines, follow_progress, print_summary
 from roboirg.language import expressible
-from roboirg.language.settings import settings_of
+from roboirg.language.generator import refusals
+from roboirg.language.settings import all_settings, settings_of
 from roboirg.tasks import every_task, get_task
 
 TASKS = tuple(every_task())
@@ -90,11 +93,36 @@ def test_the_first_seed_that_can_be_taken_is_found_with_what_was_amiss_before():
 
 def test_reasons_are_told_apart():
     assert check_words(EpisodeSlot("VideoUnmask", "val", 15), 1_061_500) == Rejection(
-        1_061_500, "not expressible", "spatial"
+        1_061_500,
+        "not expressible",
+        "spatial: no landmark tells its target from the other objects",
     )
     rejections = find_seed(EpisodeSlot("VideoPlaceOrder", "train", 3), check_words).rejections
     assert {one.reason for one in rejections} == {"no room"}
     assert all("no place for" in one.cause for one in rejections)
+
+
+def test_a_new_setting_does_not_change_which_seeds_are_accepted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    slots = [EpisodeSlot("VideoUnmask", "val", index) for index in (0, 15)]
+    before = [find_seed(slot, check_words) for slot in slots]
+    mute = dataclasses.replace(
+        all_settings()["direct"], name="mute", order=9, refusal=lambda _request: "it is mute"
+    )
+    every = {**all_settings(), "mute": mute}
+    for module in ("settings", "generator"):
+        monkeypatch.setattr(f"roboirg.language.{module}.all_settings", lambda: every)
+    episode = get_episode("VideoUnmask", "val", 0)
+    assert "mute" in settings_of(get_task("VideoUnmask"))
+    assert "mute" not in expressible(episode)
+    assert refusals(episode) == {"mute": "it is mute"}
+    assert [find_seed(slot, check_words) for slot in slots] == before
+
+
+def test_seeds_are_accepted_by_the_settings_of_the_first_release() -> None:
+    assert set(ACCEPTANCE_SETTINGS) <= set(all_settings())
+    assert [*ACCEPTANCE_SETTINGS] == ["explicit", "direct", "reasoning", "contextual", "spatial"]
 
 
 def test_processes_find_what_one_finds():

@@ -91,8 +91,8 @@ def test_a_policy_of_chaos_costs_its_own_episodes_and_nothing_else(
             assert record.cause.startswith(chaos_policy.KINDS[misdeed].replace("_", " ") + ": ")
             assert "\n" not in record.cause
     causes = {misdeed: wild[job].cause for job, misdeed in _misdeeds(plan).items()}
-    assert causes["hang"] == "timeout: the policy's act() did not come back in time"
-    assert causes["hang in reset"] == "timeout: the policy's reset() did not come back in time"
+    assert causes["hang"] == "timeout: the policy's act() did not return in time"
+    assert causes["hang in reset"] == "timeout: the policy's reset() did not return in time"
     crash = f"policy: the process died of signal {signal.SIGSEGV:d} in the policy's act()"
     assert causes["crash"] == crash
     assert causes["die"] == "policy: the process ended with exit code 0 in the policy's act()"
@@ -163,19 +163,19 @@ def test_processes_that_cannot_start_end_the_run(tmp_path: Path) -> None:
     assert len(read_records(tmp_path)) < 10
 
 
-def test_a_worker_is_gone_after_it_was_overdue() -> None:
-    worker = Worker.hire(sleepy, small_plan(1).jobs()[0])
-    assert worker.overdue(3600) is None
-    record = worker.overdue(0.0)
+def test_an_overdue_worker_is_killed() -> None:
+    worker = Worker.start(sleepy, small_plan(1).jobs()[0])
+    assert worker.kill_if_overdue(3600) is None
+    record = worker.kill_if_overdue(0.0)
     assert record is not None
-    assert worker.is_gone
+    assert worker.is_dead
     assert worker.process.exitcode == -signal.SIGKILL
 
 
 @pytest.mark.parametrize(
     ("whom", "error", "kind"),
     [
-        ("policy", ConnectionRefusedError("nobody there"), "connection"),
+        ("policy", ConnectionRefusedError("refused"), "connection"),
         ("policy", TimeoutError("slow"), "timeout"),
         ("policy", OSError("odd"), "policy"),
         ("environment", TimeoutError("slow"), "environment"),
@@ -197,7 +197,7 @@ class Unreachable:
         record = FakePlay()(job)
         if job.policy != self.policy:
             return record
-        lost = {"outcome": "error", "error": "connection", "cause": "connection: nobody there"}
+        lost = {"outcome": "error", "error": "connection", "cause": "connection: refused"}
         return record.model_copy(update=lost)
 
 

@@ -1,4 +1,4 @@
-"""Where the commands find policies that are not installed."""
+"""Import path for policies that are not installed."""
 
 from __future__ import annotations
 
@@ -7,5 +7,5 @@ from pathlib import Path
 
 
 def add_working_directory() -> None:
-    """As `python -m` has it: policies in the working directory can be named."""
+    """Add the working directory to the import path, as `python -m` does."""
     sys.path.insert(0, str(Path.cwd()))

@@ -1,4 +1,4 @@
-"""The commands about words: ``roboirg language`` and ``roboirg export``."""
+"""Commands for instructions: ``roboirg language`` and ``roboirg export``."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from roboirg.cli.options import (
     Workers,
 )
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
+from roboirg.util.plurals import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -26,10 +27,10 @@ if TYPE_CHECKING:
     from roboirg.core.episode import Split
     from roboirg.language.validation import Batch, ValidationResults
 
-# Everything heavy is imported inside the commands, so that --help answers at once.
+# Heavy modules are imported inside the commands, so that --help is fast.
 
 MINIMUM_WIDTH = 150
-"""Columns to use where the output is not a terminal."""
+"""Columns of output that is not a terminal."""
 MOST_FAILURES = 10
 """Broken rules that are spelled out."""
 _LINE_EVERY = 200
@@ -37,20 +38,20 @@ _LINE_EVERY = 200
 
 Name = TypeVar("Name", bound=str)
 
-language_app = typer.Typer(no_args_is_help=True, help="Count, prove and show the words.")
-export_app = typer.Typer(no_args_is_help=True, help="Write data for other programs.")
+language_app = typer.Typer(no_args_is_help=True, help="Count, validate and show the instructions.")
+export_app = typer.Typer(no_args_is_help=True, help="Export data for other programs.")
 
 
 @export_app.callback()
 def _export() -> None:
-    # With a callback, the only command keeps its name.
+    # With a callback, a single command keeps its name.
     pass
 
 
 @export_app.command("instructions")
 def export_instructions(
-    out: Annotated[Path, typer.Option(help="The file to write.")],
-    format: Annotated[str, typer.Option(help="jsonl or parquet.")] = "jsonl",  # noqa: A002
+    out: Annotated[Path, typer.Option(help="File to write.")],
+    format: Annotated[str, typer.Option(help="File format: jsonl or parquet.")] = "jsonl",  # noqa: A002
     split: AnySplit = "test",
     tasks: Tasks = "all",
     settings: Settings = "all",
@@ -59,7 +60,7 @@ def export_instructions(
     distractor: Distractor = "neutral",
     frame: Frame = "robot",
 ) -> None:
-    """Write a row for each episode, setting and form; docs/language.md explains the columns."""
+    """Export a row per episode, setting and form (columns: see docs/language.md)."""
     from roboirg.evaluation.plan_parsing import parse_names, parse_stages
     from roboirg.language import FORMS
     from roboirg.language.export import EXPORT_FORMATS, check_export_support, row, write_rows
@@ -68,7 +69,7 @@ def export_instructions(
     kind = _known("format", format, EXPORT_FORMATS)
     check_export_support(kind)
     if out.is_dir() or not out.parent.is_dir():
-        raise InvalidValueError(f"{str(out)!r} is no name for a file in a folder that exists.")
+        raise InvalidValueError(f"{str(out)!r} is not a file in an existing folder.")
     names, chosen = _tasks(tasks), _settings(settings)
     spoken = [_known("form", one, FORMS) for one in parse_names("form", forms)]
     episodes = [
@@ -86,16 +87,19 @@ def export_instructions(
     if not rows:
         raise InvalidValueError(f"None of these tasks has the setting {', '.join(chosen)}.")
     write_rows(rows, out, kind)
-    typer.echo(f"{len(rows)} instructions of {len(episodes)} episodes: {out}")
+    typer.echo(f"{counted(len(rows), 'instruction')} of {counted(len(episodes), 'episode')}: {out}")
 
 
 @language_app.command()
 def stats(
     split: AnySplit = "test",
     tasks: Tasks = "all",
-    out: Annotated[Path | None, typer.Option(help="Folder for the figure, as PNG and SVG.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for a figure of the referring expressions, as PNG and SVG."),
+    ] = None,
 ) -> None:
-    """Count referring expressions, words, patterns, relations and landmarks; draw the first."""
+    """Count words, referring expressions, patterns, relations and landmarks."""
     from roboirg.language.expression_figure import check_figure_support, write_figure
     from roboirg.language.statistics_tables import overview_tables
     from roboirg.language.variants import instructions, split_episodes
@@ -152,9 +156,9 @@ def prove(
 
 @language_app.command()
 def card(
-    out: Annotated[Path | None, typer.Option(help="File to write instead of stdout.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Write to this file instead of stdout.")] = None,
 ) -> None:
-    """Write the language card: an example of each variant, in Markdown."""
+    """Write the language card: an example of every variant, in Markdown."""
     from roboirg.language.card import language_card
     from roboirg.records.store import write_atomically
 

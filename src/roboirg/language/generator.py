@@ -101,6 +101,15 @@ def can_express(
     return get_setting(setting, get_task(episode.task)).refusal(request) is None
 
 
+def refusals(episode: Episode) -> dict[str, str]:
+    """Return why settings of the episode's task cannot express it, by name of the setting."""
+    request = _request(episode, "implicit", STAGE_SETS[-1], "neutral", 1, "robot")
+    found = {
+        name: all_settings()[name].refusal(request) for name in settings_of(get_task(episode.task))
+    }
+    return {name: reason for name, reason in found.items() if reason is not None}
+
+
 def _request(
     episode: Episode,
     form: str,

@@ -1,4 +1,4 @@
-"""Records as a table for pandas, Polars or DuckDB: one row for each episode."""
+"""Export records as a Parquet table for pandas, Polars or DuckDB, one row per episode."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _TEXT_COLUMNS = [
     "plan",
     "command",
     "video",
-    "film_lost",
+    "video_error",
     "details",
     "render_device",
     "started_at",
@@ -56,15 +56,15 @@ _NUMBER_COLUMNS = [
     "schema_version",
 ]
 _JSON_COLUMNS = ("goal", "metadata", "policy_metadata", "usage", "timings")
-"""Every task and policy has keys of its own here."""
+"""Fields whose keys depend on the task or policy."""
 _BATCH_ROWS = 5_000
 
 
 def check_parquet_support() -> None:
-    """See before the work starts that Parquet can be written.
+    """Check that Parquet can be written.
 
     Raises:
-        MissingDependencyError: it cannot.
+        MissingDependencyError: pyarrow is not installed.
     """
     try:
         import pyarrow.parquet  # noqa: F401
@@ -75,14 +75,14 @@ def check_parquet_support() -> None:
 
 
 def write_parquet(records: Iterable[Record], path: Path) -> int:
-    """Write records into a Parquet file, which appears whole or not at all.
+    """Write records to a Parquet file, which appears complete or not at all.
 
-    Columns are the fields of a record. ``instruction``, ``mentions``, ``events`` and
+    The columns are the fields of a record. ``instruction``, ``mentions``, ``events`` and
     ``attribution`` are nested; ``goal``, ``metadata``, ``policy_metadata``, ``usage`` and
     ``timings`` are JSON texts.
 
     Returns:
-        The number of rows.
+        Number of rows.
 
     Raises:
         MissingDependencyError: pyarrow is not installed.

@@ -78,7 +78,7 @@ def details_of(
         "events": [[one.step, at(event_text(one)), int(one.holds)] for one in _told(record)],
         "stages": [[at(mark.subgoal), mark.step] for mark in stages_of(record)],
         "traceback": None if record.details is None else at(record.details),
-        "lost": None if record.film_lost is None else at(record.film_lost),
+        "lost": None if record.video_error is None else at(record.video_error),
         "rules": at(_rules(record)),
     }  # fmt: skip
     if film is not None:

@@ -98,7 +98,7 @@ class ControlLoop:
             if isinstance(self.robot, JudgingRobot) and self._is_prepared:
                 with contextlib.suppress(Exception):  # what happened before is an extra
                     self.robot.judge(course)
-            course.fail(fault.kind, fault.cause, fault.details)
+            course.record_error(fault.kind, fault.cause, fault.details)
         return course
 
     @contextlib.contextmanager

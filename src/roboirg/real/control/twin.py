@@ -112,9 +112,9 @@ class Twin:
         course.render_device = None if device == NOTHING_DRAWN else device
         course.turn = int(first["elapsed_steps"])
         for info in (first, *later):
-            course.note(info)
+            course.add_events(info)
         last = self._infos[-1]
-        course.settle(last["status"], last.get("cause"), last["steps"])
+        course.record_status(last["status"], last.get("cause"), last["steps"])
 
     def _step(self, command: Command) -> None:
         self._feeling, *_, info = self._playing().step(command)
