@@ -200,7 +200,7 @@ def test_what_ends_every_episode_ends_the_run(
         stage(PaperWorld(), PaperPolicy(error))
 
 
-def test_ctrl_c_is_nobodys_fault(stage: Callable[..., RolloutResult]) -> None:
+def test_ctrl_c_is_no_episode_error(stage: Callable[..., RolloutResult]) -> None:
     policy = PaperPolicy()
     policy.act = lambda _observation: (_ for _ in ()).throw(KeyboardInterrupt)  # type: ignore[method-assign]
     with pytest.raises(KeyboardInterrupt):

@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 MINIMUM_WIDTH = 150
 """Columns of output that is not a terminal."""
 MOST_FAILURES = 10
-"""Broken rules that are spelled out."""
+"""Most broken rules to print."""
 _LINE_EVERY = 200
-"""Where there is no terminal, a line is printed after so many batches."""
+"""Without a terminal, print a line after this many batches."""
 
 Name = TypeVar("Name", bound=str)
 
