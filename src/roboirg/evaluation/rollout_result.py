@@ -6,7 +6,7 @@ import datetime as dt
 import importlib.metadata
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, cast
 
 from pydantic import JsonValue
@@ -144,21 +144,8 @@ def make_record(
         attribution=_attribution(episode, result),
         steps=result.steps,
         demonstration_steps=result.demonstration_steps,
-        instruction=tuple(
-            UtteranceRecord(stage=u.stage, text=u.text) for u in instruction.utterances
-        ),
-        mentions=tuple(
-            MentionSpan(
-                utterance=mention.utterance,
-                start=mention.start,
-                end=mention.end,
-                role=mention.role,
-                expression=mention.expression,
-                slot=mention.slot,
-                value=mention.value,
-            )
-            for mention in instruction.mentions
-        ),
+        instruction=tuple(UtteranceRecord(**asdict(one)) for one in instruction.utterances),
+        mentions=tuple(MentionSpan(**asdict(one)) for one in instruction.mentions),
         command=explicit.text,
         goal=dict(episode.goal.as_mapping()),
         # Exactly what a reader of the file gets.
