@@ -15,7 +15,7 @@ from roboirg.evaluation.executors.executor import LocalProcesses
 from roboirg.evaluation.plan import Plan
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.runner import run_plan
-from roboirg.records.record import EventRecord, Job, Record
+from roboirg.records.record import NON_DETERMINISTIC_FIELDS, EventRecord, Job, Record
 
 
 @dataclass(frozen=True)
@@ -77,6 +77,11 @@ def fake_result(job: Job) -> RolloutResult:
     if luck % 2 or job.setting == "explicit":
         return RolloutResult("success", cause=None, steps=luck, events=events)
     return RolloutResult("failure", cause="picked the wrong cube", steps=luck, events=events)
+
+
+def comparable(record: Record) -> dict[str, object]:
+    """Return the fields that depend only on the job."""
+    return record.model_dump(mode="json", exclude=set(NON_DETERMINISTIC_FIELDS))
 
 
 def starts(folder: Path, job: Job | None = None) -> list[str]:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import evaluation_fakes
 import pytest
-from evaluation_fakes import FakePlay, is_alive, small_plan, starts, worker_pids
+from evaluation_fakes import FakePlay, comparable, is_alive, small_plan, starts, worker_pids
 
 from roboirg.core.errors import InvalidValueError, RenderDeviceError
 from roboirg.evaluation.executors.executor import InProcess, LocalProcesses, choose_executor
@@ -24,8 +24,8 @@ from roboirg.records.store import RECORDS_FILE, RecordStore, StoreError, read_re
 WAIT_S = 20.0
 
 
-def comparable(records: tuple[Record, ...]) -> list[dict[str, object]]:
-    return [record.comparable() for record in sorted(records, key=lambda record: record.slug)]
+def all_comparable(records: tuple[Record, ...]) -> list[dict[str, object]]:
+    return [comparable(record) for record in sorted(records, key=lambda record: record.slug)]
 
 
 def wait_until(condition: Callable[[], bool]) -> None:
@@ -55,7 +55,7 @@ def finish(folder: Path) -> RunSummary:
 def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, object]]:
     folder = tmp_path_factory.mktemp("uninterrupted")
     run_plan(small_plan(8), folder, FakePlay(), InProcess())
-    return comparable(read_records(folder))
+    return all_comparable(read_records(folder))
 
 
 def test_one_and_two_workers_give_the_same_records(
@@ -64,7 +64,7 @@ def test_one_and_two_workers_give_the_same_records(
     for workers in (1, 2):
         folder = tmp_path / str(workers)
         run_plan(small_plan(8), folder, FakePlay(), LocalProcesses(workers))
-        assert comparable(read_records(folder)) == uninterrupted
+        assert all_comparable(read_records(folder)) == uninterrupted
 
 
 def test_after_sigkill_the_workers_are_gone_and_the_same_command_goes_on(
@@ -84,7 +84,7 @@ def test_after_sigkill_the_workers_are_gone_and_the_same_command_goes_on(
 
     assert summary.played == 16 - stored
     assert summary.torn_bytes == 22
-    assert comparable(read_records(tmp_path)) == uninterrupted
+    assert all_comparable(read_records(tmp_path)) == uninterrupted
     assert line_count(tmp_path) == 16
 
 
@@ -98,7 +98,7 @@ def test_a_stopped_run_ends_its_workers_and_keeps_what_ended(
     assert not any(map(is_alive, worker_pids(tmp_path)))
     assert 3 <= len(read_records(tmp_path)) < 16
     finish(tmp_path)
-    assert comparable(read_records(tmp_path)) == uninterrupted
+    assert all_comparable(read_records(tmp_path)) == uninterrupted
 
 
 def test_a_worker_that_dies_twice_costs_one_error_and_the_rest_goes_on(tmp_path: Path) -> None:
@@ -107,7 +107,7 @@ def test_a_worker_that_dies_twice_costs_one_error_and_the_rest_goes_on(tmp_path:
     assert {record.episode for record in errors} == {2}
     assert {record.error for record in errors} == {"infrastructure"}
     assert {record.cause for record in errors} == {
-        "infrastructure: the process died of signal 9 in the world"
+        "infrastructure: the process died of signal 9 in the environment"
     }
     assert (summary.total, len(summary.errors), summary.missing) == (8, 2, 0)
     assert all(len(starts(tmp_path, record.identity)) == 2 for record in errors)

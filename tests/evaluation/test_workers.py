@@ -12,7 +12,7 @@ from pathlib import Path
 
 import chaos_policy
 import pytest
-from evaluation_fakes import FakePlay, small_plan
+from evaluation_fakes import FakePlay, comparable, small_plan
 
 from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
@@ -79,7 +79,7 @@ def test_a_policy_of_chaos_costs_its_own_episodes_and_nothing_else(
     for job, record in wild.items():
         misdeed = chaos_policy.misdeed(record.policy_metadata.get("seed", _seed(job)))  # type: ignore[arg-type]
         if misdeed is None:
-            assert record.comparable() == calm[job].comparable()
+            assert comparable(record) == comparable(calm[job])
             assert record.usage == {"calls": 3.0}
         else:
             assert (misdeed, record.outcome, record.error) == (
@@ -124,7 +124,8 @@ def test_an_episode_that_takes_too_long_is_ended_and_named(tmp_path: Path) -> No
     for record in read_records(tmp_path):
         assert record.error == "timeout"
         # The process may not have got as far as the episode.
-        words = r"timeout: the episode took longer than 0\.5 s \(now in the (start|world)\)"
+        phase = "(worker startup|environment)"
+        words = rf"timeout: the episode took longer than 0\.5 s \(now in the {phase}\)"
         assert re.fullmatch(words, str(record.cause))
         assert record.duration_s >= 0.5
 
@@ -142,7 +143,7 @@ def test_a_crash_in_the_simulators_native_code_is_the_worlds(tmp_path: Path) -> 
         # Such a crash may pass, so it was tried again.
         assert (record.error, record.attempt) == ("environment", 2)
         assert record.cause == (
-            f"environment: the process died of signal {signal.SIGSEGV:d} in the world"
+            f"environment: the process died of signal {signal.SIGSEGV:d} in the environment"
         )
 
 
@@ -157,7 +158,7 @@ class Homeless:
 
 
 def test_processes_that_cannot_start_end_the_run(tmp_path: Path) -> None:
-    words = r"No worker process can start \(environment: .* exit code 3 in the start\)"
+    words = r"No worker process can start \(environment: .* exit code 3 in the worker startup\)"
     with pytest.raises(RoboIRGError, match=words):
         run_plan(small_plan(50), tmp_path, Homeless(), LocalProcesses(2))
     assert len(read_records(tmp_path)) < 10

@@ -154,7 +154,7 @@ class _CallGuard:
 
     @contextlib.contextmanager
     def environment(self, name: str) -> Iterator[None]:
-        with attribute_errors("environment"), watched("world"), self._timed(name):
+        with attribute_errors("environment"), watched("environment"), self._timed(name):
             yield
 
     @contextlib.contextmanager
@@ -190,7 +190,7 @@ def play_episode(
             needs = env_requirements(policy, job)
         with guard.environment("env_reset"):
             env = make_env(job, needs)
-        _play_in(env, policy, needs.actions, job.max_steps, writer, result, guard)
+        _play_to_end(env, policy, needs.actions, job.max_steps, writer, result, guard)
     except EpisodeError as error:
         result.record_error(error.kind, error.cause, error.details)
     finally:
@@ -254,7 +254,7 @@ def load_policy(job: Job) -> Policy:
     return policies.make_policy(job.policy_spec, seed=int(seeds.generate_state(1)[0]))
 
 
-def _play_in(
+def _play_to_end(
     env: RoboIRGEnv,
     policy: Policy,
     actions: ActionSpace,

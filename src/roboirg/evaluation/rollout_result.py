@@ -43,15 +43,15 @@ class RolloutResult:
         timed_out: whether the policy used up its steps.
         steps: control steps of the policy.
         demonstration_steps: frames of the video shown before the policy's turn.
-        turn: control steps of the world before the policy's turn.
-        elapsed: control steps of the world in all.
+        turn: control steps of the episode before the policy's turn.
+        elapsed: control steps of the episode in all.
         instruction: what the policy was told; None if the episode did not get that far.
         events: facts that became true or ceased to be.
         render_device: the driver's name; None if nothing was rendered.
         details: traceback of an error.
         policy_metadata: what the policy reports about itself.
         usage: what the policy reports that the episode cost.
-        timings: seconds spent in the policy and in the world, by phase.
+        timings: seconds spent in the policy and in the environment, by phase.
     """
 
     outcome: Outcome = "error"
@@ -177,7 +177,7 @@ def _attribution(episode: Episode, result: RolloutResult) -> Attribution | None:
     found = attribute_failure(
         episode,
         [
-            # The kinds are those that the world reported.
+            # The kinds are those that the environment reported.
             Event(
                 event.step + result.turn,
                 Fact(cast("FactKind", event.kind), event.subject, event.place),

@@ -160,7 +160,7 @@ class MentionSpan(_RecordModel):
 
 
 class EventRecord(_RecordModel):
-    """A fact that became true or false in the world.
+    """A fact that became true or false during the episode.
 
     Attributes:
         step: control steps since the policy's turn began; at most 0 in the demonstration.
@@ -284,7 +284,3 @@ class Record(Result):
     render_device: str | None = None
     started_at: str
     duration_s: float
-
-    def comparable(self) -> dict[str, object]:
-        """Return the fields that depend only on the job: all but `NON_DETERMINISTIC_FIELDS`."""
-        return self.model_dump(mode="json", exclude=set(NON_DETERMINISTIC_FIELDS))

@@ -14,8 +14,8 @@ from multiprocessing.context import SpawnContext
 from typing import Literal, get_args
 
 Phase = Literal[
-    "start",
-    "world",
+    "worker startup",
+    "environment",
     "policy's constructor",
     "policy's reset()",
     "policy's act()",
@@ -77,4 +77,4 @@ def watched(phase: Phase, limit_s: float | None = None) -> Iterator[None]:
         yield
     finally:
         for watchdog in _watchdogs:
-            watchdog.write("world")
+            watchdog.write("environment")

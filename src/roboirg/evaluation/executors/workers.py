@@ -143,7 +143,7 @@ class Worker:
     @property
     def failed_to_start(self) -> bool:
         """Whether the process died before it played anything."""
-        return self.is_dead and self.watchdog.phase == "start"
+        return self.is_dead and self.watchdog.phase == "worker startup"
 
     def release(self) -> None:
         """Let an idle process exit by closing the pipe."""
@@ -244,7 +244,7 @@ def _worker_main(
         except EOFError:
             return
         try:
-            with watched("world"):
+            with watched("environment"):
                 reply: Record | _FatalError = play(job)
         except RoboIRGError as error:
             reply = _FatalError(type(error).__name__, str(error))
