@@ -270,7 +270,8 @@ def test_splits_are_built_anew_for_what_is_named(
     words = ("build-splits", "--tasks", "VideoUnmask,PickXtimes", "--split", "val", "--workers", 0)
     said = roboirg(*words)
     assert (said.code, said.out) == (0, splits_text(shipped_splits()))
-    assert "VideoUnmask: 2 × not expressible: spatial: no landmark tells its target " in said.err
+    reason = "spatial: no landmark singles out a target"
+    assert f"VideoUnmask: 2 × not expressible: {reason} (first: VideoUnmask/val/15" in said.err
     assert "[100/100]" in said.err
     said = roboirg(*words, "--out", tmp_path / "splits.json")
     assert (said.code, said.out) == (0, "")

@@ -67,7 +67,7 @@ class ChaosPolicy:
             return self.misbehave(rows)
         return rows
 
-    def misbehave(self, rows: np.ndarray) -> Any:  # noqa: PLR0912 - one way each
+    def misbehave(self, rows: np.ndarray) -> Any:  # noqa: C901, PLR0912 - one way each
         match self.misdeed:
             case "raise":
                 raise ValueError("no more")

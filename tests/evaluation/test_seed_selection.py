@@ -95,7 +95,7 @@ def test_reasons_are_told_apart():
     assert check_words(EpisodeSlot("VideoUnmask", "val", 15), 1_061_500) == Rejection(
         1_061_500,
         "not expressible",
-        "spatial: no landmark tells its target from the other objects",
+        "spatial: no landmark singles out a target",
     )
     rejections = find_seed(EpisodeSlot("VideoPlaceOrder", "train", 3), check_words).rejections
     assert {one.reason for one in rejections} == {"no room"}

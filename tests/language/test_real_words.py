@@ -1,4 +1,4 @@
-"""Boxes and tapes in words: what is said of them, and what other people could say."""
+"""Boxes and tapes in words: the generator's, and those of other people."""
 
 import itertools
 
@@ -66,7 +66,7 @@ GRID = st.integers(-20, 20).map(lambda step: step / 100)
 
 @given(GRID, GRID, GRID, GRID, st.sampled_from(["box", "tape"]))
 def test_two_of_a_kind_are_told_by_their_sides_alone(left, right, near, far, kind):
-    """Whoever wins by the margin along y, however the two stand along x."""
+    """The margin along y decides, at any positions along x."""
     one = SceneObject("one", kind, Point(near, left, 0.03), color="green")
     two = SceneObject("two", kind, Point(far, right, 0.03), color="gray")
     scene = Scene((one, two))

@@ -27,7 +27,7 @@ HIDDEN_KINDS = {"hidden_cube", "site", "marker"}
 
 
 class Mistaken(ScriptedPolicy):
-    """The oracle's hands with another goal in mind."""
+    """The scripted expert with another goal."""
 
     def __init__(self, goal: Goal) -> None:
         super().__init__()
@@ -86,7 +86,7 @@ def test_another_goal_is_a_failure_with_a_cause(task):
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_whoever_does_nothing_runs_out_of_time(task):
+def test_doing_nothing_runs_out_of_time(task):
     env = roboirg.make(task, episode=0, cameras=(), max_steps=2)
     env.reset()
     outcomes = [env.step(physics_settings.HOME_ACTION) for _ in range(2)]

@@ -12,13 +12,13 @@ from typing import Annotated
 
 import typer
 
-import roboirg
 from roboirg.cli import language_commands, policy_commands, report_commands, run_commands
 from roboirg.cli.bench_commands import bench
 from roboirg.cli.options import Distractor, Frame, Split, Stages, Tasks, Video, Workers
 from roboirg.cli.real_commands import real_app
 from roboirg.cli.run_commands import INTERRUPTED, USAGE_ERROR, Out
 from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.core.version import __version__
 
 # Heavy modules are imported inside the commands, so that --help is fast.
 
@@ -49,7 +49,7 @@ app.command()(bench)
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"roboirg {roboirg.__version__}")
+        typer.echo(f"roboirg {__version__}")
         raise typer.Exit
 
 

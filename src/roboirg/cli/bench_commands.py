@@ -18,13 +18,13 @@ def bench(
     """Measure the time and memory of steps, resets and starts on this machine."""
     from rich.console import Console
 
-    from roboirg.perf.bench_runner import run, table, write
+    from roboirg.perf.bench_runner import results_table, run_measures, write_results
     from roboirg.perf.measures import measures
 
     console = Console()
     if not console.is_terminal:
         console.width = max(console.width, MINIMUM_WIDTH)
-    figures = run(measures(), rounds, lambda words: typer.echo(words, err=True))
-    console.print(table(figures))
+    figures = run_measures(measures(), rounds, lambda words: typer.echo(words, err=True))
+    console.print(results_table(figures))
     if out is not None:
-        write(figures, out)
+        write_results(figures, out)

@@ -61,6 +61,7 @@ def export_instructions(
     frame: Frame = "robot",
 ) -> None:
     """Export a row per episode, setting and form (columns: see docs/language.md)."""
+    from roboirg.core.instruction_options import InstructionOptions
     from roboirg.evaluation.plan_parsing import parse_names, parse_stages
     from roboirg.language import FORMS
     from roboirg.language.export import EXPORT_FORMATS, check_export_support, row, write_rows
@@ -79,9 +80,7 @@ def export_instructions(
         episodes,
         chosen,
         spoken,
-        stages=parse_stages(stages),
-        distractor=distractor,
-        frame=frame,
+        InstructionOptions(stages=parse_stages(stages), distractor=distractor, frame=frame),
     )
     rows = [row(episode, instruction) for episode, instruction in said]
     if not rows:
@@ -122,8 +121,8 @@ def stats(
             typer.echo(path)
 
 
-@language_app.command()
-def prove(
+@language_app.command("validate")
+def validate_instructions(
     seeds: Annotated[
         int, typer.Option(help="Random scenes for each task, beyond the splits.")
     ] = 100,
@@ -131,17 +130,16 @@ def prove(
     split: Annotated[str, typer.Option(help="train, val, test, all or none.")] = "all",
     workers: Workers = None,
 ) -> None:
-    """Read all words back: one goal, none without context, no leak, paired; exit code 2 if not."""
+    """Read all instructions back and check their rules; exit code 2 if one is broken."""
     from roboirg.evaluation.executors.executor import core_count
-    from roboirg.language.validation import ValidationResults, batches
-    from roboirg.language.validation import validate as examine_all
+    from roboirg.language.validation import ValidationResults, batches, validate
     from roboirg.language.validation.validation_tables import validation_tables
 
     names = _tasks(tasks)
     work = batches(names, () if split.strip().lower() == "none" else _splits(split), seeds)
     count = core_count() if workers is None else workers
     found = ValidationResults()
-    for evidence in _followed(examine_all(work, count), work):
+    for evidence in _followed(validate(work, count), work):
         found.add(evidence)
     console = _console()
     for table in validation_tables(found):

@@ -123,23 +123,23 @@ def run(
 ) -> None:
     """Play the trials of a study in order, on a robot or its twin."""
     from roboirg.real.control.limits import read_limits
-    from roboirg.real.control.robot_specs import check_scorer, make_robot
+    from roboirg.real.control.robot_loading import make_robot
     from roboirg.real.pages.operator_console import OperatorConsole
     from roboirg.real.study.study_plan import read_study
-    from roboirg.real.study.study_run import Study
+    from roboirg.real.study.study_run import Study, select_scorer
 
     path = Path(folder)
     made = read_study(path)
     console = OperatorConsole(made)
-    device = make_robot(robot, real_time=real_time, arrange=console.arrange)
+    device = make_robot(robot, real_time=real_time, arrange=console.request_arrangement)
     study = Study(
         made,
         path,
         device,
         read_limits(limits),
-        check_scorer(score, device),
-        console.ended if robot != "twin" else lambda: False,
-        console.tell,
+        select_scorer(score, device),
+        console.stop_requested if robot != "twin" else lambda: False,
+        console.report,
     )
     _play(study, console, policy or [], retry=retry_errors)
 
@@ -158,7 +158,7 @@ def score(
 
     path = Path(folder)
     server = ScoreServer(read_study(path), path, operator, port)
-    server.ledger()  # fail now if the records cannot be read
+    server.read_trial_log()  # fail now if the records cannot be read
     typer.echo(f"Open {server.url}")
     typer.echo("Press Ctrl-C to stop; all verdicts are stored.")
     sys.stdout.flush()
@@ -199,8 +199,8 @@ def _play(study: Study, console: OperatorConsole, policies: list[str], *, retry:
             err=True,
         )
         sys.exit(INTERRUPTED)
-    faulty = console.faulty
-    typer.echo(f"Played {counted(len(records), 'trial')}; {len(faulty)} ended in an error.")
-    if faulty:
-        typer.echo(f"roboirg: first error: {faulty[0]}", err=True)
+    errors = console.errors
+    typer.echo(f"Played {counted(len(records), 'trial')}; {len(errors)} ended in an error.")
+    if errors:
+        typer.echo(f"roboirg: first error: {errors[0]}", err=True)
         sys.exit(USAGE_ERROR)

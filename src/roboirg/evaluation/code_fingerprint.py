@@ -6,8 +6,6 @@ import functools
 import hashlib
 from pathlib import Path
 
-import roboirg
-
 FINGERPRINT_LENGTH = 12
 """Hexadecimal digits."""
 
@@ -16,7 +14,7 @@ FINGERPRINT_LENGTH = 12
 def code_fingerprint() -> str:
     """Return a shortened SHA-256 of the names and bytes of the package's Python files."""
     digest = hashlib.sha256()
-    root = Path(roboirg.__file__).parent
+    root = Path(__file__).parents[1]
     for path in sorted(root.rglob("*.py")):
         digest.update(f"{path.relative_to(root).as_posix()}\0".encode())
         digest.update(path.read_bytes() + b"\0")

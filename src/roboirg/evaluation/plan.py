@@ -310,7 +310,7 @@ def instruct_job(job: Job) -> Instruction:
         InvalidValueError: the setting and options cannot express the episode.
     """
     episode = splits.get_episode(job.task, job.split, job.episode)
-    return language.instruct(episode, **job.options._asdict())
+    return language.instruct_with(episode, job.options)
 
 
 def _task_names(text: str) -> tuple[str, ...]:

@@ -225,9 +225,9 @@ def env_requirements(policy: Policy, job: Job) -> EnvRequirements:
 
 def make_env(job: Job, needs: EnvRequirements) -> RoboIRGEnv:
     """Return the environment of a job with what the policy needs."""
-    import roboirg
+    from roboirg.envs.factory import make
 
-    return roboirg.make(
+    return make(
         job.task,
         split=job.split,
         episode=job.episode,

@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-import roboirg
 from roboirg.core.episode import SPLITS, Difficulty, Episode, Split, episode_key
 from roboirg.core.errors import (
     InvalidValueError,
     MotionPlanningError,
     SceneRejectedError,
 )
+from roboirg.envs.factory import make
 from roboirg.episodes.splits import (
     MAX_REJECTED,
     SIZES,
@@ -24,7 +24,7 @@ from roboirg.episodes.splits import (
     slot_key,
     slot_seed,
 )
-from roboirg.language.generator import refusals
+from roboirg.language import find_refusals
 from roboirg.policies import make_policy, play
 from roboirg.tasks import every_task, get_task
 from roboirg.util.parallel_map import parallel_map
@@ -103,7 +103,7 @@ def check_words(slot: EpisodeSlot, seed: int) -> Rejection | None:
         episode = _episode(slot, seed)
     except SceneRejectedError as error:
         return Rejection(seed, "no room", str(error))
-    refused = refusals(episode)
+    refused = find_refusals(episode)
     causes = [f"{name}: {refused[name]}" for name in ACCEPTANCE_SETTINGS if name in refused]
     return Rejection(seed, "not expressible", "; ".join(causes)) if causes else None
 
@@ -119,7 +119,7 @@ def check_seed(slot: EpisodeSlot, seed: int) -> Rejection | None:
 
 def oracle_failure(episode: Episode) -> str | None:
     """Return why the oracle fails in an episode, played without pictures; None if it succeeds."""
-    env = roboirg.make(episode, cameras=())
+    env = make(episode, cameras=())
     try:
         info = play(env, make_policy("oracle", 0))
     except MotionPlanningError as error:

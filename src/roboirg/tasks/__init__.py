@@ -1,8 +1,9 @@
 """The tasks, one file each; a file that defines ``TASK`` is a task.
 
-Those of three suites are the benchmark. The suite ``real`` has the twins of the tasks for a real
-robot: they are played, told and judged like all others, but are asked for by their names or by
-their suite's.
+Three suites are the benchmark. The suite ``real`` holds the simulated twins of the real-robot
+tasks. Installed packages add tasks, in suites of their own, through entry points of the group
+``roboirg.tasks``. Tasks outside the benchmark are played, told and judged like all others, but
+only on request: by name or by suite.
 """
 
 from __future__ import annotations
@@ -11,32 +12,38 @@ import functools
 import sys
 from collections.abc import Iterable, Mapping
 
-from roboirg.core.episode import BENCHMARK_SUITES, SUITES, Suite
-from roboirg.core.errors import UnknownNameError
+from roboirg.core.episode import BENCHMARK_SUITES, SUITES
+from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.tasks.task import Task
-from roboirg.util.discovery import discover
+from roboirg.util.discovery import discover, discover_in_modules
 
-__all__ = ["Task", "all_tasks", "every_task", "find_tasks", "get_task"]
+__all__ = ["Task", "all_suites", "all_tasks", "every_task", "find_tasks", "get_task"]
 
 ALL = "all"
-"""Stands for all tasks of the benchmark where tasks are named."""
+"""Stands for all tasks of the benchmark wherever tasks are named."""
+ENTRY_POINTS = "roboirg.tasks"
 
 
 @functools.cache
-def all_tasks(suites: tuple[Suite, ...] = BENCHMARK_SUITES) -> Mapping[str, Task]:
-    """The tasks of some suites, by default of the benchmark, by name and in the order of codes."""
-    tasks: list[Task] = discover(sys.modules[__name__], "TASK")
-    chosen = (task for task in tasks if task.suite in suites)
+def all_tasks(suites: tuple[str, ...] = BENCHMARK_SUITES) -> Mapping[str, Task]:
+    """Return the tasks of some suites by name, ordered by code; by default the benchmark's."""
+    chosen = (task for task in _registry() if task.suite in suites)
     return {task.name: task for task in sorted(chosen, key=lambda task: task.code)}
 
 
+@functools.cache
+def all_suites() -> tuple[str, ...]:
+    """Return the names of all suites: the benchmark's, ``real``, then those of other packages."""
+    return tuple(dict.fromkeys((*SUITES, *(task.suite for task in _registry()))))
+
+
 def every_task() -> Mapping[str, Task]:
-    """Every task there is, inside the benchmark and beside it."""
-    return all_tasks(SUITES)
+    """Return every task by name: the benchmark's, the real robot's, then those of packages."""
+    return {name: task for suites in _suite_groups() for name, task in all_tasks(suites).items()}
 
 
 def get_task(name: str) -> Task:
-    """The task of that name.
+    """Return the task of that name.
 
     Raises:
         UnknownNameError: there is none; the message lists all and names the nearest.
@@ -48,7 +55,7 @@ def get_task(name: str) -> Task:
 
 
 def find_tasks(words: Iterable[str]) -> tuple[str, ...]:
-    """The tasks that are meant by names of tasks, of suites, or ``all`` for the benchmark.
+    """Return the tasks meant by names of tasks, of suites, or ``all`` for the benchmark.
 
     Returns:
         Their names, each once: those of ``all`` first, the others in the order of the words.
@@ -57,16 +64,37 @@ def find_tasks(words: Iterable[str]) -> tuple[str, ...]:
         UnknownNameError: a word is none of these.
     """
     in_turn = sorted(words, key=lambda word: word.lower() != ALL)
-    return tuple(dict.fromkeys(name for word in in_turn for name in _meant(word)))
+    return tuple(dict.fromkeys(name for word in in_turn for name in _expand(word)))
 
 
-def _meant(word: str) -> tuple[str, ...]:
+@functools.cache
+def _registry() -> tuple[Task, ...]:
+    """Return our tasks and those of installed packages, which must not enter our suites."""
+    package = sys.modules[__name__]
+    ours = {task.name for task in discover_in_modules(package, "TASK", Task)}
+    tasks = discover(package, "TASK", Task, ENTRY_POINTS)
+    for task in tasks:
+        if task.name not in ours and task.suite in SUITES:
+            raise InvalidValueError(
+                f"The task {task.name} of another package is in the suite {task.suite!r}, which "
+                "only this package may fill; give it a suite of its own, such as "
+                f"{task.suite + '-more'!r}."
+            )
+    return tuple(tasks)
+
+
+def _suite_groups() -> tuple[tuple[str, ...], ...]:
+    """Return the suites that are ordered by code together, in order."""
+    return (SUITES, tuple(suite for suite in all_suites() if suite not in SUITES))
+
+
+def _expand(word: str) -> tuple[str, ...]:
     lower = word.lower()
     if lower == ALL:
         return tuple(all_tasks())
-    suite = next((one for one in SUITES if one == lower), None)
+    suite = next((one for one in all_suites() if one.lower() == lower), None)
     if suite is not None:
         return tuple(all_tasks((suite,)))
     if word not in every_task():
-        raise UnknownNameError("task", word, (*every_task(), *SUITES))
+        raise UnknownNameError("task", word, (*every_task(), *all_suites()))
     return (word,)

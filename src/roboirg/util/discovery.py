@@ -1,17 +1,101 @@
-"""Finding what the files of a package offer: adding a thing is adding a file."""
+"""Find what files and installed packages define: adding a thing is adding a file."""
 
 from __future__ import annotations
 
 import importlib
+import importlib.metadata
 import pkgutil
+from collections.abc import Iterator, Mapping
 from types import ModuleType
-from typing import Any
+from typing import Protocol, TypeVar
+
+from roboirg.core.errors import InvalidValueError
 
 
-def discover(package: ModuleType, name: str) -> list[Any]:
-    """What the modules of a package call `name`, in the order of the files' names."""
-    modules = (
-        importlib.import_module(f"{package.__name__}.{found.name}")
-        for found in pkgutil.iter_modules(package.__path__)
-    )
-    return [getattr(module, name) for module in modules if hasattr(module, name)]
+class Named(Protocol):
+    """Anything with a name that is unique in its registry."""
+
+    @property
+    def name(self) -> str:
+        """The name."""
+
+
+Thing = TypeVar("Thing", bound=Named)
+
+
+def discover(package: ModuleType, attribute: str, kind: type[Thing], group: str) -> list[Thing]:
+    """Return what the modules of a package and the installed entry points define.
+
+    Args:
+        package: ours; a module in it that has `attribute` defines one.
+        attribute: for example ``"TASK"``.
+        kind: the class that every one must be an instance of.
+        group: of the entry points through which other packages add theirs, for example
+            ``"roboirg.tasks"``. An entry point names the object, or the module that has it.
+
+    Returns:
+        Ours in the order of the modules' names, then those of other packages in the order of the
+        entry points' names.
+
+    Raises:
+        InvalidValueError: an entry point cannot be loaded, is of another kind, or takes a name
+            that is already in use; the sentence names its package.
+    """
+    found = discover_in_modules(package, attribute, kind)
+    taken = {one.name: "roboirg" for one in found}
+    for entry, thing in _from_entry_points(attribute, kind, group):
+        _take_name(taken, thing, entry, group)
+        found.append(thing)
+    return found
+
+
+def entry_point_names(group: str) -> Mapping[str, str]:
+    """Return the distribution of each entry point of a group, by the entry point's name."""
+    return {entry.name: _distribution(entry) for entry in _sorted_entry_points(group)}
+
+
+def discover_in_modules(package: ModuleType, attribute: str, kind: type[Thing]) -> list[Thing]:
+    """Return what the modules of a package define, in the order of their names."""
+    names = (f"{package.__name__}.{info.name}" for info in pkgutil.iter_modules(package.__path__))
+    things = (getattr(importlib.import_module(name), attribute, None) for name in names)
+    return [thing for thing in things if isinstance(thing, kind)]
+
+
+def _from_entry_points(
+    attribute: str, kind: type[Thing], group: str
+) -> Iterator[tuple[importlib.metadata.EntryPoint, Thing]]:
+    for entry in _sorted_entry_points(group):
+        where = f"The entry point {entry.name!r} ({entry.value}) of {_distribution(entry)}"
+        try:
+            thing = entry.load()
+        except Exception as error:
+            raise InvalidValueError(
+                f"{where} in the group {group!r} cannot be loaded: {type(error).__name__}: {error}"
+            ) from error
+        if isinstance(thing, ModuleType):
+            thing = getattr(thing, attribute, None)
+        if not isinstance(thing, kind):
+            raise InvalidValueError(
+                f"{where} in the group {group!r} is {thing!r}; it must be a {kind.__name__}, or a "
+                f"module with one as {attribute}."
+            )
+        yield entry, thing
+
+
+def _take_name(
+    taken: dict[str, str], thing: Named, entry: importlib.metadata.EntryPoint, group: str
+) -> None:
+    if thing.name in taken:
+        raise InvalidValueError(
+            f"{_distribution(entry)} adds {thing.name!r} in the group {group!r}, a name that "
+            f"{taken[thing.name]} has; choose another one."
+        )
+    taken[thing.name] = _distribution(entry)
+
+
+def _sorted_entry_points(group: str) -> list[importlib.metadata.EntryPoint]:
+    return sorted(importlib.metadata.entry_points(group=group), key=lambda one: one.name)
+
+
+def _distribution(entry: importlib.metadata.EntryPoint) -> str:
+    return entry.dist.name if entry.dist is not None else "an unknown package"

@@ -9,8 +9,8 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.policies.base import Policy
 from roboirg.policies.loading import is_privileged, load_policy_class, make_policy, policy_version
 from roboirg.policies.remote.endpoints import Endpoint
+from roboirg.policies.serving.challenge_http_server import open_http
 from roboirg.policies.serving.challenge_server import ChallengeService
-from roboirg.policies.serving.http_server import open_http
 from roboirg.policies.serving.mme_vla_server import MmeVlaService
 from roboirg.policies.serving.openpi_server import OpenpiService
 from roboirg.policies.serving.service import MakePolicy, Service

@@ -51,7 +51,7 @@ def open_websocket(
     def request(connection: ServerConnection, asked: Request) -> Response | None:
         if asked.path == "/healthz":
             return connection.respond(http.HTTPStatus.OK, "OK\n")
-        if not knows(key, asked.headers.get("Authorization")):
+        if not is_authorized(key, asked.headers.get("Authorization")):
             return connection.respond(
                 http.HTTPStatus.UNAUTHORIZED, "The key is missing or wrong.\n"
             )
@@ -84,8 +84,8 @@ def open_websocket(
     )
 
 
-def knows(key: str | None, header: str | None) -> bool:
-    """Whether a request's header ``Authorization`` holds the key, or none is needed."""
+def is_authorized(key: str | None, header: str | None) -> bool:
+    """Return whether the header ``Authorization`` holds the key, or no key is needed."""
     if key is None:
         return True
     return hmac.compare_digest((header or "").encode(), f"Api-Key {key}".encode())

@@ -15,7 +15,7 @@ from real_start import start
 from roboirg.real.pages.score_server import ScoreServer
 from roboirg.real.study.failure_choices import failure_choices
 from roboirg.real.study.study_plan import make_study, write_study
-from roboirg.real.study.trial_log import TrialLog, said_of
+from roboirg.real.study.trial_log import TrialLog, trial_metadata
 from roboirg.records.store import read_records
 
 CHROMIUM = shutil.which("chromium") or ""
@@ -33,7 +33,7 @@ def served(small):
 
 
 def ask(server, path, form=None, *, host=None, origin=None):
-    """Status, where it leads, and the text."""
+    """Return the status, headers and text of a response."""
     port = server.server_address[1]
     data = None if form is None else urllib.parse.urlencode(form).encode()
     request = urllib.request.Request(f"http://127.0.0.1:{port}{path}", data)
@@ -55,18 +55,24 @@ def ask(server, path, form=None, *, host=None, origin=None):
 
 
 def fetch(url, form=None):
-    """The text of a page of a server in another process."""
+    """Return the text of a page of a server in another process."""
     data = None if form is None else urllib.parse.urlencode(form).encode()
     with urllib.request.urlopen(url, data, timeout=30) as answer:  # noqa: S310 - our own server
         return answer.read().decode()
 
 
 def form_of(server, trial, choice, **more):
-    seen = server.ledger().count(trial.name)
-    return {"token": server.token, "trial": trial.name, "seen": seen, "choice": choice, **more}
+    revision = server.read_trial_log().revision(trial.name)
+    return {
+        "token": server.token,
+        "trial": trial.name,
+        "revision": revision,
+        "choice": choice,
+        **more,
+    }
 
 
-def test_only_pages_of_this_server_may_ask(served):
+def test_only_pages_of_this_server_are_answered(served):
     trial = served.plan.trials[0]
     port = served.server_address[1]
     assert served.server_address[0] == "127.0.0.1"
@@ -82,7 +88,7 @@ def test_only_pages_of_this_server_may_ask(served):
         ask(served, "/undo", {"last": ""}),
     ]
     assert {status for status, _, _ in refused} == {403}
-    assert not any(served.token in text for _, _, text in refused)
+    assert not any(served.token in f"{headers}{text}" for _, headers, text in refused)
     assert not (served.folder / "records.jsonl").exists()
     status, headers, _ = ask(served, "/score", form, origin=f"http://127.0.0.1:{port}")
     assert status == 303
@@ -93,13 +99,13 @@ def test_only_pages_of_this_server_may_ask(served):
     assert "default-src 'none'" in headers["Content-Security-Policy"]
 
 
-def test_forms_that_are_none_are_refused(served):
+def test_malformed_forms_are_refused(served):
     token = served.token
     assert ask(served, "/elsewhere", {"token": token})[0] == 404
     assert ask(served, f"/elsewhere?token={token}")[0] == 404
-    assert ask(served, f"/?token={token}&trial=nobody")[0] == 400
+    assert ask(served, f"/?token={token}&trial=missing")[0] == 400
     assert ask(served, "/score", {"token": token, "note": "x" * 70_000})[0] == 413
-    for form in ({"trial": "nobody"}, form_of(served, served.plan.trials[0], "magic"), {}):
+    for form in ({"trial": "missing"}, form_of(served, served.plan.trials[0], "magic"), {}):
         status, headers, _ = ask(served, "/score", {**form, "token": token})
         assert status == 303
         assert "message=" in headers["Location"]
@@ -112,27 +118,27 @@ def test_a_page_that_is_out_of_date_scores_nothing(served):
     ask(served, "/score", form)
     _, headers, _ = ask(served, "/score", {**form, "choice": "dropped"})
     assert "has+changed+since" in headers["Location"]
-    assert served.ledger().newest(trial.name).outcome == "success"
+    assert served.read_trial_log().newest(trial.name).outcome == "success"
     _, headers, _ = ask(served, "/undo", {"token": served.token, "last": "another"})
-    assert "nothing+was+taken+back" in headers["Location"]
-    assert served.ledger().state(trial.name) == "scored"
+    assert "nothing+was+undone" in headers["Location"]
+    assert served.read_trial_log().state(trial.name) == "scored"
 
 
 def test_what_an_operator_types_is_text(served):
     trial = served.plan.trials[0]
     note = "<script>alert(1)</script> \"quoted\" & 'so'"
     ask(served, "/score", form_of(served, trial, "success", note=note, video="../secret.mp4"))
-    record = served.ledger().newest(trial.name)
-    assert said_of(record)["note"] == note
+    record = served.read_trial_log().newest(trial.name)
+    assert trial_metadata(record)["note"] == note
     assert record.video is None
     _, _, page = ask(served, f"/?token={served.token}&trial={trial.name}&message=<b>x</b>")
     assert "<script>alert" not in page
     assert "<b>x</b>" not in page
-    # A film that is there is told by its path in the folder.
+    # The record has the path of a video inside the folder.
     (served.folder / "films").mkdir()
     (served.folder / "films" / "a.mp4").write_bytes(b"film")
     ask(served, "/score", form_of(served, trial, "success", video="films/a.mp4"))
-    assert served.ledger().newest(trial.name).video == "films/a.mp4"
+    assert served.read_trial_log().newest(trial.name).video == "films/a.mp4"
 
 
 def test_a_kill_between_two_clicks_costs_nothing(small):
@@ -144,7 +150,7 @@ def test_a_kill_between_two_clicks_costs_nothing(small):
         assert f"{number} of 4 scored" in page
         assert f"<h1>{number + 1}. {trial.name}</h1>" in page
         form = {
-            "token": url.partition("token=")[2], "trial": trial.name, "seen": "0",
+            "token": url.partition("token=")[2], "trial": trial.name, "revision": "0",
             "choice": "success",
         }  # fmt: skip
         address = url.partition("/?")[0] + "/score"
@@ -208,12 +214,12 @@ def test_a_study_is_scored_by_keyboard_alone_and_survives_a_kill(browser, tmp_pa
         process.send_signal(signal.SIGKILL)
         process.wait(timeout=30)
         page.close()
-    ledger = TrialLog.read(plan, tmp_path)
+    trial_log = TrialLog.read(plan, tmp_path)
     for trial in plan.trials:
-        record = ledger.newest(trial.name)
+        record = trial_log.newest(trial.name)
         choice = wanted[trial.name]
         assert record.outcome == ("success" if choice == "success" else "failure")
-        assert said_of(record)["operator"] == "ann"
+        assert trial_metadata(record)["operator"] == "ann"
         if choice != "success":
             assert choice.startswith(record.attribution.failure)
 
@@ -228,18 +234,18 @@ def test_notes_corrections_and_undo_by_keyboard(browser, served):
     page.keyboard.press("Enter")
     assert not (served.folder / "records.jsonl").exists()
     press(page, "s")
-    record = served.ledger().newest(first.name)
-    assert said_of(record)["note"] == "1 s u v: keys in a field are letters"
+    record = served.read_trial_log().newest(first.name)
+    assert trial_metadata(record)["note"] == "1 s u v: keys in a field are letters"
     # Back, and another verdict: the correction counts.
     press(page, "ArrowLeft")
     assert first.name in page.inner_text("h1")
     assert page.locator("button[aria-pressed=true]").count() == 1
     press(page, "1")
-    assert served.ledger().newest(first.name).attribution.failure == "wrong_place"
+    assert served.read_trial_log().newest(first.name).attribution.failure == "wrong_place"
     press(page, "u")
-    assert served.ledger().newest(first.name).outcome == "success"
+    assert served.read_trial_log().newest(first.name).outcome == "success"
     press(page, "u")
-    assert served.ledger().state(first.name) == "open"
+    assert served.read_trial_log().state(first.name) == "open"
     page.close()
 
 

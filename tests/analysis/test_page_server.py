@@ -17,12 +17,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboirg.analysis.page.page_server import PageServer, Range, parse_range
+from roboirg.analysis.page.page_server import PageServer
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.plan import make_plan
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.records.record import Record
 from roboirg.records.store import RecordStore
+from roboirg.util.http_server import ByteRange, parse_range
 
 FILM = bytes(range(256)) * 1000
 
@@ -118,7 +119,7 @@ def test_no_header_leads_outside_of_the_file(size: int, header: str | None) -> N
     except ValueError:
         return
     assert found is None or 0 <= found.begin < found.end <= size
-    assert parse_range("bytes=2-5", 10) == Range(2, 6)
+    assert parse_range("bytes=2-5", 10) == ByteRange(2, 6)
 
 
 @pytest.mark.parametrize(
@@ -172,7 +173,7 @@ def test_who_hangs_up_disturbs_nobody(server: PageServer) -> None:
 
 def test_a_port_that_is_taken_or_is_none_is_one_sentence(server: PageServer, run: Path) -> None:
     for port in (server.port, 70_000, -1):
-        with pytest.raises(InvalidValueError, match=f"Port {port} cannot be had"):
+        with pytest.raises(InvalidValueError, match=f"Port {port} is not available"):
             PageServer(run, str, port)
 
 

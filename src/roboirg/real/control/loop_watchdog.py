@@ -1,4 +1,4 @@
-"""The dead-man's time-out: if the control loop gives no sign of life, the arm is stopped."""
+"""Stop the arm when the control loop hangs."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ from typing import Self
 
 
 class LoopWatchdog:
-    """Stops an arm when nobody has said for a while that the loop is alive. Real time.
+    """A thread that stops the arm if the control loop does not feed it in time. Real time only.
 
-    Use as a context manager, with the loop inside.
+    Use as a context manager around the loop.
 
     Args:
-        stop: holds the arm; called from another thread, once.
-        timeout_s: how long the loop may be silent.
+        stop: holds the arm; called once, from another thread.
+        timeout_s: longest time between two calls of `feed`.
     """
 
     def __init__(self, stop: Callable[[], None], timeout_s: float) -> None:
         self._stop, self._timeout_s = stop, timeout_s
-        self._over = threading.Event()
+        self._finished = threading.Event()
         self._last = time.monotonic()
         self._tripped_after: float | None = None
-        self._thread = threading.Thread(target=self._watch, name="dead-man", daemon=True)
+        self._thread = threading.Thread(target=self._watch, name="loop watchdog", daemon=True)
 
     def feed(self) -> None:
-        """The loop is alive."""
+        """Report that the loop is running."""
         self._last = time.monotonic()
 
     @property
     def tripped_after(self) -> float | None:
-        """Seconds of silence after which the arm was stopped; None if it was not."""
+        """Seconds without a report after which the arm was stopped; None if it was not."""
         return self._tripped_after
 
     def __enter__(self) -> Self:
@@ -46,11 +46,11 @@ class LoopWatchdog:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._over.set()
+        self._finished.set()
         self._thread.join()
 
     def _watch(self) -> None:
-        while not self._over.wait(max(self._last + self._timeout_s - time.monotonic(), 0.0)):
+        while not self._finished.wait(max(self._last + self._timeout_s - time.monotonic(), 0.0)):
             silence = time.monotonic() - self._last
             if silence >= self._timeout_s:
                 self._tripped_after = silence

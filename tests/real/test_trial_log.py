@@ -1,4 +1,4 @@
-"""What operators say is stored at once, can be taken back, and is never lost."""
+"""Verdicts are stored at once, can be undone, and are never lost."""
 
 import pytest
 
@@ -8,12 +8,12 @@ from roboirg.analysis.tables.paper_tables import make_table
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.real.study.failure_choices import failure_choices
-from roboirg.real.study.trial_log import UNSCORED, VOID, WITHDRAWN, TrialLog, said_of
+from roboirg.real.study.trial_log import UNSCORED, VOID, WITHDRAWN, TrialLog, trial_metadata
 from roboirg.records.record import Record
 from roboirg.records.store import RecordStore, read_records, read_results
 
 
-def fresh(plan, folder):
+def read(plan, folder):
     return TrialLog.read(plan, folder)
 
 
@@ -25,16 +25,16 @@ def played(trial):
 def test_a_score_is_a_record_like_any_other(small):
     plan, folder = small
     first, second, third, _ = plan.trials
-    ledger = fresh(plan, folder)
+    trial_log = read(plan, folder)
     choices = failure_choices(second.episode)
-    ledger.score(first, "success", operator="ann", note="shaky")
-    ledger.score(second, choices[0].key, operator="ann")
-    ledger.score(third, "dropped", operator="ann", note="slipped")
+    trial_log.score(first, "success", operator="ann", note="shaky")
+    trial_log.score(second, choices[0].key, operator="ann")
+    trial_log.score(third, "dropped", operator="ann", note="slipped")
     found = {record.identity: record for record in read_records(folder)}
     assert len(found) == 3
     record = found[first.job]
     assert (record.outcome, record.attribution, record.events) == ("success", None, ())
-    assert said_of(record) == {
+    assert trial_metadata(record) == {
         "action": "score", "operator": "ann", "note": "shaky", "trial": first.name,
         "plan": plan.fingerprint,
     }  # fmt: skip
@@ -56,38 +56,38 @@ def test_a_score_is_a_record_like_any_other(small):
 def test_what_was_played_keeps_its_times_when_it_is_scored(small):
     plan, folder = small
     trial = plan.trials[0]
-    ledger = fresh(plan, folder)
-    ledger.add(trial, played(trial), {"robot": "arm"})
-    assert fresh(plan, folder).state(trial.name) == "waiting"
-    fresh(plan, folder).score(trial, "success", operator="ann")
-    record = fresh(plan, folder).newest(trial.name)
+    trial_log = read(plan, folder)
+    trial_log.add(trial, played(trial), {"robot": "arm"})
+    assert read(plan, folder).state(trial.name) == "waiting"
+    read(plan, folder).score(trial, "success", operator="ann")
+    record = read(plan, folder).newest(trial.name)
     assert (record.steps, record.duration_s, record.outcome) == (321, 16.0, "success")
-    assert said_of(record)["robot"] == "arm"
+    assert trial_metadata(record)["robot"] == "arm"
 
 
 def test_undo_brings_back_what_was_before(small):
     plan, folder = small
     first, second, *_ = plan.trials
-    ledger = fresh(plan, folder)
-    ledger.add(first, played(first), {"robot": "arm"})
-    ledger.score(second, "dropped", operator="ann")
-    ledger.score(first, "success", operator="ann")
-    ledger.score(first, "misplaced", operator="ann")
+    trial_log = read(plan, folder)
+    trial_log.add(first, played(first), {"robot": "arm"})
+    trial_log.score(second, "dropped", operator="ann")
+    trial_log.score(first, "success", operator="ann")
+    trial_log.score(first, "misplaced", operator="ann")
     steps = [
         (first.name, "scored", "success"),
         (first.name, "waiting", "error"),
         (second.name, "open", "error"),
     ]
     for name, state, outcome in steps:
-        assert fresh(plan, folder).undo(operator="bob") == name
-        now = fresh(plan, folder)
+        assert read(plan, folder).undo(operator="bob") == name
+        now = read(plan, folder)
         assert now.state(name) == state
         newest = {one.identity: one for one in read_records(folder)}[plan.trial(name).job]
         assert newest.outcome == outcome
-    # A score that was taken back from a trial that nobody had played is in no rate.
+    # An undone score of a trial that was never played counts in no rate.
     assert newest.cause == WITHDRAWN
-    with pytest.raises(InvalidValueError, match="no score to take back"):
-        fresh(plan, folder).undo(operator="bob")
+    with pytest.raises(InvalidValueError, match="no score to undo"):
+        read(plan, folder).undo(operator="bob")
     # Everything that ever was is still in the file.
     assert len((folder / "records.jsonl").read_text().splitlines()) == 7
 
@@ -95,32 +95,32 @@ def test_undo_brings_back_what_was_before(small):
 def test_a_score_that_was_played_over_is_not_taken_back(small):
     plan, folder = small
     trial = plan.trials[0]
-    ledger = fresh(plan, folder)
-    ledger.score(trial, "void", operator="ann", note="the lamp fell")
-    assert fresh(plan, folder).state(trial.name) == "void"
-    assert ledger.newest(trial.name).cause == f"{VOID}; the lamp fell"
-    ledger.add(trial, played(trial), {})
+    trial_log = read(plan, folder)
+    trial_log.score(trial, "void", operator="ann", note="the lamp fell")
+    assert read(plan, folder).state(trial.name) == "void"
+    assert trial_log.newest(trial.name).cause == f"{VOID}; the lamp fell"
+    trial_log.add(trial, played(trial), {})
     with pytest.raises(InvalidValueError, match="played again since"):
-        fresh(plan, folder).undo(operator="ann")
+        read(plan, folder).undo(operator="ann")
 
 
 def test_trials_come_in_order_those_that_were_played_first(small):
     plan, folder = small
-    ledger = fresh(plan, folder)
-    assert ledger.to_score() == plan.trials[0]
-    ledger.add(plan.trials[2], played(plan.trials[2]), {})
-    assert ledger.to_score() == plan.trials[2]
-    ledger.score(plan.trials[2], "success", operator="ann")
-    assert ledger.to_score() == plan.trials[0]
+    trial_log = read(plan, folder)
+    assert trial_log.next_to_score() == plan.trials[0]
+    trial_log.add(plan.trials[2], played(plan.trials[2]), {})
+    assert trial_log.next_to_score() == plan.trials[2]
+    trial_log.score(plan.trials[2], "success", operator="ann")
+    assert trial_log.next_to_score() == plan.trials[0]
     for trial in plan.trials:
-        ledger.score(trial, "success", operator="ann")
-    assert fresh(plan, folder).to_score() is None
+        trial_log.score(trial, "success", operator="ann")
+    assert read(plan, folder).next_to_score() is None
 
 
 def test_what_cannot_happen_is_refused_and_nothing_is_stored(small):
     plan, folder = small
     with pytest.raises(InvalidValueError, match="cannot fail by 'wrong_count'"):
-        fresh(plan, folder).score(plan.trials[0], "wrong_count", operator="ann")
+        read(plan, folder).score(plan.trials[0], "wrong_count", operator="ann")
     assert not (folder / "records.jsonl").exists()
 
 
@@ -130,5 +130,5 @@ def test_the_page_and_the_loop_take_turns(small):
 
     store = RecordStore(folder)
     threading.Timer(0.3, store.close).start()
-    fresh(plan, folder).score(plan.trials[0], "success", operator="ann")
-    assert fresh(plan, folder).state(plan.trials[0].name) == "scored"
+    read(plan, folder).score(plan.trials[0], "success", operator="ann")
+    assert read(plan, folder).state(plan.trials[0].name) == "scored"

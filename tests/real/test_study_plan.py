@@ -12,16 +12,21 @@ from hypothesis import strategies as st
 
 from roboirg import language
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.real.pages.arrangement_drawing import Shape, corners, shapes_of
+from roboirg.language.settings import setting_names
 from roboirg.real.pages.arrangement_svg import draw_svg
 from roboirg.real.pages.trial_sheet import _pages, write_sheet
-from roboirg.real.study.counterbalancing import Arrangement, arrangement_counts, balanced_order
+from roboirg.real.study.arrangement_shapes import Shape, scene_shapes, square_corners
+from roboirg.real.study.counterbalancing import (
+    Arrangement,
+    counterbalanced_order,
+    read_arrangement,
+)
 from roboirg.real.study.failure_choices import failure_choices
 from roboirg.real.study.plan_csv import demonstrations_csv, trials_csv
 from roboirg.real.study.study_plan import StudyPlan, make_study, read_study, write_study
 
 TASKS = ("PutInBox", "PickByCount")
-SETTINGS = ("explicit", "direct", "reasoning", "contextual", "spatial")
+SETTINGS = setting_names()
 
 plans = st.builds(
     make_study,
@@ -38,12 +43,20 @@ def spread(counts, everything):
     return max(counts[one] for one in everything) - min(counts[one] for one in everything)
 
 
+def arrangement_counts(episodes):
+    """Count arrangements and their factors."""
+    arrangements = [read_arrangement(episode) for episode in episodes]
+    factors = ("color", "left", "repeats", "side")
+    counts = {name: Counter(getattr(one, name) for one in arrangements) for name in factors}
+    return {"arrangement": Counter(arrangements), **counts}
+
+
 def check_balance(task, episodes):
     found = arrangement_counts(episodes)
-    orders = balanced_order(task)
+    orders = counterbalanced_order(task)
     assert spread(found["arrangement"], orders) <= 1
-    for respect in ("color", "left", "repeats"):
-        assert spread(found[respect], {getattr(one, respect) for one in orders}) <= 1, respect
+    for factor in ("color", "left", "repeats"):
+        assert spread(found[factor], {getattr(one, factor) for one in orders}) <= 1, factor
     assert spread(found["side"], ("left", "right")) <= 2
 
 
@@ -130,7 +143,7 @@ def test_the_paper_s_study_is_the_default():
 
 @pytest.mark.parametrize("task", TASKS)
 def test_all_arrangements_are_there_and_neighbors_are_opposites(task):
-    order = balanced_order(task)
+    order = counterbalanced_order(task)
     assert len(set(order)) == len(order) == (4 if task == "PutInBox" else 8)
     for one, other in zip(order[::2], order[1::2], strict=True):
         assert one.color != other.color
@@ -143,7 +156,7 @@ def test_what_cannot_be_is_said():
         make_study(("a",), tasks=("PickByCount",), trials=50)
     with pytest.raises(InvalidValueError, match="'a' is given twice"):
         make_study(("a", "a"), tasks=TASKS)
-    with pytest.raises(InvalidValueError, match="PickXtimes is no task of the real robot"):
+    with pytest.raises(InvalidValueError, match="PickXtimes is not a task for a real robot"):
         make_study(("a",), tasks=("PickXtimes",))
     with pytest.raises(UnknownNameError, match="no setting of PutInBox 'spatail'"):
         make_study(("a",), tasks=("PutInBox",), settings=("spatail",))
@@ -161,7 +174,7 @@ def test_a_plan_is_read_as_it_was_written_and_not_overwritten(tmp_path):
     with pytest.raises(InvalidValueError, match="There is no plan in"):
         read_study(tmp_path / "elsewhere")
     (tmp_path / "plan.json").write_text('{"policies": ["oracle"]}')
-    with pytest.raises(InvalidValueError, match="is no plan of a study with a real robot"):
+    with pytest.raises(InvalidValueError, match="is not the plan of a real-robot study"):
         read_study(tmp_path)
 
 
@@ -181,18 +194,18 @@ def test_csv_says_what_the_plan_says():
 def test_drawings_have_the_robot_s_left_on_the_left():
     plan = make_study(("a",), tasks=TASKS, trials=4, demonstrations=0)
     for trial in plan.trials:
-        for shape in shapes_of(trial.episode.scene):
+        for shape in scene_shapes(trial.episode.scene):
             # Base frame: y to the left, and everything is in reach in front of the robot.
             assert 0.35 < shape.x < 0.85
             assert abs(shape.y) < 0.3
         left = max(
-            (s for s in shapes_of(trial.episode.scene) if s.form in ("square", "ring")),
+            (s for s in scene_shapes(trial.episode.scene) if s.form in ("square", "ring")),
             key=lambda shape: shape.y,
         )
         picture = draw_svg(trial.episode.scene)
         place = picture.index(f">{left.label}<")
         x = float(picture[:place].rsplit('x="', 1)[1].split('"')[0])
-        others = [s.label for s in shapes_of(trial.episode.scene) if s is not left]
+        others = [s.label for s in scene_shapes(trial.episode.scene) if s is not left]
         for label in others:
             at = picture.index(f">{label}<")
             assert float(picture[:at].rsplit('x="', 1)[1].split('"')[0]) >= x
@@ -201,7 +214,7 @@ def test_drawings_have_the_robot_s_left_on_the_left():
 @given(st.floats(-3.0, 3.0), st.floats(0.01, 0.2))
 def test_squares_are_turned_counter_clockwise(yaw, half):
     shape = Shape("square", 0.6, -0.1, yaw, half, 0.0, "#000000", "box")
-    found = corners(shape, half)
+    found = square_corners(shape, half)
     for number, (x, y) in enumerate(found):
         assert math.hypot(x - 0.6, y + 0.1) == pytest.approx(half * math.sqrt(2.0))
         turned = math.atan2(y + 0.1, x - 0.6) - (math.pi / 4 - number * math.pi / 2 + yaw)

@@ -1,4 +1,4 @@
-"""Seconds until an episode with a video can be played, with its frames or without."""
+"""Reset time of an episode with a video, with or without reading its frames."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-import roboirg
 from roboirg.core.episode import Episode
 from roboirg.core.observations import CAMERAS
+from roboirg.envs.factory import make
 from roboirg.episodes.splits import get_episode
 from roboirg.simulation.episode_session import EpisodeSession
-from roboirg.simulation.rendering.render_mode import STOCK
+from roboirg.simulation.rendering.render_settings import STOCK
 from roboirg.util.cache import FOLDER_VARIABLE, OFF
 
 
-def shown_episode() -> Episode:
-    """An episode whose video is neither long nor short: VideoRepick, hard, 150 frames."""
+def video_episode() -> Episode:
+    """Return an episode with a video of medium length: VideoRepick, hard, 150 frames."""
     return get_episode("VideoRepick", "test", 3)
 
 
-def stock(episode: Episode) -> float:
-    """What RoboMME does: planned and drawn at every reset, color and segmentation fetched."""
+def stock_reset(episode: Episode) -> float:
+    """Return the time of a reset as in RoboMME: plan, draw, and fetch color and segmentation."""
     start = time.perf_counter()
     session = EpisodeSession(episode, visible=True, rendering=STOCK)
     cameras = session.world.cameras
@@ -37,14 +37,14 @@ def stock(episode: Episode) -> float:
     return time.perf_counter() - start
 
 
-def cold(episode: Episode, *, frames: bool) -> float:
-    """Nothing is cached; the video's frames are read, or left alone."""
+def cold_reset(episode: Episode, *, frames: bool) -> float:
+    """Return the time of a reset without a cache, with or without reading the frames."""
     with _cache(OFF):
         return _reset(episode, frames=frames)
 
 
-def warm(episode: Episode, *, frames: bool) -> float:
-    """The demonstration, and its frames if they are read, have been kept by an earlier reset."""
+def warm_reset(episode: Episode, *, frames: bool) -> float:
+    """Return the time of a reset with everything cached by an earlier one."""
     with tempfile.TemporaryDirectory() as folder, _cache(folder):
         _reset(episode, frames=frames)
         return _reset(episode, frames=frames)
@@ -52,7 +52,7 @@ def warm(episode: Episode, *, frames: bool) -> float:
 
 def _reset(episode: Episode, *, frames: bool) -> float:
     start = time.perf_counter()
-    env = roboirg.make(episode)
+    env = make(episode)
     _, info = env.reset()
     if frames:
         video = info["demonstration"]
@@ -64,7 +64,7 @@ def _reset(episode: Episode, *, frames: bool) -> float:
 
 @contextmanager
 def _cache(folder: str) -> Iterator[None]:
-    """Another cache for a while."""
+    """Use another cache within the context."""
     before = os.environ.get(FOLDER_VARIABLE)
     os.environ[FOLDER_VARIABLE] = folder
     try:

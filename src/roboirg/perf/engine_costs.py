@@ -1,4 +1,4 @@
-"""What the run engine costs beside the episodes that it plays."""
+"""Cost of the run engine apart from the episodes it plays."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from roboirg.evaluation.runner import run_plan
 from roboirg.records.record import EventRecord, Job, Record
 from roboirg.records.store import RECORDS_FILE, RecordStore
 
-MANY = 100_000
+MANY_RECORDS = 100_000
 _EVENTS = 60
-"""About as many as an episode of BinFill has."""
+"""About the number of events in an episode of BinFill."""
 
 
-def engine() -> float:
-    """Seconds per episode from plan to record, by way of a worker, if nothing is played."""
+def engine_time() -> float:
+    """Return seconds per episode from plan to record, through a worker that plays nothing."""
     plan = make_plan(["random"], tasks="PickXtimes", settings="explicit,direct", episodes="50")
-    clock = _Clock()
+    clock = _RecordClock()
     with tempfile.TemporaryDirectory() as folder:
-        run_plan(plan, Path(folder), _nothing, LocalProcesses(1), reporter=clock)
-    # Without the start of the process, which a run has once.
+        run_plan(plan, Path(folder), _unplayed_record, LocalProcesses(1), reporter=clock)
+    # Excludes starting the process, which a run does once.
     return (clock.times[-1] - clock.times[0]) / (len(clock.times) - 1)
 
 
-def episode() -> float:
-    """Seconds per episode of the oracle, without pictures: the quickest there are."""
+def episode_time() -> float:
+    """Return seconds per episode of the oracle without pictures, the fastest kind."""
     plan = make_plan(["oracle"], tasks="PickXtimes,StopCube", settings="explicit", episodes="3")
     start = time.perf_counter()
     jobs = plan.jobs()
@@ -44,19 +44,19 @@ def episode() -> float:
     return (time.perf_counter() - start) / len(jobs)
 
 
-def resume() -> float:
-    """Seconds until a run that has 100,000 records knows what is left to be played."""
-    plan, folder = _many()
+def resume_time() -> float:
+    """Return seconds until a run with 100,000 records knows which jobs remain."""
+    plan, folder = _many_records()
     start = time.perf_counter()
     plan.jobs()
     with RecordStore(folder) as store:
-        if len(store.stored) != MANY:
-            raise AssertionError(f"{len(store.stored)} of {MANY} records were found")
+        if len(store.stored) != MANY_RECORDS:
+            raise AssertionError(f"{len(store.stored)} of {MANY_RECORDS} records were found")
     return time.perf_counter() - start
 
 
-class _Clock(SilentReporter):
-    """Notes when records arrive."""
+class _RecordClock(SilentReporter):
+    """Notes the time of each record."""
 
     def __init__(self) -> None:
         self.times: list[float] = []
@@ -67,31 +67,31 @@ class _Clock(SilentReporter):
         self.times.append(time.perf_counter())
 
 
-def _nothing(job: Job) -> Record:
+def _unplayed_record(job: Job) -> Record:
     event = EventRecord(step=1, kind="picked", subject="cube_red")
-    course = RolloutResult("success", cause=None, events=[event] * _EVENTS)
-    return make_record(job, course, started_at=utc_now())
+    result = RolloutResult("success", cause=None, events=[event] * _EVENTS)
+    return make_record(job, result, started_at=utc_now())
 
 
 @functools.cache
-def _many() -> tuple[Plan, Path]:
-    """A plan of that many jobs, and a folder with all of their records."""
+def _many_records() -> tuple[Plan, Path]:
+    """Return a plan of 100,000 jobs and a folder with all their records."""
     plan = make_plan(
         ["random"],
         tasks="PickXtimes",
         settings="explicit,direct",
         episodes="50",
-        policy_seeds=f"0-{MANY // 100 - 1}",
+        policy_seeds=f"0-{MANY_RECORDS // 100 - 1}",
     )
     folder = Path(tempfile.mkdtemp(prefix="roboirg-bench-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     lines: dict[tuple[int, str], bytes] = {}
     with (folder / RECORDS_FILE).open("wb") as file:
         for job in plan.jobs():
-            place = (job.episode, job.setting)
-            if place not in lines:
-                lines[place] = _nothing(job).model_dump_json().encode() + b"\n"
+            key = (job.episode, job.setting)
+            if key not in lines:
+                lines[key] = _unplayed_record(job).model_dump_json().encode() + b"\n"
             file.write(
-                lines[place].replace(b'"policy_seed":0', b'"policy_seed":%d' % job.policy_seed)
+                lines[key].replace(b'"policy_seed":0', b'"policy_seed":%d' % job.policy_seed)
             )
     return plan, folder

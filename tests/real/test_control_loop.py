@@ -14,7 +14,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.real.control.clock import RealClock
 from roboirg.real.control.control_loop import ControlLoop
 from roboirg.real.control.limits import Limits
-from roboirg.real.control.policy_process import ProcessHost, ThreadHost
+from roboirg.real.control.policy_workers import PolicyProcess, PolicyThread
 from roboirg.real.control.robot import COMMAND_RATE
 from roboirg.real.control.twin import Twin
 from roboirg.real.study.study_plan import make_study
@@ -41,11 +41,11 @@ class Watched(Twin):
         self.log = []
 
     def command(self, command):
-        self.log.append((self.clock.now() - self._began, "command", command.copy()))
+        self.log.append((self.clock.now() - self._started_at, "command", command.copy()))
         super().command(command)
 
     def stop(self):
-        self.log.append((self.clock.now() - self._began, "stop", None))
+        self.log.append((self.clock.now() - self._started_at, "stop", None))
         super().stop()
 
     def last_command(self):
@@ -62,22 +62,22 @@ class Blinking(Watched):
 
     def taken(self, camera):
         usual = super().taken(camera)
-        return min(usual, self._began + self.since) if camera == self.blind else usual
+        return min(usual, self._started_at + self.since) if camera == self.blind else usual
 
 
-def play(name, robot=None, *, limits=None, host=None, cameras=()):
+def play(name, robot=None, *, limits=None, worker=None, cameras=()):
     robot = robot or Watched()
-    host = host or ThreadHost()
-    loop = ControlLoop(robot, host, limits or Limits(), cameras)
-    course = loop.play(JOB, f"faulty_policies:{name}", 0, "Do it.")
-    host.close()
-    return course, robot, loop
+    worker = worker or PolicyThread()
+    loop = ControlLoop(robot, worker, limits or Limits(), cameras)
+    result = loop.play(JOB, f"faulty_policies:{name}", 0, "Do it.")
+    worker.close()
+    return result, robot, loop
 
 
 def test_a_policy_that_stays_uses_its_time_in_chunks():
-    course, robot, loop = play("Still")
-    assert (course.outcome, course.error, course.steps) == ("failure", None, JOB.max_steps)
-    assert course.timed_out
+    result, robot, loop = play("Still")
+    assert (result.outcome, result.error, result.steps) == ("failure", None, JOB.max_steps)
+    assert result.timed_out
     assert loop.held == 0
     # One command in every control period, by the virtual clock.
     moments = [when for when, kind, _ in robot.log if kind == "command"]
@@ -95,23 +95,23 @@ def test_a_policy_that_stays_uses_its_time_in_chunks():
 )
 def test_a_command_outside_the_limits_is_never_sent(name, row, words):
     limits = Limits(workspace_low=(0.2, -0.5, 0.15))
-    course, robot, _ = play(name, limits=limits)
-    assert (course.outcome, course.error) == ("error", "invalid_action")
-    assert re.match(words, course.cause), course.cause
+    result, robot, _ = play(name, limits=limits)
+    assert (result.outcome, result.error) == ("error", "invalid_action")
+    assert re.match(words, result.cause), result.cause
     # In the period in which the bad command was due the arm was stopped instead.
     last = robot.last_command()
     assert robot.first_stop_after(last) - last <= PERIOD + 1e-9
     if row is not None:
-        assert course.steps == 2 * CHUNK + row
+        assert result.steps == 2 * CHUNK + row
     sent = np.array([command for _, kind, command in robot.log if kind == "command"])
     assert np.isfinite(sent).all()
     assert np.abs(np.diff(sent[:, :7], axis=0)).max() <= limits.joint_speed * PERIOD + 1e-9
 
 
 def test_a_late_policy_is_waited_for_at_rest_and_then_given_up():
-    course, robot, loop = play("Late", limits=Limits(policy_timeout_s=1.0))
-    assert (course.outcome, course.error) == ("error", "timeout")
-    assert course.cause == "timeout: policy's act() took longer than 1 s"
+    result, robot, loop = play("Late", limits=Limits(policy_timeout_s=1.0))
+    assert (result.outcome, result.error) == ("error", "timeout")
+    assert result.cause == "timeout: policy's act() took longer than 1 s"
     asked = 2 * CHUNK * PERIOD
     assert robot.last_command() == pytest.approx(asked - PERIOD)
     # The arm stops in the very period in which a command is missing.
@@ -123,8 +123,8 @@ def test_a_late_policy_is_waited_for_at_rest_and_then_given_up():
 
 
 def test_a_policy_that_thinks_for_a_while_is_waited_for():
-    course, _, loop = play("Thoughtful")
-    assert course.error is None
+    result, _, loop = play("Thoughtful")
+    assert result.error is None
     # Of every 25 periods 5 are waited.
     chunks = math.ceil((JOB.max_steps - CHUNK) / (CHUNK + 5))
     assert loop.held == 5 * chunks
@@ -138,26 +138,26 @@ def test_a_policy_that_thinks_for_a_while_is_waited_for():
     ],
 )
 def test_a_policy_that_dies_stops_the_arm(name, cause):
-    course, robot, _ = play(name, host=ProcessHost())
-    assert (course.outcome, course.error, course.cause) == ("error", "policy", cause)
+    result, robot, _ = play(name, worker=PolicyProcess())
+    assert (result.outcome, result.error, result.cause) == ("error", "policy", cause)
     last = robot.last_command()
     assert last == pytest.approx((2 * CHUNK - 1) * PERIOD)
     assert robot.first_stop_after(last) - last <= PERIOD + 1e-9
 
 
 def test_a_policy_that_is_killed_while_the_arm_moves_stops_it():
-    host = ProcessHost()
+    worker = PolicyProcess()
 
     class Killing(Watched):
         def command(self, command):
             super().command(command)
             if len(self.log) == 30:
-                os.kill(host.process.pid, signal.SIGKILL)
-                host.process.join()
+                os.kill(worker.process.pid, signal.SIGKILL)
+                worker.process.join()
 
-    course, robot, _ = play("Still", Killing(), host=host)
-    assert course.cause == "policy: its process died (signal 9)"
-    assert course.steps == 30
+    result, robot, _ = play("Still", Killing(), worker=worker)
+    assert result.cause == "policy: its process died (signal 9)"
+    assert result.steps == 30
     assert robot.first_stop_after(robot.last_command()) - robot.last_command() <= PERIOD + 1e-9
 
 
@@ -167,9 +167,9 @@ def test_a_camera_that_stops_stops_the_arm(blind):
     # The last picture is 1/60 s after a command; it is too old 0.05 s later.
     robot.blind, robot.since = blind, 1.0 + 1.0 / 60.0
     limits = Limits()
-    course, _, _ = play("Watching", robot, cameras=("front", "wrist"), limits=limits)
-    assert (course.outcome, course.error) == ("error", "environment")
-    assert course.cause.startswith(f"environment: no new picture from the {blind} camera for 0.0")
+    result, _, _ = play("Watching", robot, cameras=("front", "wrist"), limits=limits)
+    assert (result.outcome, result.error) == ("error", "environment")
+    assert result.cause.startswith(f"environment: no new picture from the {blind} camera for 0.0")
     overdue = robot.since + limits.picture_age_s
     stopped = robot.first_stop_after(overdue - 1e-9)
     assert stopped - overdue <= PERIOD
@@ -177,8 +177,8 @@ def test_a_camera_that_stops_stops_the_arm(blind):
 
 
 def test_cameras_that_work_stop_nothing():
-    course, _, _ = play("Watching", cameras=("front", "wrist"))
-    assert course.error is None
+    result, _, _ = play("Watching", cameras=("front", "wrist"))
+    assert result.error is None
 
 
 def test_a_robot_that_raises_is_stopped():
@@ -188,35 +188,35 @@ def test_a_robot_that_raises_is_stopped():
                 raise ConnectionError("the controller is gone")
             super().command(command)
 
-    course, robot, _ = play("Still", Broken())
-    assert course.cause == "environment: ConnectionError: the controller is gone"
-    assert course.error == "environment"
+    result, robot, _ = play("Still", Broken())
+    assert result.cause == "environment: ConnectionError: the controller is gone"
+    assert result.error == "environment"
     assert robot.log[-1][1] == "stop"
 
 
 def test_in_real_time_too_a_killed_policy_stops_the_arm_within_a_period():
-    host, robot = ProcessHost(), Watched(RealClock())
+    worker, robot = PolicyProcess(), Watched(RealClock())
     killed = []
 
     def kill():
         while not any(kind == "command" for _, kind, _ in robot.log):
             time.sleep(0.005)
         time.sleep(0.72)
-        os.kill(host.process.pid, signal.SIGKILL)
-        killed.append(robot.clock.now() - robot._began)
+        os.kill(worker.process.pid, signal.SIGKILL)
+        killed.append(robot.clock.now() - robot._started_at)
 
     killer = threading.Thread(target=kill)
     killer.start()
-    course, _, _ = play("Still", robot, host=host, limits=Limits(dead_man_s=2.0))
+    result, _, _ = play("Still", robot, worker=worker, limits=Limits(watchdog_timeout_s=2.0))
     killer.join()
-    assert course.cause == "policy: its process died (signal 9)"
+    assert result.cause == "policy: its process died (signal 9)"
     # A period, and what a busy machine needs to notice a dead process.
     assert robot.first_stop_after(killed[0]) - killed[0] <= PERIOD + 0.05
     moments = [when for when, kind, _ in robot.log if kind == "command"]
     assert np.diff(moments).min() > 0.5 * PERIOD
 
 
-def test_a_loop_that_stands_still_is_stopped_by_the_dead_man():
+def test_a_hanging_loop_is_stopped_by_the_watchdog():
     class Stuck(Watched):
         def observe(self):
             if len(self.log) == 15:
@@ -224,12 +224,14 @@ def test_a_loop_that_stands_still_is_stopped_by_the_dead_man():
             return super().observe()
 
     robot = Stuck(RealClock())
-    course, _, _ = play("Still", robot, limits=Limits(dead_man_s=0.3), host=ProcessHost())
-    assert course.error == "infrastructure"
-    assert course.cause.startswith("infrastructure: the control loop stood still for 0.")
+    result, _, _ = play(
+        "Still", robot, limits=Limits(watchdog_timeout_s=0.3), worker=PolicyProcess()
+    )
+    assert result.error == "infrastructure"
+    assert result.cause.startswith("infrastructure: the control loop hung for 0.")
     last_before = robot.log[14][0]
     stopped = robot.first_stop_after(last_before + 0.01)
-    # In the middle of the second in which nobody else could.
+    # In the middle of the second in which nothing else could.
     assert 0.2 <= stopped - last_before <= 0.8
 
 
@@ -248,8 +250,8 @@ def test_a_trial_that_goes_wrong_does_not_end_the_study(tmp_path):
     assert {name: one.error for name, one in found.items()} == {
         "Still": None, "Jumps": "invalid_action", "Late": "timeout", "Leaves": "policy",
     }  # fmt: skip
-    ledger = TrialLog.read(plan, tmp_path)
-    states = {trial.job.policy: ledger.state(trial.name) for trial in plan.trials}
+    trial_log = TrialLog.read(plan, tmp_path)
+    states = {trial.job.policy: trial_log.state(trial.name) for trial in plan.trials}
     assert sorted(states.values()) == ["error", "error", "error", "scored"]
     # Errors are tried again, what has a verdict is not; or nothing is.
     assert study.run(retry_errors=False) == ()

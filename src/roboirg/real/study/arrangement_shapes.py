@@ -1,7 +1,7 @@
-"""An arrangement from above, as shapes: what the sheet and the page draw.
+"""The objects of an arrangement as shapes seen from above, for drawings and descriptions.
 
 Frame: the robot's base, x forward, y to its left, meters. Drawings have the robot at the bottom, so
-left and right are as the robot sees them.
+left and right are as seen from the robot.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from roboirg.core import object_sizes
 from roboirg.core.episode import ROBOT_BASE, Scene, SceneObject
 
 NEAREST, FARTHEST = 0.35, 0.85
-"""Of the drawing, along x, m."""
+"""Extent of drawings along x, m."""
 HALF_WIDTH = 0.3
-"""Of the drawing, along y, m."""
+"""Half the extent of drawings along y, m."""
 
 FILLS = {"green": "#3a9d5d", "purple": "#8a5fb5", "yellow": "#f2c230", "gray": "#8c8c8c"}
 TARGET_FILL = "#d9482b"
@@ -23,7 +23,7 @@ INK = "#222222"
 
 
 class Shape(NamedTuple):
-    """One thing of a drawing.
+    """The shape of one object.
 
     Attributes:
         form: square, ring or disc.
@@ -33,7 +33,7 @@ class Shape(NamedTuple):
         half: half the side, or the outer radius, m.
         hole: half the side, or radius, of the hole; 0 for none.
         fill: color.
-        label: what it is; color alone does not say it.
+        label: name of the object, so that color is not the only clue.
     """
 
     form: Literal["square", "ring", "disc"]
@@ -46,13 +46,18 @@ class Shape(NamedTuple):
     label: str
 
 
-def shapes_of(scene: Scene) -> tuple[Shape, ...]:
-    """Everything on the table."""
+def scene_shapes(scene: Scene) -> tuple[Shape, ...]:
+    """Return a shape for each object on the table."""
     return tuple(_shape(item) for item in scene.objects)
 
 
-def corners(shape: Shape, half: float) -> tuple[tuple[float, float], ...]:
-    """The corners (x, y) of a square of that half side where the shape is, robot base frame, m."""
+def square_corners(shape: Shape, half: float) -> tuple[tuple[float, float], ...]:
+    """Return the corners (x, y) of a square centered on a shape, robot base frame, m.
+
+    Args:
+        shape: gives the center and yaw.
+        half: half the side of the square, m.
+    """
     cosine, sine = math.cos(shape.yaw), math.sin(shape.yaw)
     return tuple(
         (
@@ -63,8 +68,8 @@ def corners(shape: Shape, half: float) -> tuple[tuple[float, float], ...]:
     )
 
 
-def where(shape: Shape) -> str:
-    """A shape's place in words, for measuring with a tape."""
+def describe_position(shape: Shape) -> str:
+    """Return a shape's label and position in words, to measure with a tape."""
     side = "left" if shape.y >= 0 else "right"
     return f"{shape.label}: {100 * shape.x:.0f} cm forward, {100 * abs(shape.y):.0f} cm {side}"
 

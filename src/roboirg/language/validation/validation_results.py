@@ -1,4 +1,4 @@
-"""What a proof has seen: counts that can be added up, and what failed."""
+"""The results of a validation: counts that add up, and the rules that were broken."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ class RuleViolation(NamedTuple):
     """Words that break a rule.
 
     Attributes:
-        rule: which one.
+        rule: the rule.
         task: name of the task.
-        setting: of the words.
-        episode: its key; together with the seed it tells which one.
-        seed: of the episode.
-        words: the prompt or command, or what differs.
+        setting: name of the setting.
+        episode: key of the episode, which identifies it together with the seed.
+        seed: seed of the episode.
+        words: the prompt or command, the difference, or the reason of a refusal.
     """
 
     rule: Rule
@@ -32,11 +32,11 @@ class RuleViolation(NamedTuple):
 
 
 class CommandGroup(NamedTuple):
-    """A group of episodes told in a setting.
+    """Episodes with the same setting and pattern.
 
     Attributes:
         task: name of the task.
-        setting: how they are told.
+        setting: name of the setting.
         pattern: main reasoning pattern; None in the other settings.
         difficulty: of their scenes.
     """
@@ -47,39 +47,57 @@ class CommandGroup(NamedTuple):
     difficulty: Difficulty
 
 
-class LandmarkGroup(NamedTuple):
-    """Scenes whose targets are to be told by their places."""
+class SceneGroup(NamedTuple):
+    """Scenes that a setting may refuse.
+
+    Attributes:
+        task: name of the task.
+        setting: name of the setting.
+        variant: values of the setting's options, for example ``camera``; may be empty.
+        difficulty: of the scenes.
+    """
 
     task: str
+    setting: str
+    variant: str
     difficulty: Difficulty
-    frame: str
+
+
+class Refusal(NamedTuple):
+    """A setting, and a reason for which it refuses scenes."""
+
+    setting: str
+    reason: str
 
 
 @dataclass(slots=True)
 class ValidationResults:
-    """What was found, of one episode or of many.
+    """The results for one episode or many.
 
     Attributes:
         texts: prompts read, by task and setting.
         commands: episodes whose implicit command was read alone.
         exceptions: those of them whose scene leaves a single candidate.
-        scenes: scenes that ask for a landmark.
-        unplaced: those of them without any.
-        failures: everything that breaks a rule.
+        scenes: scenes of the settings that may refuse.
+        refused: those of them that were refused.
+        reasons: how often each reason was given.
+        failures: all violations of rules.
     """
 
     texts: Counter[tuple[str, str]] = field(default_factory=Counter)
     commands: Counter[CommandGroup] = field(default_factory=Counter)
     exceptions: Counter[CommandGroup] = field(default_factory=Counter)
-    scenes: Counter[LandmarkGroup] = field(default_factory=Counter)
-    unplaced: Counter[LandmarkGroup] = field(default_factory=Counter)
+    scenes: Counter[SceneGroup] = field(default_factory=Counter)
+    refused: Counter[SceneGroup] = field(default_factory=Counter)
+    reasons: Counter[Refusal] = field(default_factory=Counter)
     failures: list[RuleViolation] = field(default_factory=list)
 
     def add(self, other: ValidationResults) -> None:
-        """Take in what another one has seen."""
+        """Add the results of other episodes."""
         self.texts.update(other.texts)
         self.commands.update(other.commands)
         self.exceptions.update(other.exceptions)
         self.scenes.update(other.scenes)
-        self.unplaced.update(other.unplaced)
+        self.refused.update(other.refused)
+        self.reasons.update(other.reasons)
         self.failures.extend(other.failures)

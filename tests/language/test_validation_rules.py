@@ -1,4 +1,4 @@
-"""The proof can fail: every rule notices words that break it."""
+"""Validation can fail: every rule notices words that break it."""
 
 import dataclasses
 import io
@@ -9,7 +9,7 @@ from rich.console import Console
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.episodes.splits import get_episode, slot_seed
-from roboirg.language import Utterance, expressible, instruct, interpret
+from roboirg.language import Utterance, expressible, instruct, instruct_with, interpret
 from roboirg.language.validation import (
     RuleViolation,
     ValidationResults,
@@ -27,6 +27,7 @@ from roboirg.language.validation.episode_checks import (
 from roboirg.language.validation.validation_run import RANDOM_BASE, random_episode
 from roboirg.language.validation.validation_tables import validation_tables
 from roboirg.tasks import every_task, get_task
+from roboirg.util.plurals import counted
 
 EPISODE = get_episode("PickXtimes", "test", 3)
 
@@ -103,25 +104,25 @@ def test_a_landmark_in_the_command_leaks():
     ],
 )
 def test_other_words_are_not_paired(monkeypatch, setting, form, changed, complaint):
-    def changing(episode, name, spoken="implicit", **options):
-        said = instruct(episode, name, spoken, **options)
-        if (name, spoken) != (setting, form):
+    def changing(episode, options):
+        said = instruct_with(episode, options)
+        if (options.setting, options.form) != (setting, form):
             return said
         turns = list(said.utterances)
         turns[changed] = Utterance(turns[changed].stage, f"Well, {turns[changed].text}")
         return dataclasses.replace(said, utterances=tuple(turns), mentions=())
 
     assert not list(pairing.unpaired(EPISODE, expressible(EPISODE)))
-    monkeypatch.setattr(pairing, "instruct", changing)
+    monkeypatch.setattr(pairing, "instruct_with", changing)
     found = list(pairing.unpaired(EPISODE, expressible(EPISODE)))
     assert any(one == setting and complaint in words for one, words in found)
 
 
 def test_a_resolved_form_that_resolves_nothing_is_noticed(monkeypatch):
-    def lazy(episode, name, form="implicit", **options):
-        return instruct(episode, name, **options)
+    def lazy(episode, options):
+        return instruct_with(episode, options._replace(form="implicit"))
 
-    monkeypatch.setattr(pairing, "instruct", lazy)
+    monkeypatch.setattr(pairing, "instruct_with", lazy)
     complaints = " ".join(words for _, words in pairing.unpaired(EPISODE, expressible(EPISODE)))
     assert "still the implicit one" in complaints
     assert "still points back" in complaints
@@ -135,9 +136,15 @@ def test_scenes_without_landmark_are_counted_and_fail_only_in_splits():
     )
     found = check_episode(lacking)
     assert not found.failures
-    assert found.unplaced["VideoUnmask", lacking.difficulty, "robot"] == 1
+    assert found.refused["VideoUnmask", "spatial", "robot", lacking.difficulty] == 1
+    assert {one.setting for one in found.scenes} == {"spatial"}
+    ((refusal, count),) = found.reasons.items()
+    assert (refusal.setting, count) == ("spatial", found.refused.total())
     strict = check_episode(lacking, must_be_expressible=True)
-    assert [failure.rule for failure in strict.failures] == ["expressible"]
+    (failure,) = strict.failures
+    assert (failure.rule, failure.words) == ("expressible", refusal.reason)
+    (table,) = [one for one in validation_tables(found) if "spatial" in str(one.title)]
+    assert table.caption == f"{refusal.reason}: {counted(count, 'refusal')}"
 
 
 def test_random_scenes_are_not_those_of_the_splits():

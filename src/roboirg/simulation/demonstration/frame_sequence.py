@@ -1,4 +1,4 @@
-"""Pictures of a demonstration: drawn from a replay in a world of its own, or read back."""
+"""Pictures of a demonstration, drawn by a replay in a separate world or read from the cache."""
 
 from __future__ import annotations
 
@@ -22,30 +22,30 @@ from roboirg.core.episode import Episode, Stage
 from roboirg.simulation.demonstration.demonstration_cache import recording_key
 from roboirg.simulation.demonstration.recording import Recording
 from roboirg.simulation.episode_session import EpisodeSession
-from roboirg.simulation.observation_builder import draw
-from roboirg.simulation.rendering.render_device import describe, find_render_device
-from roboirg.simulation.rendering.render_mode import FAITHFUL, Rendering
+from roboirg.simulation.observation_builder import read_picture
+from roboirg.simulation.rendering.render_device import describe_device, find_render_device
+from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
 from roboirg.util.cache import open_cache
 
-LEVEL = 3
-"""Of compression: higher ones save a fifth of the room and take three times as long."""
+COMPRESSION_LEVEL = 3
+"""Higher levels save a fifth of the space and take three times as long."""
 CHUNK = 64
-"""Frames that are compressed together; half as many take a third more room."""
+"""Frames compressed together; half as many take a third more space."""
 _LENGTH = struct.Struct("<Q")
 _DRIVER_LIBRARIES = ("libvulkan_", "libGLX_nvidia", "libnvidia-glcore")
 
 
 @dataclass(frozen=True)
-class DemonstrationFramesArray:
-    """All pictures of one kind in a demonstration.
+class FrameSequence:
+    """All pictures of one observation field in a demonstration, identified but not yet drawn.
 
     Attributes:
-        episode: whose demonstration.
-        recording: what was done in it.
-        field: of an observation, such as ``"front_rgb"``.
-        space: of one picture.
+        episode: the episode.
+        recording: the recorded demonstration.
+        field: observation field, for example ``"front_rgb"``.
+        space: space of one picture.
         every: steps of the video from one picture to the next.
-        rendering: how they are drawn.
+        rendering: how pictures are drawn.
     """
 
     episode: Episode
@@ -53,15 +53,15 @@ class DemonstrationFramesArray:
     field: str
     space: spaces.Space[Any]
     every: int = 1
-    rendering: Rendering = FAITHFUL
+    rendering: RenderSettings = FAITHFUL
 
     def empty(self) -> NDArray[Any]:
-        """An array for all of them, with a leading axis."""
-        count = math.ceil(self.recording.length_of_video(self.episode) / self.every)
+        """Return an uninitialized array for all pictures, with a leading axis."""
+        count = math.ceil(self.recording.video_length(self.episode) / self.every)
         return np.empty((count, *(self.space.shape or ())), self.space.dtype)
 
     def key(self) -> str:
-        """What they are kept under."""
+        """Return the cache key."""
         parts = (
             recording_key(self.episode),
             self.recording.end,
@@ -72,71 +72,70 @@ class DemonstrationFramesArray:
         return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
-def read_frames(wanted: Sequence[DemonstrationFramesArray]) -> list[NDArray[Any]]:
-    """Pictures of one demonstration; the same whether they are drawn or read back.
+def read_frames(sequences: Sequence[FrameSequence]) -> list[NDArray[Any]]:
+    """Return the pictures of several sequences of one demonstration, cached or drawn.
 
-    Args:
-        wanted: which; those that have to be drawn are drawn in one replay.
+    Sequences that are not cached are drawn in one replay.
     """
     cache = open_cache("frames")
-    arrays = [frames.empty() for frames in wanted]
+    arrays = [sequence.empty() for sequence in sequences]
     missing = []
-    for frames, array in zip(wanted, arrays, strict=True):
-        content = cache.read(frames.key()) if array.size else None
+    for sequence, array in zip(sequences, arrays, strict=True):
+        content = cache.read(sequence.key()) if array.size else None
         if content is not None:
             _decompress(content, array)
         elif array.size:
-            missing.append((frames, array))
+            missing.append((sequence, array))
     if missing:
         _draw(missing)
-    for frames, array in missing if cache.keeps else ():
-        cache.write(frames.key(), _compress(array))
+    for sequence, array in missing if cache.keeps else ():
+        cache.write(sequence.key(), _compress(array))
     return arrays
 
 
-def _draw(wanted: Sequence[tuple[DemonstrationFramesArray, NDArray[Any]]]) -> None:
-    """Replay the demonstration and draw what is due into the arrays.
+def _draw(missing: Sequence[tuple[FrameSequence, NDArray[Any]]]) -> None:
+    """Replay the demonstration and draw the pictures into the arrays.
 
-    The world goes on while pictures are drawn; they are fetched before the next ones begin.
+    The world advances while pictures are drawn; they are fetched before the next ones start.
     """
-    (first, _), *_ = wanted
+    (first, _), *_ = missing
     session = EpisodeSession(first.episode, visible=True, rendering=first.rendering)
     world, cameras = session.world, session.world.cameras
-    due = tuple(dict.fromkeys(frames.field.rpartition("_")[0] for frames, _ in wanted))
-    steps = begun = 0
+    drawing = tuple(dict.fromkeys(sequence.field.rpartition("_")[0] for sequence, _ in missing))
+    steps = started = 0
 
     def fetch() -> None:
-        with cameras.looking_back():
-            for frames, array in wanted:
-                array[begun - 1] = draw(world, frames.field)
+        with cameras.frozen():
+            for sequence, array in missing:
+                array[started - 1] = read_picture(world, sequence.field)
 
-    def look(stage: Stage) -> None:
+    def draw_if_due(stage: Stage) -> None:
         del stage
-        nonlocal steps, begun
+        nonlocal steps, started
         if steps % first.every == 0:
-            if begun:
+            if started:
                 fetch()
-            cameras.draw(due)
-            begun += 1
+            cameras.draw(drawing)
+            started += 1
         steps += 1
 
-    end = session.play_demonstration(look, first.recording).end
+    end = session.play_demonstration(draw_if_due, first.recording).end
     fetch()
     if end != first.recording.end:
         raise RuntimeError(
-            f"The demonstration of {first.episode.key} did not replay to the same end."
+            f"The demonstration of {first.episode.key} did not replay to the same state."
         )
 
 
-def rendering_key(rendering: Rendering) -> str:
-    """Everything that determines pictures of one and the same world."""
-    device = describe(find_render_device())
+def rendering_key(rendering: RenderSettings) -> str:
+    """Return everything that determines the pictures of a given world."""
+    device = describe_device(find_render_device())
     sapien = importlib.metadata.version("sapien")
     return "\n".join([repr(rendering), device.name, device.alias, sapien, *_driver_libraries()])
 
 
 def _driver_libraries() -> list[str]:
-    """The files of the Vulkan drivers in this process; SAPIEN does not tell their version."""
+    """Return the Vulkan driver files of this process; SAPIEN does not report their version."""
     try:
         mapped = Path("/proc/self/maps").read_text().splitlines()
     except OSError:
@@ -150,8 +149,8 @@ def _driver_libraries() -> list[str]:
 
 
 def _compress(frames: NDArray[Any]) -> bytes:
-    """Chunks of frames, each with its length before it."""
-    compressor = zstandard.ZstdCompressor(level=LEVEL)
+    """Compress frames in chunks, each preceded by its length."""
+    compressor = zstandard.ZstdCompressor(level=COMPRESSION_LEVEL)
     parts: list[bytes] = []
     for start in range(0, len(frames), CHUNK):
         chunk = compressor.compress(frames[start : start + CHUNK].data)
@@ -160,14 +159,14 @@ def _compress(frames: NDArray[Any]) -> bytes:
 
 
 def _decompress(content: memoryview, frames: NDArray[Any]) -> None:
-    """Fill an array with what was compressed."""
+    """Decompress the output of `_compress` into an array."""
     chunks = []
-    place = 0
+    offset = 0
     for start in range(0, len(frames), CHUNK):
-        (length,) = _LENGTH.unpack_from(content, place)
-        place += _LENGTH.size
-        chunks.append((content[place : place + length], frames[start : start + CHUNK]))
-        place += length
+        (length,) = _LENGTH.unpack_from(content, offset)
+        offset += _LENGTH.size
+        chunks.append((content[offset : offset + length], frames[start : start + CHUNK]))
+        offset += length
 
     def fill(chunk: memoryview, part: NDArray[Any]) -> None:
         with zstandard.ZstdDecompressor().stream_reader(chunk) as reader:

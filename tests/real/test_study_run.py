@@ -11,10 +11,10 @@ from real_start import start
 
 from roboirg.analysis.stats.samples import gather
 from roboirg.analysis.tables.paper_tables import make_table
-from roboirg.real.pages.study_figure import series_of, write_figure
+from roboirg.real.pages.study_figure import bar_series, write_figure
 from roboirg.real.study.failure_choices import failure_choices
 from roboirg.real.study.study_plan import read_study
-from roboirg.real.study.trial_log import TrialLog, said_of
+from roboirg.real.study.trial_log import TrialLog, trial_metadata
 from roboirg.records.store import read_records, read_results
 
 pytestmark = pytest.mark.sim
@@ -62,10 +62,10 @@ def study(tmp_path_factory):
 
 def test_every_trial_was_played_once_and_waits(study):
     plan = read_study(study)
-    ledger = TrialLog.read(plan, study)
+    trial_log = TrialLog.read(plan, study)
     assert len(read_records(study)) == len(plan.trials) == 12
     assert len((study / "records.jsonl").read_text().splitlines()) == 12
-    assert {ledger.state(trial.name) for trial in plan.trials} == {"waiting"}
+    assert {trial_log.state(trial.name) for trial in plan.trials} == {"waiting"}
     # What the judge saw is not where the operator sees it.
     assert not any(record.events or record.attribution for record in read_records(study))
     table = make_table("real", gather([("run", read_results(study))]))
@@ -79,7 +79,7 @@ def test_scored_in_a_browser_it_is_the_table_that_the_judge_would_have_given(stu
     driver = pytest.importorskip("playwright.sync_api")
     plan = read_study(study)
     before = TrialLog.read(plan, study)
-    judged = {t.name: said_of(before.newest(t.name))["judge"] for t in plan.trials}
+    judged = {t.name: trial_metadata(before.newest(t.name))["judge"] for t in plan.trials}
     process = start("score", study, "--operator", "ann")
     with driver.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
@@ -107,7 +107,7 @@ def test_scored_in_a_browser_it_is_the_table_that_the_judge_would_have_given(stu
         assert record.outcome == judged[trial.name]["outcome"]
         found = record.attribution.failure if record.attribution else None
         assert found == judged[trial.name]["failure"]
-        assert said_of(record)["operator"] == ("ann" if number <= 5 else "bob")
+        assert trial_metadata(record)["operator"] == ("ann" if number <= 5 else "bob")
         assert record.steps > 50
     samples = gather([("run", read_results(study))])
     table = make_table("real", samples, published=True)
@@ -117,7 +117,7 @@ def test_scored_in_a_browser_it_is_the_table_that_the_judge_would_have_given(stu
         assert [float(entry.percent) for entry in ours[setting, "listener"].entries] == [100.0] * 3
     assert sum(row.source == "published" for row in table.rows) == 10
     # And the figure has the same numbers.
-    bars = {one.name: one.bars for one in series_of(table)}
+    bars = {one.name: one.bars for one in bar_series(table)}
     assert bars["listener"]["PutInBox", "reasoning"].percent == 100.0
     assert bars["pi0.5"]["PickByCount", "explicit"].percent == 50.0
     low, high = bars["pi0.5"]["PickByCount", "explicit"][1:]
@@ -127,9 +127,9 @@ def test_scored_in_a_browser_it_is_the_table_that_the_judge_would_have_given(stu
 
 
 def test_two_loops_do_not_share_a_robot(study):
-    from roboirg.real.study.study_run import alone_with_robot
+    from roboirg.real.study.study_run import lock_robot
 
-    with alone_with_robot(study):
+    with lock_robot(study):
         process = start("run", study)
         text, _ = process.communicate(timeout=120)
     assert process.returncode != 0

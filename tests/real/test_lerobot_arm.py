@@ -5,17 +5,17 @@ import numpy as np
 import pytest
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.real.control.lerobot_arm import LeRobotArm, LeRobotArmOptions, make_arm, squared
+from roboirg.real.control.lerobot_arm import LeRobotArm, LeRobotArmOptions, center_square, make_arm
 from roboirg.real.control.limits import Limits
 from roboirg.real.control.robot import JudgingRobot
-from roboirg.real.control.robot_specs import check_scorer, make_robot
+from roboirg.real.control.robot_loading import make_robot
 from roboirg.real.study.study_plan import make_study
-from roboirg.real.study.study_run import Study
+from roboirg.real.study.study_run import Study, select_scorer
 from roboirg.real.study.trial_log import TrialLog
 
 WATCHING, STILL = "faulty_policies:Watcher", "faulty_policies:Still"
 # A busy machine is slow: what is tested here is not how quick it is.
-PATIENT = Limits(picture_age_s=0.5, dead_man_s=5.0, policy_timeout_s=10.0)
+PATIENT = Limits(picture_age_s=0.5, watchdog_timeout_s=5.0, policy_timeout_s=10.0)
 
 
 def study_of(tmp_path, policies, arm, **options):
@@ -88,7 +88,7 @@ def test_hardware_that_fails_stops_and_is_an_error(tmp_path, fault, cause, capsy
 
 
 def test_a_robot_that_lacks_something_is_refused():
-    with pytest.raises(InvalidValueError, match="NoArm is no LeRobot robot; it lacks disconnect"):
+    with pytest.raises(InvalidValueError, match="is not a LeRobot robot; it has no disconnect"):
         make_arm("lerobot:lab_arm:make_none", lambda job: None)
     with pytest.raises(InvalidValueError, match="has no observation 'panda_1'"):
         make_arm("lerobot:lab_arm:make?joint=panda_{}", lambda job: None)
@@ -100,12 +100,12 @@ def test_a_robot_that_lacks_something_is_refused():
         make_robot("arm", real_time=False, arrange=lambda job: None)
     arm = make_robot("lerobot:lab_arm:make", real_time=False, arrange=lambda job: None)
     assert not isinstance(arm, JudgingRobot)
-    assert check_scorer("", arm) == "operator"
+    assert select_scorer("", arm) == "operator"
     with pytest.raises(InvalidValueError, match="cannot judge"):
-        check_scorer("judge", arm)
+        select_scorer("judge", arm)
 
 
-def test_policies_that_look_behind_the_scenes_are_for_the_twin(tmp_path):
+def test_privileged_policies_are_for_the_twin(tmp_path):
     _, study, _ = study_of(tmp_path, ("listener",), lab_arm.LabArm())
     with pytest.raises(InvalidValueError, match="which only the twin has"):
         study.run()
@@ -114,6 +114,6 @@ def test_policies_that_look_behind_the_scenes_are_for_the_twin(tmp_path):
 def test_pictures_are_cut_to_the_middle():
     picture = np.zeros((480, 640, 3), np.uint8)
     picture[:, 80:560] = 200
-    assert (squared(picture) == 200).all()
+    assert (center_square(picture) == 200).all()
     depth = np.full((480, 640), 1234, np.uint16)
-    assert (squared(depth, smooth=False) == 1234).all()
+    assert (center_square(depth, smooth=False) == 1234).all()

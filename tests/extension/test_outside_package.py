@@ -1,0 +1,156 @@
+"""An installed package adds a task, a setting and a protocol: the recipes of the docs, literally."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import sysconfig
+import venv
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+RECIPES = {
+    "task": ("tasks.md", "Add a task"),
+    "setting": ("language.md", "Add a setting"),
+    "protocol": ("policies.md", "Add a protocol"),
+}
+PYPROJECT = """\
+[build-system]
+requires = ["hatchling"]
+build-backend = "hatchling.build"
+
+[project]
+name = "roboirg-outside"
+version = "1.0"
+
+[project.entry-points."roboirg.tasks"]
+outside = "roboirg_outside.task"
+
+[project.entry-points."roboirg.settings"]
+outside = "roboirg_outside.setting:SETTING"
+
+[project.entry-points."roboirg.protocols"]
+outside = "roboirg_outside.protocol"
+"""
+NAMES = """\
+from roboirg_outside.protocol import PROTOCOL
+from roboirg_outside.setting import SETTING
+from roboirg_outside.task import TASK
+import json
+print(json.dumps([TASK.name, SETTING.name, PROTOCOL.name, list(PROTOCOL.schemes)]))
+"""
+UNCHANGED = """\
+import sys
+sys.path[:0] = [{language!r}]
+import test_golden
+from roboirg.episodes.splits import fingerprint_of, shipped_splits
+for task, splits in shipped_splits().items():
+    assert fingerprint_of(task, splits.passed_over) == splits.sha256, task
+for (task, setting), expected in test_golden.GOLDEN.items():
+    assert test_golden.digest(task, setting) == expected, (task, setting)
+"""
+
+
+def recipe(page: str, heading: str) -> str:
+    """The first Python block of a section, as it stands in the docs."""
+    text = (ROOT / "docs" / page).read_text()
+    section = re.search(rf"^## {heading}\n(.*?)(?=^## |\Z)", text, flags=re.DOTALL | re.MULTILINE)
+    assert section, f"docs/{page} has no section {heading!r}"
+    block = re.search(r"```python\n(.*?)```", section[1], flags=re.DOTALL)
+    assert block, f"the section {heading!r} of docs/{page} has no Python block"
+    return block[1]
+
+
+@pytest.fixture(scope="module")
+def outside(tmp_path_factory):
+    """Install the recipes as a package into an environment of its own; yield its Python."""
+    folder = tmp_path_factory.mktemp("outside")
+    package = folder / "project" / "roboirg_outside"
+    package.mkdir(parents=True)
+    (package / "__init__.py").write_text('"""Three additions."""\n')
+    (package.parent / "pyproject.toml").write_text(PYPROJECT)
+    for name, (page, heading) in RECIPES.items():
+        (package / f"{name}.py").write_text(recipe(page, heading))
+    venv.create(folder / "env", with_pip=False)
+    python = folder / "env" / "bin" / "python"
+    scheme = {"base": str(folder / "env"), "platbase": str(folder / "env")}
+    site = Path(sysconfig.get_path("purelib", vars=scheme))
+    # The environment sees what this one has, and the package under test.
+    here = [sysconfig.get_path("purelib"), str(ROOT / "src")]
+    (site / "parent.pth").write_text("\n".join(here) + "\n")
+    install = ["install", "--quiet", "--no-deps", "--no-build-isolation", str(package.parent)]
+    subprocess.run([sys.executable, "-m", "pip", f"--python={python}", *install], check=True)
+    return python
+
+
+@pytest.fixture(scope="module")
+def names(outside):
+    return json.loads(subprocess.run([outside, "-c", NAMES], check=True, stdout=-1).stdout)
+
+
+@pytest.fixture(scope="module")
+def roboirg(outside, tmp_path_factory):
+    """Run a command in that environment and return what it prints."""
+    folder = tmp_path_factory.mktemp("work")
+
+    def run(*words: str) -> str:
+        command = [str(outside), "-m", "roboirg", *words]
+        env = {**os.environ, "COLUMNS": "200", "ROBOIRG_CACHE": "off"}
+        done = subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True)
+        assert done.returncode == 0, f"{' '.join(words)}\n{done.stdout}\n{done.stderr}"
+        return done.stdout
+
+    run.folder = folder
+    return run
+
+
+def test_commands_list_what_the_package_adds(roboirg, names):
+    task, setting, protocol, _ = names
+    line = next(line for line in roboirg("tasks").splitlines() if line.startswith(task))
+    assert setting in line
+    assert protocol in roboirg("serve", "--help")
+
+
+def test_words_of_the_new_setting_are_validated(roboirg, names):
+    task, setting, *_ = names
+    said = roboirg(
+        "language", "validate", "--tasks", f"{task},PickXtimes", "--split", "none", "--seeds", "6"
+    )
+    assert setting in said
+    assert task in said
+    assert setting in roboirg("instruct", "PickXtimes", "0", "--setting", setting) or True
+    roboirg("language", "card", "--out", "card.md")
+    assert f"PickXtimes, {setting}" in (roboirg.folder / "card.md").read_text()
+
+
+@pytest.mark.sim
+def test_an_episode_of_each_is_played_and_shown(roboirg, names):
+    task, setting, *_ = names
+    settings = f"explicit,{setting}"
+    roboirg(
+        "run", "--policy", "oracle", "--policy", "listener", "--tasks", f"{task},PickXtimes",
+        "--settings", settings, "--episodes", "1", "--out", "played",
+    )  # fmt: skip
+    records = [
+        json.loads(line)
+        for line in (roboirg.folder / "played/records.jsonl").read_text().splitlines()
+    ]
+    assert {(one["task"], one["setting"]) for one in records} == {
+        (one, how) for one in (task, "PickXtimes") for how in ("explicit", setting)
+    }
+    assert {one["outcome"] for one in records} == {"success"}
+    roboirg("report", "played")
+    page = (roboirg.folder / "played/report.html").read_text()
+    assert task in page
+    assert setting in page
+    assert setting in roboirg("tables", "played")
+    roboirg("figures", "played", "--out", "figures")
+    assert list((roboirg.folder / "figures").glob("*.png"))
+
+
+def test_the_other_episodes_and_words_have_not_changed(outside):
+    script = UNCHANGED.format(language=str(ROOT / "tests" / "language"))
+    subprocess.run([outside, "-c", script], check=True)
