@@ -25,16 +25,10 @@ from roboirg.episodes.splits import (
     slot_seed,
 )
 from roboirg.language import find_refusals
+from roboirg.language.settings import ACCEPTANCE_SETTINGS
 from roboirg.policies import make_policy, play
 from roboirg.tasks import every_task, get_task
 from roboirg.util.parallel_map import parallel_map
-
-ACCEPTANCE_SETTINGS = ("explicit", "direct", "reasoning", "contextual", "spatial")
-"""Settings that must be able to express an episode for its seed to be accepted.
-
-Frozen: a new setting must not change which episodes the splits hold, or older results could no
-longer be compared. A new setting may refuse some of these episodes instead.
-"""
 
 Reason = Literal["no room", "not expressible", "oracle failed"]
 REASONS: tuple[Reason, ...] = ("no room", "not expressible", "oracle failed")
