@@ -31,7 +31,7 @@ def failures_text(records: list[Record], most: int = 10) -> str:
 
 
 def test_each_failure_is_named_with_its_cause() -> None:
-    long = "picked up the green cube [1] while due: pick up the red cube for the first time"
+    long = "picked up the green cube [1]; expected: pick up the red cube for the first time"
     assert failures_text(
         [
             record("success"),

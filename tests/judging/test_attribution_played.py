@@ -30,8 +30,8 @@ def finding(env: RoboIRGEnv, info: dict[str, Any]) -> FailureAttribution | None:
         env.episode,
         env.events,
         timed_out=env.status == "timeout",
-        turn=info["elapsed_steps"] - info["steps"],
-        elapsed=info["elapsed_steps"],
+        policy_start_step=info["elapsed_steps"] - info["steps"],
+        elapsed_steps=info["elapsed_steps"],
         cause=info["cause"],
     )
 

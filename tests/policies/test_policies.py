@@ -129,7 +129,7 @@ def test_wrong_specs_are_explained(spec, error, words):
     [
         ("front", r"write \('front',\)"),
         (("front", "wirst"), r"Did you mean 'wrist'\?"),
-        ({"front"}, "of type set; it has to be a tuple"),
+        ({"front"}, "of type set; it must be a tuple"),
         (None, "of type NoneType"),
         (("front", "front"), "names 'front' twice"),
     ],
@@ -177,9 +177,9 @@ def test_a_wrong_action_space_is_told_before_anything_starts(monkeypatch, action
 @pytest.mark.parametrize(
     ("attribute", "wish", "words"),
     [
-        ("demonstration_frames", "some", "demonstration_frames is 'some'; it has to be 'all', 'no"),
+        ("demonstration_frames", "some", "demonstration_frames is 'some'; it must be 'all', 'no"),
         ("demonstration_frames", 0, "demonstration_frames is 0"),
-        ("observe_every", -1, "observe_every is -1; it has to be None or a whole number"),
+        ("observe_every", -1, "observe_every is -1; it must be None or a whole number"),
         ("observe_every", True, "observe_every is True"),
     ],
 )

@@ -35,7 +35,7 @@ GARBAGE = [
     ({}, "it holds nothing"),
     ({"actions": np.zeros((20, 7))}, r"shape \(n, 8\).*got shape \(20, 7\)"),
     ({"actions": np.zeros((0, 8))}, r"got shape \(0, 8\)"),
-    ({"actions": np.full((20, 8), np.nan)}, "every value has to be a finite number"),
+    ({"actions": np.full((20, 8), np.nan)}, "every value must be a finite number"),
     ({"actions": "left"}, "array of 8 real numbers; got str"),
     ({"actions": None}, "got NoneType"),
     (

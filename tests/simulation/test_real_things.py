@@ -146,7 +146,7 @@ def test_the_other_box_is_a_failure(index):
     info = play(roboirg.make(episode, cameras=()), Mistaken(Goal.of(color=other)))
     assert info["status"] == "failure"
     assert info["cause"] == (
-        f"put the tape into the {other} box while due: put the tape into the {mine} box"
+        f"put the tape into the {other} box; expected: put the tape into the {mine} box"
     )
 
 

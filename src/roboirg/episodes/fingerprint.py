@@ -14,9 +14,9 @@ Plain = str | int | float | bool | None | list["Plain"] | dict[str, "Plain"]
 
 DECIMALS = 9
 
-NOT_COUNTED = frozenset({("Rule", "failure")})
-"""Type and name of fields that say how a failure is called and change no score: two episodes that
-differ in nothing else are the same."""
+NOT_COUNTED = frozenset({("Rule", "cause"), ("Rule", "failure")})
+"""Type and name of fields that describe a failure and change no score: two episodes that differ
+in nothing else are the same."""
 
 
 def fingerprint(episodes: Iterable[Episode]) -> str:

@@ -7,18 +7,17 @@ import importlib.metadata
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any, cast
+from typing import Any
 
 from pydantic import JsonValue
 
 from roboirg import language
-from roboirg.core.conditions import Fact, FactKind
+from roboirg.core.conditions import Fact
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.code_fingerprint import code_fingerprint
 from roboirg.evaluation.plan import instruct_job
-from roboirg.judging import Event
-from roboirg.judging.attribution import attribute_failure
+from roboirg.judging import Event, attribute_failure
 from roboirg.policies.loading import is_privileged, policy_version
 from roboirg.records.record import (
     Attribution,
@@ -43,8 +42,8 @@ class RolloutResult:
         timed_out: whether the policy used up its steps.
         steps: control steps of the policy.
         demonstration_steps: frames of the video shown before the policy's turn.
-        turn: control steps of the episode before the policy's turn.
-        elapsed: control steps of the episode in all.
+        policy_start_step: control steps of the episode before the policy's turn.
+        elapsed_steps: control steps of the episode in all.
         instruction: what the policy was told; None if the episode did not get that far.
         events: facts that became true or ceased to be.
         render_device: the driver's name; None if nothing was rendered.
@@ -60,8 +59,8 @@ class RolloutResult:
     timed_out: bool = False
     steps: int = 0
     demonstration_steps: int = 0
-    turn: int = 0
-    elapsed: int = 0
+    policy_start_step: int = 0
+    elapsed_steps: int = 0
     instruction: language.Instruction | None = None
     events: list[EventRecord] = field(default_factory=list)
     render_device: str | None = None
@@ -95,12 +94,12 @@ class RolloutResult:
 
     def add_events(self, info: Mapping[str, Any]) -> None:
         """Add the events and the elapsed steps in an environment's info."""
-        self.elapsed = int(info.get("elapsed_steps", self.elapsed))
+        self.elapsed_steps = int(info.get("elapsed_steps", self.elapsed_steps))
         for event in info.get("events", ()):
             place = event.get("place")
             self.events.append(
                 EventRecord(
-                    step=int(event["step"]) - self.turn,
+                    step=int(event["step"]) - self.policy_start_step,
                     kind=str(event["kind"]),
                     subject=str(event["subject"]),
                     place=None if place is None else str(place),
@@ -177,17 +176,16 @@ def _attribution(episode: Episode, result: RolloutResult) -> Attribution | None:
     found = attribute_failure(
         episode,
         [
-            # The kinds are those that the environment reported.
             Event(
-                event.step + result.turn,
-                Fact(cast("FactKind", event.kind), event.subject, event.place),
+                event.step + result.policy_start_step,
+                Fact(event.kind, event.subject, event.place),
                 event.holds,
             )
             for event in result.events
         ],
         timed_out=result.timed_out,
-        turn=result.turn,
-        elapsed=result.elapsed,
+        policy_start_step=result.policy_start_step,
+        elapsed_steps=result.elapsed_steps,
         cause=result.cause,
     )
     return None if found is None else Attribution(**found._asdict())

@@ -183,7 +183,7 @@ class Attribution(_RecordModel):
     Attributes:
         kind: ``grounding`` (the policy did the wrong thing) or ``execution`` (it tried the right
             thing and did not succeed).
-        failure: subtype, as in `roboirg.judging.attribution`.
+        failure: subtype, as in `roboirg.judging.failure_attribution`.
         subject: name of the object concerned, if there is one.
         step: control step of the policy's turn at which the failure showed, if there is one.
         sentence: explanation in words.

@@ -71,9 +71,8 @@ def describe_video(episode: Episode) -> list[str]:
 
 
 def fact_words(fact: Fact) -> str:
-    """A fact in words, with the objects' names."""
-    words = _RELATIONS.get(fact.kind, fact.kind.replace("_", " "))
-    return " ".join(part for part in (fact.subject, words, fact.place) if part)
+    """Return a fact in words, with the objects' names."""
+    return " ".join(part for part in (fact.subject, fact.traits.state, fact.place) if part)
 
 
 def instructions_table(episode: Episode) -> Table:
@@ -94,7 +93,7 @@ def instructions_table(episode: Episode) -> Table:
 
 
 def _motion_words(motion: Motion) -> tuple[str, str]:
-    """Who moves, and how."""
+    """Return the object that moves, and its movement in words."""
     match motion:
         case Away(subject, start, end, under):
             begin = f"away from step {start}" if start else "away"

@@ -8,12 +8,9 @@ from typing import Any
 
 from roboirg.analysis.page.films import EpisodeVideo
 from roboirg.analysis.page.reconstruction import resolved_form, stages_of
+from roboirg.core.fact_traits import fact_traits
 from roboirg.records.record import EventRecord, Record
 
-SHORT_LIVED = frozenset({"home", "held", "lying", "still"})
-"""Kinds of event that say how the world is rather than what is done."""
-LASTING = frozenset({"lifted", "picked", "placed"})
-"""Kinds of event of which the end is told too."""
 INSIDE = "#"
 """Stands for a film that is part of the page."""
 
@@ -89,16 +86,15 @@ def details_of(
 
 def event_text(event: EventRecord) -> str:
     """An event in words."""
-    words = event.kind.replace("_", " ")
-    text = f"{event.subject.replace('_', ' ')} {words}"
-    if event.place:
-        text += f" {'' if event.kind == 'over' else 'on '}{event.place.replace('_', ' ')}"
+    names = (event.subject, fact_traits(event.kind).state, event.place)
+    text = " ".join(name.replace("_", " ") for name in names if name)
     return text if event.holds else f"{text}: no longer"
 
 
 def _told(record: Record) -> Iterator[EventRecord]:
     for event in record.events:
-        if event.kind not in SHORT_LIVED and (event.holds or event.kind in LASTING):
+        shown = fact_traits(event.kind).timeline
+        if shown == "both" or (shown == "start" and event.holds):
             yield event
 
 

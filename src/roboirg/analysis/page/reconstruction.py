@@ -47,7 +47,7 @@ def stages_of(record: Record) -> tuple[StageMark, ...]:
         return ()
     turn = max(0, -min(event.step for event in record.events))
     events = [
-        Event(one.step + turn, Fact(one.kind, one.subject, one.place), one.holds)  # type: ignore[arg-type]
+        Event(one.step + turn, Fact(one.kind, one.subject, one.place), one.holds)
         for one in record.events
     ]
     last = max(record.steps, *(event.step for event in record.events))
@@ -57,8 +57,8 @@ def stages_of(record: Record) -> tuple[StageMark, ...]:
     except (RoboIRGError, KeyError):
         return ()  # a task that is no longer installed, or events that are not all there
     done = {
-        trace.dues[step]: step - turn
-        for step in range(len(trace.dues))
+        stage: step - turn
+        for step, stage in enumerate(trace.expected_stages)
         if trace.completed(step) is not None
     }
     return tuple(

@@ -110,7 +110,7 @@ class Twin:
         first, *later = self._infos
         device = str(self._require_env().render_device)
         result.render_device = None if device == NO_RENDER_DEVICE else device
-        result.turn = int(first["elapsed_steps"])
+        result.policy_start_step = int(first["elapsed_steps"])
         for info in (first, *later):
             result.add_events(info)
         last = self._infos[-1]
