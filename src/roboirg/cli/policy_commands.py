@@ -1,4 +1,4 @@
-"""Commands that serve and check policies."""
+"""The commands about policies: serve one, and check one."""
 
 from __future__ import annotations
 
@@ -17,46 +17,43 @@ FAILED = 2
 _STOPPED = {signal.SIGINT: 130, signal.SIGTERM: 143}
 _LOOPBACK = "127.0.0.1"
 
-PolicySpec = Annotated[str, typer.Argument(help="Built-in name, package.module:Class, or address.")]
+PolicySpec = Annotated[str, typer.Argument(help="Built-in name, package.module:Class, or a URL.")]
 
 
 def serve(
     policy: PolicySpec,
     protocol: Annotated[
-        str, typer.Option(help="Protocol: openpi, mme-vla, challenge or challenge+http.")
+        str, typer.Option(help="openpi, mme-vla, challenge or challenge+http.")
     ] = "mme-vla",
-    host: Annotated[str, typer.Option(help="Address to listen on.")] = _LOOPBACK,
-    port: Annotated[int, typer.Option(help="Port to listen on; 0 for any free port.")] = 8000,
-    seed: Annotated[int, typer.Option(help="Random seed of the policy.")] = 0,
+    host: Annotated[str, typer.Option(help="Address to listen at.")] = _LOOPBACK,
+    port: Annotated[int, typer.Option(help="0 takes any that is free.")] = 8000,
+    seed: Annotated[int, typer.Option(help="Of the policy's random choices.")] = 0,
     api_key_env: Annotated[
         str | None,
-        typer.Option(help="Environment variable that holds the API key which clients must send."),
+        typer.Option(help="Environment variable with the key that clients have to send."),
     ] = None,
 ) -> None:
-    """Serve a policy over the network."""
+    """Serve a policy to this benchmark and to any other client of the protocol."""
     from roboirg.policies.serving import open_server
 
     add_working_directory()
     key = None if api_key_env is None else os.environ.get(api_key_env)
     if api_key_env is not None and not key:
-        raise InvalidValueError(f"The environment variable {api_key_env} is not set or empty.")
+        raise InvalidValueError(f"The environment variable {api_key_env} holds no key.")
     server = open_server(policy, protocol, host, port, seed=seed, key=key)
     for number in _STOPPED:
         signal.signal(number, _stop)
     if host not in (_LOOPBACK, "localhost", "::1") and key is None:
-        typer.echo(
-            f"Warning: anyone who can reach {host} can use this server; set --api-key-env.",
-            err=True,
-        )
-    typer.echo(f"Serving {policy} at {server.url}; press Ctrl-C to stop.")
+        typer.echo(f"Whoever reaches {host} can use it: there is no --api-key-env.", err=True)
+    typer.echo(f"{policy} at {server.url}; Ctrl-C stops.")
     server.listening.serve_forever()
 
 
 def check_policy(
     policy: PolicySpec,
-    seed: Annotated[int, typer.Option(help="Random seed of the policy.")] = 0,
+    seed: Annotated[int, typer.Option(help="Of the policy's random choices.")] = 0,
 ) -> None:
-    """Check that a policy follows the interface, on synthetic observations; needs no simulator."""
+    """Check that a policy keeps the contract, on made-up observations; needs no simulator."""
     from rich.console import Console
 
     from roboirg.policies.policy_check import FAIL, print_check_results
@@ -71,6 +68,6 @@ def check_policy(
 
 def _stop(number: int, frame: FrameType | None) -> None:
     del frame
-    # Connections may be busy for a long time, and there is nothing to save.
+    # Connections may be in the middle of something that takes long; there is nothing to save.
     sys.stdout.flush()
     os._exit(_STOPPED[signal.Signals(number)])
