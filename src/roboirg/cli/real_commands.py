@@ -176,7 +176,7 @@ def figure(
     out: Annotated[str, typer.Option(help="Folder for real.png and real.svg.")],
     published: Annotated[bool, typer.Option(help="Show the paper's results beside these.")] = True,
 ) -> None:
-    """Draw the success rate by setting with 95 % intervals, as PNG and SVG."""
+    """Draw success by setting, with 95 % intervals, as PNG and SVG."""
     from roboirg.analysis.stats.samples import gather
     from roboirg.real.pages.study_figure import write_figure
     from roboirg.records.store import read_results
