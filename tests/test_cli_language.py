@@ -100,7 +100,7 @@ def test_what_is_wrong_is_one_sentence(tmp_path: Path, words, kind, sentence):
 
 def test_an_export_needs_a_place(tmp_path: Path):
     for path in (tmp_path, tmp_path / "nowhere" / "out.jsonl"):
-        with pytest.raises(InvalidValueError, match="is no name for a file"):
+        with pytest.raises(InvalidValueError, match="is not a file in an existing folder"):
             call("export", "instructions", "--out", path)
 
 

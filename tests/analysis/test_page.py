@@ -89,7 +89,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     film.caption = "Do it."
     world = Blank()
     for step in range(0, 101, 8):
-        film.shoot(world, is_demonstration=step < 20)  # type: ignore[arg-type]
+        film.add_frame(world, is_demonstration=step < 20)  # type: ignore[arg-type]
     assert film.finish()
     with RecordStore(folder) as store:
         for record in records():

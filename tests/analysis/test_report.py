@@ -285,7 +285,7 @@ def test_films_are_inside_or_beside(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     (tmp_path / "videos" / "a b.jpg").write_bytes(b"poster")
     first, second, *_ = records()
     filmed = first.model_copy(update={"video": "videos/a b.mp4"})
-    lost = second.model_copy(update={"video": "videos/gone.mp4", "film_lost": "no room"})
+    lost = second.model_copy(update={"video": "videos/gone.mp4", "video_error": "no room"})
 
     page = Page(render([filmed, lost], tmp_path))
     key = filmed.slug[-8:]

@@ -12,6 +12,7 @@ from rich.console import Console
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.episodes.splits import get_episode
+from roboirg.evaluation import seed_selection
 from roboirg.evaluation.plan import make_plan
 from roboirg.evaluation.seed_selection import EpisodeSlot, check_words
 from roboirg.language import (
@@ -30,7 +31,7 @@ from roboirg.language import (
 from roboirg.language.export import row
 from roboirg.language.setting import Setting
 from roboirg.language.settings import all_settings, direct
-from roboirg.language.validation import Batch, check_episode, validate_batch
+from roboirg.language.validation import Batch, check_episode, episode_checks, validate_batch
 from roboirg.language.validation.validation_tables import validation_tables
 from roboirg.language.variants import all_variants, instructions, split_episodes
 from roboirg.tasks import all_tasks
@@ -119,11 +120,12 @@ def test_a_pairing_rule_of_a_setting_can_fail(register):
     assert (failure.rule, failure.setting, failure.words) == ("pairing", "dummy", "not explicit")
 
 
-def test_only_a_setting_that_selects_seeds_changes_the_splits(register):
+def test_a_new_setting_does_not_change_the_splits(register, monkeypatch):
     slot = EpisodeSlot("PickXtimes", "test", 0)
     register(DUMMY)
     assert check_words(slot, EPISODE.seed) is None
-    register(dataclasses.replace(DUMMY, selects_seeds=True))
+    for module in (seed_selection, episode_checks):
+        monkeypatch.setattr(module, "ACCEPTANCE_SETTINGS", ("direct", "dummy"))
     rejection = check_words(slot, EPISODE.seed)
     assert (rejection.reason, rejection.cause) == ("not expressible", f"dummy: {REASON}")
     strict = check_episode(EPISODE, must_be_expressible=True)

@@ -56,7 +56,7 @@ def study(tmp_path_factory):
     text = finished(*play)
     assert records.read_bytes().startswith(killed[: killed.rindex(b"\n")])
     played = 12 - killed.count(b"\n")
-    assert f"{played} trials were played, 0 of them ended in an error." in text
+    assert f"Played {played} trials; 0 ended in an error." in text
     return folder
 
 

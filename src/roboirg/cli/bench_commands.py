@@ -1,4 +1,4 @@
-"""The command that measures this machine."""
+"""Command that measures the speed of this machine."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Annotated
 import typer
 
 MINIMUM_WIDTH = 110
-"""Columns to use where the output is not a terminal."""
+"""Columns of output that is not a terminal."""
 
 
 def bench(
-    rounds: Annotated[int, typer.Option(help="How often everything is measured.")] = 5,
-    out: Annotated[Path | None, typer.Option(help="A JSON file for all figures.")] = None,
+    rounds: Annotated[int, typer.Option(help="Number of repetitions.")] = 5,
+    out: Annotated[Path | None, typer.Option(help="JSON file for the results.")] = None,
 ) -> None:
-    """Time steps, resets, starts and memory against the floor and the stock path."""
+    """Measure the time and memory of steps, resets and starts on this machine."""
     from rich.console import Console
 
     from roboirg.perf.bench_runner import results_table, run_measures, write_results

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from roboirg.cli.import_path import see_working_directory
+from roboirg.cli.import_path import add_working_directory
 from roboirg.core.errors import InvalidValueError
 
 FAILED = 2
@@ -59,7 +59,7 @@ def serve(
     """Serve a policy to this benchmark and other clients of a protocol."""
     from roboirg.policies.serving.policy_server import open_server
 
-    see_working_directory()
+    add_working_directory()
     key = None if api_key_env is None else os.environ.get(api_key_env)
     if api_key_env is not None and not key:
         raise InvalidValueError(f"The environment variable {api_key_env} holds no key.")
@@ -84,7 +84,7 @@ def check_policy(
     from roboirg.policies.policy_check import FAIL, print_check_results
     from roboirg.policies.policy_check import check_policy as check
 
-    see_working_directory()
+    add_working_directory()
     results = check(policy, seed=seed)
     print_check_results(results, Console())
     if any(result.verdict == FAIL for result in results):

@@ -1,4 +1,4 @@
-"""Which code played: a fingerprint of the installed package."""
+"""Fingerprint of the installed package, for the records."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ FINGERPRINT_LENGTH = 12
 
 @functools.cache
 def code_fingerprint() -> str:
-    """SHA-256 over the names and bytes of the package's Python files, shortened."""
+    """Return a shortened SHA-256 of the names and bytes of the package's Python files."""
     digest = hashlib.sha256()
     root = Path(__file__).parents[1]
     for path in sorted(root.rglob("*.py")):

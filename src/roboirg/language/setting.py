@@ -56,8 +56,6 @@ class Setting:
             command gives the goal away where the scene has one such goal.
         pairing_rules: yields how the words of an episode differ from those of another setting
             with which they must agree; nothing if they agree.
-        selects_seeds: whether seed selection skips the scenes that the setting refuses. Keep it
-            False in new settings: the published splits were selected without them.
         example: index of the test episode that shows the setting in the language card.
     """
 
@@ -74,7 +72,6 @@ class Setting:
     variants: Sequence[Mapping[str, Any]] = ({},)
     hides_only_color: Callable[[Instruction], bool] = lambda _instruction: False
     pairing_rules: Callable[[Instruct], Iterable[str]] = no_pairing_rules
-    selects_seeds: bool = False
     example: int = 0
 
     @property

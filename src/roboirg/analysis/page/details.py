@@ -79,7 +79,7 @@ def details_of(
         ],
         "stages": [[index(mark.subgoal), mark.step] for mark in stages_of(record)],
         "traceback": optional_index(record.details),
-        "lost": optional_index(record.film_lost),
+        "lost": optional_index(record.video_error),
         "conditions": index(_conditions(record)),
     }
     if video is not None:

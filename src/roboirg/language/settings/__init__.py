@@ -11,10 +11,24 @@ from roboirg.language.setting import Setting
 from roboirg.tasks import Task
 from roboirg.util.discovery import discover
 
-__all__ = ["EXPLICIT", "all_settings", "get_setting", "setting_names", "settings_of"]
+__all__ = [
+    "ACCEPTANCE_SETTINGS",
+    "EXPLICIT",
+    "all_settings",
+    "get_setting",
+    "setting_names",
+    "settings_of",
+]
 
 EXPLICIT = "explicit"
 """The setting with which every other one is compared."""
+
+ACCEPTANCE_SETTINGS = ("explicit", "direct", "reasoning", "contextual", "spatial")
+"""Settings that must be able to express an episode for its seed to be accepted into a split.
+
+Frozen: a new setting must not change which episodes the splits hold, or older results could no
+longer be compared. A new setting may refuse some of these episodes instead.
+"""
 
 
 @functools.cache

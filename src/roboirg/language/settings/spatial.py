@@ -116,6 +116,5 @@ SETTING = Setting(
     reads=frozenset({"frame"}),
     variants=tuple({"frame": frame} for frame in FRAMES),
     hides_only_color=lambda _instruction: True,
-    selects_seeds=True,
     example=6,
 )

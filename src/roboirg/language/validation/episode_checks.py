@@ -11,7 +11,7 @@ from roboirg.language.generator import expressible, find_refusal, instruct_with
 from roboirg.language.instruction import Instruction
 from roboirg.language.interpreter import Interpretation, interpret
 from roboirg.language.setting import Setting
-from roboirg.language.settings import all_settings, settings_of
+from roboirg.language.settings import ACCEPTANCE_SETTINGS, all_settings, settings_of
 from roboirg.language.validation.leaks import find_leaks
 from roboirg.language.validation.necessity import only_candidate
 from roboirg.language.validation.pairing import unpaired
@@ -66,7 +66,7 @@ def check_episode(episode: Episode, *, must_be_expressible: bool = False) -> Val
     for setting in settings_of(get_task(episode.task)):
         _count_refusals(all_settings()[setting], episode, results)
         reason = find_refusal(episode, InstructionOptions(setting))
-        if reason is not None and must_be_expressible and all_settings()[setting].selects_seeds:
+        if reason is not None and must_be_expressible and setting in ACCEPTANCE_SETTINGS:
             _add_violations(results, episode, setting, [("expressible", reason)])
     return results
 

@@ -106,7 +106,7 @@ class ControlLoop:
             if isinstance(self.robot, JudgingRobot) and self._is_prepared:
                 with contextlib.suppress(Exception):  # the events before the error are optional
                     self.robot.judge(result)
-            result.fail(error.kind, error.cause, error.details)
+            result.record_error(error.kind, error.cause, error.details)
         return result
 
     @contextlib.contextmanager

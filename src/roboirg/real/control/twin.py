@@ -110,11 +110,11 @@ class Twin:
         first, *later = self._infos
         device = str(self._require_env().render_device)
         result.render_device = None if device == NO_RENDER_DEVICE else device
-        result.turn = int(first["elapsed_steps"])
+        result.policy_start_step = int(first["elapsed_steps"])
         for info in (first, *later):
-            result.note(info)
+            result.add_events(info)
         last = self._infos[-1]
-        result.settle(last["status"], last.get("cause"), last["steps"])
+        result.record_status(last["status"], last.get("cause"), last["steps"])
 
     def _step(self, command: Command) -> None:
         self._proprioception, *_, info = self._require_env().step(command)

@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.plan_parsing import split_name
+from roboirg.evaluation.plan_parsing import name_and_spec
 from roboirg.language.settings import setting_names, settings_of
 from roboirg.real.study.counterbalancing import counterbalanced_episodes, target_kind
 from roboirg.records.record import DEFAULT_MAX_STEPS, Job
@@ -150,7 +150,7 @@ def make_study(
         UnknownNameError: a task, setting or split does not exist.
         InvalidValueError: a number is out of range, or a name is given twice.
     """
-    named = [split_name(policy) for policy in policies]
+    named = [name_and_spec(policy) for policy in policies]
     names = [name for name, _ in named]
     settings = _shared_settings(tasks) if settings is None else settings
     _check(names, tasks, settings, trials, demonstrations, seed, max_steps)

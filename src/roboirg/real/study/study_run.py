@@ -17,7 +17,7 @@ from roboirg.core.actions import JOINT_ANGLE
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.plan import instruct_job
-from roboirg.evaluation.plan_parsing import split_name
+from roboirg.evaluation.plan_parsing import name_and_spec
 from roboirg.evaluation.rollout_result import make_record, utc_now
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.policies.loading import is_privileged, load_policy_class, policy_version
@@ -143,7 +143,7 @@ class Study:
         """Return the spec of each policy to play by its name; None where the name is the spec."""
         planned = {trial.job.policy: trial.job.spec for trial in self.plan.trials}
         specs: dict[str, str | None] = {}
-        for name, spec in map(split_name, policies or self.plan.policies):
+        for name, spec in map(name_and_spec, policies or self.plan.policies):
             if name not in planned:
                 raise UnknownNameError("policy in the plan", name, planned)
             specs[name] = planned[name] if spec == name else spec

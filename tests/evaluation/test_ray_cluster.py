@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from evaluation_fakes import FakePlayer, small_plan
+from evaluation_fakes import FakePlayer, comparable, small_plan
 
 from roboirg.core.errors import InvalidValueError, RenderDeviceError, RoboIRGError
 from roboirg.evaluation.executors.executor import InProcess, LocalProcesses
@@ -23,16 +23,16 @@ ray = pytest.importorskip("ray")
 PLAN = small_plan(10)
 
 
-def comparable(folder: Path) -> list[dict[str, object]]:
+def all_comparable(folder: Path) -> list[dict[str, object]]:
     records = sorted(read_records(folder), key=lambda record: record.slug)
-    return [record.comparable() for record in records]
+    return [comparable(record) for record in records]
 
 
 @pytest.fixture(scope="module")
 def here(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, object]]:
     folder = tmp_path_factory.mktemp("here")
     run_plan(PLAN, folder, FakePlayer(folder), InProcess())
-    return comparable(folder)
+    return all_comparable(folder)
 
 
 @pytest.fixture
@@ -74,7 +74,7 @@ def test_records_are_those_of_one_process_even_if_a_node_is_killed_half_way(
     assert (summary.errors, summary.missing) == ((), 0)
     # The episode that it had in hand was tried again.
     assert lines(tmp_path) > len(here)
-    assert comparable(tmp_path) == here
+    assert all_comparable(tmp_path) == here
     for record in read_records(tmp_path):
         assert (tmp_path / str(record.video)).read_text() == record.slug
 
@@ -92,14 +92,14 @@ class Homebound:
 
 def test_what_the_machines_do_not_have_is_told(tmp_path: Path) -> None:
     with pytest.raises(
-        RoboIRGError, match=r"No worker of the Ray cluster can begin \(.*only_at_home"
+        RoboIRGError, match=r"No worker of the Ray cluster can start \(.*only_at_home"
     ):
         run_plan(PLAN, tmp_path, Homebound(), RayCluster(1))  # type: ignore[arg-type]
 
 
 def test_four_workers_give_the_same_records(tmp_path: Path, here: list[dict[str, object]]) -> None:
     run_plan(PLAN, tmp_path, FakePlayer(tmp_path), LocalProcesses(4))
-    assert comparable(tmp_path) == here
+    assert all_comparable(tmp_path) == here
 
 
 def test_a_cluster_that_is_not_there_is_one_sentence(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Older schemas, damaged lines, and very many of them."""
+"""Lines of a records file: older schemas, damaged lines, and very many of them."""
 
 from __future__ import annotations
 
@@ -6,47 +6,23 @@ import json
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 from evaluation_fakes import FakePlay, small_plan
 
 from roboirg.evaluation.executors.executor import InProcess
 from roboirg.evaluation.runner import run_plan
-from roboirg.records.record import ERROR_KINDS, Job, Record, Result
+from roboirg.records.record import Job, Result
 from roboirg.records.record_codec import identity_key
 from roboirg.records.store import (
     RECORDS_FILE,
     RecordStore,
+    StoreError,
     read_contents,
     read_index,
     read_records,
     read_results,
 )
-
-NEW_IN_2 = [
-    "distractors",
-    "actions",
-    "demonstration_frames",
-    "observe_every",
-    "meshes",
-    "error",
-    "attribution",
-    "code",
-    "plan",
-    "attempt",
-    "spec",
-    "policy_metadata",
-    "usage",
-    "timings",
-]
-
-
-def first_schema(record: Record, **changes: Any) -> bytes:
-    data = {**record.model_dump(mode="json"), "schema_version": 1, **changes}
-    for name in NEW_IN_2:
-        del data[name]
-    return json.dumps(data).encode() + b"\n"
 
 
 def write(folder: Path, *lines: bytes) -> Path:
@@ -54,34 +30,19 @@ def write(folder: Path, *lines: bytes) -> Path:
     return folder
 
 
-def test_records_of_the_first_schema_are_read(tmp_path: Path) -> None:
+@pytest.mark.parametrize("version", [1, 2])
+def test_records_of_older_schemas_are_refused(tmp_path: Path, version: int) -> None:
     record = FakePlay()(small_plan().jobs()[0])
-    write(tmp_path, first_schema(record))
-    (read,) = read_records(tmp_path)
-    assert read.identity == record.identity
-    assert (read.outcome, read.events, read.schema_version) == (record.outcome, record.events, 2)
-    assert list(read_index(tmp_path)) == [identity_key(record)]
-    with RecordStore(tmp_path) as store:
-        assert list(store.stored) == [identity_key(record)]
+    line = {**record.model_dump(mode="json"), "schema_version": version, "film_lost": None}
+    del line["video_error"]
+    write(tmp_path, json.dumps(line).encode() + b"\n")
+    sentence = f"line 1 has schema version {version}, but this roboirg reads only version 3;"
+    for read in (read_records, read_results, read_index, RecordStore):
+        with pytest.raises(StoreError, match=sentence):
+            read(tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("cause", "kind"),
-    [
-        ("policy: ValueError: no", "policy"),
-        ("invalid action: nan", "invalid_action"),
-        ("environment: boom", "environment"),
-        ("environment: worker died (signal 9)", "infrastructure"),
-    ],
-)
-def test_errors_of_the_first_schema_get_their_kind(tmp_path: Path, cause: str, kind: str) -> None:
-    assert kind in ERROR_KINDS
-    record = FakePlay()(small_plan().jobs()[0])
-    write(tmp_path, first_schema(record, outcome="error", cause=cause))
-    assert read_records(tmp_path)[0].error == kind
-
-
-def test_a_damaged_line_costs_itself_and_is_told(tmp_path: Path) -> None:
+def test_a_damaged_line_loses_only_its_episode(tmp_path: Path) -> None:
     run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
     lines = (tmp_path / RECORDS_FILE).read_bytes().splitlines(keepends=True)
     write(tmp_path, *lines[:2], lines[2][:40] + b"\x00\xff\n", *lines[3:])

@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 import evaluation_fakes
-from evaluation_fakes import FakePlay, is_alive, small_plan, worker_pids
+from evaluation_fakes import FakePlay, comparable, is_alive, small_plan, worker_pids
 
 from roboirg.evaluation.executors.executor import InProcess
 from roboirg.evaluation.runner import run_plan
@@ -53,7 +53,7 @@ def test_after_any_number_of_sigkills_the_records_are_those_of_an_undisturbed_ru
         seen = len(contents.records)
     assert subprocess.run(command, check=False).returncode == 0
     assert not any(map(is_alive, worker_pids(folder)))
-    killed = {record.slug: record.comparable() for record in read_records(folder)}
-    assert killed == {record.slug: record.comparable() for record in read_records(undisturbed)}
+    killed = {record.slug: comparable(record) for record in read_records(folder)}
+    assert killed == {record.slug: comparable(record) for record in read_records(undisturbed)}
     assert read_contents(folder / RECORDS_FILE).torn == b""
     assert late < KILLS / 2  # most of them hit a run

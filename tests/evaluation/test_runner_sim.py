@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+from evaluation_fakes import comparable
 
 from roboirg.evaluation.plan import read_plan
 from roboirg.records.store import RECORDS_FILE, read_records
@@ -49,7 +50,7 @@ def test_an_invalid_action_is_recorded_and_told(tmp_path: Path) -> None:
         assert (record.outcome, record.steps) == ("error", 3)
 
 
-def test_a_film_of_a_real_episode(tmp_path: Path) -> None:
+def test_a_video_of_a_real_episode(tmp_path: Path) -> None:
     words = ("--policy", "oracle", "--tasks", "VideoUnmask", "--settings", "direct")
     said = command("run", *words, "--episodes", "1", "--video", "all", "--out", "o", cwd=tmp_path)
     assert said.returncode == 0, said.stderr
@@ -82,9 +83,9 @@ SMALL_RUN = (
 )  # fmt: skip
 
 
-def comparable(folder: Path) -> list[dict[str, object]]:
+def all_comparable(folder: Path) -> list[dict[str, object]]:
     records = sorted(read_records(folder), key=lambda record: record.slug)
-    return [record.comparable() for record in records]
+    return [comparable(record) for record in records]
 
 
 def kill_in_the_middle(folder: Path, *words: str) -> None:
@@ -110,7 +111,7 @@ def test_workers_and_kills_leave_no_trace_in_the_records(tmp_path: Path) -> None
     for run in words:
         said = command(*run, cwd=tmp_path)
         assert said.returncode == 0, said.stderr
-    one, two, killed = map(comparable, folders)
+    one, two, killed = map(all_comparable, folders)
     assert len(one) == 8
     assert {record["outcome"] for record in one} == {"success", "failure"}
     assert two == one

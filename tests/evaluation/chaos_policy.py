@@ -1,4 +1,4 @@
-"""A policy that misbehaves in every way that is known, in some of its episodes."""
+"""A policy that misbehaves in some of its episodes, in every known way."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 EVERY = 3
-"""One episode in so many goes wrong."""
+"""Every third episode goes wrong."""
 
 KINDS = {
     "raise": "policy",
@@ -36,7 +36,7 @@ KINDS = {
 """What it does, and the kind of error that this is."""
 
 CALM = "ROBOIRG_TEST_CALM"
-"""The variable that makes it behave in every episode."""
+"""Environment variable that makes it behave in every episode."""
 
 
 def misdeed(seed: int) -> str | None:

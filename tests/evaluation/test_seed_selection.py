@@ -1,30 +1,32 @@
 """The shipped splits are what the rule gives: scene, words and oracle agree."""
 
+import dataclasses
 import io
 from collections import Counter
 
 import pytest
-from acceptance_fakes import die, refuse, take_the_third
 from rich.console import Console
+from seed_selection_fakes import die, refuse, take_the_third
 
 from roboirg.core.episode import SPLITS
 from roboirg.core.errors import InvalidValueError, RoboIRGError, SceneRejectedError
 from roboirg.episodes.splits import SIZES, TaskSplits, get_episode, shipped_splits, slot_seed
 from roboirg.evaluation.seed_selection import (
+    ACCEPTANCE_SETTINGS,
     EpisodeSlot,
     Rejection,
     SelectedSeed,
-    check_kept,
+    check_kept_splits,
     check_seed,
     check_words,
     episode_slots,
     find_seed,
     find_seeds,
-    merged,
+    merge_splits,
 )
 from roboirg.evaluation.seed_summary import cause_lines, follow_progress, print_summary
-from roboirg.language import expressible
-from roboirg.language.settings import settings_of
+from roboirg.language import expressible, find_refusals
+from roboirg.language.settings import all_settings, settings_of
 from roboirg.tasks import every_task, get_task
 
 TASKS = tuple(every_task())
@@ -99,6 +101,28 @@ def test_reasons_are_told_apart():
     assert all("no place for" in one.cause for one in rejections)
 
 
+def test_a_new_setting_does_not_change_which_seeds_are_accepted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    slots = [EpisodeSlot("VideoUnmask", "val", index) for index in (0, 15)]
+    before = [find_seed(slot, check_words) for slot in slots]
+    mute = dataclasses.replace(
+        all_settings()["direct"], name="mute", order=9, refusal=lambda _request: "it is mute"
+    )
+    every = {**all_settings(), "mute": mute}
+    monkeypatch.setattr("roboirg.language.settings.all_settings", lambda: every)
+    episode = get_episode("VideoUnmask", "val", 0)
+    assert "mute" in settings_of(get_task("VideoUnmask"))
+    assert "mute" not in expressible(episode)
+    assert find_refusals(episode) == {"mute": "it is mute"}
+    assert [find_seed(slot, check_words) for slot in slots] == before
+
+
+def test_seeds_are_accepted_by_the_settings_of_the_first_release() -> None:
+    assert set(ACCEPTANCE_SETTINGS) <= set(all_settings())
+    assert [*ACCEPTANCE_SETTINGS] == ["explicit", "direct", "reasoning", "contextual", "spatial"]
+
+
 def test_processes_find_what_one_finds():
     slots = episode_slots(["VideoPlaceButton"], ["val"])
     alone = list(find_seeds(slots, 0, check_words))
@@ -122,11 +146,11 @@ def test_what_ends_a_search_is_named():
 def test_what_was_not_built_again_stays():
     slots = episode_slots(["VideoUnmask"], ["test"])
     built = [SelectedSeed(slot, ()) for slot in slots]
-    now = merged(built, shipped_splits())
+    now = merge_splits(built, shipped_splits())
     assert now == dict(shipped_splits())
     assert list(now) == list(TASKS)
     three = (Rejection(0, "no room", "no place"),) * 3
-    now = merged([SelectedSeed(slots[7], three), *built[:7], *built[8:]], shipped_splits())
+    now = merge_splits([SelectedSeed(slots[7], three), *built[:7], *built[8:]], shipped_splits())
     assert now["VideoUnmask"].passed_over == {
         **shipped_splits()["VideoUnmask"].passed_over,
         "test/7": 3,
@@ -136,14 +160,14 @@ def test_what_was_not_built_again_stays():
 
 
 def test_only_what_is_valid_can_stay():
-    check_kept(["VideoUnmask"], ["test"], shipped_splits())
-    check_kept(["VideoUnmask"], SPLITS, {})
+    check_kept_splits(["VideoUnmask"], ["test"], shipped_splits())
+    check_kept_splits(["VideoUnmask"], SPLITS, {})
     with pytest.raises(
         InvalidValueError, match=r"VideoUnmask/train/0 .* all splits of VideoUnmask"
     ):
-        check_kept(["VideoUnmask"], ["test"], {})
+        check_kept_splits(["VideoUnmask"], ["test"], {})
     with pytest.raises(InvalidValueError, match=r"VideoUnmask/val/15"):
-        check_kept(["VideoUnmask"], ["train", "test"], {"VideoUnmask": TaskSplits("", {})})
+        check_kept_splits(["VideoUnmask"], ["train", "test"], {"VideoUnmask": TaskSplits("", {})})
 
 
 def test_the_summary_tells_how_many_and_why():

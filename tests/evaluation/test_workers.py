@@ -10,9 +10,9 @@ import time
 from collections import Counter
 from pathlib import Path
 
-import chaos
+import chaos_policy
 import pytest
-from evaluation_fakes import FakePlay, small_plan
+from evaluation_fakes import FakePlay, comparable, small_plan
 
 from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
@@ -30,7 +30,7 @@ TIMEOUT_S = 3.0
 def plan_of_chaos() -> Plan:
     """Enough episodes for every misdeed to happen, and twice as many good ones."""
     plan = Plan(
-        policies=(chaos.SPEC,),
+        policies=(chaos_policy.SPEC,),
         tasks=("PickXtimes",),
         settings=("direct",),
         episodes=tuple(range(50)),
@@ -42,10 +42,10 @@ def plan_of_chaos() -> Plan:
     jobs, chosen, met = plan.jobs(), [], Counter[str | None]()
     for job in jobs:
         misdeed = load_policy(job).misdeed  # type: ignore[attr-defined]
-        if met[misdeed] < (1 if misdeed else 2 * len(chaos.KINDS)):
+        if met[misdeed] < (1 if misdeed else 2 * len(chaos_policy.KINDS)):
             met[misdeed] += 1
             chosen.append(job)
-    assert set(met) == {None, *chaos.KINDS}
+    assert set(met) == {None, *chaos_policy.KINDS}
 
     class Chosen(Plan):
         def jobs(self) -> tuple[Job, ...]:
@@ -62,7 +62,7 @@ def play(plan: Plan, folder: Path) -> tuple[RunSummary, dict[Job, Record]]:
 
 @pytest.fixture
 def plan(monkeypatch: pytest.MonkeyPatch) -> Plan:
-    monkeypatch.syspath_prepend(Path(chaos.__file__).parent)
+    monkeypatch.syspath_prepend(Path(chaos_policy.__file__).parent)
     return plan_of_chaos()
 
 
@@ -71,28 +71,28 @@ def test_a_policy_of_chaos_costs_its_own_episodes_and_nothing_else(
     plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     summary, wild = play(plan, tmp_path / "wild")
-    monkeypatch.setenv(chaos.CALM, "1")
+    monkeypatch.setenv(chaos_policy.CALM, "1")
     _, calm = play(plan, tmp_path / "calm")
 
     assert (summary.missing, summary.total) == (0, len(plan.jobs()))
-    assert len(summary.errors) == len(chaos.KINDS)
+    assert len(summary.errors) == len(chaos_policy.KINDS)
     for job, record in wild.items():
-        misdeed = chaos.misdeed(record.policy_metadata.get("seed", _seed(job)))  # type: ignore[arg-type]
+        misdeed = chaos_policy.misdeed(record.policy_metadata.get("seed", _seed(job)))  # type: ignore[arg-type]
         if misdeed is None:
-            assert record.comparable() == calm[job].comparable()
+            assert comparable(record) == comparable(calm[job])
             assert record.usage == {"calls": 3.0}
         else:
             assert (misdeed, record.outcome, record.error) == (
                 misdeed,
                 "error",
-                chaos.KINDS[misdeed],
+                chaos_policy.KINDS[misdeed],
             )
             assert record.cause is not None
-            assert record.cause.startswith(chaos.KINDS[misdeed].replace("_", " ") + ": ")
+            assert record.cause.startswith(chaos_policy.KINDS[misdeed].replace("_", " ") + ": ")
             assert "\n" not in record.cause
     causes = {misdeed: wild[job].cause for job, misdeed in _misdeeds(plan).items()}
-    assert causes["hang"] == "timeout: the policy's act() did not come back in time"
-    assert causes["hang in reset"] == "timeout: the policy's reset() did not come back in time"
+    assert causes["hang"] == "timeout: the policy's act() did not return in time"
+    assert causes["hang in reset"] == "timeout: the policy's reset() did not return in time"
     crash = f"policy: the process died of signal {signal.SIGSEGV:d} in the policy's act()"
     assert causes["crash"] == crash
     assert causes["die"] == "policy: the process ended with exit code 0 in the policy's act()"
@@ -103,7 +103,7 @@ def test_a_policy_of_chaos_costs_its_own_episodes_and_nothing_else(
 
 
 def _misdeeds(plan: Plan) -> dict[Job, str]:
-    found = {job: chaos.misdeed(_seed(job)) for job in plan.jobs()}
+    found = {job: chaos_policy.misdeed(_seed(job)) for job in plan.jobs()}
     return {job: misdeed for job, misdeed in found.items() if misdeed is not None}
 
 
@@ -124,7 +124,8 @@ def test_an_episode_that_takes_too_long_is_ended_and_named(tmp_path: Path) -> No
     for record in read_records(tmp_path):
         assert record.error == "timeout"
         # The process may not have got as far as the episode.
-        words = r"timeout: the episode took longer than 0\.5 s \(now in the (start|world)\)"
+        phase = "(worker startup|environment)"
+        words = rf"timeout: the episode took longer than 0\.5 s \(now in the {phase}\)"
         assert re.fullmatch(words, str(record.cause))
         assert record.duration_s >= 0.5
 
@@ -142,7 +143,7 @@ def test_a_crash_in_the_simulators_native_code_is_the_worlds(tmp_path: Path) -> 
         # Such a crash may pass, so it was tried again.
         assert (record.error, record.attempt) == ("environment", 2)
         assert record.cause == (
-            f"environment: the process died of signal {signal.SIGSEGV:d} in the world"
+            f"environment: the process died of signal {signal.SIGSEGV:d} in the environment"
         )
 
 
@@ -157,25 +158,25 @@ class Homeless:
 
 
 def test_processes_that_cannot_start_end_the_run(tmp_path: Path) -> None:
-    words = r"No worker process can start \(environment: .* exit code 3 in the start\)"
+    words = r"No worker process can start \(environment: .* exit code 3 in the worker startup\)"
     with pytest.raises(RoboIRGError, match=words):
         run_plan(small_plan(50), tmp_path, Homeless(), LocalProcesses(2))
     assert len(read_records(tmp_path)) < 10
 
 
-def test_a_worker_is_gone_after_it_was_overdue() -> None:
-    worker = Worker.hire(sleepy, small_plan(1).jobs()[0])
-    assert worker.overdue(3600) is None
-    record = worker.overdue(0.0)
+def test_an_overdue_worker_is_killed() -> None:
+    worker = Worker.start(sleepy, small_plan(1).jobs()[0])
+    assert worker.kill_if_overdue(3600) is None
+    record = worker.kill_if_overdue(0.0)
     assert record is not None
-    assert worker.is_gone
+    assert worker.is_dead
     assert worker.process.exitcode == -signal.SIGKILL
 
 
 @pytest.mark.parametrize(
     ("whom", "error", "kind"),
     [
-        ("policy", ConnectionRefusedError("nobody there"), "connection"),
+        ("policy", ConnectionRefusedError("refused"), "connection"),
         ("policy", TimeoutError("slow"), "timeout"),
         ("policy", OSError("odd"), "policy"),
         ("environment", TimeoutError("slow"), "environment"),
@@ -197,7 +198,7 @@ class Unreachable:
         record = FakePlay()(job)
         if job.policy != self.policy:
             return record
-        lost = {"outcome": "error", "error": "connection", "cause": "connection: nobody there"}
+        lost = {"outcome": "error", "error": "connection", "cause": "connection: refused"}
         return record.model_copy(update=lost)
 
 
