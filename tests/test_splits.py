@@ -93,7 +93,7 @@ def test_only_plain_data_has_a_fingerprint():
     episode = get_episode("VideoUnmask", "test", 0)
     assert json.loads(json.dumps(plain(episode))) == plain(episode)
     for wrong in (np.float64(1.0), np.int64(1), [1], {1}):
-        with pytest.raises(TypeError, match="is no plain data"):
+        with pytest.raises(TypeError, match="is not plain data"):
             plain((wrong,))
 
 

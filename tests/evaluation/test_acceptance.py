@@ -113,7 +113,7 @@ def test_what_ends_a_search_is_named():
     slots = episode_slots(["PickXtimes"], ["val"])[:3]
     with pytest.raises(SceneRejectedError, match="PickXtimes/val/0"):
         list(find_seeds(slots[:1], 1, refuse))
-    with pytest.raises(RoboIRGError, match="process at work died"):
+    with pytest.raises(RoboIRGError, match="worker process died"):
         list(find_seeds(slots, 1, die))
     with pytest.raises(InvalidValueError, match="workers is -1"):
         list(find_seeds(slots, -1))

@@ -10,7 +10,7 @@ from language_variants import SPATIAL_TASKS, random_episodes
 from roboirg.core.episode import COLORS, Point, Scene, SceneObject
 from roboirg.core.motions import Away
 from roboirg.language import FORMS, expressible, instruct, interpret
-from roboirg.language.interpreter.places import find, read_places
+from roboirg.language.interpreter.places import find_objects, read_places
 from roboirg.language.interpreter.tokens import split_sentences
 from roboirg.language.landmarks import MARGIN, landmarks, selectors
 
@@ -72,7 +72,7 @@ def check_reader(scene, thing, landmark, target, frame):
     (sentence,) = split_sentences(f"the {thing} {landmark.phrase}")
     (place,) = read_places(sentence)
     mirrored = frame == "camera"
-    assert find(place, scene, thing, mirrored=mirrored) == (target,), landmark
+    assert find_objects(place, scene, thing, mirrored=mirrored) == (target,), landmark
 
 
 @settings(max_examples=200, deadline=None)
@@ -162,7 +162,7 @@ def test_a_corner_is_used_only_if_it_does_not_matter_which_one_is_meant():
 def test_the_reader_reports_near_ties(words, places):
     scene = containers(places)
     (place,) = read_places(*split_sentences(f"the container {words}"))
-    assert find(place, scene, "container", mirrored=False) == scene.objects[:2]
+    assert find_objects(place, scene, "container", mirrored=False) == scene.objects[:2]
 
 
 def test_a_place_of_two_things_makes_two_goals():

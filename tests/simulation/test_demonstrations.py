@@ -305,7 +305,7 @@ def test_a_damaged_entry_is_made_anew(cache, caplog, kind):
     _, _, again = reset(cameras=("front",))
     assert np.array_equal(again["demonstration"]["front_rgb"], before)
     assert [record.getMessage() for record in caplog.records] == [
-        f"The cache entry {entry} is damaged; it is made anew."
+        f"The cache entry {entry} is damaged and will be rebuilt."
     ]
     assert entry.stat().st_size == size
 

@@ -132,7 +132,7 @@ def test_damaged_meshes_are_made_anew_and_told(right):
     out, complaints = told_by(process)
     assert out == picture
     for path in harmed:
-        assert f"The cache entry {path} is damaged; it is made anew." in complaints
+        assert f"The cache entry {path} is damaged and will be rebuilt." in complaints
     assert complaints.count("damaged") == 2
     assert {path.name: path.read_bytes() for path in cache.iterdir()} == sound
 

@@ -12,9 +12,8 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Literal, NamedTuple
 
-from roboirg.core.episode import Scene, SceneObject
+from roboirg.core.episode import ObjectKind, Scene, SceneObject
 from roboirg.core.motions import Away
-from roboirg.tasks.task import Thing
 
 MARGIN = 0.03
 """Meters by which a landmark's object must exceed all others in the compared quantity."""
@@ -30,7 +29,7 @@ Frame = Literal["robot", "camera"]
 FRAMES: tuple[Frame, ...] = ("robot", "camera")
 
 ORDINALS = {1: "second", 2: "third"}
-PAIRED: tuple[Thing, ...] = ("box", "tape")
+PAIRED: tuple[ObjectKind, ...] = ("box", "tape")
 """Kinds of objects that always come in pairs."""
 
 
@@ -90,7 +89,7 @@ class Selector(NamedTuple):
 # Cached: all forms of an episode ask for the same.
 @functools.lru_cache(maxsize=64)
 def landmarks(
-    scene: Scene, thing: Thing, target: SceneObject, frame: Frame = "robot"
+    scene: Scene, thing: ObjectKind, target: SceneObject, frame: Frame = "robot"
 ) -> tuple[Landmark, ...]:
     """Return the landmarks of the best available class that single out the target; maybe none.
 
@@ -109,7 +108,7 @@ def landmarks(
     return tuple(found)
 
 
-def selectors(scene: Scene, thing: Thing, frame: Frame) -> Iterator[Selector]:
+def selectors(scene: Scene, thing: ObjectKind, frame: Frame) -> Iterator[Selector]:
     """Yield every selector, from the best class to the last.
 
     Boxes and tapes stand in pairs, one on each side of the robot; only their sides are used.
@@ -129,7 +128,7 @@ def selectors(scene: Scene, thing: Thing, frame: Frame) -> Iterator[Selector]:
     yield from _chains(thing, candidates, named, level=9, rank=2)
 
 
-def candidates_in(scene: Scene, thing: Thing) -> tuple[SceneObject, ...]:
+def candidates_in(scene: Scene, thing: ObjectKind) -> tuple[SceneObject, ...]:
     """Return the visible candidates: all objects of a kind, without cubes that arrive later."""
     if thing != "cube":
         return scene.of_kind(thing)

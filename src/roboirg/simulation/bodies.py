@@ -191,7 +191,7 @@ def _build_container(scene: sapien.Scene, item: SceneObject, visible: bool) -> B
 
 
 def _build_target(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
-    """A ringed disc, purple or as the scene wants it."""
+    """Build a ringed disc, purple unless the scene gives a color."""
     half = (item.thickness or object_sizes.TARGET_THICKNESS) / 2
     return _ringed_disc(
         scene, item, PURPLE if item.rgb is None else (*item.rgb, 1.0), half, visible
@@ -199,7 +199,7 @@ def _build_target(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body
 
 
 def _build_marker(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
-    """A ringed disc, red and thick enough to cover a target."""
+    """Build a red ringed disc, thick enough to cover a target."""
     return _ringed_disc(scene, item, RED, object_sizes.MARKER_HALF_THICKNESS, visible)
 
 

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from roboirg.core.episode import COLORS, Color, Difficulty, Goal, Scene, Stage, Suite
-
-Thing = Literal["cube", "container", "box", "tape"]
-"""Kinds of object that a command can refer to by their place; also their names in words."""
+from roboirg.core.episode import COLORS, Color, Difficulty, Goal, ObjectKind, Scene, Stage, Suite
 
 
 def _no_stages(_scene: Scene) -> tuple[Stage, ...]:
@@ -39,8 +36,8 @@ class Commands:
     Attributes:
         patterns: reasoning patterns, in the order in which the episodes cycle through them.
         wordings: at least two for each number of parts.
-        thing: kind of object that the goal selects; a place distinguishes one among all objects
-            of that kind.
+        thing: kind of object that the goal selects, and its name in words; a place distinguishes
+            one among all objects of that kind.
         colored: kind of object that has the goal's color: the same, or the cube in a container.
         colors: those that commands mention; color exclusion takes exactly three.
         by_color: how to refer to the object by a color; ``{cube}`` is the colored object.
@@ -50,8 +47,8 @@ class Commands:
 
     patterns: tuple[str, ...]
     wordings: tuple[Wording, ...]
-    thing: Thing = "cube"
-    colored: Thing = "cube"
+    thing: ObjectKind = "cube"
+    colored: ObjectKind = "cube"
     colors: tuple[Color, ...] = COLORS
     by_color: str = "{cube}"
     by_place: str = "the cube {place}"

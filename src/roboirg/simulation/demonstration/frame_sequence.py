@@ -88,7 +88,7 @@ def read_frames(sequences: Sequence[FrameSequence]) -> list[NDArray[Any]]:
             missing.append((sequence, array))
     if missing:
         _draw(missing)
-    for sequence, array in missing if cache.keeps else ():
+    for sequence, array in missing if cache.enabled else ():
         cache.write(sequence.key(), _compress(array))
     return arrays
 

@@ -1,4 +1,4 @@
-"""The reader understands sentences that no template makes, and leaves open what nobody said."""
+"""The interpreter reads sentences that no template makes, and leaves open what they do not name."""
 
 import itertools
 
@@ -297,7 +297,7 @@ def test_late_cubes_are_nowhere_yet():
 COUNTS = st.dictionaries(st.sampled_from(COLORS), st.integers(1, 4), min_size=1)
 WORDED = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 NUMBERS = st.tuples(st.integers(1, 10), st.booleans())
-"""A number, and whether it is said in a word."""
+"""A number, and whether it is spelled as a word."""
 
 
 def spelled(number, worded):
