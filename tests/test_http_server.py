@@ -11,7 +11,7 @@ import pytest
 
 from roboirg.analysis.page.page_server import PageServer
 from roboirg.core.errors import InvalidValueError
-from roboirg.policies.serving import open_server
+from roboirg.policies.serving.policy_server import open_server
 from roboirg.real.pages.score_server import ScoreServer
 from roboirg.real.study.study_plan import make_study, write_study
 from roboirg.util.http_server import LoopbackRequestHandler, LoopbackServer
