@@ -28,15 +28,21 @@ FORBIDDEN_MODULES = {
 }  # fmt: skip
 
 FORBIDDEN_IDENTIFIERS = {
-    "Began", "Board", "Chooser", "Company", "Contestant", "Courier", "Course", "DeadMan", "Desk",
-    "Draft", "Drawable", "Excerpt", "Fault", "Film", "Finding", "HandedPolicy", "Ledger",
-    "MOST_STILLBORN", "PASSING", "PlannedPolicy", "Said", "Seat", "Slip", "Spell",
-    "Studio", "Telling", "Wishes", "blame", "course", "dead_man", "excuse", "felt", "happenings",
-    "kept_arrays", "ledger", "lettering", "mistake", "retelling", "retrace", "send_limit", "slips",
-    "wishes",
+    "Asker", "Began", "Board", "Chooser", "Company", "Contestant", "Courier", "Course", "DeadMan",
+    "Desk", "Draft", "Drawable", "Excerpt", "Fault", "Film", "Finding", "HandedPolicy", "Ledger",
+    "MOST_STILLBORN", "MadeUpEpisode", "PASSING", "PlannedPolicy", "Play", "Player", "Rules",
+    "Said", "Sample", "Seat", "Senses", "Slip", "Spell", "Studio", "Telling", "Trace", "Wishes",
+    "blame", "course", "dead_man", "ending", "excuse", "felt", "happenings", "kept_arrays",
+    "ledger", "lettering", "mistake", "offered", "perform", "retelling", "retrace", "send_limit",
+    "slips", "wishes",
 }  # fmt: skip
 """A leading underscore makes no difference."""
 
+SPOKEN = (
+    "src/roboirg/language/templates.py",
+    "src/roboirg/policies/planning/prompts/listener.toml",
+)
+"""Words that are said to robots and models are data: changing them would change results."""
 FORBIDDEN_PROSE = ("whoever", "nobody", "somebody", "anybody", "so many", "so often", "while due")
 
 
@@ -197,6 +203,7 @@ def test_no_prose_has_a_forbidden_phrase(phrase):
     found = [
         f"{path.relative_to(ROOT)}:{text.count(chr(10), 0, match.start()) + 1}"
         for path, text in texts()
+        if str(path.relative_to(ROOT)) not in SPOKEN
         for match in pattern.finditer(text)
     ]
     check_empty(found)

@@ -70,7 +70,7 @@ def test_primitives_take_as_long_as_the_known_ones_within_fifteen_percent():
             expert = MotionPrimitives(session.world)
             for stage in episode.demonstration:
                 begin = session.world.elapsed
-                for action in itertools.chain.from_iterable(expert.perform(stage.primitive)):
+                for action in itertools.chain.from_iterable(expert.execute(stage.primitive)):
                     session.step(action)
                 steps[stage.primitive.kind].append(session.world.elapsed - begin)
     assert set(steps) == set(PRIMITIVES)

@@ -152,7 +152,7 @@ def test_first_picks_take_as_long_as_robomme_s(task, primitive, low, high):
         while world.elapsed < APPEAR_STEP + 8:  # containers have to be there and at rest
             world.step(HOME_ACTION)
         begun = world.elapsed
-        for piece in MotionPrimitives(world).perform(stage.primitive):
+        for piece in MotionPrimitives(world).execute(stage.primitive):
             for action in piece:
                 world.step(action)
         assert low <= world.elapsed - begun <= high

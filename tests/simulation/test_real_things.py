@@ -65,7 +65,7 @@ def test_a_roll_weighs_about_as_much_as_a_cube_and_lies_still():
 
 def test_a_roll_is_picked_from_outside():
     world = World(Scene((TAPE,)), visible=False)
-    execute(world, MotionPrimitives(world).perform(Primitive("pick_cube", "tape")))
+    execute(world, MotionPrimitives(world).execute(Primitive("pick_cube", "tape")))
     assert Fact("picked", "tape") in world.facts
     assert Fact("held", "tape") in world.facts
 
@@ -110,8 +110,8 @@ def test_what_is_held_over_a_box_is_not_inside():
     episode = get_episode("PutInBox", "test", 0)
     world = World(episode.scene, visible=False)
     expert, box = MotionPrimitives(world), f"box_{episode.goal.text('color')}"
-    execute(world, expert.perform(Primitive("pick_cube", "tape")))
-    into = expert.perform(Primitive("put_into", "tape", box))
+    execute(world, expert.execute(Primitive("pick_cube", "tape")))
+    into = expert.execute(Primitive("put_into", "tape", box))
     inside = Fact("binned", "tape", box)
     execute(world, itertools.islice(into, 2))
     assert inside not in world.facts

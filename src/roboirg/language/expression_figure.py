@@ -62,7 +62,7 @@ def write_figure(
     # The salt makes the ids in the SVG file reproducible.
     with mpl.rc_context({"svg.hashsalt": "roboirg", "font.family": "DejaVu Sans", "font.size": 9}):
         figure = _draw(instructions, title)
-        paths = tuple(folder / f"{name}.{ending}" for ending in FORMATS)
+        paths = tuple(folder / f"{name}.{suffix}" for suffix in FORMATS)
         try:
             folder.mkdir(parents=True, exist_ok=True)
             for path in paths:

@@ -60,7 +60,7 @@ def _stretch(task: str, index: int, first: int) -> Workload:
     session = EpisodeSession(episode, visible=False)
     expert, actions = MotionPrimitives(session.world), []
     stages = (*episode.demonstration, *episode.stages)
-    for trajectory in itertools.chain.from_iterable(expert.perform(s.primitive) for s in stages):
+    for trajectory in itertools.chain.from_iterable(expert.execute(s.primitive) for s in stages):
         for action in trajectory:
             session.step(action)
             actions.append(action)

@@ -114,7 +114,7 @@ class EpisodeSession:
 
         expert = MotionPrimitives(self.world)
         for index, stage in enumerate(self.episode.demonstration):
-            for trajectory in expert.perform(stage.primitive):
+            for trajectory in expert.execute(stage.primitive):
                 for action in trajectory:
                     yield RecordedStep(index, action)
 

@@ -46,10 +46,11 @@ class MotionPlayer:
     def __init__(self, motions: Sequence[Motion], bodies: Bodies) -> None:
         spots = (Point(10.0 + _SPACING * index, 10.0, 10.0) for index in range(len(motions)))
         players = [
-            _player(motion, bodies, spot) for motion, spot in zip(motions, spots, strict=True)
+            _scripted_motion(motion, bodies, spot)
+            for motion, spot in zip(motions, spots, strict=True)
         ]
         # Swaps come first: an object that returns under another needs that one's new position.
-        self._players = sorted(players, key=lambda player: not isinstance(player, _SwapPlayer))
+        self._players = sorted(players, key=lambda player: not isinstance(player, _SwapMotion))
 
     def before_step(self, context: MotionContext) -> None:
         """Move the objects for the next control step."""
@@ -70,7 +71,7 @@ class MotionPlayer:
         return frozenset(player.subject for player in self._players if player.stopped)
 
 
-class _Player(ABC):
+class _ScriptedMotion(ABC):
     """Plays one motion of one object.
 
     Attributes:
@@ -91,7 +92,7 @@ class _Player(ABC):
         del facts
 
 
-class _AwayPlayer(_Player):
+class _AwayMotion(_ScriptedMotion):
     def __init__(self, motion: Away, bodies: Bodies, spot: Point) -> None:
         super().__init__(motion.subject)
         self._motion, self._spot = motion, spot
@@ -111,7 +112,7 @@ class _AwayPlayer(_Player):
             self._body.put(place)
 
 
-class _SwapPlayer(_Player):
+class _SwapMotion(_ScriptedMotion):
     def __init__(self, motion: Swap, bodies: Bodies) -> None:
         super().__init__(motion.first)
         self._motion = motion
@@ -139,7 +140,7 @@ class _SwapPlayer(_Player):
             body.set_pose(pose)
 
 
-class _ShuttlePlayer(_Player):
+class _ShuttleMotion(_ScriptedMotion):
     def __init__(self, motion: Shuttle, bodies: Bodies) -> None:
         super().__init__(motion.subject)
         self._motion, self._body = motion, bodies[motion.subject]
@@ -151,7 +152,7 @@ class _ShuttlePlayer(_Player):
         self.stopped = self._motion.stopped_by in context.facts
 
 
-class _GlowPlayer(_Player):
+class _GlowMotion(_ScriptedMotion):
     def __init__(self, motion: Glow, bodies: Bodies, spot: Point) -> None:
         super().__init__(motion.subject)
         self._motion, self._body, self._spot = motion, bodies[motion.subject], spot
@@ -165,7 +166,7 @@ class _GlowPlayer(_Player):
         self._body.put(self._spot if self.absent else self._body.item.position)
 
 
-class _VanishPlayer(_Player):
+class _VanishMotion(_ScriptedMotion):
     def __init__(self, motion: Vanish, bodies: Bodies, spot: Point) -> None:
         super().__init__(motion.subject)
         self._motion, self._body, self._spot = motion, bodies[motion.subject], spot
@@ -181,18 +182,18 @@ class _VanishPlayer(_Player):
             self._body.put(self._spot)
 
 
-def _player(motion: Motion, bodies: Bodies, spot: Point) -> _Player:
+def _scripted_motion(motion: Motion, bodies: Bodies, spot: Point) -> _ScriptedMotion:
     match motion:
         case Away():
-            return _AwayPlayer(motion, bodies, spot)
+            return _AwayMotion(motion, bodies, spot)
         case Swap():
-            return _SwapPlayer(motion, bodies)
+            return _SwapMotion(motion, bodies)
         case Shuttle():
-            return _ShuttlePlayer(motion, bodies)
+            return _ShuttleMotion(motion, bodies)
         case Glow():
-            return _GlowPlayer(motion, bodies, spot)
+            return _GlowMotion(motion, bodies, spot)
         case Vanish():
-            return _VanishPlayer(motion, bodies, spot)
+            return _VanishMotion(motion, bodies, spot)
         case _:
             assert_never(motion)
 

@@ -66,12 +66,12 @@ def save(draw: Callable[[], Figure | None], folder: Path, name: str) -> tuple[Pa
         figure = draw()
         if figure is None:
             return ()
-        paths = tuple(folder / f"{name}.{ending}" for ending in FORMATS)
+        paths = tuple(folder / f"{name}.{suffix}" for suffix in FORMATS)
         dates = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": None}
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            for path, ending in zip(paths, FORMATS, strict=True):
-                figure.savefig(path, dpi=DOTS_PER_INCH, metadata=dates[ending])
+            for path, suffix in zip(paths, FORMATS, strict=True):
+                figure.savefig(path, dpi=DOTS_PER_INCH, metadata=dates[suffix])
         except OSError as error:
             raise InvalidValueError(f"Cannot write to {folder}: {error.strerror}.") from error
     return paths

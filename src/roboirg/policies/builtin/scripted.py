@@ -71,7 +71,7 @@ def _execute(env: RoboIRGEnv, stages: tuple[Stage, ...]) -> Iterator[NDArray[np.
     index, retries = 0, 0
     while index < len(stages):
         primitive = stages[index].primitive
-        yield from primitives.perform(primitive)
+        yield from primitives.execute(primitive)
         if progress.completed() > index:
             index += 1
         elif retries < MAX_RETRIES:

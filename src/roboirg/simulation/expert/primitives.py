@@ -59,7 +59,7 @@ class MotionPrimitives:
         self._planner = MotionPlanner(world.robot)
         self._gripper = OPEN
 
-    def perform(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+    def execute(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         """Yield the trajectories of a primitive; take the next after executing the last.
 
         Raises:
