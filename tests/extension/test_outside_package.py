@@ -35,6 +35,8 @@ outside = "roboirg_outside.setting:SETTING"
 [project.entry-points."roboirg.protocols"]
 outside = "roboirg_outside.protocol"
 """
+WITH_SETTING = "PickXtimes"
+"""A task of the benchmark to which the recipe's setting applies."""
 NAMES = """\
 from roboirg_outside.protocol import PROTOCOL
 from roboirg_outside.setting import SETTING
@@ -57,7 +59,7 @@ for (task, setting), expected in test_golden.GOLDEN.items():
 def recipe(page: str, heading: str) -> str:
     """The first Python block of a section, as it stands in the docs."""
     text = (ROOT / "docs" / page).read_text()
-    section = re.search(rf"^## {heading}\n(.*?)(?=^## |\Z)", text, flags=re.DOTALL | re.MULTILINE)
+    section = re.search(rf"^##+ {heading}\n(.*?)(?=^##|\Z)", text, flags=re.DOTALL | re.MULTILINE)
     assert section, f"docs/{page} has no section {heading!r}"
     block = re.search(r"```python\n(.*?)```", section[1], flags=re.DOTALL)
     assert block, f"the section {heading!r} of docs/{page} has no Python block"
@@ -111,46 +113,70 @@ def roboirg(outside, tmp_path_factory):
 
 def test_commands_list_what_the_package_adds(roboirg, names):
     task, setting, protocol, _ = names
-    line = next(line for line in roboirg("tasks").splitlines() if line.startswith(task))
-    assert setting in line
+    listed = {line.split()[0]: line for line in roboirg("tasks").splitlines()}
+    assert "explicit" in listed[task]
+    assert setting in listed[WITH_SETTING]
     assert protocol in roboirg("serve", "--help")
 
 
 def test_words_of_the_new_setting_are_validated(roboirg, names):
     task, setting, *_ = names
-    said = roboirg(
-        "language", "validate", "--tasks", f"{task},PickXtimes", "--split", "none", "--seeds", "6"
-    )
-    assert setting in said
-    assert task in said
-    assert setting in roboirg("instruct", "PickXtimes", "0", "--setting", setting)
+    tasks = f"{task},{WITH_SETTING}"
+    said = roboirg("language", "validate", "--tasks", tasks, "--split", "test", "--seeds", "6")
+    assert {task, setting} <= set(said.replace("│", " ").split())
+    assert setting in roboirg("instruct", WITH_SETTING, "0", "--setting", setting)
     roboirg("language", "card", "--out", "card.md")
-    assert f"PickXtimes, {setting}" in (roboirg.folder / "card.md").read_text()
+    assert f"### {WITH_SETTING}, {setting}" in (roboirg.folder / "card.md").read_text()
+    roboirg(
+        "export", "instructions", "--tasks", tasks, "--settings", setting, "--split", "test",
+        "--out", "words.jsonl",
+    )  # fmt: skip
+    rows = [json.loads(line) for line in (roboirg.folder / "words.jsonl").open()]
+    assert {row["setting"] for row in rows} == {setting}
 
 
 @pytest.mark.sim
 def test_an_episode_of_each_is_played_and_shown(roboirg, names):
     task, setting, *_ = names
-    settings = f"explicit,{setting}"
     roboirg(
-        "run", "--policy", "oracle", "--policy", "listener", "--tasks", f"{task},PickXtimes",
-        "--settings", settings, "--episodes", "1", "--out", "played",
+        "run", "--policy", "listener", "--tasks", f"{task},{WITH_SETTING}", "--settings", "all",
+        "--episodes", "1", "--out", "played",
     )  # fmt: skip
-    records = [
-        json.loads(line)
-        for line in (roboirg.folder / "played/records.jsonl").read_text().splitlines()
-    ]
-    assert {(one["task"], one["setting"]) for one in records} == {
-        (one, how) for one in (task, "PickXtimes") for how in ("explicit", setting)
-    }
+    records = [json.loads(line) for line in (roboirg.folder / "played/records.jsonl").open()]
+    played = {(one["task"], one["setting"]) for one in records}
+    assert {(task, "direct"), (WITH_SETTING, "direct"), (WITH_SETTING, setting)} <= played
     assert {one["outcome"] for one in records} == {"success"}
     roboirg("report", "played")
     page = (roboirg.folder / "played/report.html").read_text()
     assert task in page
     assert setting in page
-    assert setting in roboirg("tables", "played")
+    table = roboirg("tables", "played", "--format", "csv")
+    assert task in table
+    assert setting in table
     roboirg("figures", "played", "--out", "figures")
-    assert list((roboirg.folder / "figures").glob("*.png"))
+    assert any(setting in path.read_text() for path in (roboirg.folder / "figures").glob("*.svg"))
+
+
+@pytest.mark.sim
+def test_the_new_protocol_serves_and_plays(outside, roboirg, names):
+    _, _, protocol, schemes = names
+    server = subprocess.Popen(
+        [outside, "-m", "roboirg", "serve", "random", "--protocol", protocol, "--port", "0"],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        address = re.search(rf"{re.escape(schemes[0])}://[\w.:]+", server.stdout.readline())
+        assert address, "serve does not print its address"
+        roboirg(
+            "run", "--policy", address[0], "--tasks", WITH_SETTING, "--settings", "explicit",
+            "--episodes", "1", "--max-steps", "20", "--out", "served",
+        )  # fmt: skip
+    finally:
+        server.terminate()
+        server.wait(60)
+    (record,) = [json.loads(line) for line in (roboirg.folder / "served/records.jsonl").open()]
+    assert (record["outcome"], record["steps"]) == ("failure", 20)
 
 
 def test_the_other_episodes_and_words_have_not_changed(outside):
