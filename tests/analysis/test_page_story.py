@@ -88,13 +88,10 @@ def test_the_whole_report_follows(run: Path, tmp_path: Path) -> None:
           for policy_run in (listener, forgetful)),
         np.random.default_rng(0),
     )  # fmt: skip
-    verdicts = {finding.where.options: finding.gap.value for finding in found.averages}
-    assert (
-        verdicts[InstructionOptions("explicit")]
-        == verdicts[InstructionOptions("direct", "resolved")]
-        == 0
-    )
-    assert verdicts[InstructionOptions("direct")] > 0
+    gaps = {result.key.options: result.gap.value for result in found.averages}
+    resolved = InstructionOptions("direct", form="resolved")
+    assert gaps[InstructionOptions("explicit")] == gaps[resolved] == 0
+    assert gaps[InstructionOptions("direct")] > 0
     paths = write_figures(content, tmp_path)
     assert {path.stem for path in paths} == {"averages", "forms", "expressions", "failures"}
     assert "ended in an error (" not in write_report(run, planned=PLAN.jobs()).read_text()
