@@ -14,18 +14,15 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from roboirg.core.errors import InvalidValueError
-
-if TYPE_CHECKING:
-    from roboirg.core.conditions import Fact
 
 FactKind = str
 """A key of `FACT_TRAITS`."""
 
-Detector = Callable[[Any], Iterable["Fact"]]
-"""Returns the facts of a kind that hold now, given a
+Detector = Callable[[Any], Iterable[tuple[FactKind, str, str | None]]]
+"""Returns the facts of a kind (kind, subject and place) that hold now, given a
 `roboirg.simulation.fact_detection.DetectionContext`."""
 
 

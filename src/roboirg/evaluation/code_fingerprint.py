@@ -6,8 +6,7 @@ import functools
 import hashlib
 from pathlib import Path
 
-FINGERPRINT_LENGTH = 12
-"""Hexadecimal digits."""
+from roboirg.util.short_hash import DIGITS
 
 
 @functools.cache
@@ -18,4 +17,4 @@ def code_fingerprint() -> str:
     for path in sorted(root.rglob("*.py")):
         digest.update(f"{path.relative_to(root).as_posix()}\0".encode())
         digest.update(path.read_bytes() + b"\0")
-    return digest.hexdigest()[:FINGERPRINT_LENGTH]
+    return digest.hexdigest()[:DIGITS]

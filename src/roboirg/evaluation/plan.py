@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Literal, get_args
@@ -39,6 +38,7 @@ from roboirg.language.instruction import FORMS, Instruction
 from roboirg.language.settings import all_settings
 from roboirg.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, ERROR_KINDS, ErrorKind, Job
 from roboirg.records.store import write_atomically
+from roboirg.util.short_hash import short_hash
 
 PLAN_FILE = "plan.json"
 
@@ -49,9 +49,6 @@ MESHES = ("faithful", "light")
 
 RETRYABLE: tuple[ErrorKind, ...] = ("connection", "environment", "infrastructure")
 """Kinds of errors that may not occur again when the episode is retried."""
-
-FINGERPRINT_LENGTH = 12
-"""Hexadecimal digits."""
 
 
 class Plan(BaseModel):
@@ -125,7 +122,7 @@ class Plan(BaseModel):
     @property
     def fingerprint(self) -> str:
         """Hash of all fields."""
-        return hashlib.sha256(self.model_dump_json().encode()).hexdigest()[:FINGERPRINT_LENGTH]
+        return short_hash(self.model_dump_json())
 
     def checked(self) -> Plan:
         """Return this plan if all of it can be played.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import inspect
 from pathlib import Path
 from typing import Any, cast
@@ -12,9 +11,7 @@ from roboirg.policies.base import Policy
 from roboirg.policies.planning import policy_specs
 from roboirg.policies.policy_classes import BUILTIN, find_class, make_from_class
 from roboirg.policies.policy_urls import is_url
-
-FINGERPRINT_LENGTH = 12
-"""Hexadecimal digits."""
+from roboirg.util.short_hash import short_hash
 
 
 def load_policy_class(spec: str) -> type[Any]:
@@ -79,4 +76,4 @@ def policy_version(spec: str) -> str:
         source = Path(inspect.getfile(policy_class)).read_bytes()
     except (InvalidValueError, OSError, TypeError):
         return "unknown"
-    return hashlib.sha256(source).hexdigest()[:FINGERPRINT_LENGTH]
+    return short_hash(source)

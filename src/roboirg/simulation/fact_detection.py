@@ -122,7 +122,7 @@ class FactDetector:
                 bodies, self._robot, self._tool, self._contacts, self._before
             )
             for detect in detectors:
-                yield from detect(context)
+                yield from (Fact(*found) for found in detect(context))
 
     def _cube_facts(self, cube: Body) -> Iterator[Fact]:
         name, position = cube.item.name, cube.position

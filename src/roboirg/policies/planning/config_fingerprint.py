@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Mapping
 from typing import Any
 
 from roboirg.policies.planning.models import ModelOptions
-
-FINGERPRINT_LENGTH = 12
-"""Hexadecimal digits."""
+from roboirg.util.short_hash import short_hash
 
 
 def config_version(model: ModelOptions, about: Mapping[str, Any]) -> str:
     """Return the model's name and a fingerprint of all else that may change its answers."""
     canonical = json.dumps(_without_address(about), sort_keys=True)
-    digest = hashlib.sha256(canonical.encode()).hexdigest()
-    return f"{model.model} {digest[:FINGERPRINT_LENGTH]}"
+    return f"{model.model} {short_hash(canonical)}"
 
 
 def _without_address(about: object) -> object:

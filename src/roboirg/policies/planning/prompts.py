@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import tomllib
 from dataclasses import dataclass
 from importlib import resources
@@ -11,12 +10,11 @@ from string import Template
 from typing import Any
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.util.short_hash import short_hash
 
 FOLDER = "prompts"
 SHARED = "subgoals"
 """The file with the forms of subgoals, for the prompts of all planners."""
-FINGERPRINT_LENGTH = 12
-"""Hexadecimal digits."""
 
 
 @dataclass(frozen=True)
@@ -91,4 +89,4 @@ def load_prompts(name: str, file: str | None = None) -> Prompts:
         texts = tomllib.loads(content.decode())
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InvalidValueError(f"Prompts {origin!r} are not TOML ({error}).") from error
-    return Prompts(texts, hashlib.sha256(content).hexdigest()[:FINGERPRINT_LENGTH], origin)
+    return Prompts(texts, short_hash(content), origin)

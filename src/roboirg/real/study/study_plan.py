@@ -7,7 +7,6 @@ are between neighbors. The seed decides the orders and nothing else.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from pathlib import Path
@@ -25,11 +24,9 @@ from roboirg.real.study.counterbalancing import counterbalanced_episodes, target
 from roboirg.records.record import DEFAULT_MAX_STEPS, Job
 from roboirg.records.store import write_atomically
 from roboirg.tasks import get_task
+from roboirg.util.short_hash import short_hash
 
 PLAN_FILE = "plan.json"
-FINGERPRINT_LENGTH = 12
-"""Hexadecimal digits."""
-
 TRIAL_SPLIT = "val"
 """The smallest of the three splits with all eight arrangements of PickByCount."""
 DEMONSTRATION_SPLIT = "train"
@@ -109,7 +106,7 @@ class StudyPlan(_StudyModel):
     @property
     def fingerprint(self) -> str:
         """Digest that identifies the plan."""
-        return hashlib.sha256(self.model_dump_json().encode()).hexdigest()[:FINGERPRINT_LENGTH]
+        return short_hash(self.model_dump_json())
 
     def trial(self, name: str) -> PlannedTrial:
         """Return the trial of that name.
