@@ -349,7 +349,7 @@ class Choosy:
 def test_policies_are_shown_what_they_ask_for():
     policy = Choosy()
     wrong = roboirg.make("PickXtimes", cameras=(), demonstration_frames="none")
-    with pytest.raises(InvalidValueError, match=r"wants observe_every=5, but .* has None"):
+    with pytest.raises(InvalidValueError, match=r"needs observe_every=5, but .* has None"):
         play(wrong, policy)
     job = Job(
         policy=f"{__name__}:Choosy", task="PickXtimes", split="test", episode=2, setting="direct"

@@ -22,8 +22,8 @@ from roboirg.records.store import (
     StoreError,
     read_contents,
     read_records,
-    write_atomically,
 )
+from roboirg.util.atomic_write import write_atomically
 
 
 @functools.cache

@@ -141,8 +141,8 @@ def build_splits(
         merge_splits,
     )
     from roboirg.evaluation.seed_summary import follow_progress, print_summary
-    from roboirg.records.store import write_atomically
     from roboirg.tasks import find_tasks
+    from roboirg.util.atomic_write import write_atomically
 
     names = find_tasks(parse_names("task", tasks))
     wanted = SPLITS if means_all(split) else (splits.check_split(split),)

@@ -99,9 +99,10 @@ def stats(
     ] = None,
 ) -> None:
     """Count words, referring expressions, patterns, relations and landmarks."""
-    from roboirg.language.expression_figure import check_figure_support, write_figure
+    from roboirg.language.expression_figure import write_figure
     from roboirg.language.statistics_tables import overview_tables
     from roboirg.language.variants import instructions, split_episodes
+    from roboirg.util.figure_files import check_figure_support
 
     if out is not None:
         check_figure_support()
@@ -158,7 +159,7 @@ def card(
 ) -> None:
     """Write the language card: an example of every variant, in Markdown."""
     from roboirg.language.card import language_card
-    from roboirg.records.store import write_atomically
+    from roboirg.util.atomic_write import write_atomically
 
     if out is None:
         typer.echo(language_card(), nl=False)

@@ -73,7 +73,7 @@ def _write(made: StudyPlan, folder: Path, *, sheet: bool) -> None:
     from roboirg.real.pages.trial_sheet import SHEET_FILE, write_sheet
     from roboirg.real.study import plan_csv
     from roboirg.real.study.study_plan import write_study
-    from roboirg.records.store import write_atomically
+    from roboirg.util.atomic_write import write_atomically
 
     typer.echo(write_study(made, folder))
     for name, text in (

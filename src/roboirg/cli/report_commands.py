@@ -84,7 +84,7 @@ def figures(
 ) -> None:
     """Draw the paper's figures of one or several runs, as PNG, SVG and PDF."""
     from roboirg.analysis.figures import FIGURES, FigureData, write_figures
-    from roboirg.analysis.figures.figure_style import check_figure_support
+    from roboirg.util.figure_files import check_figure_support
 
     check_figure_support()
     names = FIGURES if which == _ALL else tuple(word.strip() for word in which.split(","))
@@ -185,7 +185,8 @@ def _print(found: list[Table]) -> None:
 
 def _write(found: list[Table], folder: Path, suffix: str, name: str) -> None:
     from roboirg.analysis.tables.rendering import get_format
-    from roboirg.records.store import StoreError, write_atomically
+    from roboirg.records.store import StoreError
+    from roboirg.util.atomic_write import write_atomically
 
     try:
         folder.mkdir(parents=True, exist_ok=True)

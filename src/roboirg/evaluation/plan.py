@@ -37,7 +37,7 @@ from roboirg.evaluation.plan_parsing import (
 from roboirg.language.instruction import FORMS, Instruction
 from roboirg.language.settings import all_settings
 from roboirg.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, ERROR_KINDS, ErrorKind, Job
-from roboirg.records.store import write_atomically
+from roboirg.util.atomic_write import write_atomically
 from roboirg.util.short_hash import short_hash
 
 PLAN_FILE = "plan.json"

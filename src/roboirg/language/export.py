@@ -14,9 +14,10 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from roboirg.core.episode import Episode
-from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.core.errors import MissingDependencyError
 from roboirg.language.instruction import Instruction
 from roboirg.tasks import get_task
+from roboirg.util.atomic_write import write_atomically
 
 ExportFormat = Literal["jsonl", "parquet"]
 EXPORT_FORMATS: tuple[ExportFormat, ...] = get_args(ExportFormat)
@@ -173,10 +174,4 @@ def write_rows(rows: Iterable[ExportRow], path: Path, kind: ExportFormat) -> Non
         MissingDependencyError: the format is Parquet, and pyarrow is not installed.
         InvalidValueError: the file is not writable.
     """
-    data = encode(rows, kind)
-    partial = path.with_name(f".{path.name}.part")
-    try:
-        partial.write_bytes(data)
-        partial.replace(path)
-    except OSError as error:
-        raise InvalidValueError(f"Cannot write {path}: {error.strerror}.") from error
+    write_atomically(path, encode(rows, kind))

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.language.corpus_statistics import expression_counts, expression_order, scene_counts
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import all_settings
+from roboirg.util.figure_files import save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,21 +21,6 @@ ROW_INCHES, MARGIN_INCHES = 0.29, 1.25
 DOTS_PER_INCH = 200
 PANEL_RANGE = 1.25
 """Width of a panel in units of the longest bar; leaves space for its number."""
-
-
-def check_figure_support() -> None:
-    """Check early that figures can be drawn.
-
-    Raises:
-        MissingDependencyError: matplotlib is not installed.
-    """
-    try:
-        import matplotlib as mpl  # noqa: F401
-    except ImportError as error:
-        raise MissingDependencyError(
-            "The figure needs matplotlib: pip install 'roboirgbench[report]'; "
-            "without --out the tables alone are printed."
-        ) from error
 
 
 def write_figure(
@@ -56,21 +41,14 @@ def write_figure(
         MissingDependencyError: matplotlib is not installed.
         InvalidValueError: the folder is not writable.
     """
-    check_figure_support()
-    import matplotlib as mpl
-
-    # The salt makes the ids in the SVG file reproducible.
-    with mpl.rc_context({"svg.hashsalt": "roboirg", "font.family": "DejaVu Sans", "font.size": 9}):
-        figure = _draw(instructions, title)
-        paths = tuple(folder / f"{name}.{suffix}" for suffix in FORMATS)
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            for path in paths:
-                metadata = {"Date": None} if path.suffix == ".svg" else None
-                figure.savefig(path, dpi=DOTS_PER_INCH, metadata=metadata)
-        except OSError as error:
-            raise InvalidValueError(f"Cannot write to {folder}: {error.strerror}.") from error
-    return paths
+    return save_figure(
+        lambda: _draw(instructions, title),
+        folder,
+        name,
+        formats=FORMATS,
+        dots_per_inch=DOTS_PER_INCH,
+        style={"font.size": 9},
+    )
 
 
 def _draw(instructions: Sequence[Instruction], title: str) -> Figure:

@@ -8,8 +8,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.core.errors import MissingDependencyError
 from roboirg.records.record import Record
+from roboirg.util.atomic_write import replacing
 
 if TYPE_CHECKING:
     from pyarrow import Schema
@@ -93,17 +94,14 @@ def write_parquet(records: Iterable[Record], path: Path) -> int:
     from pyarrow import parquet
 
     schema, count = _schema(), 0
-    partial = path.with_name(f".{path.name}.part")
     rows = map(_row, records)
-    try:
-        with parquet.ParquetWriter(partial, schema, compression="zstd") as writer:
-            while batch := list(itertools.islice(rows, _BATCH_ROWS)):
-                writer.write_table(pa.Table.from_pylist(batch, schema=schema))
-                count += len(batch)
-        partial.replace(path)
-    except OSError as error:
-        partial.unlink(missing_ok=True)
-        raise InvalidValueError(f"Cannot write {path}: {error.strerror or error}.") from error
+    with (
+        replacing(path) as partial,
+        parquet.ParquetWriter(partial, schema, compression="zstd") as writer,
+    ):
+        while batch := list(itertools.islice(rows, _BATCH_ROWS)):
+            writer.write_table(pa.Table.from_pylist(batch, schema=schema))
+            count += len(batch)
     return count
 
 

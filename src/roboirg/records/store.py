@@ -35,6 +35,7 @@ from roboirg.records.record_codec import (
     read_index_entry,
     read_line,
 )
+from roboirg.util.atomic_write import sync_to_disk
 
 __all__ = [
     "RecordStore",
@@ -105,7 +106,7 @@ class RecordStore:
                 self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
                 undo.callback(os.close, self._file)
                 self._repair_tail()
-                _sync_folder(folder)
+                sync_to_disk(folder)
             except OSError as error:
                 raise StoreError(f"Cannot write to {folder}: {error.strerror}.") from error
             undo.pop_all()
@@ -207,24 +208,6 @@ def read_index(folder: Path) -> dict[RecordKey, RecordIndexEntry]:
     }
 
 
-def write_atomically(path: Path, text: str) -> None:
-    """Replace a file atomically: readers see the old or the new text, never a part.
-
-    Raises:
-        StoreError: the file cannot be written.
-    """
-    partial = path.with_name(f".{path.name}.part")
-    try:
-        with partial.open("w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        partial.replace(path)
-        _sync_folder(path.parent)
-    except OSError as error:
-        raise StoreError(f"Cannot write {path}: {error.strerror}.") from error
-
-
 class _RecordsFile:
     """Reads a records file line by line.
 
@@ -287,11 +270,3 @@ def _write_all(descriptor: int, data: bytes) -> None:
     # One system call, unless the disk is full or a signal interrupts it.
     while data:
         data = data[os.write(descriptor, data) :]
-
-
-def _sync_folder(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

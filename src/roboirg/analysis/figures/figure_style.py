@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from roboirg.analysis.stats.intervals import Interval
-from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.util.figure_files import save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,62 +19,23 @@ COLUMN_INCHES, PAGE_INCHES = 3.4, 7.0
 LEGEND_COLUMNS, LEGEND_LINE_INCHES = 2, 0.16
 """Of a figure of one column."""
 DOTS_PER_INCH = 300
+STYLE = {
+    "font.size": 7.5,
+    "axes.linewidth": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": 7,
+}
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
 """Okabe and Ito's colors, safe for color-blind readers; signs differ as well."""
 SIGNS = ("o", "s", "^", "D", "v", "P")
 GHOST, GHOST_SIGNS = "#8a8a8a", ("d", "X", "p", "<", ">", "h", "8", "*")
 
 
-def check_figure_support() -> None:
-    """Check that figures can be drawn.
-
-    Raises:
-        MissingDependencyError: matplotlib is not installed.
-    """
-    try:
-        import matplotlib as mpl  # noqa: F401
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"Figures need matplotlib, which is not installed ({error}); run: "
-            "pip install 'roboirgbench[report]'"
-        ) from error
-
-
 def save(draw: Callable[[], Figure | None], folder: Path, name: str) -> tuple[Path, ...]:
-    """Draw a figure and write it in all formats; write no file without a figure.
-
-    The same content gives the same bytes.
-
-    Raises:
-        MissingDependencyError: matplotlib is not installed.
-        InvalidValueError: the folder is not writable.
-    """
-    check_figure_support()
-    import matplotlib as mpl
-
-    with mpl.rc_context(
-        {
-            "font.family": "DejaVu Sans",
-            "font.size": 7.5,
-            "axes.linewidth": 0.6,
-            "legend.frameon": False,
-            "legend.fontsize": 7,
-            "pdf.fonttype": 42,  # letters, not outlines, which some venues refuse
-            "svg.hashsalt": "roboirg",  # the ids in an SVG file are random without it
-        }
-    ):
-        figure = draw()
-        if figure is None:
-            return ()
-        paths = tuple(folder / f"{name}.{suffix}" for suffix in FORMATS)
-        dates = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": None}
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            for path, suffix in zip(paths, FORMATS, strict=True):
-                figure.savefig(path, dpi=DOTS_PER_INCH, metadata=dates[suffix])
-        except OSError as error:
-            raise InvalidValueError(f"Cannot write to {folder}: {error.strerror}.") from error
-    return paths
+    """Draw a figure in the common style and write it in all formats; see `save_figure`."""
+    return save_figure(
+        draw, folder, name, formats=FORMATS, dots_per_inch=DOTS_PER_INCH, style=STYLE
+    )
 
 
 def new_figure(width: float, height: float) -> Figure:

@@ -17,7 +17,8 @@ from roboirg.core.errors import MissingDependencyError
 from roboirg.evaluation.video_writer import LAST_FRAME_REPEATS, VideoOptions
 from roboirg.language.settings import EXPLICIT, all_settings
 from roboirg.records.record import Job, Record
-from roboirg.records.store import read_records, write_atomically
+from roboirg.records.store import read_records
+from roboirg.util.atomic_write import write_atomically
 
 if TYPE_CHECKING:
     import jinja2

@@ -21,7 +21,7 @@ from roboirg.real.study.arrangement_shapes import (
 from roboirg.real.study.failure_choices import failure_choices
 from roboirg.real.study.study_plan import PlannedDemonstration, PlannedTrial, StudyPlan
 from roboirg.real.study.trial_text import describe_positions, explicit_command, spoken_turns
-from roboirg.records.store import StoreError
+from roboirg.util.atomic_write import replacing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -63,24 +63,19 @@ def write_sheet(plan: StudyPlan, path: Path) -> int:
 
     Raises:
         MissingDependencyError: matplotlib is not installed.
-        StoreError: the file cannot be written.
+        InvalidValueError: the file cannot be written.
     """
     check_sheet_support()
     from matplotlib.backends.backend_pdf import PdfPages
 
-    partial = path.with_name(f".{path.name}.part")
-    try:
-        # Without the date, so that the same plan gives the same file.
-        with PdfPages(partial, metadata={"CreationDate": None, "Title": "Trials"}) as pages:
-            for number, page in enumerate(_pages(plan), 1):
-                page.text(0.5, 0.02, f"plan {plan.fingerprint}, page {number}", fontsize=SMALL,
-                          ha="center", color="#666666")  # fmt: skip
-                pages.savefig(page)
-            count = int(pages.get_pagecount())
-        partial.replace(path)
-    except OSError as error:
-        raise StoreError(f"Cannot write {path}: {error.strerror}.") from error
-    return count
+    # Without the date, so that the same plan gives the same file.
+    metadata = {"CreationDate": None, "Title": "Trials"}
+    with replacing(path) as partial, PdfPages(partial, metadata=metadata) as pages:
+        for number, page in enumerate(_pages(plan), 1):
+            page.text(0.5, 0.02, f"plan {plan.fingerprint}, page {number}", fontsize=SMALL,
+                      ha="center", color="#666666")  # fmt: skip
+            pages.savefig(page)
+        return int(pages.get_pagecount())
 
 
 def _pages(plan: StudyPlan) -> Iterator[Figure]:

@@ -22,8 +22,8 @@ from roboirg.evaluation.plan_parsing import name_and_spec
 from roboirg.language.settings import setting_names, settings_of
 from roboirg.real.study.counterbalancing import counterbalanced_episodes, target_kind
 from roboirg.records.record import DEFAULT_MAX_STEPS, Job
-from roboirg.records.store import write_atomically
 from roboirg.tasks import get_task
+from roboirg.util.atomic_write import write_atomically
 from roboirg.util.short_hash import short_hash
 
 PLAN_FILE = "plan.json"

@@ -6,7 +6,6 @@ import functools
 import hashlib
 import json
 import math
-import secrets
 from collections.abc import Callable
 from pathlib import Path
 
@@ -68,14 +67,3 @@ def unpack_arrays(content: memoryview) -> Arrays:
 def source_code(*modules: str) -> bytes:
     """Return the source code of modules in this folder, as part of cache keys."""
     return b"".join((Path(__file__).parent / f"{name}.py").read_bytes() for name in modules)
-
-
-def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file atomically."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
-    try:
-        part.write_bytes(content)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)

@@ -21,7 +21,8 @@ import numpy as np
 import sapien
 import sapien.render
 
-from roboirg.simulation.rendering.mesh_cache import write_atomically
+from roboirg.core.errors import InvalidValueError
+from roboirg.util.atomic_write import write_atomically
 from roboirg.util.cache import cache_folder
 
 STOCK_SHADER = "minimal"
@@ -150,7 +151,7 @@ def _write(texts: dict[str, str]) -> Path:
     if folder is not None:
         try:
             return _fill(folder / "shaders" / _digest(texts)[:16], texts)
-        except OSError as error:
+        except (OSError, InvalidValueError) as error:
             _log.warning("The cache cannot be used for shaders (%s).", error)
     temporary = Path(tempfile.mkdtemp(prefix="roboirg-shaders-"))
     atexit.register(shutil.rmtree, temporary, ignore_errors=True)
@@ -160,6 +161,7 @@ def _write(texts: dict[str, str]) -> Path:
 def _fill(folder: Path, texts: dict[str, str]) -> Path:
     for name, text in texts.items():
         path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
         if not path.is_file() or path.read_bytes() != text.encode():
             write_atomically(path, text.encode())
     return folder
