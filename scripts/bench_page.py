@@ -1,9 +1,8 @@
-"""Print how long a page of many episodes takes to make, to open and to filter.
+"""Measure how long a page of many episodes takes to make, open and filter.
 
 python scripts/bench_page.py RUN [--episodes 10000] [--browser /usr/bin/chromium]
 
-The episodes of a run are taken as often as it needs, each time with another policy seed. Needs
-Playwright for Python and a Chromium.
+Repeats the episodes of a run with other policy seeds. Needs Playwright for Python and Chromium.
 """
 
 from __future__ import annotations
@@ -40,11 +39,11 @@ FILTER = """async (hash) => {
   await new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
   return performance.now() - begun;
 }"""
-"""Filter; the milliseconds until the next picture is painted."""
+"""Filter and return the milliseconds until the next frame is painted."""
 
 
-def many(records: tuple[Record, ...], number: int) -> list[Record]:
-    """So many records, each a copy with a policy seed of its own."""
+def repeated(records: tuple[Record, ...], number: int) -> list[Record]:
+    """Return a number of copies of records; each round has another policy seed."""
     copies = (
         record.model_copy(update={"policy_seed": seed, "video": None})
         for seed in itertools.count()
@@ -54,15 +53,15 @@ def many(records: tuple[Record, ...], number: int) -> list[Record]:
 
 
 def measure(page: Any, path: Path) -> None:  # noqa: ANN401 - Playwright may be missing
-    """Open and filter, several times each; print the medians in milliseconds."""
+    """Open and filter a page several times; print the medians in milliseconds."""
     opened = []
     for _ in range(REPEATS):
-        begun = time.perf_counter()
+        start = time.perf_counter()
         page.goto(path.as_uri())
         page.wait_for_selector("#rows li")
-        opened.append(1000 * (time.perf_counter() - begun))
-    print(f"open, until the list is there: {statistics.median(opened):.0f} ms")
-    print(f"open, by the page's own clock: {page.evaluate('roboirg.counters.openMs'):.0f} ms")
+        opened.append(1000 * (time.perf_counter() - start))
+    print(f"open, until the list appears: {statistics.median(opened):.0f} ms")
+    print(f"open, by the page's clock: {page.evaluate('roboirg.counters.openMs'):.0f} ms")
     for name, filters in FILTERS.items():
         words = "&".join(f"{key}={value}" for key, value in filters.items())
         times = [page.evaluate(FILTER, f"#?{words}") for _ in range(REPEATS)]
@@ -74,24 +73,24 @@ def measure(page: Any, path: Path) -> None:  # noqa: ANN401 - Playwright may be 
 
 
 def main() -> None:
-    """Make the page in a temporary folder and measure it."""
+    """Create the page in a temporary folder and measure it."""
     from playwright.sync_api import sync_playwright
 
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("run", type=Path)
     parser.add_argument("--episodes", type=int, default=10_000)
     parser.add_argument("--browser", default=next(filter(None, map(shutil.which, BROWSERS)), None))
-    given = parser.parse_args()
-    records = many(read_records(given.run), given.episodes)
-    begun = time.perf_counter()
+    arguments = parser.parse_args()
+    records = repeated(read_records(arguments.run), arguments.episodes)
+    start = time.perf_counter()
     text = render(records)
-    print(f"{len(records)} episodes, {len(text) / 1e6:.1f} MB, made in "
-          f"{time.perf_counter() - begun:.1f} s")  # fmt: skip
+    print(f"{len(records)} episodes, {len(text) / 1e6:.1f} MB, created in "
+          f"{time.perf_counter() - start:.1f} s")  # fmt: skip
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
         path = Path(folder) / "page.html"
         path.write_text(text)
-        arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
-        browser = playwright.chromium.launch(executable_path=given.browser, args=arguments)
+        flags = ["--no-sandbox"] if os.geteuid() == 0 else []
+        browser = playwright.chromium.launch(executable_path=arguments.browser, args=flags)
         measure(browser.new_page(viewport={"width": 1280, "height": 900}), path)
         browser.close()
 

@@ -71,13 +71,13 @@ def exchange(path):
 
 
 @pytest.mark.parametrize("harm", [truncate, empty, flip, exchange])
-def test_damage_is_noticed_told_once_and_repaired(tmp_path, caplog, harm):
+def test_damage_is_logged_once_and_repaired(tmp_path, caplog, harm):
     cache = Cache(tmp_path, 1000)
     cache.write("a1", b"forty-two")
     harm(tmp_path / "a1")
     assert cache.read("a1") is None
     assert [record.getMessage() for record in caplog.records] == [
-        f"The cache entry {tmp_path / 'a1'} is damaged; it is made anew."
+        f"The cache entry {tmp_path / 'a1'} is damaged and will be rebuilt."
     ]
     cache.write("a1", b"forty-two")
     assert cache.read("a1") == b"forty-two"
@@ -144,12 +144,12 @@ def test_a_kill_while_writing_leaves_no_bad_entry(tmp_path, caplog, monkeypatch)
 def test_a_disk_that_refuses_costs_one_notice(tmp_path, caplog):
     (tmp_path / "file").write_bytes(b"")
     cache = Cache(tmp_path / "file" / "below", 1000)
-    cache_module._noticed.clear()
+    cache_module._warned.clear()
     for _ in range(3):
         cache.write("a1", b"content")
         assert cache.read("a1") is None
     assert [record.levelno for record in caplog.records] == [logging.WARNING]
-    assert "cannot be used" in caplog.text
+    assert "is unusable" in caplog.text
 
 
 def test_the_environment_says_where_and_how_much(tmp_path, monkeypatch):

@@ -88,7 +88,7 @@ def test_options_of_the_words_are_passed_on(tmp_path: Path):
         (("--forms", "implied"), UnknownNameError, "There is no form 'implied'"),
         (("--tasks", "StopCub"), UnknownNameError, "Did you mean 'StopCube'?"),
         (("--split", "dev"), UnknownNameError, "There is no split 'dev'"),
-        (("--stages", "2,5"), InvalidValueError, "none of the four sets"),
+        (("--stages", "2,5"), InvalidValueError, "must be one of"),
         (("--tasks", "StopCube", "--settings", "spatial"), InvalidValueError, "None of these"),
     ],
 )
@@ -100,7 +100,7 @@ def test_what_is_wrong_is_one_sentence(tmp_path: Path, words, kind, sentence):
 
 def test_an_export_needs_a_place(tmp_path: Path):
     for path in (tmp_path, tmp_path / "nowhere" / "out.jsonl"):
-        with pytest.raises(InvalidValueError, match="is no name for a file"):
+        with pytest.raises(InvalidValueError, match="is not a file in an existing folder"):
             call("export", "instructions", "--out", path)
 
 
@@ -119,9 +119,9 @@ def test_stats_of_all_splits_need_no_figure():
     assert "Landmark" not in printed
 
 
-def test_prove_prints_what_was_read_and_the_exceptions():
+def test_validate_prints_what_was_read_and_the_exceptions():
     words = ("--tasks", "PickXtimes", "--split", "none", "--seeds", "4", "--workers", "0")
-    printed = call("language", "prove", *words)
+    printed = call("language", "validate", *words)
     assert "Texts read back" in printed
     assert "2 of 2 (100.00 %)" in printed  # easy, spatial
     assert "0 of 1" in printed
@@ -135,7 +135,7 @@ def test_a_broken_rule_is_told_and_ends_with_a_sentence(monkeypatch: pytest.Monk
         "roboirg.language.validation.validation_run.validate_batch", lambda _batch: found
     )
     words = ("--tasks", "PickXtimes", "--split", "none", "--seeds", "1", "--workers", "0")
-    result = CliRunner().invoke(cli.app, ["language", "prove", *words])
+    result = CliRunner().invoke(cli.app, ["language", "validate", *words])
     assert isinstance(result.exception, RoboIRGError)
     assert "1 rules were broken in 1 texts." in str(result.exception)
     assert "no leak: PickXtimes/test/0, seed 7, direct: [red]ly" in result.output

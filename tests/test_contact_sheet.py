@@ -10,9 +10,9 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.motions import Away, Glow, Point, Shuttle, Swap, Vanish
 from roboirg.episodes.splits import get_episode
 from roboirg.visualization.contact_sheet import SheetPanel, compose_sheet, evenly_spaced, write_png
-from roboirg.visualization.episode_text import fact_words, motion_lines, video_lines
+from roboirg.visualization.episode_text import describe_motions, describe_video, fact_words
 from roboirg.visualization.key_events import KeyEvents
-from roboirg.visualization.playthrough import FEWEST, MOST, choose, play_through
+from roboirg.visualization.playthrough import MAX_MOMENTS, MIN_MOMENTS, choose_moments, play_through
 
 
 def picture(value):
@@ -85,19 +85,19 @@ def test_thinning_keeps_the_ends():
 
 
 def test_the_remarkable_is_chosen_first_and_fillers_only_fill_up():
-    assert choose([0, 4, 4, 4, 0]) == (0, 1, 2, 3, 4)
-    filled = choose([0, *[4] * 20, 1, 0])
-    assert len(filled) == FEWEST
+    assert choose_moments([0, 4, 4, 4, 0]) == (0, 1, 2, 3, 4)
+    filled = choose_moments([0, *[4] * 20, 1, 0])
+    assert len(filled) == MIN_MOMENTS
     assert {0, 21, 22} <= set(filled)
-    assert choose([0, 1, 4, 1, 4, 1, 1, 0]) == (0, 1, 3, 5, 6, 7)
+    assert choose_moments([0, 1, 4, 1, 4, 1, 1, 0]) == (0, 1, 3, 5, 6, 7)
     crowded = [0, *[3] * 20, 0, *[1] * 8, 0]
-    chosen = choose(crowded)
-    assert len(chosen) == MOST
+    chosen = choose_moments(crowded)
+    assert len(chosen) == MAX_MOMENTS
     assert [crowded[position] for position in chosen].count(3) == 1
-    assert len(choose([1] * 40)) == MOST
+    assert len(choose_moments([1] * 40)) == MAX_MOMENTS
 
 
-def test_motions_are_told_in_words_and_like_ones_together():
+def test_motions_are_described_and_like_ones_merged():
     over = Fact("over", "cube", "target")
     motions = (
         Away("a", 0, 32),
@@ -108,7 +108,7 @@ def test_motions_are_told_in_words_and_like_ones_together():
         Glow("m", over, 20),
         Vanish("cube", Fact("binned", "cube", "bin")),
     )
-    assert motion_lines(Scene((), motions)) == [
+    assert describe_motions(Scene((), motions)) == [
         "a, b: away until step 32",
         "c: away from step 64 until step 164, then under a",
         "a and b: change places, step 0 to 50 of the video's stage 4",
@@ -122,13 +122,13 @@ def test_motions_are_told_in_words_and_like_ones_together():
     assert fact_words(Fact("still", "robot")) == "robot still"
 
 
-def test_the_video_is_told_by_its_stages_and_by_what_counts():
-    lines = video_lines(get_episode("VideoPlaceButton", "test", 0))
+def test_the_video_is_described_by_its_stages_and_facts():
+    lines = describe_video(get_episode("VideoPlaceButton", "test", 0))
     assert lines[:2] == ["1. pick up the cube", "2. drop the cube onto target"]
     assert "go home" not in " ".join(lines)  # it is not in the video
     assert lines[-1].startswith("that is: cube_")
     assert lines[-1].count("button pressed") == 1
-    assert video_lines(get_episode("PickXtimes", "test", 0)) == []
+    assert describe_video(get_episode("PickXtimes", "test", 0)) == []
 
 
 @pytest.mark.sim
@@ -138,7 +138,7 @@ def test_a_playthrough_shows_the_start_each_stage_and_the_end():
     assert played.verdict == "success"
     steps = [moment.step for moment in played.moments]
     assert steps == sorted(set(steps))
-    assert len(steps) == FEWEST
+    assert len(steps) == MIN_MOMENTS
     assert played.moments[0].caption == "the video begins"
     assert played.moments[0].is_demonstration
     (turn,) = [one for one in played.moments if one.caption == "the policy's turn begins"]
@@ -151,10 +151,10 @@ def test_a_playthrough_shows_the_start_each_stage_and_the_end():
 
 def test_what_moves_by_itself_is_remarkable_while_it_does():
     episode = get_episode("ButtonUnmaskSwap", "test", 3)
-    happenings = KeyEvents(episode.scene.motions)
-    told = {step: happenings.at(step, 0) for step in range(300)}
-    assert str(told[33]).endswith("container 3 appear")
-    swaps = [step for step, words in told.items() if words and "change places" in words]
+    key_events = KeyEvents(episode.scene.motions)
+    captions = {step: key_events.at(step, 0) for step in range(300)}
+    assert str(captions[33]).endswith("container 3 appear")
+    swaps = [step for step, words in captions.items() if words and "change places" in words]
     count = sum(isinstance(motion, Swap) for motion in episode.scene.motions)
     assert swaps == [90, 140, 190][:count]
 

@@ -27,7 +27,7 @@ def run_module(*arguments: str, **environment: str) -> subprocess.CompletedProce
 def test_a_healthy_machine_passes() -> None:
     result = run_module()
     assert result.returncode == 0, result.stdout + result.stderr
-    assert result.stdout.endswith("All is well.\n")
+    assert result.stdout.endswith("All checks passed.\n")
 
 
 def test_without_vulkan_the_remedy_is_named() -> None:
@@ -66,8 +66,8 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(metadata, "requires", lambda _: requirements)
     assert list(doctor._check_packages()) == [
         Check("roboirgbench", True, "0.1.0"),
-        Check("numpy", False, "not installed, >=1.26 is needed", "pip install 'numpy>=1.26'"),
-        Check("av", False, "9.2, >=12 is needed", "pip install 'av>=12'"),
+        Check("numpy", False, "not installed; needs >=1.26", "pip install 'numpy>=1.26'"),
+        Check("av", False, "9.2; needs >=12", "pip install 'av>=12'"),
         Check("mani-skill", True, "3.0.1"),
     ]
 

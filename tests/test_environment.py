@@ -1,5 +1,6 @@
 """The Gymnasium environment: contract, verdicts, limits, and bad input."""
 
+import inspect
 import os
 import re
 import subprocess
@@ -15,6 +16,8 @@ from gymnasium.utils.env_checker import check_env
 import roboirg
 from roboirg.core.actions import ACTION_SPACES
 from roboirg.core.errors import InvalidActionError, InvalidValueError, UnknownNameError
+from roboirg.envs.environment import RoboIRGEnv
+from roboirg.envs.factory import EnvOptions
 from roboirg.envs.registration import environment_id
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.rollout import EnvRequirements, make_env
@@ -31,7 +34,7 @@ TASKS = tuple(every_task())
 
 
 class Wrong(ScriptedPolicy):
-    """Does another goal of the scene than the one that is meant."""
+    """Pursues another goal of the scene than the right one."""
 
     def __init__(self, goal):
         super().__init__()
@@ -105,7 +108,7 @@ def test_subgoals_are_grounded_once_their_object_is_seen_and_then_frozen():
         info["grounded_subgoal"],
     )
     x, y, _ = env.episode.scene[stage.points_at].position
-    # Projected by hand; the middle of a container is some 4 cm above the table.
+    # Projected by hand; the center of a container is some 4 cm above the table.
     z = 0.04
     distance = -0.44721 * x - 0.89443 * z + 0.49194
     row = 128 + 128 * (0.89443 * x - 0.44721 * z - 0.08944) / distance
@@ -147,6 +150,19 @@ def test_subgoals_change_one_step_after_their_stage_and_only_pointing_ones_are_g
     for stage, (_, (simple, grounded)) in zip(env.episode.stages, changes, strict=False):
         assert re.sub(r"at <\d+, \d+> ?", "", grounded).strip() == simple
         assert ("<" in grounded) == (stage.points_at is not None)
+
+
+def test_make_is_typed_with_the_options_of_the_environment():
+    _, task, *options = inspect.signature(RoboIRGEnv.__init__).parameters.values()
+    assert task.name == "task"
+    typed = {name: hint.__forward_arg__ for name, hint in EnvOptions.__annotations__.items()}
+    assert typed == {option.name: option.annotation for option in options}
+    documented = roboirg.make.__doc__.partition("Keyword Args:")[2].partition("Raises:")[0]
+    assert re.findall(r"^        (\w+): ", documented, re.MULTILINE) == list(typed)
+    made = inspect.signature(roboirg.make).parameters["options"]
+    assert made.annotation == "Unpack[EnvOptions]"
+    with pytest.raises(TypeError, match="camera"):
+        roboirg.make("PickXtimes", camera=("front",))
 
 
 def test_an_environment_of_another_action_space_is_refused():
@@ -201,7 +217,7 @@ def test_every_other_goal_of_the_scene_fails(task):
     episode = get_episode(task, "test", 2)
     for goal in get_task(task).goals(episode.scene):
         info = play(roboirg.make(task, episode=2, cameras=(), max_steps=700), Wrong(goal))
-        # Who means to do more than was asked succeeds on the way.
+        # A goal that includes more than the right one succeeds on the way.
         planned = get_task(task).stages(episode.scene, goal)
         right = planned[: len(episode.stages)] == episode.stages
         assert info["status"] in ({"success"} if right else {"failure", "timeout"}), goal
@@ -316,7 +332,7 @@ def test_gymnasium_s_checker_is_content_with_history():
 
 
 class Choosy:
-    """Wants to be shown things in its own way."""
+    """Requires its own observations and video."""
 
     cameras = ()
     observe_every = 5
@@ -333,7 +349,7 @@ class Choosy:
 def test_policies_are_shown_what_they_ask_for():
     policy = Choosy()
     wrong = roboirg.make("PickXtimes", cameras=(), demonstration_frames="none")
-    with pytest.raises(InvalidValueError, match=r"wants observe_every=5, but .* has None"):
+    with pytest.raises(InvalidValueError, match=r"needs observe_every=5, but .* has None"):
         play(wrong, policy)
     job = Job(
         policy=f"{__name__}:Choosy", task="PickXtimes", split="test", episode=2, setting="direct"
@@ -394,9 +410,9 @@ def test_names_and_numbers_are_checked_before_anything_is_built():
     with pytest.raises(UnknownNameError, match=r"no action space 'pose'.*ee_pose"):
         roboirg.make("PickXtimes", actions="pose")
     for option in ("depth", "calibration"):
-        with pytest.raises(InvalidValueError, match=f"{option}=True is for the cameras asked for"):
+        with pytest.raises(InvalidValueError, match=f"{option}=True needs a camera"):
             roboirg.make("PickXtimes", cameras=(), **{option: True})
-        with pytest.raises(InvalidValueError, match=f"{option} is 1; it has to be True or False"):
+        with pytest.raises(InvalidValueError, match=f"{option} is 1; it must be True or False"):
             roboirg.make("PickXtimes", **{option: 1})
     for wrong in (0, 1.5, True, "every", None):
         with pytest.raises(InvalidValueError, match=f"demonstration_frames is {wrong!r}"):

@@ -41,7 +41,7 @@ def test_no_task_s_episodes_have_drifted(task):
         fingerprint_of(task, shipped_splits()[task].passed_over) == shipped_splits()[task].sha256
     ), (
         f"The episodes of {task} are not those for which the splits were built; if that is wanted, "
-        f"run: roboirg build-splits --tasks {task} --out src/roboirg/splits.json"
+        f"run: roboirg build-splits --tasks {task} --out src/roboirg/episodes/splits.json"
     )
     assert fingerprint(episodes(task)) == shipped_splits()[task].sha256
 
@@ -93,7 +93,7 @@ def test_only_plain_data_has_a_fingerprint():
     episode = get_episode("VideoUnmask", "test", 0)
     assert json.loads(json.dumps(plain(episode))) == plain(episode)
     for wrong in (np.float64(1.0), np.int64(1), [1], {1}):
-        with pytest.raises(TypeError, match="is no plain data"):
+        with pytest.raises(TypeError, match="is not plain data"):
             plain((wrong,))
 
 

@@ -1,8 +1,8 @@
-"""`roboirg doctor`: is everything here that playing an episode needs, and does it work?
+"""`roboirg doctor`: check that everything needed to play an episode is installed and works.
 
-Nothing heavy is imported in this process. The renderer is tried in a process of its own
-(``python -m roboirg.doctor --frame``), because a bad graphics driver can crash Python; then the
-crash is a failed check and not a dead doctor.
+This process imports nothing heavy. A child process (``python -m roboirg.doctor --frame``) tries the
+renderer, because a bad graphics driver can crash Python; a crash is then a failed check and does
+not end the report.
 """
 
 from __future__ import annotations
@@ -27,30 +27,30 @@ from roboirg.simulation.rendering.render_device import DEVICE_VARIABLE
 
 DISTRIBUTION = "roboirgbench"
 FRAME_TIMEOUT = 120.0
-"""Seconds that the test frame may take."""
+"""Time limit for the test frame, s."""
 
 OLDEST_PYTHON = (3, 11)
 _EXTRAS = ("world", "sim", "report")
 _GIB = 1024**3
-_LEAST_MEMORY = 2 * _GIB
+_MIN_MEMORY = 2 * _GIB
 _RENDER_REMEDY = (
     "run `make setup`, or install Mesa >= 23.2: apt-get install mesa-vulkan-drivers libvulkan1 "
     "libegl1 (see docs/install.md)"
 )
-# The lines by which the child process reports how far it came.
+# Prefixes of the lines by which the child process reports its progress.
 _DEVICE_PREFIX = "device: "
 _FRAME_PREFIX = "frame: "
 
 
 @dataclass(frozen=True)
 class Check:
-    """One thing that was looked at.
+    """The result of one check.
 
     Attributes:
-        name: what was looked at.
-        ok: it is as it has to be.
-        found: what is there.
-        remedy: what to do about it; empty when ``ok``.
+        name: what was checked.
+        ok: whether the check passed.
+        found: what was found.
+        remedy: how to fix a failure; ignored if ``ok``.
     """
 
     name: str
@@ -59,8 +59,8 @@ class Check:
     remedy: str = ""
 
 
-def examine() -> list[Check]:
-    """Look at everything and return one check for each; takes a few seconds, raises nothing."""
+def run_checks() -> list[Check]:
+    """Run all checks; takes a few seconds and raises nothing."""
     return [
         _check_python(),
         *_check_packages(),
@@ -73,7 +73,7 @@ def examine() -> list[Check]:
 
 
 def report(checks: Sequence[Check]) -> str:
-    """Return a line for each check, and below every failure a line that says what to do."""
+    """Return a line for each check, with a remedy below every failure."""
     width = max((len(check.name) for check in checks), default=0)
     lines: list[str] = []
     for check in checks:
@@ -81,13 +81,15 @@ def report(checks: Sequence[Check]) -> str:
         if not check.ok:
             lines.append(f"      {'':<{width}}  -> {check.remedy}")
     failures = sum(not check.ok for check in checks)
-    lines.append(f"{failures} of {len(checks)} checks failed." if failures else "All is well.")
+    lines.append(
+        f"{failures} of {len(checks)} checks failed." if failures else "All checks passed."
+    )
     return "\n".join(lines)
 
 
 def run_doctor() -> int:
     """Print the report and return the exit code: 0 if every check passed, otherwise 1."""
-    checks = examine()
+    checks = run_checks()
     sys.stdout.write(report(checks) + "\n")
     return 0 if all(check.ok for check in checks) else 1
 
@@ -110,7 +112,7 @@ def _check_packages() -> Iterator[Check]:
         yield Check(DISTRIBUTION, False, "not installed", remedy)
         return
     yield Check(DISTRIBUTION, True, metadata.version(DISTRIBUTION))
-    wanted: dict[str, str] = {}  # a package may be in several extras
+    wanted: dict[str, str] = {}  # several extras may list the same package
     for requirement in requirements:
         name, specifier, extra = _read_requirement(requirement)
         if extra in ("", *_EXTRAS) and name != DISTRIBUTION:
@@ -126,9 +128,9 @@ def _check_package(name: str, specifier: str) -> Check:
     try:
         version = metadata.version(name)
     except metadata.PackageNotFoundError:
-        return Check(name, False, f"not installed, {specifier} is needed", remedy)
+        return Check(name, False, f"not installed; needs {specifier}", remedy)
     if not _satisfies(version, specifier):
-        return Check(name, False, f"{version}, {specifier} is needed", remedy)
+        return Check(name, False, f"{version}; needs {specifier}", remedy)
     return Check(name, True, version)
 
 
@@ -172,30 +174,30 @@ def _check_model_files() -> Check:
 
 
 def _check_opencv() -> Check:
-    """Load OpenCV in a child process: its wheel needs two libraries of the system."""
+    """Load OpenCV in a child process; its wheel needs two system libraries."""
     command = [sys.executable, "-c", "import cv2; print(cv2.__version__)"]
     child = subprocess.run(  # noqa: S603 - a constant command in our own interpreter
         command, capture_output=True, text=True, check=False, timeout=FRAME_TIMEOUT
     )
-    words = (child.stdout + child.stderr).strip().splitlines() or [f"exit code {child.returncode}"]
+    lines = (child.stdout + child.stderr).strip().splitlines() or [f"exit code {child.returncode}"]
     return Check(
         "OpenCV libraries",
         child.returncode == 0,
-        "loaded" if child.returncode == 0 else words[-1],
+        "loaded" if child.returncode == 0 else lines[-1],
         "run `make setup`, or: apt-get install libgl1 libglib2.0-0",
     )
 
 
 def _check_rendering() -> tuple[Check, Check]:
-    """Try the renderer in a child process and say how far it came."""
+    """Try the renderer in a child process and report its progress."""
     code, output, fault = _run_frame_process()
-    said = {
+    reported = {
         prefix: line.removeprefix(prefix)
         for line in output.splitlines()
         for prefix in (_DEVICE_PREFIX, _FRAME_PREFIX)
         if line.startswith(prefix)
     }
-    device, frame = said.get(_DEVICE_PREFIX), said.get(_FRAME_PREFIX)
+    device, frame = reported.get(_DEVICE_PREFIX), reported.get(_FRAME_PREFIX)
     drawn = frame is not None and code == 0
     chosen = os.environ.get(DEVICE_VARIABLE)
     remedy = f"unset {DEVICE_VARIABLE} (now {chosen!r}), or " if chosen else ""
@@ -205,14 +207,14 @@ def _check_rendering() -> tuple[Check, Check]:
         Check(
             "test frame",
             drawn,
-            (frame or "") if drawn else (fault if device else "not tried, there is no device"),
+            (frame or "") if drawn else (fault if device else "not tried: no device"),
             remedy,
         ),
     )
 
 
 def _run_frame_process() -> tuple[int, str, str]:
-    """Return the child's exit code, its output, and a sentence that says what went wrong."""
+    """Return the child's exit code, its output, and a description of what went wrong."""
     command = [sys.executable, "-m", "roboirg.doctor", "--frame"]
     try:
         child = subprocess.run(  # noqa: S603 - our own module in our own interpreter
@@ -224,12 +226,12 @@ def _run_frame_process() -> tuple[int, str, str]:
     if child.returncode < 0:
         number = -child.returncode
         return child.returncode, child.stdout, f"the driver crashed ({signal.strsignal(number)})"
-    last_words = child.stderr.strip().splitlines() or [f"exit code {child.returncode}"]
-    return child.returncode, child.stdout, last_words[-1]
+    error_lines = child.stderr.strip().splitlines() or [f"exit code {child.returncode}"]
+    return child.returncode, child.stdout, error_lines[-1]
 
 
 def _check_processors() -> Check:
-    # os.cpu_count() would count processors that a container may not use.
+    # os.cpu_count() also counts processors that a container may not use.
     count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return Check("processors", bool(count), f"{count}", "")
 
@@ -241,24 +243,24 @@ def _check_memory() -> Check:
         total = min(total, int(text))
     return Check(
         "memory",
-        total >= _LEAST_MEMORY,
+        total >= _MIN_MEMORY,
         f"{total / _GIB:.1f} GiB",
-        f"give it at least {_LEAST_MEMORY // _GIB} GiB; every worker process takes about 0.5 GiB",
+        f"provide at least {_MIN_MEMORY // _GIB} GiB; each worker process takes about 0.5 GiB",
     )
 
 
 def _render_test_frame() -> str:
-    """Draw a lit red box and return what was seen, or raise a RoboIRGError.
+    """Draw a lit red box; returns a description of the picture.
 
     Raises:
         MissingDependencyError: SAPIEN is not installed.
         RenderDeviceError: no device can render, or the picture is wrong.
     """
-    # Named here and not at the top: only the child process may load them.
+    # Imported here because only the child process may load them.
     devices = importlib.import_module("roboirg.simulation.rendering.render_device")
-    device = devices.describe(devices.find_render_device())
+    device = devices.describe_device(devices.find_render_device())
     kind = "drawn by the processor" if device.is_software else "GPU"
-    # Flushed at once: the next lines may crash this process.
+    # Flushed at once, because the next lines may crash this process.
     sys.stdout.write(f"{_DEVICE_PREFIX}{device.name} at {device.alias} ({kind})\n")
     sys.stdout.flush()
 
@@ -274,7 +276,7 @@ def _render_test_frame() -> str:
     builder.build_static()
     sapien.render.set_camera_shader_dir("minimal")
     camera = scene.add_camera("camera", 64, 64, 1.0, 0.01, 10.0)
-    # Without it SAPIEN computes a light table that this picture does not need, for seconds.
+    # Otherwise SAPIEN spends seconds on a light table that this picture does not need.
     table = sapien.render.RenderTexture(np.zeros((2, 2, 4), np.uint8), 2, "r8g8b8a8unorm")
     camera.set_texture("BRDFLUT", table)
     scene.update_render()
@@ -291,7 +293,7 @@ def _render_test_frame() -> str:
 
 def _is_reddish(color: Sequence[float]) -> bool:
     red, green, blue = (float(part) for part in color)
-    return red > 0.2 and red > 2 * max(green, blue)  # noqa: PLR2004 - in units of full brightness
+    return red > 0.2 and red > 2 * max(green, blue)  # noqa: PLR2004 - relative to full brightness
 
 
 def _main() -> int:

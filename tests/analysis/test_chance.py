@@ -18,8 +18,8 @@ from roboirg.tasks import all_tasks, get_task
 
 
 def job(task: str, setting: str, episode: int = 2, **fields: object) -> Job:
-    told = {"policy": "any", "split": "test", **fields}
-    return Job(task=task, setting=setting, episode=episode, **told)  # type: ignore[arg-type]
+    usual = {"policy": "any", "split": "test", **fields}
+    return Job(task=task, setting=setting, episode=episode, **usual)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("task", all_tasks())
@@ -39,7 +39,7 @@ def test_resolved_commands_leave_nothing_to_chance(setting: str, form: str) -> N
 
 
 def test_by_hand() -> None:
-    """StopCube has the second to the fifth visit, VideoRepick one to three times, told of none."""
+    """StopCube has the second to the fifth visit, VideoRepick one to three repeats."""
     assert chance_of(job("StopCube", "direct")) == Fraction(1, 4)
     assert chance_of(job("VideoRepick", "direct")) == Fraction(1, 3)
 
@@ -48,15 +48,15 @@ def test_by_hand() -> None:
 @pytest.mark.parametrize("setting", ["direct", "reasoning", "spatial"])
 def test_it_is_what_the_forgetful_listener_comes_to(task: str, setting: str) -> None:
     """Its own decisions, with 400 seeds in one episode; only its hands are left out."""
-    told = job(task, setting)
-    episode = get_episode(task, "test", told.episode)
-    env = SimpleNamespace(episode=episode, instruction=instruct_job(told))
+    played = job(task, setting)
+    episode = get_episode(task, "test", played.episode)
+    env = SimpleNamespace(episode=episode, instruction=instruct_job(played))
     wanted = get_task(task).stages(episode.scene, episode.goal)
     right = [
         get_task(task).stages(episode.scene, ForgetfulPolicy(seed=seed).decide(env, "")) == wanted  # type: ignore[arg-type]
         for seed in range(400)
     ]
-    level = float(chance_of(told))
+    level = float(chance_of(played))
     assert np.mean(right) == pytest.approx(level, abs=0.01 + 3 * np.sqrt(level * (1 - level) / 400))
 
 

@@ -1,4 +1,4 @@
-"""Comparisons of two policies: who is better, what cannot be told, what is unfair."""
+"""Comparisons of two policies: which is better, what stays open, what is refused."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import re
 import numpy as np
 import pytest
 
+from roboirg.analysis.stats.cells import gather
 from roboirg.analysis.stats.comparison import compare
 from roboirg.analysis.stats.comparison_text import sentences
-from roboirg.analysis.stats.samples import gather
 from roboirg.core.errors import InvalidValueError
 
 GOOD, POOR = "listener", "forgetful"
@@ -32,7 +32,7 @@ def text(first: list, second: list) -> str:
     return "\n".join(sentences(compared(first, second), GOOD, POOR))
 
 
-def test_who_is_better_is_said_in_words(result) -> None:
+def test_the_better_policy_is_named(result) -> None:
     first = play(result, GOOD, "1" * 20) + play(result, GOOD, "1" * 20, setting="direct")
     second = play(result, POOR, "1" * 20) + play(result, POOR, "1" * 5 + "0" * 15, setting="direct")
     found = compared(first, second)
@@ -45,21 +45,21 @@ def test_who_is_better_is_said_in_words(result) -> None:
         r"^direct: listener is better, \+75\.0 points \(95 % interval \+\d", words, re.M
     )
     assert "p < 0.001, 20 episodes." in words
-    assert "explicit: cannot tell, ±0.0 points" in words
+    assert "explicit: no clear difference, ±0.0 points" in words
     assert "the two did equally well" in words
     assert "single cell" not in words  # there is one task only
     other_way = compared(second, first).averages[1]
     assert (other_way.verdict, other_way.gap.value) == ("second", -0.75)
 
 
-def test_what_cannot_be_told_says_what_it_would_take(result) -> None:
+def test_an_open_comparison_says_what_it_would_take(result) -> None:
     """3 of 20 against 6 of 20, differing on 5: a gap of 15 points with a discordance of 25."""
     first, second = "11100000000000000000", "11000000000000001111"
     words = text(play(result, GOOD, first), play(result, POOR, second))
-    assert "explicit: cannot tell, −15.0 points" in words
+    assert "explicit: no clear difference, −15.0 points" in words
     # mcnemar_power(5 unlike of 20): not even all 5 to one side are found in 4 of 5 cases.
-    assert "So many episodes show no gap in 80 % of cases" in words
-    needed = int(re.search(r"about (\d+) would be needed", words)[1])
+    assert "This many episodes show no gap in 80 % of cases" in words
+    needed = int(re.search(r"this size needs about (\d+)\.", words)[1])
     assert 80 <= needed <= 110  # by the normal approximation 7.85 · 0.25 / 0.15² = 87
 
 
@@ -71,7 +71,7 @@ def test_averages_are_over_tasks_and_cells_are_named(result) -> None:
     assert found.averages[0].tasks == ("PickXtimes", "BinFill")
     words = text(first, second)
     assert "30 episodes of 2 tasks" in words
-    assert "Of 2 single cells (a task told in one way), 1 can be told apart:" in words
+    assert "1 of 2 single cells (one task in one setting) shows a difference:" in words
     assert "  PickXtimes, explicit: listener is better, +100.0 points" in words
     nothing = text(first, first)
     assert "None of 2 single cells" in nothing
@@ -81,11 +81,14 @@ def test_what_has_no_counterpart_or_no_verdict_is_left_out_and_counted(result) -
     first = play(result, GOOD, "1111!1") + play(result, GOOD, "11", setting="direct")
     second = play(result, POOR, "0000-")
     found = compared(first, second)
-    assert [finding.where.variant.setting for finding in found.averages] == ["explicit"]
+    assert [finding.key.options.setting for finding in found.averages] == ["explicit"]
     assert found.averages[0].gap.episodes == 4
     words = text(first, second)
-    assert "1 trial of one without counterpart" in words
-    assert "Incomplete: 1 trial ended in an error" in words
+    assert "1 trial without a counterpart is left out." in words
+    assert (
+        "Incomplete: 1 trial without a verdict (an error, or still to be played) is left out."
+        in words
+    )
 
 
 def test_policies_with_other_seeds_are_compared_by_episode(result) -> None:
@@ -113,11 +116,11 @@ def test_what_cannot_be_compared_is_refused(result, changes, words) -> None:
         compared(play(result, GOOD, "11"), play(result, POOR, "11", **changes))
 
 
-def test_a_side_has_to_be_one_policy_of_one_version(result) -> None:
+def test_a_side_is_one_policy_of_one_version(result) -> None:
     one = play(result, GOOD, "11")
     with pytest.raises(InvalidValueError, match="name one as RUN:listener"):
         compared([*one, *play(result, POOR, "11")], one)
-    with pytest.raises(InvalidValueError, match="several rules or in several versions"):
+    with pytest.raises(InvalidValueError, match="several conditions or in several versions"):
         compared([*one, *play(result, GOOD, "--1", policy_version="2")], one)
     with pytest.raises(InvalidValueError, match="no results"):
         compared([], one)

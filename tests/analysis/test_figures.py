@@ -14,9 +14,9 @@ from roboirg.analysis.figures.failures import COLORS, UNKNOWN, draw_failures
 from roboirg.analysis.figures.forms import PARTS, draw_forms
 from roboirg.analysis.published import published_rows
 from roboirg.analysis.stats.run_summary import ALL
-from roboirg.analysis.stats.success_rates import SettingColumn
 from roboirg.cli.report_commands import figures
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan import Plan
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
@@ -37,7 +37,7 @@ PLAN = Plan(
 
 
 def results() -> list[Result]:
-    """The listener succeeds; the forgetful fails where it has to remember."""
+    """The listener succeeds; the forgetful fails where it must remember."""
     found = []
     for number, job in enumerate(PLAN.jobs()):
         lost = job.policy == "forgetful" and job.form == "implicit" and job.setting != "explicit"
@@ -136,7 +136,7 @@ def test_published_values_are_ghosts_on_request(
     for row in published_rows("context"):
         assert f"<!-- {row.model} (published)" in drawn
         summary = found.summaries[
-            next(who for who in found.names if who.policy == row.model), ALL, row.variant
+            next(who for who in found.names if who.policy == row.model), ALL, row.options
         ]
         assert float(summary.rate) == pytest.approx(float(row.average) / 100, abs=1e-4)
     assert "(published)" not in texts(tmp_path / "without" / "context.svg")
@@ -203,4 +203,4 @@ def test_the_command_draws_what_it_is_asked_for(tmp_path: Path) -> None:
     assert sorted(path.stem for path in out.iterdir()) == ["averages"] * 3 + ["failures"] * 3
     assert str(out / "averages.pdf") in done.output
     assert set(FIGURES) >= {"averages", "failures"}
-    assert SettingColumn("explicit") in {variant for _, _, variant in content().samples}
+    assert InstructionOptions("explicit") in {options for _, _, options in content().cells}

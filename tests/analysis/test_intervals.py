@@ -9,6 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from roboirg.analysis.stats.cells import (
+    CellResults,
+    Trial,
+    cell_interval,
+    clustered_interval,
+)
 from roboirg.analysis.stats.intervals import (
     percentile_interval,
     resampled_rates,
@@ -17,13 +23,6 @@ from roboirg.analysis.stats.intervals import (
     without_spread,
 )
 from roboirg.analysis.stats.paired_tests import Pairs, measure_gap, sign_flip_test
-from roboirg.analysis.stats.samples import (
-    CellResults,
-    Trial,
-    clustered_interval,
-    shown_interval,
-    wilson,
-)
 
 LONG = "ROBOIRG_LONG_TESTS" in os.environ
 """Ten times as many simulated runs."""
@@ -34,7 +33,7 @@ SLACK = 2.6 * np.sqrt(0.05 * 0.95 / RUNS)
 """What chance alone does to a simulated share, in 99 of 100 cases."""
 
 
-def sample(won: np.ndarray) -> CellResults:
+def cell(won: np.ndarray) -> CellResults:
     """Of an array (episodes, seeds)."""
     return CellResults(
         {
@@ -58,6 +57,28 @@ def played(
 
 def is_nominal(share: float) -> bool:
     return NOMINAL[0] - SLACK <= share <= NOMINAL[1] + SLACK
+
+
+# By hand, z = 1.96: 8 of 10 is 0.8 with weight 0.38415, center 0.99207 / 1.38415 = 0.71674,
+# half 1.96 * sqrt(0.016 + 0.0096036) / 1.38415 = 0.22658. Also in Newcombe 1998, table I.
+@pytest.mark.parametrize(
+    ("successes", "trials", "low", "high"),
+    [
+        (8, 10, 0.4902, 0.9433),
+        (81, 263, 0.2553, 0.3662),
+        (15, 148, 0.0624, 0.1605),
+        (0, 20, 0.0, 0.1611),
+        (20, 20, 0.8389, 1.0),
+    ],
+)
+def test_wilson(successes: int, trials: int, low: float, high: float) -> None:
+    assert wilson_interval(successes, trials) == pytest.approx((low, high), abs=5e-5)
+
+
+@pytest.mark.parametrize(("successes", "trials"), [(0, 0), (3, 2), (-1, 2)])
+def test_no_interval_of_nonsense(successes: int, trials: int) -> None:
+    with pytest.raises(ValueError, match="not a proportion"):
+        wilson_interval(successes, trials)
 
 
 @given(st.integers(1, 400).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))
@@ -99,7 +120,7 @@ def test_the_order_of_episodes_and_the_hour_make_no_difference() -> None:
     rng = np.random.default_rng(3)
     won = played(rng, 0.4, 40, 3, 0.3)
     first, again, mixed = (
-        clustered_interval([sample(rows)], np.random.default_rng(5))
+        clustered_interval([cell(rows)], np.random.default_rng(5))
         for rows in (won, won, rng.permutation(won))
     )
     assert first == again == mixed
@@ -128,20 +149,20 @@ def test_where_all_is_alike_what_was_not_seen_is_allowed_for() -> None:
     assert without_spread(1.0, 50) == pytest.approx((0.92865, 1), abs=1e-5)
     assert without_spread(0.0, 50, least=-1) == pytest.approx((-0.07135, 0.07135), abs=1e-5)
     assert without_spread(-1.0, 50, least=-1) == pytest.approx((-1, -0.85730), abs=1e-5)
-    none = sample(np.zeros((50, 3), dtype=bool))
+    none = cell(np.zeros((50, 3), dtype=bool))
     assert clustered_interval([none], np.random.default_rng(0)) == without_spread(0.0, 50)
 
 
 def test_with_several_seeds_the_clustered_interval_is_shown() -> None:
     rng = np.random.default_rng(2)
-    once, thrice = (sample(played(rng, 0.4, 50, seeds, 0.5)) for seeds in (1, 3))
-    assert shown_interval(once, np.random.default_rng(0)) == wilson(once)
-    assert shown_interval(thrice, np.random.default_rng(0)) == clustered_interval(
+    once, thrice = (cell(played(rng, 0.4, 50, seeds, 0.5)) for seeds in (1, 3))
+    assert cell_interval(once, np.random.default_rng(0)) == wilson_interval(once.successes, 50)
+    assert cell_interval(thrice, np.random.default_rng(0)) == clustered_interval(
         [thrice], np.random.default_rng(0)
     )
-    assert shown_interval(CellResults(), rng) is None
+    assert cell_interval(CellResults(), rng) is None
     assert clustered_interval([once, CellResults()], rng) is None
-    assert clustered_interval([sample(np.ones((1, 3), dtype=bool))], rng) is None
+    assert clustered_interval([cell(np.ones((1, 3), dtype=bool))], rng) is None
 
 
 @pytest.mark.parametrize("alike", [0.0, 0.5])
@@ -151,12 +172,13 @@ def test_the_clustered_interval_covers(rate: float, alike: float) -> None:
     rng = np.random.default_rng(11)
     hits = np.zeros(2)
     for _ in range(RUNS):
-        one = sample(played(rng, rate, 50, 3, alike))
-        intervals = clustered_interval([one], rng, DRAWS), wilson(one)
+        one = cell(played(rng, rate, 50, 3, alike))
+        naive = wilson_interval(one.successes, one.trials)
+        intervals = clustered_interval([one], rng, DRAWS), naive
         hits += [each is not None and each.low <= rate <= each.high for each in intervals]
-    clustered, naive = hits / RUNS
+    clustered, by_trials = hits / RUNS
     assert is_nominal(clustered)
-    assert is_nominal(naive) == (alike == 0)
+    assert is_nominal(by_trials) == (alike == 0)
 
 
 def test_the_interval_of_an_average_covers() -> None:
@@ -165,7 +187,7 @@ def test_the_interval_of_an_average_covers() -> None:
     truth, hits = np.mean([0.2, 0.5, 0.9]), 0
     for _ in range(RUNS):
         tasks = [
-            sample(played(rng, rate, episodes, 3, 0.4))
+            cell(played(rng, rate, episodes, 3, 0.4))
             for rate, episodes in ((0.2, 30), (0.5, 50), (0.9, 40))
         ]
         found = clustered_interval(tasks, rng, DRAWS)
@@ -181,7 +203,7 @@ def test_the_intervals_of_gap_and_retention_cover(seeds: int) -> None:
         ease = rng.beta(2, 2, size=50)
         second = rng.random((50, seeds)) < ease[:, None]
         first = rng.random((50, seeds)) < 0.6 * ease[:, None]
-        gap = measure_gap([Pairs.of(sample(first), sample(second))], rng, DRAWS)
+        gap = measure_gap([Pairs.of(cell(first), cell(second))], rng, DRAWS)
         assert gap is not None
         assert gap.interval is not None
         assert gap.retention_interval is not None
@@ -198,15 +220,14 @@ def test_the_test_raises_few_false_alarms(seeds: int) -> None:
 
     McNemar's test over single trials raises far too many with several seeds.
     """
-    from roboirg.analysis.stats.paired_tests import mcnemar_test
-
     rng = np.random.default_rng(14)
     alarms = np.zeros(2)
     for _ in range(2 * RUNS):
         chances = rng.choice([0.1, 0.9], size=(2, 50))
         won, lost = (rng.random((50, seeds)) < side[:, None] for side in chances)
         differences = won.sum(axis=1) - lost.sum(axis=1)
-        naive = mcnemar_test(int((won & ~lost).sum()), int((lost & ~won).sum()))
+        # With one difference for each trial the test is McNemar's.
+        naive = sign_flip_test(won.astype(np.int64).ravel() - lost.astype(np.int64).ravel())
         alarms += [sign_flip_test(differences) <= 0.05, naive <= 0.05]
     exact, naive = alarms / (2 * RUNS)
     assert exact <= 0.05 + SLACK

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import itertools
-import os
 import re
-import shutil
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -26,7 +24,6 @@ from roboirg.records.store import RecordStore
 pytest.importorskip("jinja2")
 pytestmark = pytest.mark.browser
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 PAGE_SIZE = 40
 MOST_ELEMENTS = 4000
 PLAN = Plan(
@@ -40,11 +37,11 @@ TRACEBACK = "Traceback <script>alert(1)</script>"
 
 
 def records() -> list[Record]:
-    """The listener succeeds, the forgetful fails where it has to remember; one error."""
+    """The listener succeeds, the forgetful fails where it must remember; one error."""
     found = []
     for index, job in enumerate(PLAN.jobs()):
-        told = make_record(job, RolloutResult("success", cause=None), started_at="now")
-        subject = f"cube_{told.goal.get('color', 'red')}"
+        success = make_record(job, RolloutResult("success", cause=None), started_at="now")
+        subject = f"cube_{success.goal.get('color', 'red')}"
         events = [
             EventRecord(step=-20, kind="still", subject="robot"),
             EventRecord(step=-10, kind="over", subject=subject, place="target"),
@@ -92,7 +89,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     film.caption = "Do it."
     world = Blank()
     for step in range(0, 101, 8):
-        film.shoot(world, is_demonstration=step < 20)  # type: ignore[arg-type]
+        film.add_frame(world, is_demonstration=step < 20)  # type: ignore[arg-type]
     assert film.finish()
     with RecordStore(folder) as store:
         for record in records():
@@ -107,40 +104,10 @@ def page_file(run: Path) -> Path:
     return path
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    reason = "no browser: pip install playwright, and a Chromium (Debian's package chromium)"
-    playwright = pytest.importorskip("playwright.sync_api", reason=reason)
-    path = next(filter(None, map(shutil.which, BROWSERS)), None)
-    with playwright.sync_playwright() as driver:
-        if path is None and not Path(driver.chromium.executable_path).exists():
-            pytest.skip(reason)
-        # Chromium refuses its sandbox to root, as whom containers run.
-        arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
-        chromium = driver.chromium.launch(executable_path=path, args=arguments)
-        yield chromium
-        chromium.close()
-
-
 @pytest.fixture
-def page(browser: Any, page_file: Path) -> Iterator[Any]:
-    yield from opened(browser, page_file.as_uri())
-
-
-def opened(browser: Any, address: str, **options: Any) -> Iterator[Any]:
-    """A page of which nothing may go wrong unnoticed, and which may ask nobody for anything."""
-    context = browser.new_context(viewport={"width": 1280, "height": 900}, **options)
-    page = context.new_page()
-    page.set_default_timeout(10_000)
-    wrong: list[str] = []
-    page.on("pageerror", lambda error: wrong.append(str(error)))
-    page.on("console", lambda said: said.type in ("error", "warning") and wrong.append(said.text))
-    page.on("request", lambda asked: asked.url.startswith(("file:", "data:", "http://127.0.0.1"))
-            or wrong.append(asked.url))  # fmt: skip
-    page.goto(address)
-    yield page
-    context.close()
-    assert wrong == []
+def page(open_page: Any, page_file: Path) -> Iterator[Any]:
+    with open_page(page_file.as_uri()) as page:
+        yield page
 
 
 def shown(page: Any) -> int:
@@ -200,7 +167,7 @@ def test_words_are_searched_in_utterances_and_causes(page: Any) -> None:
         for one in records()
     )
     assert shown(page) == some
-    search.fill("nobody says this")
+    search.fill("words in no record")
     assert shown(page) == 0
     assert page.locator("#nothing").is_visible()
 
@@ -284,7 +251,7 @@ def test_errors_are_marked_in_every_average_they_belong_to(page: Any) -> None:
         "all => all.map(one => one.getAttribute('aria-label'))")}  # fmt: skip
     assert len(rows) >= 2
     assert any("all tasks" in row for row in rows)
-    assert "ended in an error" in page.locator(".notices .warning").inner_text()
+    assert "ended in an error" in page.locator(".warnings .warning").inner_text()
 
 
 def test_bars_show_their_episodes(page: Any) -> None:
@@ -313,15 +280,15 @@ def test_an_expression_and_its_antecedent_light_up_together(page: Any) -> None:
     assert row.locator("mark.lit").count() == 0
 
 
-def test_an_episode_shows_its_forms_failure_and_company(page: Any) -> None:
+def test_an_episode_shows_its_forms_failure_and_scene_mates(page: Any) -> None:
     row = first_row(page, policy="forgetful (privileged)", task="StopCube", setting="direct",
                     form="implicit")  # fmt: skip
     text = row.locator(".inside").inner_text()
-    for label in ("explicit", "resolved", "meant", "why it failed", "played", "under"):
+    for label in ("explicit", "resolved", "meant", "why it failed", "played", "conditions"):
         assert re.search(rf"^{label}$", text, re.MULTILINE), label
     assert "Picked up the wrong cube." in text
     assert "stage never completed" in text or "stages never completed" in text
-    row.locator(".company .chip", has_text="explicit").first.click()
+    row.locator(".scene-mates .chip", has_text="explicit").first.click()
     # It is hidden by the filters, so they are cleared.
     assert shown(page) == len(records())
     assert "explicit" in focused(page)
@@ -365,21 +332,21 @@ def test_choosing_an_event_seeks_in_the_film_inside(page: Any) -> None:
     check_seeking(page)
 
 
-def test_choosing_an_event_seeks_in_the_film_that_is_served(browser: Any, run: Path) -> None:
+def test_choosing_an_event_seeks_in_the_film_that_is_served(open_page: Any, run: Path) -> None:
     with PageServer(run, lambda: make_view(run)) as server:
         thread = threading.Thread(target=server.serve_forever)
         thread.start()
-        for page in opened(browser, server.address):
+        with open_page(server.address) as page:
             check_seeking(page)
             assert page.locator("video").first.get_attribute("src") == "videos/x.mp4"
         server.shutdown()
         thread.join()
 
 
-def test_a_film_beside_the_page_plays_from_a_file(browser: Any, run: Path) -> None:
+def test_a_film_beside_the_page_plays_from_a_file(open_page: Any, run: Path) -> None:
     path = run / "linked.html"
     path.write_text(render_runs([Run("a", records(), run)], embed=False))
-    for page in opened(browser, path.as_uri()):
+    with open_page(path.as_uri()) as page:
         check_seeking(page)
 
 
@@ -407,7 +374,7 @@ def test_two_policies_are_compared_episode_by_episode(page: Any) -> None:
     assert page.locator("#filters [name=outcome]").is_visible()
 
 
-def test_two_runs_are_compared(browser: Any, tmp_path: Path) -> None:
+def test_two_runs_are_compared(open_page: Any, tmp_path: Path) -> None:
     before = [one for one in records() if one.policy == "forgetful"]
     after = [
         one.model_copy(update={"outcome": "success", "cause": None, "attribution": None})
@@ -418,7 +385,7 @@ def test_two_runs_are_compared(browser: Any, tmp_path: Path) -> None:
     path = tmp_path / "page.html"
     path.write_text(render_runs([Run("before", before), Run("after", after)]))
     gained = sum(one.outcome == "failure" and one.task == "StopCube" for one in before[:-4])
-    for page in opened(browser, f"{path.as_uri()}#?view=pairs"):
+    with open_page(f"{path.as_uri()}#?view=pairs") as page:
         assert shown(page) == gained > 0
         assert f"of {len(after)} pairs" in page.locator("#shown").inner_text()
         page.select_option("#filters [name=change]", "right")
@@ -427,9 +394,9 @@ def test_two_runs_are_compared(browser: Any, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_it_fits_a_telephone_and_its_texts_can_be_read(
-    browser: Any, page_file: Path, scheme: str
+    open_page: Any, page_file: Path, scheme: str
 ) -> None:
-    for page in opened(browser, page_file.as_uri(), color_scheme=scheme):
+    with open_page(page_file.as_uri(), color_scheme=scheme) as page:
         first_row(page, policy="forgetful (privileged)", setting="contextual", form="implicit")
         assert page.evaluate(CONTRASTS) == []
         page.set_viewport_size({"width": 400, "height": 800})
@@ -467,7 +434,7 @@ def test_landmarks_headings_and_names(page: Any) -> None:
 
 
 def test_ten_thousand_episodes_cost_no_more_than_a_page_of_them(
-    browser: Any, tmp_path: Path
+    open_page: Any, tmp_path: Path
 ) -> None:
     # By the page's own counters: how much is drawn, not how long it takes on this machine.
     some = [one.model_copy(update={"video": None}) for one in records()]
@@ -478,11 +445,11 @@ def test_ten_thousand_episodes_cost_no_more_than_a_page_of_them(
     ][:10_000]
     path = tmp_path / "many.html"
     path.write_text(render(many))
-    for page in opened(browser, path.as_uri()):
+    with open_page(path.as_uri()) as page:
         assert shown(page) == 10_000
         elements = "document.querySelectorAll('*').length"
         assert page.evaluate(elements) < MOST_ELEMENTS
-        for words in ("cube", "nobody says this", ""):
+        for words in ("cube", "words in no record", ""):
             page.fill("[name=words]", words)
             counters = page.evaluate("roboirg.counters")
             assert counters["scanned"] == 10_000

@@ -1,4 +1,4 @@
-"""A run of the listener and the forgetful policy tells the story it should, all the way."""
+"""A run of the listener and the forgetful policy, from records to page."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from roboirg.analysis.page.report import write_report
 from roboirg.analysis.stats.chance import chance_of
 from roboirg.analysis.stats.comparison import compare
 from roboirg.analysis.stats.run_summary import ALL
-from roboirg.analysis.stats.success_rates import SettingColumn
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.executors.executor import choose_executor
 from roboirg.evaluation.plan import make_plan
 from roboirg.evaluation.rollout import EpisodeRunner
@@ -29,7 +29,7 @@ PLAN = make_plan(
     forms="implicit,resolved",
     episodes="3",
 )
-"""A task of each suite, told in all its ways."""
+"""A task of each suite, in all settings and forms."""
 MOST_DEVIATIONS = 4
 """Standard deviations between what came of guessing and what is expected."""
 
@@ -79,18 +79,19 @@ def test_the_whole_report_follows(run: Path, tmp_path: Path) -> None:
     content = FigureData.of([("story", read_records(run))], PLAN.jobs())
     listener, forgetful = content.names
     assert (listener.policy, forgetful.policy) == ("listener", "forgetful")
-    told = content.summaries[forgetful, ALL, SettingColumn("direct")]
-    assert told.form_gap is not None
-    assert told.form_gap.value < -0.3
-    assert told.form_gap.overlap.only_first == told.form_gap.overlap.neither == 0
+    direct = content.summaries[forgetful, ALL, InstructionOptions("direct")]
+    assert direct.form_gap is not None
+    assert direct.form_gap.value < -0.3
+    assert direct.form_gap.overlap.only_first == direct.form_gap.overlap.neither == 0
     found = compare(
-        *({key: one for key, one in content.samples.items() if key[0] == who}
-          for who in (listener, forgetful)),
+        *({key: one for key, one in content.cells.items() if key.policy_run == policy_run}
+          for policy_run in (listener, forgetful)),
         np.random.default_rng(0),
     )  # fmt: skip
-    verdicts = {finding.where.variant: finding.gap.value for finding in found.averages}
-    assert verdicts[SettingColumn("explicit")] == verdicts[SettingColumn("direct", "resolved")] == 0
-    assert verdicts[SettingColumn("direct")] > 0
+    gaps = {result.key.options: result.gap.value for result in found.averages}
+    resolved = InstructionOptions("direct", form="resolved")
+    assert gaps[InstructionOptions("explicit")] == gaps[resolved] == 0
+    assert gaps[InstructionOptions("direct")] > 0
     paths = write_figures(content, tmp_path)
     assert {path.stem for path in paths} == {"averages", "forms", "expressions", "failures"}
     assert "ended in an error (" not in write_report(run, planned=PLAN.jobs()).read_text()

@@ -1,4 +1,4 @@
-"""What is amiss with a run is shown: incomplete, in error, alone, of several versions."""
+"""Tables mark incomplete cells, errors, single policies and several versions."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
+from roboirg.analysis.stats.cells import gather
 from roboirg.analysis.stats.rates import change, mean_percent, percent
-from roboirg.analysis.stats.samples import gather
-from roboirg.analysis.tables.paper_tables import has_something_to_say, make_table
+from roboirg.analysis.tables.paper_tables import is_informative, make_table
 from roboirg.analysis.tables.rendering import FORMATS, get_format
 from roboirg.analysis.tables.rendering.terminal import renderable
 from roboirg.analysis.tables.table import Entry
@@ -132,15 +132,15 @@ def test_versions_stand_apart_and_are_named(result) -> None:
     ]
     table = make_table("main", gather([("run", results)]))
     assert len(table.rows) == 4
-    assert "several language versions (1, 2) stand apart" in notes(table)
-    assert "Several versions of a (new, unknown) stand apart" in notes(table)
+    assert "several language versions (1, 2) have separate rows" in notes(table)
+    assert "Several versions of a (new, unknown) have separate rows" in notes(table)
     assert {row.name for row in table.rows} == {
         "a, policy unknown, language 1",
         "a, policy new, language 2",
     }
 
 
-def test_what_is_told_otherwise_is_in_no_cell_and_named(result) -> None:
+def test_other_options_are_in_no_cell_and_named(result) -> None:
     results = [
         *whole(result),
         result("failure", 0, policy="a", task="BinFill", setting="direct", form="resolved"),
@@ -152,17 +152,17 @@ def test_what_is_told_otherwise_is_in_no_cell_and_named(result) -> None:
     assert "direct (resolved)" in notes(table)
 
 
-def test_only_tables_with_something_to_say_are_wanted(result) -> None:
-    samples = gather([("run", whole(result, settings=("explicit", "contextual")))])
-    assert has_something_to_say("main", samples)
-    assert has_something_to_say("coverage", samples)
-    assert not any(has_something_to_say(one, samples) for one in ("planner", "context", "real"))
+def test_only_informative_tables_are_wanted(result) -> None:
+    cells = gather([("run", whole(result, settings=("explicit", "contextual")))])
+    assert is_informative("main", cells)
+    assert is_informative("coverage", cells)
+    assert not any(is_informative(one, cells) for one in ("planner", "context", "real"))
     short = whole(result, settings=("contextual",), stages=(1, 5))
     both = gather([("run", [*whole(result, settings=("contextual",)), *short])])
-    assert has_something_to_say("context", both)
-    assert has_something_to_say("planner", gather([("run", [*whole(result), *whole(result, "b")])]))
+    assert is_informative("context", both)
+    assert is_informative("planner", gather([("run", [*whole(result), *whole(result, "b")])]))
     real = gather([("run", [result(task="PutInBox")])])
-    assert has_something_to_say("real", real)
+    assert is_informative("real", real)
     assert entries(make_table("real", real), "explicit")["Avg"].marks == "*"
 
 
@@ -218,8 +218,8 @@ def test_csv_has_every_entry_with_its_counts(result) -> None:
 
 def test_latex_is_balanced_and_markdown_rectangular(result) -> None:
     odd = "my_pkg:Net & 50% #1|{x}\\*"
-    samples = gather([("run", [*whole(result, odd), *whole(result, "b", settings=("spatial",))])])
-    table = make_table("main", samples, published=True)
+    cells = gather([("run", [*whole(result, odd), *whole(result, "b", settings=("spatial",))])])
+    table = make_table("main", cells, published=True)
     latex = FORMATS["latex"].draw(table)
     rows = [
         line for line in latex.splitlines() if line.endswith(r"\\") and "multicolumn" not in line

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roboirg.analysis.stats.paired_tests import mcnemar_test
-from roboirg.analysis.stats.power import MOST_EPISODES, episodes_needed, mcnemar_power, smallest_gap
+from roboirg.analysis.stats.paired_tests import sign_flip_test
+from roboirg.analysis.stats.power import MAX_EPISODES, episodes_needed, mcnemar_power, smallest_gap
 from roboirg.core.errors import InvalidValueError
 
 
@@ -28,18 +28,20 @@ def test_power_by_simulation(episodes: int, gap: float, discordance: float) -> N
     first, second = (discordance + gap) / 2, (discordance - gap) / 2
     draws = rng.multinomial(episodes, [first, second, 1 - discordance], size=4000)
     kinds, counts = np.unique(draws, axis=0, return_counts=True)
-    rejected = [mcnemar_test(won, lost) <= 0.05 for won, lost, _ in kinds.tolist()]
+    rejected = [
+        sign_flip_test(np.repeat([1, -1], [won, lost])) <= 0.05 for won, lost, _ in kinds.tolist()
+    ]
     found = counts @ rejected / 4000
     assert mcnemar_power(episodes, gap, discordance) == pytest.approx(found, abs=0.02)
 
 
 @settings(deadline=None, max_examples=30)
 @given(st.floats(0.05, 1), st.floats(0.05, 1))
-def test_so_many_episodes_are_enough_and_half_are_not(share: float, discordance: float) -> None:
+def test_the_needed_episodes_are_enough_and_half_are_not(share: float, discordance: float) -> None:
     gap = share * discordance
     needed = episodes_needed(gap, discordance)
     if needed is None:
-        assert mcnemar_power(MOST_EPISODES, gap, discordance) < 0.8
+        assert mcnemar_power(MAX_EPISODES, gap, discordance) < 0.8
         return
     assert mcnemar_power(needed, gap, discordance) >= 0.8
     assert mcnemar_power(max(1, needed // 2), gap, discordance) < 0.8

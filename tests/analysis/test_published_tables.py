@@ -16,8 +16,8 @@ from roboirg.analysis.published import (
     published_rows,
     published_tasks,
 )
+from roboirg.analysis.stats.cells import gather
 from roboirg.analysis.stats.rates import mean_percent, percent
-from roboirg.analysis.stats.samples import gather
 from roboirg.analysis.tables.paper_tables import WHICH, make_table
 from roboirg.analysis.tables.rendering import FORMATS
 from roboirg.analysis.tables.table import Row, Table
@@ -140,10 +140,10 @@ def test_some_rows_by_hand(published_like, table, model, name, texts) -> None:
 def test_against_which_average_spatial_is_compared_makes_no_difference_to_the_paper() -> None:
     """Explicit over the same 7 tasks, as here, or over all 11: the arrows are the same."""
     explicit = {
-        row.model: row for row in published_rows("main") if row.variant.setting == "explicit"
+        row.model: row for row in published_rows("main") if row.options.setting == "explicit"
     }
     for row in published_rows("main"):
-        if row.variant.setting == "spatial":
+        if row.options.setting == "spatial":
             same = [
                 explicit[row.model].rates[task]
                 for task, rate in row.rates.items()
@@ -189,14 +189,14 @@ def test_every_published_rate_is_a_number_of_trials() -> None:
 
 
 def test_the_tables_agree_where_they_show_the_same() -> None:
-    main = {(row.model, row.variant): row.rates for row in published_rows("main")}
+    main = {(row.model, row.options): row.rates for row in published_rows("main")}
     for row in published_rows("context"):
-        if row.variant.stages == STAGE_SETS[-1]:
-            rates = main[row.model, row.variant]
+        if row.options.stages == STAGE_SETS[-1]:
+            rates = main[row.model, row.options]
             assert row.rates == {task: rates[task] for task in row.rates}
     for row in published_rows("planner"):
         if row.model == "QwenVL":
-            rates = main["GroundSG-QwenVL", row.variant]
+            rates = main["GroundSG-QwenVL", row.options]
             assert row.rates == {task: rates[task] for task in row.rates}
 
 
@@ -204,8 +204,8 @@ def test_published_tables_fit_this_benchmark() -> None:
     assert set(published_tasks("main")) == set(all_tasks())
     for row in published_rows("main"):
         for task, rate in row.rates.items():
-            assert (rate is not None) == (row.variant.setting in settings_of(all_tasks()[task]))
-    assert [row.variant.stages for row in published_rows("context")[:4]] == list(STAGE_SETS)
+            assert (rate is not None) == (row.options.setting in settings_of(all_tasks()[task]))
+    assert [row.options.stages for row in published_rows("context")[:4]] == list(STAGE_SETS)
     with pytest.raises(UnknownNameError, match="main, planner, context, real"):
         published_rows("mian")
 

@@ -13,7 +13,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from roboirg.analysis.page import films
+from roboirg.analysis.page import episode_videos
 from roboirg.analysis.page.columns import UNATTRIBUTED
 from roboirg.analysis.page.entries import Run
 from roboirg.analysis.page.report import make_view, render, render_runs, write_report
@@ -41,7 +41,7 @@ class Page(HTMLParser):
         super().__init__()
         self.open: list[tuple[str, dict[str, str | None]]] = []
         self.scripts: dict[str, str] = {}
-        self.notices: list[tuple[str, str]] = []
+        self.warnings: list[tuple[str, str]] = []
         self.links: list[str] = []
         self.text = ""
         self.feed(text)
@@ -54,7 +54,7 @@ class Page(HTMLParser):
         if tag not in VOID:
             self.open.append((tag, fields))
         if tag == "li" and fields.get("class") in ("warning", "note"):
-            self.notices.append((str(fields["class"]), ""))
+            self.warnings.append((str(fields["class"]), ""))
         self.links += [str(fields[name]) for name in ("src", "href", "poster") if name in fields]
 
     def handle_endtag(self, tag: str) -> None:
@@ -67,9 +67,9 @@ class Page(HTMLParser):
             self.scripts[str(fields.get("id"))] = self.scripts.get(str(fields.get("id")), "") + data
         elif tag != "style":
             self.text += data
-            if any(name == "li" and own.get("class") for name, own in self.open) and self.notices:
-                kind, words = self.notices[-1]
-                self.notices[-1] = (kind, words + data)
+            if any(name == "li" and own.get("class") for name, own in self.open) and self.warnings:
+                kind, words = self.warnings[-1]
+                self.warnings[-1] = (kind, words + data)
 
     def column(self, name: str) -> list[Any]:
         """The values of a column in words."""
@@ -77,7 +77,7 @@ class Page(HTMLParser):
         known = {choice["name"]: choice["values"] for choice in self.data["choices"]}
         return [known[name][value] if value >= 0 else None for value in values]
 
-    def said(self, place: int) -> str:
+    def string(self, place: int) -> str:
         return str(self.data["strings"][place])
 
     def notes(self, *words: str) -> list[str]:
@@ -182,7 +182,7 @@ def test_mentions_explicit_and_resolved_form_are_there() -> None:
         for (at, start, end, *_), mention in zip(
             details.get("mentions", []), record.mentions, strict=True
         ):
-            text = page.said(details["turns"][at][1])
+            text = page.string(details["turns"][at][1])
             assert text[start:end] == record.instruction[mention.utterance].text[start:end]
         assert ("command" in details) == (record.setting != "explicit")
         implicit = record.setting != "explicit" and record.form == "implicit"
@@ -191,8 +191,8 @@ def test_mentions_explicit_and_resolved_form_are_there() -> None:
             twin = next(
                 one for one in found if one.setting == record.setting and one.form == "resolved"
             )
-            said = " ".join(turn.text for turn in twin.instruction)
-            assert page.said(details["resolved"]) == said
+            words = " ".join(turn.text for turn in twin.instruction)
+            assert page.string(details["resolved"]) == words
 
 
 def test_the_resolved_form_is_said_again_where_it_was_not_played() -> None:
@@ -200,9 +200,9 @@ def test_the_resolved_form_is_said_again_where_it_was_not_played() -> None:
     (record,) = records(plan)
     (details,) = Page(page := render([record])).details
     assert "resolved" in details
-    resolved = Page(page).said(details["resolved"])
+    resolved = Page(page).string(details["resolved"])
     assert resolved != " ".join(turn.text for turn in record.instruction)
-    # Another version of the language may have said something else.
+    # Another version of the language may have other words.
     (other,) = Page(render([record.model_copy(update={"language_version": "0.1"})])).details
     assert "resolved" not in other
 
@@ -233,30 +233,32 @@ def test_what_is_amiss_is_said_first() -> None:
     jobs = PLAN.jobs()
     found = records()[:-5]
     page = Page(render(found, planned=jobs))
-    warnings = " ".join(words for kind, words in page.notices if kind == "warning")
+    warnings = " ".join(words for kind, words in page.warnings if kind == "warning")
     errors = sum(record.outcome == "error" for record in found)
     assert f"Incomplete: 5 of {len(jobs)} planned" in warnings
     assert f"{errors} of {len(found)} episodes ended in an error ({errors} policy)" in warnings
-    assert any("are still to be played" in note for note in page.notes("all tasks"))
+    assert any("still to be played" in note for note in page.notes("all tasks"))
     cells = page.data["matrix"]["levels"][0]["cells"]
     assert sum(cell.get("missing", 0) for cell in cells if cell["at"][1] > 0) == 5
-    assert Page(render([one for one in found if one.outcome != "error"])).notices == []
+    assert Page(render([one for one in found if one.outcome != "error"])).warnings == []
 
 
 def test_versions_that_differ_stand_apart() -> None:
     one, other = records()[0], records()[1]
     mixed = [one, other.model_copy(update={"language_version": "9.9"})]
     page = Page(render(mixed))
-    assert any("Mixed versions of the language" in words for _, words in page.notices)
+    assert any("Mixed versions of the language" in words for _, words in page.warnings)
     assert len(page.data["matrix"]["policies"]) == 2
     again = [one, one.model_copy(update={"policy_version": "2", "episode": 9})]
-    assert any("several versions: 2, built-in" in words for _, words in Page(render(again)).notices)
+    assert any(
+        "several versions: 2, built-in" in words for _, words in Page(render(again)).warnings
+    )
 
 
 def test_one_policy_alone_is_said_to_be_alone() -> None:
     one = [record for record in records() if record.policy == "listener"]
-    assert [kind for kind, words in Page(render(one)).notices if "One policy alone" in words]
-    assert not [words for _, words in Page(usual()).notices if "alone" in words]
+    assert [kind for kind, words in Page(render(one)).warnings if "Only one policy" in words]
+    assert not [words for _, words in Page(usual()).warnings if "Only one" in words]
 
 
 def test_cells_say_how_sure_they_are_and_each_difficulty_has_its_own() -> None:
@@ -267,14 +269,14 @@ def test_cells_say_how_sure_they_are_and_each_difficulty_has_its_own() -> None:
     (note,) = page.notes("listener (privileged), PickXtimes, direct")
     assert re.search(r"\d+ % success: \d of \d trials, \d episodes", note)
     assert "95 % interval" in note
-    assert "points to explicit on" in note
+    assert "points to explicit on the same" in note
     lost = [
         make_record(job, RolloutResult("failure", cause="it fell"), started_at="now")
         for job in PLAN.jobs()
         if job.setting in {"explicit", "direct"}
     ]
     (note,) = Page(render(lost)).notes("listener (privileged), PickXtimes, direct")
-    assert "nothing succeeded either: that says nothing" in note
+    assert "no success either, so the gap says nothing" in note
 
 
 def test_films_are_inside_or_beside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -283,22 +285,22 @@ def test_films_are_inside_or_beside(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     (tmp_path / "videos" / "a b.jpg").write_bytes(b"poster")
     first, second, *_ = records()
     filmed = first.model_copy(update={"video": "videos/a b.mp4"})
-    lost = second.model_copy(update={"video": "videos/gone.mp4", "film_lost": "no room"})
+    lost = second.model_copy(update={"video": "videos/gone.mp4", "video_error": "no room"})
 
     page = Page(render([filmed, lost], tmp_path))
     key = filmed.slug[-8:]
     assert page.scripts[f"film-{key}"] == "data:video/mp4;base64,ZmlsbQ=="
     assert page.scripts[f"poster-{key}"] == "data:image/jpeg;base64,cG9zdGVy"
     assert [details.get("film") for details in page.details] == ["#", None]
-    assert page.said(page.details[1]["lost"]) == "no room"
-    assert "but beside it" not in page.text
+    assert page.string(page.details[1]["lost"]) == "no room"
+    assert "plays them from the folder" not in page.text
     assert not [name for name in Page(render([filmed])).scripts if name.startswith("film")]
 
-    monkeypatch.setattr(films, "MOST_FILM_BYTES", 3)
+    monkeypatch.setattr(episode_videos, "MAX_EMBEDDED_BYTES", 3)
     page = Page(render([filmed, lost], tmp_path))
     assert page.details[0]["film"] == "videos/a%20b.mp4"
     assert page.details[0]["poster"] == "videos/a%20b.jpg"
-    assert "but beside it" in page.text
+    assert "plays them from the folder" in page.text
 
 
 def test_the_served_page_never_holds_films(tmp_path: Path) -> None:
@@ -335,15 +337,15 @@ def test_two_runs_are_held_against_each_other(tmp_path: Path) -> None:
     pairs = page.data["columns"]["pair"]
     # Both policies of both runs, but for the last four.
     assert sorted(map(pairs.count, set(pairs))) == [3] * 4 + [4] * (len(found) // 2 - 4)
-    assert any("Incomplete: 4 of" in words for _, words in page.notices)
-    said = next(one for one in page.data["comparisons"] if [one["left"], one["right"]] == [0, 2])
-    assert "listener, ours (privileged) against listener, theirs" in said["said"][0]
+    assert any("Incomplete: 4 of" in words for _, words in page.warnings)
+    found = next(one for one in page.data["comparisons"] if [one["left"], one["right"]] == [0, 2])
+    assert "listener, ours (privileged) against listener, theirs" in found["sentences"][0]
 
 
 def test_films_of_another_run_are_found_from_the_page(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(films, "MOST_FILM_BYTES", 0)
+    monkeypatch.setattr(episode_videos, "MAX_EMBEDDED_BYTES", 0)
     (tmp_path / "b" / "videos").mkdir(parents=True)
     (tmp_path / "b" / "videos" / "x.mp4").write_bytes(b"film")
     store(tmp_path / "a", [records()[0]])
@@ -367,7 +369,7 @@ def test_the_command_prints_the_table_and_writes_the_page(tmp_path: Path) -> Non
     page = Page((tmp_path / "ours" / "report.html").read_text())
     assert len(page.data["matrix"]["policies"]) == 4
     missing = len(PLAN.jobs()) - len(found)
-    assert any(f"Incomplete: {2 * missing} of" in words for _, words in page.notices)
+    assert any(f"Incomplete: {2 * missing} of" in words for _, words in page.warnings)
     with pytest.raises(StoreError, match="There are no records"):
         CliRunner().invoke(app, [*asked[:2], str(tmp_path)], catch_exceptions=False)
 
@@ -375,8 +377,8 @@ def test_the_command_prints_the_table_and_writes_the_page(tmp_path: Path) -> Non
 def test_what_cannot_be_compared_says_why() -> None:
     (one, *_), (_, other, *_) = records(), records()
     runs = [Run("a", [one]), Run("b", [other.model_copy(update={"language_version": "9"})])]
-    (said,) = Page(render_runs(runs)).data["comparisons"]
-    assert "same version can be compared" in said["said"][0]
+    (found,) = Page(render_runs(runs)).data["comparisons"]
+    assert "same version can be compared" in found["sentences"][0]
 
 
 def test_the_head_says_which_run_it_was(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from roboirg.evaluation.executors.executor import LocalProcesses
 from roboirg.evaluation.plan import Plan
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.runner import run_plan
-from roboirg.records.record import EventRecord, Job, Record
+from roboirg.records.record import NON_DETERMINISTIC_FIELDS, EventRecord, Job, Record
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class FakePlay:
         if job.episode == self.deadly and self._dies(job):
             os.kill(os.getpid(), signal.SIGKILL)
         time.sleep(self.seconds)
-        return make_record(job, fake_course(job), started_at=started_at, duration_s=self.seconds)
+        return make_record(job, fake_result(job), started_at=started_at, duration_s=self.seconds)
 
     def _dies(self, job: Job) -> bool:
         return self.folder is None or len(starts(self.folder, job)) <= self.deaths
@@ -54,7 +54,7 @@ class FakePlay:
 
 @dataclass(frozen=True)
 class FakePlayer:
-    """Plays nothing, and films it."""
+    """Plays nothing and writes a video of it."""
 
     folder: Path
     seconds: float = 0.0
@@ -65,18 +65,23 @@ class FakePlayer:
 
     def __call__(self, job: Job) -> Record:
         record = FakePlay(seconds=self.seconds, fatal=self.fatal)(job)
-        film = self.folder / "videos" / f"{job.slug}.mp4"
-        film.parent.mkdir(exist_ok=True)
-        film.write_text(job.slug)
-        return record.model_copy(update={"video": f"videos/{film.name}"})
+        video = self.folder / "videos" / f"{job.slug}.mp4"
+        video.parent.mkdir(exist_ok=True)
+        video.write_text(job.slug)
+        return record.model_copy(update={"video": f"videos/{video.name}"})
 
 
-def fake_course(job: Job) -> RolloutResult:
+def fake_result(job: Job) -> RolloutResult:
     luck = hashlib.sha256(job.slug.encode()).digest()[0]
     events = [EventRecord(step=luck, kind="picked", subject="cube_red")]
     if luck % 2 or job.setting == "explicit":
         return RolloutResult("success", cause=None, steps=luck, events=events)
     return RolloutResult("failure", cause="picked the wrong cube", steps=luck, events=events)
+
+
+def comparable(record: Record) -> dict[str, object]:
+    """Return the fields that depend only on the job."""
+    return record.model_dump(mode="json", exclude=set(NON_DETERMINISTIC_FIELDS))
 
 
 def starts(folder: Path, job: Job | None = None) -> list[str]:

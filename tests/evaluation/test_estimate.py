@@ -29,11 +29,11 @@ def test_what_was_measured_replaces_what_is_assumed(tmp_path: Path) -> None:
             store.append(FakePlay()(job).model_copy(update={"duration_s": 30.0}))
     guess = estimate(jobs, (), 2)
     known = estimate(jobs, read_index(tmp_path).values(), 2)
-    assert (guess.episodes, guess.most_steps, guess.is_measured) == (8, 8 * 1300, False)
+    assert (guess.episodes, guess.max_steps, guess.is_measured) == (8, 8 * 1300, False)
     assert (known.seconds, known.is_measured) == (8 * 30.0 / 2, True)
     assert "about 2 min on 2 workers" in estimate_text(known, 10, 2)[1]
-    assert estimate_text(known, 10, 2)[0] == "10 episodes, 2 of them are there already."
+    assert estimate_text(known, 10, 2)[0] == "10 episodes, 2 already stored."
 
 
 def test_nothing_left_is_said_so() -> None:
-    assert estimate_text(estimate((), (), 1), 5, 1) == ("5 episodes, 5 of them are there already.",)
+    assert estimate_text(estimate((), (), 1), 5, 1) == ("5 episodes, 5 already stored.",)

@@ -30,10 +30,10 @@ def test_two_halves_make_the_whole(tmp_path: Path) -> None:
     records = read_records(whole)
     parts = [fill(tmp_path / "a", *records[:5]), fill(tmp_path / "b", *records[3:])]
     merged = merge_runs(parts, tmp_path / "out")
-    assert (merged.added, merged.doubled, merged.disputed) == (8, 2, ())
+    assert (merged.added, merged.duplicates, merged.conflicts) == (8, 2, ())
     assert read_records(tmp_path / "out") == records
     again = merge_runs(parts, tmp_path / "out")
-    assert (again.added, again.doubled) == (0, 10)
+    assert (again.added, again.duplicates) == (0, 10)
 
 
 def test_a_verdict_beats_an_error_and_the_first_verdict_a_later_one(tmp_path: Path) -> None:
@@ -48,18 +48,18 @@ def test_a_verdict_beats_an_error_and_the_first_verdict_a_later_one(tmp_path: Pa
         one.outcome,
         two.outcome,
     }
-    assert merged.disputed == (disputed,)
+    assert merged.conflicts == (disputed,)
 
 
-def test_films_come_along(tmp_path: Path) -> None:
+def test_videos_are_copied(tmp_path: Path) -> None:
     record = some()[0].model_copy(update={"video": "videos/x.mp4"})
     lost = some()[1].model_copy(update={"video": "videos/gone.mp4"})
     source = fill(tmp_path / "a", record, lost)
     (source / "videos").mkdir()
-    (source / "videos/x.mp4").write_bytes(b"film")
+    (source / "videos/x.mp4").write_bytes(b"video")
     (source / "videos/x.jpg").write_bytes(b"poster")
     merge_runs([source], tmp_path / "out")
-    assert (tmp_path / "out/videos/x.mp4").read_bytes() == b"film"
+    assert (tmp_path / "out/videos/x.mp4").read_bytes() == b"video"
     assert (tmp_path / "out/videos/x.jpg").read_bytes() == b"poster"
     assert [record.video for record in read_records(tmp_path / "out")] == ["videos/x.mp4", None]
 
@@ -67,16 +67,16 @@ def test_films_come_along(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("field", "value", "words"),
     [
-        ("language_version", "0.9", "language version is '0.9' here"),
-        ("environment_version", 7, "environment version is 7 here"),
-        ("policy_version", "old", "version of policy random is 'old' here"),
-        ("seed", 5, "seed of PickXtimes test 0 is 5 here"),
+        ("language_version", "0.9", "language version is '0.9' in the first"),
+        ("environment_version", 7, "environment version is 7 in the first"),
+        ("policy_version", "old", "version of policy random is 'old' in the first"),
+        ("seed", 5, "seed of PickXtimes test 0 is 5 in the first"),
     ],
 )
 def test_versions_are_not_mixed(tmp_path: Path, field: str, value: object, words: str) -> None:
     record = some()[0]
     odd = record.model_copy(update={field: value})
-    with pytest.raises(StoreError, match=f"do not go together: the {words}"):
+    with pytest.raises(StoreError, match=f"cannot be merged: the {words}"):
         merge_runs([fill(tmp_path / "a", record), fill(tmp_path / "b", odd)], tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

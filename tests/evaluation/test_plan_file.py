@@ -65,10 +65,10 @@ def test_values_are_those_that_would_be_typed(
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("episode: 4", r"no key of a plan .* 'episode'; .*Did you mean 'episodes'\?"),
-        ("- oracle", r"is of type list; it has to be a mapping"),
+        ("episode: 4", r"no plan key .* 'episode'; .*Did you mean 'episodes'\?"),
+        ("- oracle", r"is of type list; it must be a mapping"),
         ("", r"is of type NoneType"),
-        ("tasks: [", r"is no YAML"),
+        ("tasks: [", r"is not valid YAML"),
     ],
 )
 def test_what_is_no_plan_is_one_sentence(tmp_path: Path, text: str, sentence: str) -> None:

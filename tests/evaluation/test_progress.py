@@ -14,7 +14,7 @@ RECORDS = [FakePlay()(job) for job in small_plan(2).jobs()]
 def report(*, terminal: bool) -> str:
     console = Console(file=io.StringIO(), force_terminal=terminal, width=80)
     with ConsoleReporter(console) as reporter:
-        reporter.begin(6, 2)
+        reporter.start(6, 2)
         for record in RECORDS:
             reporter.advance(record)
     return console.file.getvalue()  # type: ignore[attr-defined]
@@ -31,14 +31,14 @@ def test_a_terminal_sees_pace_time_left_and_score_in_80_columns() -> None:
 
 def test_elsewhere_every_episode_is_one_plain_line() -> None:
     lines = report(terminal=False).splitlines()
-    assert lines[0] == "2 of 6 episodes are already there."
+    assert lines[0] == "2 of 6 episodes already stored."
     assert lines[1].startswith("[3/6] random PickXtimes test/0 explicit: success")
     assert len(lines) == 5
     assert "\x1b" not in "".join(lines)
 
 
-def test_a_notice_is_said_at_once_on_stderr(capsys: pytest.CaptureFixture[str]) -> None:
-    ConsoleReporter(Console(file=io.StringIO())).notice("Mind the gap.")
+def test_a_warning_is_printed_at_once_on_stderr(capsys: pytest.CaptureFixture[str]) -> None:
+    ConsoleReporter(Console(file=io.StringIO())).warn("Mind the gap.")
     assert capsys.readouterr().err == "Mind the gap.\n"
 
 
@@ -47,6 +47,6 @@ def test_errors_are_in_the_score_but_in_no_rate() -> None:
     for record in RECORDS[:1]:
         score.add(record)
         score.add(record.model_copy(update={"outcome": "error"}))
-    assert score.line() == "explicit 1/1 · errors 1"
+    assert score.summary() == "explicit 1/1 · errors 1"
     assert score.time_left(0) == "0:00"
     assert ProgressCounter().time_left(5) == "-:--"

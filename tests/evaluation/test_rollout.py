@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from evaluation_fakes import comparable
 
 from roboirg.core.errors import (
     InvalidActionError,
@@ -19,6 +19,7 @@ from roboirg.core.errors import (
 )
 from roboirg.evaluation import rollout
 from roboirg.evaluation.episode_errors import one_line
+from roboirg.evaluation.plan import instruct_job
 from roboirg.evaluation.rollout import EpisodeRunner, load_policy, play_episode
 from roboirg.evaluation.rollout_result import RolloutResult
 from roboirg.evaluation.video_writer import VideoOptions, VideoWriter
@@ -34,7 +35,7 @@ class PaperWorld:
 
     def __init__(self, length: int = 5, status: str = "success", cause: str | None = None) -> None:
         self.length, self.status, self.cause = length, status, cause
-        self.instruction = SimpleNamespace(text="do it")
+        self.instruction = instruct_job(JOB)
         self.steps = 0
         self.hook: Callable[[Any, bool], None] | None = None
         self.closed = False
@@ -120,7 +121,7 @@ def test_all_rows_are_played_until_the_end(stage: Callable[..., RolloutResult]) 
     assert course.demonstration_steps == 3
     assert [event.step for event in course.events] == [-1, 5]
     assert course.render_device is None
-    assert policy.heard == ["do it", 3]
+    assert policy.heard == [instruct_job(JOB).text, 3]
     assert world.closed
 
 
@@ -131,7 +132,7 @@ def test_one_row_is_a_chunk_of_one(stage: Callable[..., RolloutResult]) -> None:
 def test_an_insider_is_attached_before_reset(stage: Callable[..., RolloutResult]) -> None:
     policy = PaperInsider()
     stage(PaperWorld(), policy)
-    assert policy.heard == ["PaperWorld", "do it", 3]
+    assert policy.heard == ["PaperWorld", instruct_job(JOB).text, 3]
 
 
 @pytest.mark.parametrize(
@@ -200,7 +201,7 @@ def test_what_ends_every_episode_ends_the_run(
         stage(PaperWorld(), PaperPolicy(error))
 
 
-def test_ctrl_c_is_nobodys_fault(stage: Callable[..., RolloutResult]) -> None:
+def test_ctrl_c_is_no_episode_error(stage: Callable[..., RolloutResult]) -> None:
     policy = PaperPolicy()
     policy.act = lambda _observation: (_ for _ in ()).throw(KeyboardInterrupt)  # type: ignore[method-assign]
     with pytest.raises(KeyboardInterrupt):
@@ -223,18 +224,18 @@ def test_one_line_is_the_same_in_every_process() -> None:
 
 
 @pytest.mark.parametrize(
-    ("mode", "status", "filmed"),
+    ("mode", "status", "kept"),
     [("all", "success", True), ("failures", "success", False), ("failures", "failure", True)],
 )
-def test_films_are_kept_as_asked(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, mode: Any, status: str, filmed: bool
+def test_videos_are_kept_as_asked(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, mode: Any, status: str, kept: bool
 ) -> None:
     monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: PaperWorld(5, status))
     monkeypatch.setattr(rollout, "load_policy", lambda _job: PaperPolicy())
     record = EpisodeRunner(tmp_path, mode, VideoOptions(cameras=("front",)))(JOB)
-    assert (record.video is not None) == filmed
+    assert (record.video is not None) == kept
     files = sorted(path.suffix for path in tmp_path.rglob("*") if path.is_file())
-    assert files == ([".jpg", ".mp4"] if filmed else [])
+    assert files == ([".jpg", ".mp4"] if kept else [])
     if record.video:
         assert record.video == f"videos/{JOB.slug}.mp4"
 
@@ -250,29 +251,29 @@ class Broken:
 
 
 @pytest.mark.parametrize("after", [1, 3, 8])
-def test_a_film_that_cannot_be_written_does_not_touch_the_verdict(
+def test_a_video_that_cannot_be_written_does_not_change_the_verdict(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, after: int
 ) -> None:
-    real, count = VideoWriter._add, 0
+    real, count = VideoWriter._encode, 0
 
-    def add(film: VideoWriter, frame: np.ndarray) -> None:
+    def add(writer: VideoWriter, frame: np.ndarray) -> None:
         nonlocal count
         if count == after:
-            film._container = Broken()  # type: ignore[assignment]
+            writer._container = Broken()  # type: ignore[assignment]
         count += 1
-        real(film, frame)
+        real(writer, frame)
 
-    monkeypatch.setattr(VideoWriter, "_add", add)
+    monkeypatch.setattr(VideoWriter, "_encode", add)
     monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: PaperWorld(5))
     monkeypatch.setattr(rollout, "load_policy", lambda _job: PaperPolicy())
-    film = VideoOptions(cameras=("front",))
-    record = EpisodeRunner(tmp_path, "all", film)(JOB)
+    options = VideoOptions(cameras=("front",))
+    record = EpisodeRunner(tmp_path, "all", options)(JOB)
     assert (record.outcome, record.steps, record.video) == ("success", 5, None)
-    assert "No space left on device" in str(record.film_lost)
+    assert "No space left on device" in str(record.video_error)
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
-def test_a_folder_of_films_that_is_a_file_does_not_touch_the_verdict(
+def test_a_video_folder_that_is_a_file_does_not_change_the_verdict(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     (tmp_path / "videos").touch()
@@ -280,8 +281,8 @@ def test_a_folder_of_films_that_is_a_file_does_not_touch_the_verdict(
     monkeypatch.setattr(rollout, "load_policy", lambda _job: PaperPolicy())
     record = EpisodeRunner(tmp_path, "all", VideoOptions(cameras=("front",)))(JOB)
     assert (record.outcome, record.video) == ("success", None)
-    assert "FileExistsError" in str(record.film_lost)
-    assert "film_lost" not in record.comparable()
+    assert "FileExistsError" in str(record.video_error)
+    assert "video_error" not in comparable(record)
 
 
 def test_wrong_cameras_of_an_object_are_the_policys_fault(
@@ -295,9 +296,19 @@ def test_wrong_cameras_of_an_object_are_the_policys_fault(
 
 def test_a_record_says_what_is_in_the_words_and_who_cheats() -> None:
     job = JOB.model_copy(update={"setting": "reasoning", "policy": "oracle"})
-    record = rollout.describe(job, RolloutResult("success", None), started_at="now")
+    record = rollout.make_record(job, RolloutResult("success", None), started_at="now")
     assert record.metadata["pattern"]
     assert record.metadata["templates"]
     assert record.privileged
-    assert not rollout.describe(JOB, RolloutResult(), started_at="now").privileged
+    assert not rollout.make_record(JOB, RolloutResult(), started_at="now").privileged
     assert type(record).model_validate_json(record.model_dump_json()) == record
+
+
+def test_a_record_has_the_words_that_were_spoken() -> None:
+    spoken = instruct_job(JOB.model_copy(update={"setting": "spatial"}))
+    result = RolloutResult("success", None, instruction=spoken)
+    record = rollout.make_record(JOB, result, started_at="now")
+    assert record.instruction[-1].text == spoken.utterances[-1].text
+    # An episode that did not begin has the words that it would have had.
+    record = rollout.make_record(JOB, RolloutResult(), started_at="now")
+    assert record.instruction[-1].text == instruct_job(JOB).utterances[-1].text != record.command

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import evaluation_fakes
 import pytest
-from evaluation_fakes import FakePlay, is_alive, small_plan, starts, worker_pids
+from evaluation_fakes import FakePlay, comparable, is_alive, small_plan, starts, worker_pids
 
 from roboirg.core.errors import InvalidValueError, RenderDeviceError
 from roboirg.evaluation.executors.executor import InProcess, LocalProcesses, choose_executor
@@ -24,8 +24,8 @@ from roboirg.records.store import RECORDS_FILE, RecordStore, StoreError, read_re
 WAIT_S = 20.0
 
 
-def comparable(records: tuple[Record, ...]) -> list[dict[str, object]]:
-    return [record.comparable() for record in sorted(records, key=lambda record: record.slug)]
+def all_comparable(records: tuple[Record, ...]) -> list[dict[str, object]]:
+    return [comparable(record) for record in sorted(records, key=lambda record: record.slug)]
 
 
 def wait_until(condition: Callable[[], bool]) -> None:
@@ -55,7 +55,7 @@ def finish(folder: Path) -> RunSummary:
 def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, object]]:
     folder = tmp_path_factory.mktemp("uninterrupted")
     run_plan(small_plan(8), folder, FakePlay(), InProcess())
-    return comparable(read_records(folder))
+    return all_comparable(read_records(folder))
 
 
 def test_one_and_two_workers_give_the_same_records(
@@ -64,7 +64,7 @@ def test_one_and_two_workers_give_the_same_records(
     for workers in (1, 2):
         folder = tmp_path / str(workers)
         run_plan(small_plan(8), folder, FakePlay(), LocalProcesses(workers))
-        assert comparable(read_records(folder)) == uninterrupted
+        assert all_comparable(read_records(folder)) == uninterrupted
 
 
 def test_after_sigkill_the_workers_are_gone_and_the_same_command_goes_on(
@@ -84,7 +84,7 @@ def test_after_sigkill_the_workers_are_gone_and_the_same_command_goes_on(
 
     assert summary.played == 16 - stored
     assert summary.torn_bytes == 22
-    assert comparable(read_records(tmp_path)) == uninterrupted
+    assert all_comparable(read_records(tmp_path)) == uninterrupted
     assert line_count(tmp_path) == 16
 
 
@@ -98,7 +98,7 @@ def test_a_stopped_run_ends_its_workers_and_keeps_what_ended(
     assert not any(map(is_alive, worker_pids(tmp_path)))
     assert 3 <= len(read_records(tmp_path)) < 16
     finish(tmp_path)
-    assert comparable(read_records(tmp_path)) == uninterrupted
+    assert all_comparable(read_records(tmp_path)) == uninterrupted
 
 
 def test_a_worker_that_dies_twice_costs_one_error_and_the_rest_goes_on(tmp_path: Path) -> None:
@@ -107,7 +107,7 @@ def test_a_worker_that_dies_twice_costs_one_error_and_the_rest_goes_on(tmp_path:
     assert {record.episode for record in errors} == {2}
     assert {record.error for record in errors} == {"infrastructure"}
     assert {record.cause for record in errors} == {
-        "infrastructure: the process died of signal 9 in the world"
+        "infrastructure: the process died of signal 9 in the environment"
     }
     assert (summary.total, len(summary.errors), summary.missing) == (8, 2, 0)
     assert all(len(starts(tmp_path, record.identity)) == 2 for record in errors)
@@ -156,7 +156,9 @@ def test_words_of_two_versions_are_not_mixed(
 ) -> None:
     run_plan(small_plan(1), tmp_path, FakePlay(), InProcess())
     monkeypatch.setattr("roboirg.evaluation.runner.LANGUAGE_VERSION", "99.0")
-    with pytest.raises(StoreError, match=r"language version .*, but this roboirg speaks 99\.0"):
+    with pytest.raises(
+        StoreError, match=r"language version .*, but this roboirg has version 99\.0"
+    ):
         run_plan(small_plan(2), tmp_path, FakePlay(), InProcess())
     assert len(read_records(tmp_path)) == 2
 
@@ -164,10 +166,10 @@ def test_words_of_two_versions_are_not_mixed(
 @pytest.mark.parametrize(
     ("name", "value", "sentence"),
     [
-        ("seed", 7, r"PickXtimes test/0 with the scene of seed 7, but .* has \d+; choose another"),
+        ("seed", 7, r"PickXtimes test/0 with scene seed 7, but .* has \d+; choose another"),
         ("environment_version", 99, "of environment version 99, but this roboirg has version 0;"),
         ("task", "Gone", r"Gone test/0 .* no such episode"),
-        ("policy_version", "old", r"version old, but it has changed since \(now built-in\)"),
+        ("policy_version", "old", r"version old, but the policy is now version built-in"),
     ],
 )
 def test_worlds_of_two_versions_are_not_mixed(
@@ -183,7 +185,7 @@ def test_worlds_of_two_versions_are_not_mixed(
 
 
 class Ears(SilentReporter):
-    """Hears notices, and how many episodes had been played before the last one."""
+    """Hears warnings, and how many episodes had been played before the last one."""
 
     def __init__(self) -> None:
         self.notices: list[str] = []
@@ -192,7 +194,7 @@ class Ears(SilentReporter):
     def advance(self, record: Record, *, is_new: bool = True) -> None:
         self.played += 1
 
-    def notice(self, text: str) -> None:
+    def warn(self, text: str) -> None:
         assert self.played == 0
         self.notices.append(text)
 
@@ -202,18 +204,18 @@ def test_a_torn_line_is_told_before_anything_is_played(tmp_path: Path) -> None:
     ears = Ears()
     run_plan(small_plan(1), tmp_path, FakePlay(), InProcess(), reporter=ears)
     (notice,) = ears.notices
-    assert "22 bytes were moved to" in notice
+    assert "(22 bytes) to" in notice
     assert "again" not in notice
     assert ears.played == 2
 
 
-def test_films_that_were_lost_are_counted(tmp_path: Path) -> None:
+def test_lost_videos_are_counted(tmp_path: Path) -> None:
     def play(job: Job) -> Record:
-        return FakePlay()(job).model_copy(update={"film_lost": "OSError: disk full"})
+        return FakePlay()(job).model_copy(update={"video_error": "OSError: disk full"})
 
     summary = run_plan(small_plan(1), tmp_path, play, InProcess())
-    assert len(summary.unfilmed) == 2
-    assert not run_plan(small_plan(1), tmp_path, play, InProcess()).unfilmed
+    assert len(summary.video_errors) == 2
+    assert not run_plan(small_plan(1), tmp_path, play, InProcess()).video_errors
 
 
 def test_workers_are_counted() -> None:

@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from evaluation_fakes import fake_course, small_plan
+from evaluation_fakes import fake_result, small_plan
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -22,14 +22,14 @@ from roboirg.records.store import (
     StoreError,
     read_contents,
     read_records,
-    write_atomically,
 )
+from roboirg.util.atomic_write import write_atomically
 
 
 @functools.cache
 def some_records() -> tuple[Record, ...]:
     return tuple(
-        make_record(job, fake_course(job), started_at="now") for job in small_plan().jobs()
+        make_record(job, fake_result(job), started_at="now") for job in small_plan().jobs()
     )
 
 
@@ -126,9 +126,9 @@ def test_a_killed_writer_leaves_no_lock(tmp_path: Path) -> None:
 
 def test_another_schema_version_is_refused_and_nothing_changes(tmp_path: Path) -> None:
     whole = fill(tmp_path, some_records())
-    newer = whole.replace(b'"schema_version":2', b'"schema_version":7', 1)
+    newer = whole.replace(b'"schema_version":3', b'"schema_version":7', 1)
     (tmp_path / RECORDS_FILE).write_bytes(newer)
-    with pytest.raises(StoreError, match=r"line 1 has schema version 7, .* reads versions 1 to 2"):
+    with pytest.raises(StoreError, match=r"line 1 has schema version 7, .* reads only version 3;"):
         RecordStore(tmp_path)
     assert (tmp_path / RECORDS_FILE).read_bytes() == newer
     (tmp_path / RECORDS_FILE).write_bytes(whole)
@@ -138,7 +138,7 @@ def test_another_schema_version_is_refused_and_nothing_changes(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("line", "sentence"),
     [
-        (b'{"schema_version":2,"policy":3}', "line 1 is not a record: policy"),
+        (b'{"schema_version":3,"policy":3}', "line 1 is not a record: policy"),
         (b"[]", "line 1 has schema version None"),
     ],
 )
@@ -202,7 +202,7 @@ def test_a_full_disk_is_one_sentence_and_costs_no_record(tmp_path: Path) -> None
         capture_output=True,
         text=True,
         check=True,
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parent)},
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
     )
     assert done.stdout == f"Cannot write to {folder / RECORDS_FILE}: File too large.\n"
     kept = read_contents(folder / RECORDS_FILE)

@@ -576,7 +576,7 @@ def places_it_on_another_disc(staged: Staged) -> None:
 
 
 @case("wrong_place", *PLACING)
-def places_it_on_another_disc_after_a_slip(staged: Staged) -> None:
+def places_it_on_another_disc_after_a_misplaced_release(staged: Staged) -> None:
     target, answer = staged.episode.stages[1].primitive[1:3]
     discs = [d.name for d in staged.episode.scene.of_kind("target") if d.name != answer]
     staged.lift(target).drop(target).lift(target).put(target, discs[0])
@@ -618,7 +618,7 @@ def picks_a_dropped_cube_up_again(staged: Staged) -> None:
 
 
 @case("wrong_count", "PickXtimes")
-def a_slip_does_not_excuse_two_that_are_missing(staged: Staged) -> bool | None:
+def a_misplaced_release_does_not_excuse_two_missing_ones(staged: Staged) -> bool | None:
     stages = staged.episode.stages
     if len(stages) < 7:
         return False
@@ -628,7 +628,7 @@ def a_slip_does_not_excuse_two_that_are_missing(staged: Staged) -> bool | None:
 
 
 @case("wrong_object", "BinFill")
-def the_other_color_came_before_the_slip(staged: Staged) -> bool | None:
+def the_other_color_came_before_the_misplaced_release(staged: Staged) -> bool | None:
     stages = staged.episode.stages
     if not unwanted(staged) or len(stages) < 7:
         return False

@@ -1,4 +1,4 @@
-"""A stage for episodes without a simulator: hands that bring about facts as the world would.
+"""Play episodes without a simulator: methods that change facts as the world would.
 
 Every method takes at least one control step. The judge looks on from the first moment and nothing
 more happens after its verdict.
@@ -59,7 +59,7 @@ class Staged:
         return self
 
     def until(self, step: int) -> Staged:
-        """Let time pass until so many steps since reset."""
+        """Let time pass until a step since reset."""
         return self.tick(step - self.step)
 
     def _run_shuttle(self) -> None:
@@ -176,8 +176,8 @@ class Staged:
             self.episode,
             self.events,
             timed_out=ongoing and timed_out,
-            turn=self.turn,
-            elapsed=self.step,
+            policy_start_step=self.turn,
+            elapsed_steps=self.step,
             cause=self.judge.cause or cause,
         )
 

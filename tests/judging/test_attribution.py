@@ -86,7 +86,7 @@ def test_a_pose_that_cannot_be_reached_and_what_came_before(task: str) -> None:
     staged = Staged(get_episode(task, "test", 3)).tick(5)
     found = staged.finding(timed_out=False, cause="no way to (9, 9, 9)")
     assert found == FailureAttribution(
-        "execution", "unreachable", None, 5, "A pose could not be reached: no way to (9, 9, 9)."
+        "execution", "unreachable", None, 5, "Could not reach a pose: no way to (9, 9, 9)."
     )
     assert staged.finding(timed_out=False) is None
 
@@ -109,11 +109,13 @@ episodes = st.builds(get_episode, st.sampled_from(TASKS), st.just("test"), st.in
 
 @given(episodes, st.floats(0, 1, exclude_max=True))
 @settings(max_examples=150)
-def test_whoever_does_only_what_is_meant_fails_by_execution(episode: Episode, share: float) -> None:
+def test_right_acts_that_stop_early_fail_by_execution(episode: Episode, share: float) -> None:
     staged = Staged(episode).play(episode.stages)
     end = staged.turn + int(share * (staged.step - staged.turn))
     events = [event for event in staged.events if event.step <= end]
-    found = attribute_failure(episode, events, timed_out=True, turn=staged.turn, elapsed=end)
+    found = attribute_failure(
+        episode, events, timed_out=True, policy_start_step=staged.turn, elapsed_steps=end
+    )
     assert found is not None
     assert found.kind == "execution"
     assert found.step <= end - staged.turn
@@ -210,7 +212,7 @@ def test_what_shows_late_is_dated_when_it_was_done() -> None:
     assert staged.turn + found.step == done < staged.step
 
 
-def test_what_the_video_shows_is_nobody_s_act() -> None:
+def test_the_acts_in_the_video_are_not_the_policy_s() -> None:
     """In the video the cube is picked and put on discs; the policy has done nothing."""
     staged = Staged(get_episode("VideoPlaceOrder", "test", 0)).tick(50)
     shown = {event.fact.kind for event in staged.events if event.step < staged.turn}
@@ -220,7 +222,7 @@ def test_what_the_video_shows_is_nobody_s_act() -> None:
     assert (found.failure, found.step) == ("nothing_reached", 50)
 
 
-def test_a_slip_is_dated_and_what_came_right_before_is_not_blamed() -> None:
+def test_a_misplaced_release_is_dated_and_the_right_ones_before_it_are_not_the_cause() -> None:
     episodes = (get_episode("BinFill", "test", index) for index in range(50))
     episode = next(found for found in episodes if len(found.stages) == 5)
     second = episode.stages[2].primitive.subject
@@ -263,9 +265,9 @@ def test_rules_name_their_failure_where_their_facts_cannot_tell() -> None:
                     assert rule.failure in (*GROUNDING, *EXECUTION)
 
 
-def test_the_name_of_a_failure_is_no_part_of_an_episode_s_identity() -> None:
-    named, other = Rule(Fact("pressed", "b"), "x", "wrong_time"), Rule(Fact("pressed", "b"), "x")
+def test_how_a_failure_is_described_is_no_part_of_an_episode_s_identity() -> None:
+    named, other = Rule(Fact("pressed", "b"), "x", "wrong_time"), Rule(Fact("pressed", "b"), "y")
     assert plain(named) == plain(other)
-    assert plain(named) != plain(named._replace(cause="y"))
-    assert {("Rule", "failure")} == NOT_COUNTED
+    assert plain(named) != plain(named._replace(condition=Fact("pressed", "c")))
+    assert {("Rule", "cause"), ("Rule", "failure")} == NOT_COUNTED
     assert fingerprint([get_episode("StopCube", "test", 0)])

@@ -30,8 +30,8 @@ def finding(env: RoboIRGEnv, info: dict[str, Any]) -> FailureAttribution | None:
         env.episode,
         env.events,
         timed_out=env.status == "timeout",
-        turn=info["elapsed_steps"] - info["steps"],
-        elapsed=info["elapsed_steps"],
+        policy_start_step=info["elapsed_steps"] - info["steps"],
+        elapsed_steps=info["elapsed_steps"],
         cause=info["cause"],
     )
 
@@ -81,7 +81,7 @@ Pieces = Iterator[NDArray[np.float64]]
 
 
 def picked_up(hands: MotionPrimitives, cube: str) -> Pieces:
-    yield from hands.perform(Primitive("pick_cube", cube))
+    yield from hands.execute(Primitive("pick_cube", cube))
 
 
 def dropping(hands: MotionPrimitives, cube: str) -> Pieces:
@@ -93,7 +93,7 @@ def dropping(hands: MotionPrimitives, cube: str) -> Pieces:
 
 def setting_down(hands: MotionPrimitives, cube: str) -> Pieces:
     yield from picked_up(hands, cube)
-    yield from hands.perform(Primitive("put_down", cube, height=0.02))
+    yield from hands.execute(Primitive("put_down", cube, height=0.02))
 
 
 def missing(hands: MotionPrimitives, cube: str) -> Pieces:

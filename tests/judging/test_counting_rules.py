@@ -77,7 +77,7 @@ def test_bin_fill_punishes_a_press_before_the_last_drop():
     for cubes in (("cube_red_0",), ("cube_red_0", "cube_red_1")):
         judge = filled(*cubes, then=[[PRESSED]])
         assert judge.status is Status.FAILURE
-        assert judge.cause.startswith("pressed the button while due: pick up the")
+        assert judge.cause.startswith("pressed the button; expected: pick up the")
 
 
 def test_bin_fill_punishes_a_press_while_a_cube_is_held():
@@ -88,25 +88,25 @@ def test_bin_fill_punishes_a_press_while_a_cube_is_held():
 @pytest.mark.parametrize(
     ("cubes", "cause"),
     [
-        (("cube_red_0", "cube_red_1", "cube_red_2"), "more than 2 red cubes in the bin"),
-        (("cube_red_0", "cube_blue_0", "cube_blue_1"), "fewer than 2 red cubes in the bin"),
-        (("cube_red_0", "cube_red_1", "cube_green_0"), "fewer than 1 blue cube in the bin"),
-        (("cube_blue_0", "cube_blue_1", "cube_blue_2"), "fewer than 2 red cubes in the bin"),
+        (("cube_red_0", "cube_red_1", "cube_red_2"), "put more than 2 red cubes into the bin"),
+        (("cube_red_0", "cube_blue_0", "cube_blue_1"), "put fewer than 2 red cubes into the bin"),
+        (("cube_red_0", "cube_red_1", "cube_green_0"), "put no blue cube into the bin"),
+        (("cube_blue_0", "cube_blue_1", "cube_blue_2"), "put fewer than 2 red cubes into the bin"),
     ],
 )
 def test_bin_fill_punishes_a_wrong_mix_one_step_after_the_last_drop(cubes, cause):
     assert filled(*cubes).status is Status.ONGOING
     judge = filled(*cubes, then=[[]])
     assert judge.status is Status.FAILURE
-    assert judge.cause == f"{cause} while due: press the button to stop"
+    assert judge.cause == f"{cause}; expected: press the button to stop"
 
 
 @pytest.mark.parametrize(
     ("extra", "cause"),
     [
-        ("cube_red_2", "more than 2 red cubes in the bin"),
-        ("cube_blue_1", "more than 1 blue cube in the bin"),
-        ("cube_green_0", "a green cube in the bin"),
+        ("cube_red_2", "put more than 2 red cubes into the bin"),
+        ("cube_blue_1", "put more than 1 blue cube into the bin"),
+        ("cube_green_0", "put a green cube into the bin"),
     ],
 )
 def test_bin_fill_punishes_one_cube_too_many_as_it_lands_but_not_its_picking(extra, cause):
@@ -181,7 +181,7 @@ def test_swing_punishes_a_visit_too_many_before_and_after_the_put_down(side):
         assert swung(*steps[:-1]).status is Status.ONGOING
         judge = swung(*steps)
         assert judge.status is Status.FAILURE
-        assert judge.cause.startswith("passed over the targets once too often")
+        assert judge.cause.startswith("moved the cube over a target too often")
 
 
 def test_swing_punishes_left_first_at_the_last_visit():

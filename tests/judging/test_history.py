@@ -16,7 +16,7 @@ bounds = st.integers(0, 4)
 def followed(course):
     history = FactHistory()
     for step, facts in enumerate(course):
-        history.follow(step, facts)
+        history.update(step, facts)
     return history
 
 
@@ -50,7 +50,7 @@ def test_time_is_counted_from_reset_or_from_a_timer_that_starts_once():
     history = FactHistory()
     assert not history.holds(Elapsed(0, timer="pick"))
     for step in range(10):
-        history.follow(step, frozenset())
+        history.update(step, frozenset())
         if step in {3, 5}:
             history.start_timer("pick")
     assert history.holds(Elapsed(9))

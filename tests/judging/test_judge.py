@@ -46,7 +46,7 @@ def test_one_stage_per_evaluation():
 def test_what_is_forbidden_counts_before_what_is_expected():
     judge = judged([stage(A, BAD)], [A, BAD])
     assert judge.status is Status.FAILURE
-    assert judge.cause == "pressed button while due: do it"
+    assert judge.cause == "pressed button; expected: do it"
 
 
 def test_what_ends_a_stage_is_not_held_against_the_next_in_the_same_step():
@@ -93,18 +93,20 @@ def test_events_tell_the_same_story_as_the_facts(history):
 def test_every_forbidden_fact_of_every_stage_fails(task, index):
     episode = get_episode(task, "test", index)
     tested = 0
-    for number, due in enumerate(episode.stages):
-        for wrong in due.forbids:
+    for number, stage in enumerate(episode.stages):
+        for wrong in stage.forbids:
             if isinstance(wrong, Rule):
                 continue  # driven by the rule tests of each task
             judge = Judge(episode.stages, episode.scene)
             judge.index = number
-            judge.update(0, frozenset([wrong, *facts_of(due.expects)]))
+            judge.update(0, frozenset([wrong, *facts_of(stage.expects)]))
             assert judge.status is Status.FAILURE
             assert describe_object(wrong.subject, episode.scene) in str(judge.cause)
-            assert plain_subgoal(due) in str(judge.cause)
+            assert plain_subgoal(stage) in str(judge.cause)
             tested += 1
-    assert tested > 0 or all(isinstance(one, Rule) for due in episode.stages for one in due.forbids)
+    assert tested > 0 or all(
+        isinstance(one, Rule) for stage in episode.stages for one in stage.forbids
+    )
 
 
 def test_causes_call_things_by_what_they_are():
@@ -114,7 +116,7 @@ def test_causes_call_things_by_what_they_are():
     judge = Judge(episode.stages, episode.scene)
     judge.update(0, frozenset([Fact("lifted", covers[second])]))
     assert judge.cause == (
-        f"lifted the container over the {second} cube while due: "
+        f"lifted the container over the {second} cube; expected: "
         f"pick up the container that hides the {first} cube"
     )
     empty = next(

@@ -32,7 +32,7 @@ def put_down(name):
 
 
 def verdict(episode, *steps):
-    """The judge after so many evaluations, one after each of the sets of facts."""
+    """The judge after one evaluation for each set of facts."""
     judge = Judge(episode.stages, episode.scene)
     for number, facts in enumerate(steps):
         judge.update(number, frozenset(facts))
@@ -81,7 +81,7 @@ def test_any_other_container_fails_the_first_pick(task, seed):
         what = f"the container over the {hidden.color} cube" if hidden else "an empty container"
         color = episode.goal.texts("colors")[0]
         assert judge.cause == (
-            f"lifted {what} while due: pick up the container that hides the {color} cube"
+            f"lifted {what}; expected: pick up the container that hides the {color} cube"
         )
 
 
@@ -98,7 +98,7 @@ def test_any_other_container_fails_the_putting_down(task, seed):
     for wrong in (second, *others):
         judge = verdict(episode, *PRESSES[task], [lifted(first)], [put_down(first), lifted(wrong)])
         assert judge.status is Status.FAILURE
-        assert str(judge.cause).endswith("while due: put down the container")
+        assert str(judge.cause).endswith("; expected: put down the container")
 
 
 @each_task

@@ -16,7 +16,7 @@ from roboirg.tasks.video_repick import TASK as VIDEO_REPICK
 
 PRESSED = Fact("pressed", "button")
 STILL, HOME = Fact("still", "robot"), Fact("home", "robot")
-TOO_EARLY = "pressed the button too early while due: "
+TOO_EARLY = "pressed the button too early; expected: "
 
 
 def sample(task, difficulty):
@@ -69,7 +69,7 @@ def test_repick_with_one_repetition_too_many():
     episode, picked, lying, _ = repick(2)
     judge = judged(episode, *[[picked], [lying]] * 3)
     assert judge.status is Status.FAILURE
-    assert "while due: press the button to finish" in str(judge.cause)
+    assert "; expected: press the button to finish" in str(judge.cause)
 
 
 @pytest.mark.parametrize("difficulty", DIFFICULTIES)
@@ -207,7 +207,7 @@ def test_place_on_any_other_disc_fails_even_together_with_the_right_one(episode)
         wrong = Fact("placed", picked.subject, other)
         judge = judged(episode, [picked], [], [wrong])
         assert judge.status is Status.FAILURE
-        assert "while due: place the cube onto the correct target" in str(judge.cause)
+        assert "; expected: place the cube onto the correct target" in str(judge.cause)
         assert verdict(episode, [picked], [placed, wrong]) is Status.FAILURE
         # Before it is picked, the cube may be anywhere.
         assert verdict(episode, [wrong], [picked], [placed]) is Status.SUCCESS
@@ -253,9 +253,9 @@ def test_videos_and_perfect_runs_succeed(task, difficulty):
     episode = make(task, difficulty)
     judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
     step = 0
-    for due in judge.stages:
+    for stage in judge.stages:
         assert judge.status is Status.ONGOING
-        for _ in range(due.lasting + 1):
-            judge.update(step, frozenset([due.expects]))
+        for _ in range(stage.lasting + 1):
+            judge.update(step, frozenset([stage.expects]))
             step += 1
     assert judge.status is Status.SUCCESS

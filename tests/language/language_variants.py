@@ -1,4 +1,4 @@
-"""What the language tests share: episodes and their default words."""
+"""Episodes for the language tests."""
 
 import itertools
 from collections.abc import Iterator

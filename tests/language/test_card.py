@@ -1,4 +1,4 @@
-"""The language card is what the generator gives now."""
+"""The language card is up to date."""
 
 from pathlib import Path
 

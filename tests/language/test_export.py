@@ -78,8 +78,8 @@ def test_goals_are_the_episodes():
 
 
 def test_json_lines_are_the_rows():
-    data = export.encoded(rows(), "jsonl")
-    assert data == export.encoded(rows(), "jsonl")
+    data = export.encode(rows(), "jsonl")
+    assert data == export.encode(rows(), "jsonl")
     lines = data.decode().splitlines()
     assert [json.loads(line) for line in lines] == list(rows())
 
@@ -89,11 +89,11 @@ def test_arrow_reads_json_lines_and_parquet_alike():
     from pyarrow import json as arrow_json
     from pyarrow import parquet
 
-    data = export.encoded(rows(), "parquet")
-    assert data == export.encoded(rows(), "parquet")
+    data = export.encode(rows(), "parquet")
+    assert data == export.encode(rows(), "parquet")
     table = parquet.read_table(io.BytesIO(data))
     assert table.to_pylist() == list(rows())
-    inferred = arrow_json.read_json(io.BytesIO(export.encoded(rows(), "jsonl")))
+    inferred = arrow_json.read_json(io.BytesIO(export.encode(rows(), "jsonl")))
     assert inferred.to_pylist() == list(rows())
     assert inferred.schema.names == table.schema.names
     for mine, theirs in zip(table.schema, inferred.schema, strict=True):
@@ -106,7 +106,7 @@ def test_parquet_has_its_types_whatever_is_in_it(settings):
     from pyarrow import parquet
 
     few = [one for one in rows() if one["setting"] in settings]
-    schema = parquet.read_schema(io.BytesIO(export.encoded(few, "parquet")))
+    schema = parquet.read_schema(io.BytesIO(export.encode(few, "parquet")))
     assert str(schema.field("landmark_classes").type) == "list<element: int64>"
     assert str(schema.field("pattern").type) == "string"
     assert str(schema.field("episode").type) == "int64"

@@ -6,8 +6,8 @@ import hashlib
 import pytest
 from language_variants import PAIRS, random_episodes
 
-from roboirg.language import LANGUAGE_VERSION, expressible
-from roboirg.language.variants import tellings
+from roboirg.language import LANGUAGE_VERSION, instruct_with
+from roboirg.language.variants import expressible_options
 
 GOLDEN_VERSION = "1.1.0"
 GOLDEN: dict[tuple[str, str], str] = {
@@ -76,15 +76,13 @@ GOLDEN: dict[tuple[str, str], str] = {
 
 
 def digest(task, setting):
-    """A hash of all that is said in 24 episodes."""
+    """A hash of all instructions of 24 episodes."""
     sha = hashlib.sha256()
     for episode in random_episodes(task, 24):
-        if setting not in expressible(episode):
-            continue
-        for telling in tellings(episode):
-            if telling.setting == setting:
-                instruction = telling.of(episode)
-                sha.update("\n".join((episode.key, telling.form, *instruction.turns)).encode())
+        for options in expressible_options(episode):
+            if options.setting == setting:
+                instruction = instruct_with(episode, options)
+                sha.update("\n".join((episode.key, options.form, *instruction.turns)).encode())
                 sha.update(
                     repr([dataclasses.astuple(one) for one in instruction.mentions]).encode()
                 )

@@ -10,7 +10,7 @@ from language_variants import SPATIAL_TASKS, random_episodes
 from roboirg.core.episode import COLORS, Point, Scene, SceneObject
 from roboirg.core.motions import Away
 from roboirg.language import FORMS, expressible, instruct, interpret
-from roboirg.language.interpreter.places import find, read_places
+from roboirg.language.interpreter.places import find_objects, read_places
 from roboirg.language.interpreter.tokens import split_sentences
 from roboirg.language.landmarks import MARGIN, landmarks, selectors
 
@@ -63,7 +63,7 @@ def test_every_class_reads_as_it_selects(places, button, target):
     scene = cubes(places, button, target)
     for frame in ("robot", "camera"):
         for selector in selectors(scene, "cube", frame):
-            selected = selector.selected()
+            selected = selector.select()
             if selected is not None:
                 check_reader(scene, "cube", selector.landmark, selected, frame)
 
@@ -72,7 +72,7 @@ def check_reader(scene, thing, landmark, target, frame):
     (sentence,) = split_sentences(f"the {thing} {landmark.phrase}")
     (place,) = read_places(sentence)
     mirrored = frame == "camera"
-    assert find(place, scene, thing, mirrored=mirrored) == (target,), landmark
+    assert find_objects(place, scene, thing, mirrored=mirrored) == (target,), landmark
 
 
 @settings(max_examples=200, deadline=None)
@@ -140,10 +140,10 @@ def test_a_corner_is_used_only_if_it_does_not_matter_which_one_is_meant():
     scene = containers([(-0.11, 0.06), (0.0, 0.17), (-0.11, -0.2), (0.0, -0.2), (0.1, 0.17)])
     words = "closest to the near left corner of the table"
     corner = next(one for one in selectors(scene, "container", "robot") if one.landmark[0] == words)
-    work_area, table = (one.selected(corner.candidates, 0) for one in corner.readings)
+    work_area, table = (one.select(corner.candidates, 0) for one in corner.rankings)
     assert work_area is scene["container_0"]
     assert table is scene["container_1"]
-    assert corner.selected() is None
+    assert corner.select() is None
     clear = containers([(-0.15, 0.15), (-0.15, -0.15), (0.15, 0.15), (0.15, -0.15)])
     assert phrases(clear, "container_0") == {words}
 
@@ -162,7 +162,7 @@ def test_a_corner_is_used_only_if_it_does_not_matter_which_one_is_meant():
 def test_the_reader_reports_near_ties(words, places):
     scene = containers(places)
     (place,) = read_places(*split_sentences(f"the container {words}"))
-    assert find(place, scene, "container", mirrored=False) == scene.objects[:2]
+    assert find_objects(place, scene, "container", mirrored=False) == scene.objects[:2]
 
 
 def test_a_place_of_two_things_makes_two_goals():
@@ -202,7 +202,7 @@ def test_containers_appear_and_are_candidates_all_the_same():
 def test_the_bin_is_a_fixture():
     bin_ = SceneObject("bin", "bin", Point(-0.2, 0.0, 0.0))
     scene = Scene((*cubes([(-0.1, 0.0), (0.1, 0.0)]).of_kind("cube"), bin_))
-    found = {one.landmark.phrase: one.selected() for one in selectors(scene, "cube", "robot")}
+    found = {one.landmark.phrase: one.select() for one in selectors(scene, "cube", "robot")}
     assert found["closest to the bin"] is scene["cube_red"]
     assert found["farthest from the bin"] is scene["cube_green"]
 
@@ -214,7 +214,7 @@ def test_a_place_of_a_counted_color_is_that_of_one_of_its_cubes():
         said = instruct(episode, "spatial").metadata["landmarks"]
         for color, phrase in zip(episode.goal.texts("colors"), said, strict=True):
             places = selectors(episode.scene, "cube", "robot")
-            found = {one.selected() for one in places if one.landmark.phrase == phrase}
+            found = {one.select() for one in places if one.landmark.phrase == phrase}
             assert {item.color for item in found if item is not None} == {color}
 
 

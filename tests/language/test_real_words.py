@@ -1,4 +1,4 @@
-"""Boxes and tapes in words: what is said of them, and what other people could say."""
+"""Boxes and tapes in words: the generator's, and those of other people."""
 
 import itertools
 
@@ -9,7 +9,7 @@ from language_variants import random_episodes
 
 from roboirg.core.episode import ALL_COLORS, Goal, Point, Scene, SceneObject
 from roboirg.language import expressible, instruct, interpret
-from roboirg.language.interpreter.places import Towards, read_places
+from roboirg.language.interpreter.places import DirectionalPlace, read_places
 from roboirg.language.interpreter.tokens import split_sentences
 from roboirg.language.landmarks import MARGIN, landmarks
 
@@ -66,7 +66,7 @@ GRID = st.integers(-20, 20).map(lambda step: step / 100)
 
 @given(GRID, GRID, GRID, GRID, st.sampled_from(["box", "tape"]))
 def test_two_of_a_kind_are_told_by_their_sides_alone(left, right, near, far, kind):
-    """Whoever wins by the margin along y, however the two stand along x."""
+    """The margin along y decides, at any positions along x."""
     one = SceneObject("one", kind, Point(near, left, 0.03), color="green")
     two = SceneObject("two", kind, Point(far, right, 0.03), color="gray")
     scene = Scene((one, two))
@@ -88,7 +88,7 @@ def test_for_the_camera_sides_are_mirrored(kind):
 
 def test_sides_of_other_things_are_no_places():
     (words,) = split_sentences("swing it over the target on your right and the box on your left")
-    assert read_places(words) == (Towards("left", 0),)
+    assert read_places(words) == (DirectionalPlace("left", 0),)
 
 
 def test_the_excluded_pair_is_the_tape_s_color_and_the_other_box_s():

@@ -1,4 +1,4 @@
-"""What the language promises: English, exact spans, balanced patterns, noted choices."""
+"""Rules of the language: English, exact spans, balanced patterns, noted choices."""
 
 import functools
 import itertools
@@ -11,11 +11,11 @@ from language_variants import SPATIAL_TASKS, TASKS, split_episodes
 
 from roboirg.core.episode import ALL_COLORS
 from roboirg.episodes.splits import get_episode
-from roboirg.language import FORMS, STAGE_SETS, instruct, templates
+from roboirg.language import FORMS, STAGE_SETS, instruct, instruct_with, templates
 from roboirg.language.number_words import CARDINALS, ORDINALS
 from roboirg.language.patterns import deduction, sequence
 from roboirg.language.settings import settings_of
-from roboirg.language.variants import tellings
+from roboirg.language.variants import expressible_options
 from roboirg.tasks import every_task, get_task
 
 COLOR_NAMES = frozenset(ALL_COLORS)
@@ -27,10 +27,10 @@ def words_of(text):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_every_text_of_the_splits(task):
-    """English, mentions and what they point at, in every way of telling."""
+    """English, mentions and their referents, in every setting, form and option."""
     for episode in split_episodes(task):
-        for telling in tellings(episode):
-            instruction = telling.of(episode)
+        for options in expressible_options(episode):
+            instruction = instruct_with(episode, options)
             for text in instruction.turns:
                 check_english(text)
             check_spans(instruction)
@@ -71,7 +71,7 @@ def values_of(goal, mention):
 
 
 def referents(mention):
-    """What an anaphor needs to have been introduced."""
+    """The values that must be introduced before an anaphor."""
     if mention.expression == "other":
         return set()  # derived: the goal's value itself never was
     values = mention.value.split(" and ") if mention.expression == "them" else [mention.value]
@@ -145,7 +145,7 @@ THING = "cube|container|box|tape"
 
 
 def check_agreement(lower):
-    """Verbs agree with what stands before them: one thing, or several joined by *and*."""
+    """Verbs agree with their subject: one thing, or several joined by *and*."""
     for sentence in re.split(r"(?<=\.) ", lower):
         several = r"\b(cubes|containers|boxes|tapes|colors|those) (is|was|has)\b"
         assert not re.search(several, sentence), sentence
@@ -258,12 +258,12 @@ def test_where_things_move_places_are_those_before():
 def test_metadata_is_plain_and_complete(task):
     keys = None
     for episode in itertools.islice(split_episodes(task), 8):
-        for telling in tellings(episode):
-            metadata = telling.of(episode).metadata
+        for options in expressible_options(episode):
+            metadata = instruct_with(episode, options).metadata
             assert json.loads(json.dumps(metadata)) == dict(metadata)
             keys = keys or set(metadata)
             assert set(metadata) == keys
             assert metadata["language_version"] == templates.LANGUAGE_VERSION
-            assert (metadata["frame"] is not None) == (telling.setting == "spatial")
-            if telling.setting == "contextual":
+            assert (metadata["frame"] is not None) == (options.setting == "spatial")
+            if options.setting == "contextual":
                 assert tuple(metadata["stages"]) in STAGE_SETS

@@ -12,6 +12,7 @@ from roboirg.language import corpus_statistics, expression_figure, setting_names
 from roboirg.language.settings import settings_of
 from roboirg.language.variants import instructions, split_episodes
 from roboirg.tasks import every_task
+from roboirg.util import figure_files
 
 
 @functools.cache
@@ -98,4 +99,4 @@ def test_a_folder_that_cannot_be_is_one_sentence(tmp_path):
 def test_without_matplotlib_one_sentence_says_what_to_install(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "matplotlib", None)
     with pytest.raises(MissingDependencyError, match=r"roboirgbench\[report\]"):
-        expression_figure.check_figure_support()
+        figure_files.check_figure_support()

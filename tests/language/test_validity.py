@@ -1,6 +1,6 @@
-"""Validity is proved: the independent reader finds exactly the goal, and needs the introduction.
+"""Instructions are valid: the interpreter finds exactly the goal, and needs the introduction.
 
-This is what `roboirg language prove` does too, which covers all splits and many more scenes.
+`roboirg language validate` checks the same on all splits and many more scenes.
 """
 
 import functools
@@ -19,15 +19,15 @@ RANDOM_SCENES = 24
 
 
 @functools.cache
-def evidence(task: str, split: str | None) -> ValidationResults:
-    """What the test split (or, for None, random scenes) of a task proves."""
+def results(task: str, split: str | None) -> ValidationResults:
+    """Results for the test split of a task, or for None of random scenes."""
     return validate_batch(Batch(task, split, 0, RANDOM_SCENES if split is None else SIZES[split]))
 
 
 @pytest.mark.parametrize("task", TASKS)
 @pytest.mark.parametrize("split", ["test", None])
-def test_every_way_of_telling_is_valid(task, split):
-    found = evidence(task, split)
+def test_every_instruction_is_valid(task, split):
+    found = results(task, split)
     assert not found.failures
     episodes = RANDOM_SCENES if split is None else SIZES[split]
     read = {setting: found.texts[task, setting] for setting in settings_of(get_task(task))}
@@ -59,7 +59,7 @@ def exceptions(task):
     """Groups of scenes that leave one candidate, with their share."""
     total = ValidationResults()
     for split in ("test", None):
-        total.add(evidence(task, split))
+        total.add(results(task, split))
     return {
         (group.difficulty, group.pattern or group.setting): count / total.commands[group]
         for group, count in total.exceptions.items()

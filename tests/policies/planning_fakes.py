@@ -1,4 +1,4 @@
-"""Models that answer as they are told, over real HTTP, in OpenAI's and in Google's dialect."""
+"""Models with prescribed replies, over real HTTP, with OpenAI's and with Google's API."""
 
 import base64
 import hashlib
@@ -25,28 +25,28 @@ KEY_VARIABLE, KEY = "PLANNING_TEST_KEY", "sk-very-secret-0123456789"
 
 
 class Late:
-    """Answer after so many seconds; drip=True sends a space now and then meanwhile."""
+    """Reply after some seconds; with drip=True, send a space every 50 ms meanwhile."""
 
     def __init__(self, seconds, drip=False):
         self.seconds, self.drip = seconds, drip
 
 
 class Status:
-    """Answer with an HTTP error."""
+    """Reply with an HTTP error."""
 
     def __init__(self, code, words="something went wrong"):
         self.code, self.words = code, words
 
 
 class Garbage:
-    """Answer with what is no reply at all."""
+    """Reply with something malformed."""
 
     def __init__(self, body, kind="application/json"):
         self.body, self.kind = body, kind
 
 
 class FakeVLM(ThreadingHTTPServer):
-    """Answers with what a function says of the request, and keeps all requests.
+    """Replies with what a function returns for the request, and keeps all requests.
 
     Attributes:
         answer: from a request (path, headers, body) to a text, or one of the mishaps above.
@@ -182,7 +182,7 @@ def make_listener(server, provider="openai", **more):
 
 
 def words_of(body):
-    """All words of a request, the last turn's last."""
+    """All text of a request, the last turn's last."""
     if "contents" in body:
         return "\n".join(
             part["text"] for turn in body["contents"] for part in turn["parts"] if "text" in part
@@ -196,7 +196,7 @@ def words_of(body):
 
 
 def stand_in(episode, setting="explicit", shade=0):
-    """As much of an environment as a listener looks at before its hands move."""
+    """The part of an environment that a listener reads before it executes the goal."""
     picture = np.full((256, 256, 3), shade, np.uint8)
     return SimpleNamespace(
         episode=episode,

@@ -95,5 +95,5 @@ def test_a_checkpoint_is_fed_its_own_names(checkpoint):
 
 def test_a_checkpoint_that_wants_another_camera_is_told(checkpoint):
     checkpoint.config.input_features = {"observation.images.laptop": None}
-    with pytest.raises(InvalidValueError, match=r"wants to see 'observation\.images\.laptop'"):
+    with pytest.raises(InvalidValueError, match=r"needs 'observation\.images\.laptop'"):
         make_policy("lerobot://x/y", 0).reset(INSTRUCTION, video(0))

@@ -1,4 +1,4 @@
-"""A model says what is meant, over real HTTP; what it may know, and what comes of its answers."""
+"""A model names the goal, over real HTTP: its input, its answers, and their consequences."""
 
 import contextlib
 import itertools
@@ -38,14 +38,19 @@ from roboirg.episodes.splits import SIZES, get_episode
 from roboirg.language import instruct, interpret
 from roboirg.language.settings import settings_of
 from roboirg.policies import play
-from roboirg.policies.planning.goal_schema import full_answer, goal_schema
+from roboirg.policies.planning.goal_schema import goal_schema
 from roboirg.policies.planning.models import ModelOptions
-from roboirg.policies.planning.vlm_listener import NotUnderstood
-from roboirg.policies.planning.vlm_query import UnparsableReply
+from roboirg.policies.planning.vlm_listener import NotUnderstoodError
+from roboirg.policies.planning.vlm_query import UnparsableReplyError
 from roboirg.tasks import every_task
 
 SPLITS = tuple(SIZES)
 EPISODES = 3
+
+
+def answer_text(goal, schema):
+    """The answer that names a goal, as JSON."""
+    return next(text for text, other in schema.goals.items() if other == goal)
 
 
 def heard(body):
@@ -54,11 +59,11 @@ def heard(body):
 
 
 def hearing(episode):
-    """Answers as the resolver understands the words of the request."""
+    """Answers with the goal that the interpreter finds in the words of the request."""
 
     def answer(body):
         (goal,) = interpret(heard(body), episode.scene, episode.task).goals
-        return json.dumps(full_answer(goal, goal_schema(episode.task)))
+        return answer_text(goal, goal_schema(episode.task))
 
     return answer
 
@@ -74,7 +79,7 @@ def test_every_goal_of_every_split_can_be_answered_and_nothing_else(task):
     }
     assert set(slots.goals.values()) == seen
     for goal in seen:
-        assert slots.read(json.dumps(full_answer(goal, slots))) == goal
+        assert slots.read(answer_text(goal, slots)) == goal
 
 
 @pytest.mark.parametrize("task", every_task())
@@ -82,7 +87,7 @@ def test_the_schema_allows_every_answer(task):
     slots = goal_schema(task)
     properties = slots.schema()["properties"]
     for goal in slots.goals.values():
-        for name, value in full_answer(goal, slots).items():
+        for name, value in json.loads(answer_text(goal, slots)).items():
             schema = properties[name]
             if schema["type"] == "array":
                 assert schema["minItems"] <= len(value) <= schema["maxItems"]
@@ -108,7 +113,7 @@ def test_the_schema_allows_every_answer(task):
 def test_any_reply_is_a_goal_or_unparsable(reply):
     for task in every_task():
         slots = goal_schema(task)
-        with contextlib.suppress(UnparsableReply):
+        with contextlib.suppress(UnparsableReplyError):
             assert slots.read(json.dumps(reply)) in slots.goals.values()
 
 
@@ -124,7 +129,7 @@ def test_any_reply_is_a_goal_or_unparsable(reply):
     ],
 )
 def test_wrong_replies_are_explained(reply, words):
-    with pytest.raises(UnparsableReply, match=words):
+    with pytest.raises(UnparsableReplyError, match=words):
         goal_schema("PickXtimes").read(reply)
 
 
@@ -133,7 +138,7 @@ def test_values_that_do_not_go_together_are_no_goal():
         ("BinFill", {"red": 0, "blue": 0, "green": 0}),
         ("VideoUnmask", {"colors": ["red", "red"]}),
     ]:
-        with pytest.raises(UnparsableReply, match="meant together"):
+        with pytest.raises(UnparsableReplyError, match="meant together"):
             goal_schema(task).read(json.dumps(reply))
 
 
@@ -172,12 +177,12 @@ def test_random_answers_reach_the_chance_level():
             goals = list(slots.goals.values())
 
             def guess(_body, goals=goals, slots=slots):
-                return json.dumps(full_answer(goals[int(rng.integers(len(goals)))], slots))
+                return answer_text(goals[int(rng.integers(len(goals)))], slots)
 
             server.answer = guess
             for index in range(40):
                 episode = get_episode(task, "test", index)
-                with contextlib.suppress(NotUnderstood):
+                with contextlib.suppress(NotUnderstoodError):
                     right += policy.decide(stand_in(episode), "Do it.") == episode.goal
                 rounds += 1
                 chance = 1 / len(goals)
@@ -194,7 +199,7 @@ def test_a_listener_tells_what_a_policy_may_know_and_nothing_of_the_scene():
     with fake_vlm(["{}"]) as server:
         for index in range(8):
             env = stand_in(get_episode("PickXtimes", "test", index))
-            with pytest.raises(NotUnderstood):
+            with pytest.raises(NotUnderstoodError):
                 make_listener(server).decide(env, "Do that again.")
             requests.add(json.dumps(server.requests[0]))
             server.requests.clear()
@@ -204,7 +209,7 @@ def test_a_listener_tells_what_a_policy_may_know_and_nothing_of_the_scene():
 def test_unparsable_replies_are_retried_once_then_counted():
     env = stand_in(get_episode("PickXtimes", "test", 0))
     goal = env.episode.goal
-    good = json.dumps(full_answer(goal, goal_schema("PickXtimes")))
+    good = answer_text(goal, goal_schema("PickXtimes"))
     with fake_vlm(["no idea", good]) as server:
         policy = make_listener(server)
         assert policy.decide(env, "Do it.") == goal
@@ -216,7 +221,7 @@ def test_unparsable_replies_are_retried_once_then_counted():
         assert "no JSON object" in complaint["content"][0]["text"]
     with fake_vlm(["no idea", "", good]) as server:
         policy = make_listener(server)
-        with pytest.raises(NotUnderstood):
+        with pytest.raises(NotUnderstoodError):
             policy.decide(env, "Do it.")
         assert policy.usage() == usage(calls=2, unparsed=1)
         assert policy.decide(env, "Do it.") == goal
@@ -271,7 +276,7 @@ def test_a_new_episode_has_a_new_account():
         (Late(30), PolicyTimeoutError, "did not answer within 0.5 s"),
         (Late(30, drip=True), PolicyTimeoutError, "did not answer within 0.5 s"),
         (Garbage(b"<html>", "text/html"), PolicyReplyError, "fake"),
-        (Garbage(b'{"no": 1}'), (PolicyReplyError, NotUnderstood), ".*"),
+        (Garbage(b'{"no": 1}'), (PolicyReplyError, NotUnderstoodError), ".*"),
         (Garbage(b"{"), PolicyReplyError, "fake"),
     ],
 )
@@ -288,7 +293,7 @@ def test_mishaps_have_their_own_errors(provider, mishap, error, words, monkeypat
 
 
 @pytest.mark.parametrize("provider", ["openai", "google"])
-def test_nobody_at_home_is_a_connection_error(provider):
+def test_an_absent_service_is_a_connection_error(provider):
     with fake_vlm(["{}"]) as server:
         policy = make_listener(server, provider)
     with pytest.raises(PolicyConnectionError, match="cannot be reached"):
@@ -380,7 +385,7 @@ def test_two_listeners_do_not_mix():
     ("task", "setting"),
     [("PickXtimes", "direct"), ("VideoUnmask", "spatial"), ("StopCube", "reasoning")],
 )
-def test_the_hands_do_what_the_model_understood(task, setting):
+def test_the_expert_executes_what_the_model_understood(task, setting):
     episode = get_episode(task, "test", 0)
     with fake_vlm(hearing(episode)) as server:
         policy = make_listener(server, frames=2, frames_every=20)

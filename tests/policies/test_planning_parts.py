@@ -1,4 +1,4 @@
-"""Points, key frames, forms of subgoals, pictures and what two share: without any model."""
+"""Points, key frames, forms of subgoals, pictures and merged requirements, without a model."""
 
 import itertools
 import re
@@ -13,25 +13,32 @@ from planning_fakes import decoded
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import DemonstrationFrames
 from roboirg.episodes.splits import get_episode
-from roboirg.policies.planning.keyframes import NEAR, merged
-from roboirg.policies.planning.model_content import Clip, Picture, evenly, mp4, png, summary
+from roboirg.policies.planning.keyframes import MAX_GAP, merge_keyframes
+from roboirg.policies.planning.model_content import (
+    Clip,
+    Picture,
+    encode_mp4,
+    encode_png,
+    sample_evenly,
+    summary_clip,
+)
 from roboirg.policies.planning.observation_merging import (
     DemonstrationSubset,
-    both_cameras,
-    both_frames,
-    both_histories,
-    cut_history,
+    merge_cameras,
+    merge_demonstration_frames,
+    merge_observe_every,
+    select_history,
 )
 from roboirg.policies.planning.points import (
-    LONGEST_SUBGOAL,
-    from_boxes,
-    from_points,
-    pixel,
+    MAX_SUBGOAL_LENGTH,
+    parse_boxes,
+    parse_points,
     says_finished,
-    without_places,
+    strip_points,
+    to_pixel,
 )
 from roboirg.policies.planning.prompts import load_prompts
-from roboirg.policies.planning.vlm_query import UnparsableReply, json_object, text_of
+from roboirg.policies.planning.vlm_query import UnparsableReplyError, json_object, text_of
 from roboirg.tasks import every_task
 
 thousandths = st.integers(0, 1000)
@@ -41,50 +48,50 @@ PROMPTS = ("listener", "qwen", "gemini", "memer", "subgoals")
 @given(st.lists(st.tuples(thousandths, thousandths), max_size=5))
 def test_points_are_scaled_row_first_all_at_once(points):
     """One pass: what is a pixel already is not taken for a thousandth again."""
-    expected = " and ".join(f"at <{pixel(y)}, {pixel(x)}>" for y, x in points)
+    expected = " and ".join(f"at <{to_pixel(y)}, {to_pixel(x)}>" for y, x in points)
     texts = " and ".join(f"at <{y}, {x}>" for y, x in points)
     boxes = " and ".join(f"at <|box_start|>({y},{x})<|box_end|>" for y, x in points)
     bare = " and ".join(f"at ({y}, {x})" for y, x in points)
-    assert from_points(f"Go {texts}") == f"go {expected}".strip()
-    assert from_boxes(f"Go {boxes}<|im_end|>") == f"go {expected}".strip()
-    assert from_boxes(f'"Go\n{bare}."') == f"go {expected}".strip()
+    assert parse_points(f"Go {texts}") == f"go {expected}".strip()
+    assert parse_boxes(f"Go {boxes}<|im_end|>") == f"go {expected}".strip()
+    assert parse_boxes(f'"Go\n{bare}."') == f"go {expected}".strip()
 
 
 @given(thousandths)
 def test_a_pixel_is_floored_and_stays_in_the_picture(value):
-    assert pixel(value) == min(int(Fraction(256 * value, 1000)), 255)
+    assert to_pixel(value) == min(int(Fraction(256 * value, 1000)), 255)
 
 
 def test_examples_of_points():
-    assert [pixel(value) for value in (0, 3, 4, 500, 999, 1000)] == [0, 0, 1, 128, 255, 255]
-    assert from_points("from <500, 300> to <128, 76>") == "from <128, 76> to <32, 19>"
+    assert [to_pixel(value) for value in (0, 3, 4, 500, 999, 1000)] == [0, 0, 1, 128, 255, 255]
+    assert parse_points("from <500, 300> to <128, 76>") == "from <128, 76> to <32, 19>"
 
 
 @pytest.mark.parametrize(
     "text",
     [
         *("", "  \n", "go at <1001, 3>", "go at <3>", "go at <|box_start|>(3)<|box_end|>", "{}"),
-        *("<y, x>", "x" * (LONGEST_SUBGOAL + 1)),
+        *("<y, x>", "x" * (MAX_SUBGOAL_LENGTH + 1)),
     ],
 )
 def test_broken_subgoals_are_unparsable(text):
-    for read in (from_points, from_boxes):
-        if text == "go at <1001, 3>" and read is from_boxes:
+    for read in (parse_points, parse_boxes):
+        if text == "go at <1001, 3>" and read is parse_boxes:
             text = "go at (1001,3)"
-        with pytest.raises(UnparsableReply):
+        with pytest.raises(UnparsableReplyError):
             read(text)
 
 
 def test_places_are_left_out_to_compare():
-    assert without_places("press the button at <3, 200> to stop") == "press the button to stop"
+    assert strip_points("press the button at <3, 200> to stop") == "press the button to stop"
 
 
 @given(st.lists(st.integers(0, 200)), st.integers(0, 20))
 def test_merged_key_frames(steps, near):
-    kept = merged(steps, near)
+    kept = merge_keyframes(steps, near)
     assert set(kept) <= set(steps)
     assert kept == tuple(sorted(kept))
-    assert merged(reversed(steps), near) == kept == merged(kept, near)
+    assert merge_keyframes(reversed(steps), near) == kept == merge_keyframes(kept, near)
     assert all(later - sooner > near for sooner, later in itertools.pairwise(kept))
     # Every frame is in a chain of near ones that has exactly one representative.
     ordered = sorted(set(steps))
@@ -105,8 +112,8 @@ def test_merged_key_frames(steps, near):
     ],
 )
 def test_examples_of_merging(steps, kept):
-    assert NEAR == 8
-    assert merged(steps) == kept
+    assert MAX_GAP == 8
+    assert merge_keyframes(steps) == kept
 
 
 def test_every_subgoal_of_every_task_has_a_form_that_planners_know():
@@ -145,7 +152,7 @@ def test_complete_is_no_subgoal():
 @given(st.integers(1, 60), st.integers(1, 12))
 def test_chosen_frames_are_spread_evenly(length, most):
     frames = np.arange(length, dtype=np.uint8)[:, None, None, None]
-    kept = evenly(frames, most).ravel().tolist()
+    kept = sample_evenly(frames, most).ravel().tolist()
     assert len(kept) == min(length, most) == len(set(kept))
     assert kept == sorted(kept)
     assert kept[0] == 0
@@ -153,47 +160,47 @@ def test_chosen_frames_are_spread_evenly(length, most):
         assert kept[-1] == length - 1
         gaps = np.diff(kept)
         assert not len(gaps) or gaps.max() - gaps.min() <= 1
-    clip = summary(frames, most, length)
+    clip = summary_clip(frames, most, length)
     assert len(kept) / clip.rate == Fraction(length, 30)
 
 
 def test_a_picture_and_a_clip_become_files():
     rng = np.random.default_rng(1)
     pixels = rng.integers(0, 256, (256, 256, 3), np.uint8)
-    frames, _ = decoded(png(Picture(pixels)))
+    frames, _ = decoded(encode_png(Picture(pixels)))
     assert np.array_equal(frames[0], pixels)
     shades = np.arange(0, 250, 10, dtype=np.uint8)[:, None, None, None]
     shown = np.broadcast_to(shades, (25, 256, 256, 3))
-    content = mp4(Clip(shown))
+    content = encode_mp4(Clip(shown))
     frames, rate = decoded(content)
     assert rate == 30
     assert frames.shape == shown.shape
     assert np.abs(frames.astype(int) - shown).max() < 4
-    assert mp4(Clip(shown)) == content
+    assert encode_mp4(Clip(shown)) == content
 
 
 @pytest.mark.parametrize("text", ["", "none", "[1]", "{", "{]}", '{"a": {"b": }'])
 def test_no_object_is_unparsable(text):
-    with pytest.raises(UnparsableReply, match="no JSON object"):
+    with pytest.raises(UnparsableReplyError, match="no JSON object"):
         json_object(text)
 
 
 @pytest.mark.parametrize("value", [None, 3, "", " ", ["x"]])
 def test_a_field_without_words_is_unparsable(value):
-    with pytest.raises(UnparsableReply, match="'a' has to hold words"):
+    with pytest.raises(UnparsableReplyError, match="'a' has to hold words"):
         text_of({"a": value}, "a")
 
 
 def test_prompts_are_versioned_and_can_be_replaced(tmp_path):
     assert len({load_prompts(name).fingerprint for name in PROMPTS}) == len(PROMPTS)
     file = tmp_path / "mine.toml"
-    file.write_text('again = "no: $why"\nsystem = "x $nobody"\n')
+    file.write_text('again = "no: $why"\nsystem = "x $missing"\n')
     mine = load_prompts("qwen", str(file))
     assert mine.fill("again", why="so") == "no: so"
     assert mine.fingerprint != load_prompts("qwen").fingerprint
     with pytest.raises(InvalidValueError, match=r"'goal'"):
         mine.fill("goal", instruction="x")
-    with pytest.raises(InvalidValueError, match=r"'system' .*nobody.*\$why"):
+    with pytest.raises(InvalidValueError, match=r"'system' .*missing.*\$why"):
         mine.fill("system", why="so")
     file.write_text("= 3")
     with pytest.raises(InvalidValueError, match="not TOML"):
@@ -209,7 +216,7 @@ wishes = st.sampled_from(["all", "none"]) | st.integers(1, 12)
 def test_each_sees_the_pictures_of_the_video_that_it_asked_for(
     one: DemonstrationFrames, other: DemonstrationFrames, steps
 ):
-    drawn = both_frames(one, other)
+    drawn = merge_demonstration_frames(one, other)
     every = {"all": 1}.get(drawn, drawn)
     shown = {"joint_positions": np.arange(steps)}
     if drawn != "none":
@@ -232,7 +239,7 @@ def test_each_sees_the_pictures_of_the_video_that_it_asked_for(
     st.lists(st.integers(1, 20), max_size=6),
 )
 def test_each_sees_the_moments_that_it_asked_for(one, other, chunks):
-    every = both_histories(one, other)
+    every = merge_observe_every(one, other)
     step = looked = 0
     seen = {True: [], False: []}
     for chunk in chunks:
@@ -242,7 +249,7 @@ def test_each_sees_the_moments_that_it_asked_for(one, other, chunks):
         step += chunk
         observation = {"now": step} if every is None else {"now": step, "history": looks}
         for wish, who in ((one, True), (other, False)):
-            cut = cut_history(observation, looked, every, wish)
+            cut = select_history(observation, looked, every, wish)
             assert cut["now"] == step
             assert ("history" in cut) == (wish is not None)
             seen[who] += cut.get("history", ())
@@ -253,5 +260,5 @@ def test_each_sees_the_moments_that_it_asked_for(one, other, chunks):
 
 
 def test_cameras_are_united_in_the_usual_order():
-    assert both_cameras(("wrist",), ("front",)) == ("front", "wrist")
-    assert both_cameras((), ()) == ()
+    assert merge_cameras(("wrist",), ("front",)) == ("front", "wrist")
+    assert merge_cameras((), ()) == ()

@@ -36,7 +36,7 @@ ANSWERS = {
 
 
 class Follower:
-    """Does as it is told: nothing, so many rows at a time."""
+    """Returns still actions, a given number of rows per chunk."""
 
     cameras = ()
     demonstration_frames = "none"
@@ -93,7 +93,7 @@ NO_VIDEO = {"front_rgb": np.zeros((0, 256, 256, 3), np.uint8), "joint_positions"
 
 
 def drive(planner, steps, chunk=CHUNK, demonstration=NO_VIDEO, instruction="Do it."):
-    """An episode of so many steps; the subgoal at each chunk's first step."""
+    """Play an episode in chunks; return the subgoal at each chunk's first step."""
     policy = HierarchicalPolicy(planner, Follower(chunk))
     policy.reset(instruction, demonstration)
     every = policy.observe_every
@@ -393,7 +393,7 @@ class Wishful(Follower):
     demonstration_frames = 6
 
 
-def test_wishes_of_both_are_met():
+def test_requirements_of_both_are_met():
     with fake_vlm(["x"]) as server:
         together = HierarchicalPolicy(make_planner("gemini", server, observe_every=4), Wishful())
         assert together.cameras == ("front", "wrist")
@@ -401,7 +401,7 @@ def test_wishes_of_both_are_met():
         assert together.demonstration_frames == 2
         assert together.observe_every == 4
         assert together.grounded is False
-        # Only what is seen tells how long a way point takes.
+        # Only the history tells how many control steps a waypoint takes.
         assert HierarchicalPolicy(make_planner("qwen", server), Wishful()).observe_every == 1
         assert HierarchicalPolicy(OraclePlanner(), Follower()).grounded is True
         assert (

@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from planning_fakes import KEY, fake_vlm, stand_in
@@ -107,6 +108,14 @@ def test_a_factory_has_what_a_class_would_have(spec):
     assert factory.version == load_policy_class(spec).version
 
 
+def test_the_page_s_code_runs():
+    page = (Path(__file__).parents[2] / "docs" / "planners.md").read_text()
+    (block,) = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    names: dict = {}
+    exec(block, names)  # noqa: S102 - it is our own page
+    assert isinstance(names["mine"], PrivilegedPolicy)
+
+
 def test_a_listener_by_its_spec():
     policy = make_policy(f"{LISTENER}&frames=4&timeout_s=9&reasoning=yes", 5)
     assert isinstance(policy, VLMListener)
@@ -164,7 +173,7 @@ def test_own_systems_are_files(tmp_path):
     file.write_text('name = "mine"\nabout = "x"\npolicy = "random"\n[planner]\nkind = "oracle"\n')
     with pytest.raises(InvalidValueError, match="RandomPolicy has no method follow"):
         load_system(str(file))
-    with pytest.raises(InvalidValueError, match="no URL"):
+    with pytest.raises(InvalidValueError, match="not a URL"):
         load_system(str(file), {"server": "x:1"})
     file.write_text('name = "mine"\nabout = "x"\npolicy = "random"\n')
     assert load_system(str(file), seed=4).seed == 4

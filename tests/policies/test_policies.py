@@ -1,4 +1,4 @@
-"""The built-in policies, and how a name becomes one."""
+"""The built-in policies, and policies made from names."""
 
 import numpy as np
 import pytest
@@ -103,7 +103,7 @@ def test_own_policies_are_named_by_import_path():
         (
             "json:loads",
             InvalidValueError,
-            "'loads' in module json is no class but of type function",
+            "'loads' in module json is of type function, not a class",
         ),
         (f"{__name__}:pytest", InvalidValueError, "'pytest' .* of type module"),
         (
@@ -111,7 +111,7 @@ def test_own_policies_are_named_by_import_path():
             InvalidValueError,
             r"Needy\(\) .* needs 'weights'; give it a default",
         ),
-        (f"{__name__}:Numb", InvalidValueError, "act of class Numb is no method"),
+        (f"{__name__}:Numb", InvalidValueError, "act of class Numb is not a method"),
         (
             "roboirg.policies.builtin.scripted:ScriptedPolicy",
             InvalidValueError,
@@ -129,7 +129,7 @@ def test_wrong_specs_are_explained(spec, error, words):
     [
         ("front", r"write \('front',\)"),
         (("front", "wirst"), r"Did you mean 'wrist'\?"),
-        ({"front"}, "of type set; it has to be a tuple"),
+        ({"front"}, "of type set; it must be a tuple"),
         (None, "of type NoneType"),
         (("front", "front"), "names 'front' twice"),
     ],
@@ -177,9 +177,9 @@ def test_a_wrong_action_space_is_told_before_anything_starts(monkeypatch, action
 @pytest.mark.parametrize(
     ("attribute", "wish", "words"),
     [
-        ("demonstration_frames", "some", "demonstration_frames is 'some'; it has to be 'all', 'no"),
+        ("demonstration_frames", "some", "demonstration_frames is 'some'; it must be 'all', 'no"),
         ("demonstration_frames", 0, "demonstration_frames is 0"),
-        ("observe_every", -1, "observe_every is -1; it has to be None or a whole number"),
+        ("observe_every", -1, "observe_every is -1; it must be None or a whole number"),
         ("observe_every", True, "observe_every is True"),
     ],
 )
@@ -200,8 +200,8 @@ def test_a_policy_says_which_frames_it_wants(monkeypatch):
     assert wanted_history(make_policy(f"{__name__}:Silent", 0)) == 8
 
 
-def test_whoever_looks_behind_the_scenes_is_known():
-    assert [is_privileged(name) for name in ("oracle", "forgetful", "random", "nobody")] == [
+def test_privileged_policies_are_known_by_name():
+    assert [is_privileged(name) for name in ("oracle", "forgetful", "random", "unknown")] == [
         True, True, False, False,
     ]  # fmt: skip
 

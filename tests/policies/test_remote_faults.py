@@ -1,4 +1,4 @@
-"""Servers that die, stall, restart, answer late or garbage: named errors, and the next episode."""
+"""Servers that die, stall, restart, or reply late or malformed: named errors, and recovery."""
 
 import socket
 import threading
@@ -23,19 +23,19 @@ from roboirg.core.errors import (
 )
 from roboirg.policies import make_policy
 
-GARBAGE = [
+MALFORMED = [
     ("Traceback …\nValueError: the weights melted\n", "error: ValueError: the weights melted."),
     ("", "error: an empty text"),
-    (b"\xc1\xff\x00", "something else than a message: the bytes are no msgpack"),
-    (b"", "something else than a message"),
-    (pack([1, 2]), "the message is no map but of type list"),
-    (pack({b"x": 2}), "key b.x. that is no text"),
+    (b"\xc1\xff\x00", "something other than a message: the bytes are not a msgpack"),
+    (b"", "something other than a message"),
+    (pack([1, 2]), "the message is of type list, not a map"),
+    (pack({b"x": 2}), "key b.x. that is not a text"),
     (pack({1: 2}), "int is not allowed"),
     ({"action": np.zeros((20, 8))}, "without 'actions'; it holds 'action'"),
     ({}, "it holds nothing"),
     ({"actions": np.zeros((20, 7))}, r"shape \(n, 8\).*got shape \(20, 7\)"),
     ({"actions": np.zeros((0, 8))}, r"got shape \(0, 8\)"),
-    ({"actions": np.full((20, 8), np.nan)}, "every value has to be a finite number"),
+    ({"actions": np.full((20, 8), np.nan)}, "every value must be a finite number"),
     ({"actions": "left"}, "array of 8 real numbers; got str"),
     ({"actions": None}, "got NoneType"),
     (
@@ -67,8 +67,8 @@ def before_inference(protocol):
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
-@pytest.mark.parametrize(("reply", "words"), GARBAGE)
-def test_garbage_is_told_and_the_next_episode_works(protocol, reply, words):
+@pytest.mark.parametrize(("reply", "words"), MALFORMED)
+def test_a_malformed_reply_is_reported_and_the_next_episode_works(protocol, reply, words):
     if protocol == "challenge+http" and isinstance(reply, str):
         pytest.skip("text comes with status 500 there")
     if protocol == "challenge+http" and reply == {}:
@@ -193,7 +193,7 @@ def test_a_surplus_reply_is_not_taken_for_the_next():
         policy = make_policy(f"mme-vla://{server.place}", 0)
         policy.reset(INSTRUCTION, video(0))
         time.sleep(0.3)  # until the surplus has come
-        with pytest.raises(PolicyReplyError, match="nobody had asked for"):
+        with pytest.raises(PolicyReplyError, match="without a request"):
             policy.act(moment(0, history=()))
         policy.close()
 
@@ -216,7 +216,7 @@ def test_a_server_that_starts_late_or_again_is_found():
     policy.close()
 
 
-def test_nobody_there_is_told_in_one_sentence():
+def test_an_absent_server_is_reported_in_one_sentence():
     policy = make_policy("openpi://127.0.0.1:9?connect=0.2", 0)
     with pytest.raises(
         PolicyConnectionError,

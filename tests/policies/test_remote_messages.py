@@ -136,7 +136,7 @@ def test_an_episode_longer_than_the_memory_is_told():
     with MmeVlaServer() as server:
         policy = make_policy(f"mme-vla://{server.place}?part=512", 0)
         policy.reset(INSTRUCTION, video(4096))
-        with pytest.raises(InvalidValueError, match=r"4097 frames, and .* counts to 4096"):
+        with pytest.raises(InvalidValueError, match=r"4097 frames, but .* holds 4096"):
             policy.act(moment(0, history=()))
         policy.close()
 
@@ -144,7 +144,7 @@ def test_an_episode_longer_than_the_memory_is_told():
 def test_the_video_is_read_only_if_it_is_sent():
     class Unread(dict):
         def __getitem__(self, field):
-            assert not field.endswith("wrist_rgb"), "nobody sends the wrist's video"
+            assert not field.endswith("wrist_rgb"), "the wrist's video is not sent"
             return super().__getitem__(field)
 
     with MmeVlaServer() as server:

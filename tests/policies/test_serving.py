@@ -1,4 +1,4 @@
-"""Policies of this process behind real sockets: what they get, give, and how they fail."""
+"""Policies of this process behind real sockets: inputs, outputs and errors."""
 
 import os
 import signal
@@ -18,7 +18,8 @@ from wire_servers import pack, unpack
 
 from roboirg.core.errors import InvalidValueError, PolicyReplyError, UnknownNameError
 from roboirg.policies import make_policy
-from roboirg.policies.serving import PROTOCOLS, open_server
+from roboirg.policies.protocols import protocols_by_scheme
+from roboirg.policies.serving.policy_server import open_server
 
 HERE = f"{__name__}:Recorder"
 
@@ -78,7 +79,7 @@ SEEN = {
 }
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS)
+@pytest.mark.parametrize("protocol", protocols_by_scheme())
 def test_a_served_policy_gets_what_the_client_was_given(protocol):
     first, later = moment(3, history=()), moment(5, history=(moment(4), moment(5)))
     with served(HERE, protocol, seed=7) as url:
@@ -148,10 +149,10 @@ def test_mme_vla_has_one_memory_for_all_connections():
 @pytest.mark.parametrize(
     ("message", "words"),
     [
-        (b"\xc1", "the bytes are no msgpack message"),
-        (pack({}), "'observation/state' has to hold 8 real numbers; got nothing"),
-        (pack({"add_buffer": True, "images": np.zeros((2, 4, 4, 3), np.uint8)}), "'images' has"),
-        ("hello", "Messages are binary"),
+        (b"\xc1", "the bytes are not a msgpack message"),
+        (pack({}), "'observation/state' must hold 8 real numbers; got nothing"),
+        (pack({"add_buffer": True, "images": np.zeros((2, 4, 4, 3), np.uint8)}), "'images' must"),
+        ("hello", "Messages must be binary"),
     ],
 )
 def test_errors_are_a_traceback_and_close_1011(message, words):
@@ -171,7 +172,7 @@ def test_errors_are_a_traceback_and_close_1011(message, words):
         client.close()
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS)
+@pytest.mark.parametrize("protocol", protocols_by_scheme())
 def test_what_a_policy_raises_is_the_clients_error(protocol):
     with served(HERE, protocol) as url:
         client = make_policy(url, 0)
@@ -183,7 +184,7 @@ def test_what_a_policy_raises_is_the_clients_error(protocol):
         client.close()
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS)
+@pytest.mark.parametrize("protocol", protocols_by_scheme())
 def test_health_and_keys(protocol, monkeypatch):
     with served(HERE, protocol, key="sesame") as url:
         place = url.split("://")[1]
@@ -207,7 +208,7 @@ def test_the_http_interface_tells_what_is_wrong():
             assert client.post("/elsewhere", content=b"x").status_code == 404
             failed = client.post("/infer", content=pack({"task_goal": "go"}))
             assert failed.status_code == 500
-            assert "'task_goal' has to be a list of texts" in failed.text
+            assert "'task_goal' must be a list of texts" in failed.text
             assert unpack(client.post("/reset").content) == {"reset_finished": True}
 
 
@@ -218,7 +219,7 @@ def test_the_http_interface_tells_what_is_wrong():
         ({"spec": "randon"}, UnknownNameError, "Did you mean 'random'"),
         ({"protocol": "mmevla"}, UnknownNameError, "Did you mean 'mme-vla'"),
         ({"port": 70000}, InvalidValueError, "port is 70000"),
-        ({"host": "192.0.2.1"}, InvalidValueError, "Nothing can listen at 192"),
+        ({"host": "192.0.2.1"}, InvalidValueError, "Cannot listen at 192"),
     ],
 )
 def test_what_cannot_be_served_is_told(options, error, words):

@@ -25,7 +25,7 @@ def moment(number, size=8, history=None):
 
 
 def video(length, size=8):
-    """So many moments as a demonstration."""
+    """A demonstration of a given length."""
     moments = [moment(number, size) for number in range(length)] or [moment(0, size)]
     fields = ("front_rgb", "wrist_rgb", "joint_positions", "gripper", "end_effector")
     return {field: np.stack([m[field] for m in moments])[:length] for field in fields}

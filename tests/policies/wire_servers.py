@@ -1,4 +1,4 @@
-"""Policy servers on real sockets, written from the protocols' descriptions, with faults to order.
+"""Policy servers on real sockets, written from the protocols' descriptions, with faults on demand.
 
 Nothing here is the benchmark's own: not the codec, not the server. As the published servers do,
 they compute in the event loop, so that nothing else is answered meanwhile.
@@ -51,7 +51,7 @@ class WireServer:
     """A server whose policy is the method `answer`.
 
     `faults` are consumed one for each message: None for none; "die" drops the connection, "stall"
-    says nothing, a number answers so many seconds late, bytes or text are sent as they are, and a
+    says nothing, a number of seconds delays the reply, bytes or text are sent as they are, and a
     dictionary is sent instead of the reply.
     """
 

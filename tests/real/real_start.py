@@ -1,4 +1,4 @@
-"""Starts commands of the kit in processes of their own."""
+"""Start ``roboirg real`` in processes of their own."""
 
 import os
 import subprocess
@@ -12,8 +12,11 @@ STARTED = []
 
 
 def start(*words, **options):
-    """A command of ``roboirg real`` in a process of its own."""
-    environment = {**os.environ, "PYTHONPATH": str(HERE), "PYTHONUNBUFFERED": "1"}
+    """Start a command of ``roboirg real`` in a process of its own."""
+    paths = filter(None, (str(HERE), os.environ.get("PYTHONPATH")))
+    environment = {
+        **os.environ, "PYTHONPATH": os.pathsep.join(paths), "PYTHONUNBUFFERED": "1",
+    }  # fmt: skip
     process = subprocess.Popen(
         [sys.executable, "-c", CLI, *map(str, words)],
         env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, **options,
@@ -23,7 +26,7 @@ def start(*words, **options):
 
 
 def end_all():
-    """No process outlives its test, even one that fails."""
+    """Kill all processes that a test started."""
     while STARTED:
         process = STARTED.pop()
         process.kill()

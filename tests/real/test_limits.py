@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roboirg.core.errors import InvalidActionError, InvalidValueError
-from roboirg.real.control.kinematics import tool_in_base
+from roboirg.real.control.kinematics import tool_pose
 from roboirg.real.control.limits import HIGH, LOW, Limits, read_limits
 
 HOME = np.array([0.0, 0.0, 0.0, -np.pi / 2, 0.0, np.pi / 2, np.pi / 4])
@@ -50,7 +50,7 @@ def test_going_back_to_where_the_arm_is_is_not_fast(share):
 def test_the_tool_stays_in_the_workspace(share):
     target = (LOW + HIGH) / 2 + share * (HIGH - LOW) / 2
     limits = Limits(joint_speed=1e6)
-    tool = tool_in_base(target)[:3, 3]
+    tool = tool_pose(target)[:3, 3]
     inside = np.all((tool >= limits.workspace_low) & (tool <= limits.workspace_high))
     assert allowed(limits, target, target, target) == inside
 
@@ -66,7 +66,7 @@ def test_joints_stay_in_their_range(joint):
 
 
 def test_home_has_the_tool_in_the_middle_of_the_workspace():
-    x, y, z = tool_in_base(HOME)[:3, 3]
+    x, y, z = tool_pose(HOME)[:3, 3]
     assert (x, y, z) == pytest.approx((0.5545, 0.0, 0.5223), abs=0.01)
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from roboirg.evaluation.rollout import EpisodeRunner
 from roboirg.real.control.clock import VirtualClock
-from roboirg.real.control.kinematics import end_effector, tool_in_base
+from roboirg.real.control.kinematics import end_effector_pose, tool_pose
 from roboirg.real.control.limits import Limits
 from roboirg.real.control.robot import CAMERA_RATE, JudgingRobot
 from roboirg.real.control.twin import Twin
@@ -43,11 +43,11 @@ def test_the_tool_is_where_the_joints_say():
         command = np.append(joints + rng.uniform(-0.07, 0.07, 7), 1.0)
         twin.command(command)
         sensed = twin.observe()
-        told, found = np.asarray(sensed.fields["end_effector"]), end_effector(sensed.joints)
+        told, found = np.asarray(sensed.fields["end_effector"]), end_effector_pose(sensed.joints)
         assert np.allclose(told[:3], found[:3], atol=1e-4)
         turned = (told[3:] - found[3:] + np.pi) % (2 * np.pi) - np.pi
         assert np.allclose(turned, 0.0, atol=1e-3)
-        assert np.allclose(tool_in_base(sensed.joints)[:3, 3] - [0.615, 0, 0], told[:3], atol=1e-4)
+        assert np.allclose(tool_pose(sensed.joints)[:3, 3] - [0.615, 0, 0], told[:3], atol=1e-4)
 
 
 def test_cameras_take_pictures_at_their_rate_and_draw_what_is_read():

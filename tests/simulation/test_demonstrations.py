@@ -1,4 +1,4 @@
-"""Demonstrations: a replay is the demonstration to the last bit, and a cache changes nothing."""
+"""Demonstrations: replays are exact, and the cache changes nothing."""
 
 import os
 import pickle
@@ -13,14 +13,13 @@ import roboirg
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.rollout import EpisodeRunner
 from roboirg.records.record import Job
-from roboirg.simulation.demonstration import demonstration_cache
-from roboirg.simulation.demonstration import demonstration_frames as frames_module
-from roboirg.simulation.demonstration.recording import Move, Recording
+from roboirg.simulation.demonstration import demonstration_cache, frame_sequence
+from roboirg.simulation.demonstration.recording import RecordedStep, Recording
 from roboirg.simulation.episode_session import EpisodeSession
 from roboirg.simulation.expert.primitives import MotionPrimitives
 from roboirg.simulation.physics_settings import HOME_ACTION
 from roboirg.simulation.rendering.cameras import Cameras
-from roboirg.simulation.rendering.render_mode import FAITHFUL
+from roboirg.simulation.rendering.render_settings import FAITHFUL
 from roboirg.tasks import all_tasks
 
 pytestmark = pytest.mark.sim
@@ -37,7 +36,7 @@ def cache(tmp_path, monkeypatch):
 
 @pytest.fixture
 def unplanned(monkeypatch):
-    """Makes planning a mistake."""
+    """Makes planning fail once called."""
 
     def forbid():
         monkeypatch.setattr(MotionPrimitives, "perform", None)
@@ -47,7 +46,7 @@ def unplanned(monkeypatch):
 
 @pytest.fixture
 def drawn(monkeypatch):
-    """Which pictures have been drawn."""
+    """Cameras whose pictures have been drawn, in order."""
     names, picture = [], Cameras.picture
 
     def counted(self, camera):
@@ -83,11 +82,11 @@ def test_a_replay_is_the_demonstration_to_the_last_bit(task, visible):
     )
     first, second = [], []
     made = planned.play_demonstration(lambda _: first.append(planned.state_hash()))
-    kept = Recording.decoded(made.encoded())
-    again = replayed.play_demonstration(lambda _: second.append(replayed.state_hash()), kept)
+    restored = Recording.from_bytes(made.to_bytes())
+    again = replayed.play_demonstration(lambda _: second.append(replayed.state_hash()), restored)
     assert first == second
-    assert len(first) == kept.length_of_video(planned.episode) > 0
-    assert again.end == made.end == kept.end
+    assert len(first) == restored.video_length(planned.episode) > 0
+    assert again.end == made.end == restored.end
     assert planned.events == replayed.events
     # What cannot be read, such as the solver's memory of contacts, shows in what comes next.
     rng = np.random.default_rng(5)
@@ -127,7 +126,9 @@ def test_depth_and_calibration_of_the_video_are_those_of_its_moments():
     options = {"cameras": ("wrist",), "depth": True, "calibration": True}
     seen = []
     env = roboirg.make(SHORT, episode=1, **options)
-    env.set_frame_hook(lambda env, shown: seen.append(env._playing.senses.read()) if shown else 0)
+    env.set_frame_hook(
+        lambda env, shown: seen.append(env._current.observation_builder.read()) if shown else 0
+    )
     video = env.reset()[1]["demonstration"]
     assert list(video) == list(seen[0])
     same({key: np.stack([moment[key] for moment in seen]) for key in video}, dict(video))
@@ -191,7 +192,7 @@ def test_every_nth_picture_or_none_if_that_is_wanted(drawn):
 
 
 def story(task=SHORT):
-    """All that an environment and a run tell."""
+    """Everything that an environment and a run return."""
     _, observation, info = reset(task, cameras=("front", "wrist"), depth=True, grounded=True)
     job = Job(policy=f"{__name__}:Viewer", task=task, split="test", episode=1, setting="direct")
     record = EpisodeRunner(None)(job).model_dump(
@@ -202,7 +203,7 @@ def story(task=SHORT):
 
 
 class Viewer:
-    """Acts by what it has seen of the video."""
+    """Acts on the pictures of the video."""
 
     def reset(self, instruction, demonstration):
         self.seen = demonstration["wrist_rgb"].mean(axis=(1, 2, 3))
@@ -250,7 +251,7 @@ def test_a_warm_reset_is_a_cold_one(task, cache, unplanned):
 
 def tampered(recording, **changes):
     fields = {"actions": recording.actions, "stages": recording.stages, "end": recording.end}
-    return Recording(**{**fields, **changes}).encoded()
+    return Recording(**{**fields, **changes}).to_bytes()
 
 
 @pytest.mark.parametrize("fault", ["end", "actions", "stages"])
@@ -259,7 +260,7 @@ def test_a_replay_that_ends_differently_is_replaced_and_told(cache, caplog, faul
     (entry,) = cache.glob("actions/*")
     store = demonstration_cache.open_cache("actions")
     good = store.read(entry.name)
-    right = Recording.decoded(good)
+    right = Recording.from_bytes(good)
     changes = {
         "end": "0" * 64,
         "actions": right.actions[::-1] + 0.3,
@@ -275,16 +276,16 @@ def test_a_replay_that_ends_differently_is_replaced_and_told(cache, caplog, faul
     assert f"{SHORT}/test/1" in caplog.text
     assert np.array_equal(after["end_effector"], observation["end_effector"])
     same(dict(info["demonstration"]), dict(rebuilt["demonstration"]))
-    assert Recording.decoded(store.read(entry.name)).end == right.end
+    assert Recording.from_bytes(store.read(entry.name)).end == right.end
     reset()
     assert len(caplog.records) == 1
 
 
-def test_who_looks_on_sees_the_right_demonstration_once(cache):
+def test_a_frame_hook_sees_the_right_demonstration_once(cache):
     _, _, _ = reset()
     (entry,) = cache.glob("actions/*")
     store = demonstration_cache.open_cache("actions")
-    right = Recording.decoded(store.read(entry.name))
+    right = Recording.from_bytes(store.read(entry.name))
     store.write(entry.name, tampered(right, actions=right.actions + 0.2))
     seen = []
     env = roboirg.make(SHORT, episode=1, cameras=())
@@ -304,7 +305,7 @@ def test_a_damaged_entry_is_made_anew(cache, caplog, kind):
     _, _, again = reset(cameras=("front",))
     assert np.array_equal(again["demonstration"]["front_rgb"], before)
     assert [record.getMessage() for record in caplog.records] == [
-        f"The cache entry {entry} is damaged; it is made anew."
+        f"The cache entry {entry} is damaged and will be rebuilt."
     ]
     assert entry.stat().st_size == size
 
@@ -336,9 +337,9 @@ def test_two_processes_may_fill_the_cache_at_once(cache):
     for process in processes:
         process.stdin.write("\n")
         process.stdin.flush()
-    told = [process.communicate(timeout=120) for process in processes]
-    assert [complaints for _, complaints in told] == ["", ""]
-    assert len({line for lines, _ in told for line in lines.splitlines()}) == 1
+    outputs = [process.communicate(timeout=120) for process in processes]
+    assert [errors for _, errors in outputs] == ["", ""]
+    assert len({line for lines, _ in outputs for line in lines.splitlines()}) == 1
     for kind in ("actions", "frames"):
         assert len(list(cache.glob(f"{kind}/*"))) == 1
 
@@ -351,13 +352,13 @@ def test_keys_change_with_what_determines_a_demonstration(monkeypatch):
     for name, other in (("_SOURCE_HASH", "another"), ("_processor", lambda: "another")):
         with monkeypatch.context() as patch:
             patch.setattr(demonstration_cache, name, other)
-            demonstration_cache._ground.cache_clear()
+            demonstration_cache._platform_fingerprint.cache_clear()
             assert demonstration_cache.recording_key(episode) != key
-        demonstration_cache._ground.cache_clear()
+        demonstration_cache._platform_fingerprint.cache_clear()
     assert demonstration_cache.recording_key(episode) == key
-    ground = demonstration_cache._ground()
+    fingerprint = demonstration_cache._platform_fingerprint()
     for part in ("sapien 3", "numpy ", "scipy ", "toppra ", "python 3"):
-        assert part in ground
+        assert part in fingerprint
 
 
 def test_pictures_drawn_otherwise_are_other_entries(cache):
@@ -366,7 +367,7 @@ def test_pictures_drawn_otherwise_are_other_entries(cache):
 
     faithful = read("faithful")
     assert len(list(cache.glob("frames/*"))) == 1
-    key = frames_module.rendering_key(FAITHFUL)
+    key = frame_sequence.rendering_key(FAITHFUL)
     assert "llvmpipe" in key or "NVIDIA" in key
     assert ".so" in key
     light = read("light")
@@ -376,10 +377,10 @@ def test_pictures_drawn_otherwise_are_other_entries(cache):
 
 
 def test_a_recording_survives_as_it_is():
-    moves = [Move(1, np.nextafter(np.arange(8.0), 9.0)), Move(2, np.full(8, -0.0))]
-    recording = Recording.of(moves, "ab12")
-    again = Recording.decoded(recording.encoded())
+    steps = [RecordedStep(1, np.nextafter(np.arange(8.0), 9.0)), RecordedStep(2, np.full(8, -0.0))]
+    recording = Recording.from_steps(steps, "ab12")
+    again = Recording.from_bytes(recording.to_bytes())
     assert again.actions.tobytes() == recording.actions.tobytes()
-    assert [move.stage for move in again.moves()] == [1, 2]
+    assert [step.stage for step in again.steps()] == [1, 2]
     assert again.end == "ab12"
-    assert Recording.of([], "").actions.shape == (0, 8)
+    assert Recording.from_steps([], "").actions.shape == (0, 8)

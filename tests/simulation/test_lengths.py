@@ -67,10 +67,10 @@ def test_primitives_take_as_long_as_the_known_ones_within_fifteen_percent():
     for task in ("VideoRepick", "VideoPlaceButton"):
         for episode in first_scenes(task, "medium", 3):
             session = EpisodeSession(episode, visible=False)
-            hands = MotionPrimitives(session.world)
+            expert = MotionPrimitives(session.world)
             for stage in episode.demonstration:
                 begin = session.world.elapsed
-                for action in itertools.chain.from_iterable(hands.perform(stage.primitive)):
+                for action in itertools.chain.from_iterable(expert.execute(stage.primitive)):
                     session.step(action)
                 steps[stage.primitive.kind].append(session.world.elapsed - begin)
     assert set(steps) == set(PRIMITIVES)

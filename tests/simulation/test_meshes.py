@@ -1,4 +1,4 @@
-"""Derived meshes: exact, kept in the common cache, and the same whatever happens to that."""
+"""Derived meshes: exact, cached, and unaffected by damage to the cache."""
 
 import os
 import signal
@@ -15,7 +15,7 @@ from hypothesis.extra.numpy import array_shapes, arrays, scalar_dtypes
 
 from roboirg.simulation.model_files import find_model_files
 from roboirg.simulation.rendering import mesh_cache, robot_meshes, table_mesh
-from roboirg.simulation.rendering.mesh_cache import cached_arrays, packed, unpacked
+from roboirg.simulation.rendering.mesh_cache import cached_arrays, pack_arrays, unpack_arrays
 from roboirg.util.cache import open_cache
 
 DERIVED = 13
@@ -34,7 +34,7 @@ def complete(cache):
 
 @given(st.dictionaries(st.text(), arrays(scalar_dtypes(), array_shapes(min_dims=0, min_side=0))))
 def test_arrays_come_back_as_they_were(given_arrays):
-    again = unpacked(memoryview(packed(given_arrays)))
+    again = unpack_arrays(memoryview(pack_arrays(given_arrays)))
     assert list(again) == list(given_arrays)
     for name, array in given_arrays.items():
         assert (again[name].dtype, again[name].shape) == (array.dtype, array.shape)
@@ -100,7 +100,7 @@ def told_by(process):
 
 @pytest.fixture(scope="module")
 def right(tmp_path_factory):
-    """A filled cache and the picture that its meshes give."""
+    """A filled cache and the checksum of a picture with its meshes."""
     cache = tmp_path_factory.mktemp("filled") / "meshes"
     processes = [filler(cache) for _ in range(2)]
     for process in processes:
@@ -132,7 +132,7 @@ def test_damaged_meshes_are_made_anew_and_told(right):
     out, complaints = told_by(process)
     assert out == picture
     for path in harmed:
-        assert f"The cache entry {path} is damaged; it is made anew." in complaints
+        assert f"The cache entry {path} is damaged and will be rebuilt." in complaints
     assert complaints.count("damaged") == 2
     assert {path.name: path.read_bytes() for path in cache.iterdir()} == sound
 

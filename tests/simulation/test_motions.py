@@ -1,4 +1,4 @@
-"""Scripted motions: where things are at which step, and what the robot cannot change."""
+"""Scripted motions: positions of objects at each step, independent of the robot."""
 
 import math
 
@@ -34,7 +34,7 @@ def turn(world: World, name: str) -> float:
     return 2 * math.atan2(z, w)
 
 
-def test_two_things_change_places_on_opposite_lanes_and_the_others_stay():
+def test_two_objects_change_places_on_opposite_lanes_and_the_others_stay():
     places = {"a": (0.0, -0.1), "b": (0.0, 0.1), "c": (0.1, 0.15)}
     objects = tuple(cube(name, *xy, yaw=0.3 * i) for i, (name, xy) in enumerate(places.items()))
     world = World(Scene(objects, (Swap("a", "b", 10, 50, 0.07, ("c",)),)), visible=False)

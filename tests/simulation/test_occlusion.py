@@ -1,4 +1,4 @@
-"""What can be seen of what never moves, against a painter that tries every triangle and pixel."""
+"""Occlusion culling, compared with a renderer that tries every triangle and pixel."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import sapien
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboirg.simulation.rendering.occlusion import shown_triangles
+from roboirg.simulation.rendering.occlusion import unoccluded_triangles
 from roboirg.simulation.rendering.viewpoint import (
     FOCAL_LENGTH,
     FRONT_EYE,
@@ -16,9 +16,9 @@ from roboirg.simulation.rendering.viewpoint import (
 )
 
 GRID = 256
-"""Parts of a pixel to which renderers round the places of corners."""
+"""Subpixel grid to which renderers round corners."""
 WINDOW = 12
-"""Pixels around the picture's middle in which everything happens."""
+"""Half width of the tested area at the picture's center, pixels."""
 
 
 DEPTH_NOISE = 1e-5
@@ -26,9 +26,9 @@ DEPTH_NOISE = 1e-5
 
 
 def painted(corners, shift, noise, *, both_sides):
-    """The triangle that a renderer would show at each pixel of the window; -1 for none.
+    """Return the triangle that a renderer would show at each pixel of the window; -1 for none.
 
-    Each triangle's corners are shifted by so many pixels, and its depth by so many meters.
+    `shift` displaces each triangle's corners (pixels) and `noise` its depth (m).
     """
     places = FOCAL_LENGTH * corners[..., :2] / corners[..., 2:] + SIZE / 2
     places = np.round((places + shift) * GRID) / GRID
@@ -71,7 +71,7 @@ def soups(draw):
 
 @given(soups(), st.booleans(), st.integers(0, 99))
 def test_whatever_a_renderer_shows_is_kept(corners, both_sides, seed):
-    shown = shown_triangles(corners)
+    shown = unoccluded_triangles(corners)
     random = np.random.default_rng(seed)
     for size in (0.0, 1.0, 1.0, 1.0):
         shift = size * random.uniform(-0.01, 0.01, (*corners.shape[:2], 2))
@@ -92,29 +92,31 @@ def test_what_is_behind_something_else_is_left_out():
     wide, hidden = square(1.0, 8), square(1.01, 1.5, center=(4, -4))
     peeping, nearer = square(1.01, 9), square(0.99, 2)
     corners = np.concatenate([wide, hidden, peeping, nearer])
-    assert shown_triangles(corners).tolist() == [True] * 2 + [False] * 2 + [True] * 4
+    assert unoccluded_triangles(corners).tolist() == [True] * 2 + [False] * 2 + [True] * 4
 
 
 def test_what_is_nearly_as_near_is_kept():
     behind = square(1.0003, 1.5, center=(4, -4))
-    assert shown_triangles(np.concatenate([square(1.0, 8), behind])).all()
+    assert unoccluded_triangles(np.concatenate([square(1.0, 8), behind])).all()
 
 
 def test_what_turns_its_back_hides_nothing():
     behind = square(1.1, 1.5, center=(4, -4))
-    assert shown_triangles(np.concatenate([square(1.0, 8, back=True), behind])).all()
+    assert unoccluded_triangles(np.concatenate([square(1.0, 8, back=True), behind])).all()
 
 
 def test_what_lies_between_the_middles_of_pixels_is_left_out():
-    assert not shown_triangles(square(1.0, 0.4)).any()
-    assert shown_triangles(square(1.0, 0.4, center=(0.5, 0.5))).all()
-    assert shown_triangles(square(1.0, 0.49)).all(), "it may be rounded to where it is shown"
+    assert not unoccluded_triangles(square(1.0, 0.4)).any()
+    assert unoccluded_triangles(square(1.0, 0.4, center=(0.5, 0.5))).all()
+    assert unoccluded_triangles(square(1.0, 0.49)).all(), "it may be rounded to where it is shown"
 
 
 def test_what_is_out_of_the_picture_is_left_out_and_what_is_at_the_eye_is_kept():
     beside = square(1.0, 8, center=(SIZE, 0))
     behind = square(1.0, 8) * [1, 1, -1]
-    assert shown_triangles(np.concatenate([beside, behind])).tolist() == [False] * 2 + [True] * 2
+    assert (
+        unoccluded_triangles(np.concatenate([beside, behind])).tolist() == [False] * 2 + [True] * 2
+    )
 
 
 def test_the_front_camera_s_frame():

@@ -39,7 +39,7 @@ MOMENTS = {
 }
 """Elapsed steps of the oracle's run; the last is the step of success, whichever it is."""
 BOTH_CAMERAS = {"PickXtimes", "VideoUnmask", "PutInBox", "PickByCount"}
-"""Of the other tasks the front picture is kept: the wrist's shows no other things."""
+"""For the other tasks only the front picture is stored; the wrist's shows no other objects."""
 
 
 def film(task: str, index: int, steps: set[int]) -> dict[tuple[int, str], np.ndarray]:
@@ -91,7 +91,7 @@ def test_pictures_do_not_depend_on_other_worlds_in_the_process():
         assert np.array_equal(again.picture(camera), picture)
 
 
-def test_a_kept_picture_is_drawn_anew_when_something_moves():
+def test_a_picture_is_drawn_again_when_something_moves():
     world = World(get_episode("PickXtimes", "test", 0).scene)
     world.step(HOME_ACTION)
     before = world.picture("front")

@@ -40,26 +40,28 @@ def turned(position: np.ndarray, angle: float) -> ToolPose:
 
 
 def test_forward_kinematics_of_home_is_where_the_simulator_has_the_tool(planner):
-    assert planner.forward(HOME).position == pytest.approx([-0.0605, 0.0, 0.5211], abs=1e-4)
+    assert planner.forward_kinematics(HOME).position == pytest.approx(
+        [-0.0605, 0.0, 0.5211], abs=1e-4
+    )
 
 
 def test_moves_are_straight_and_end_at_the_goal(planner):
     for goal in random_goals(30):
-        path = planner.straight(HOME, goal)
+        path = planner.plan_straight(HOME, goal)
         assert path[0] == pytest.approx(HOME, abs=1e-9)
-        end = planner.forward(path[-1])
+        end = planner.forward_kinematics(path[-1])
         assert end.position == pytest.approx(goal.position, abs=1e-5)
         assert (end.rotation.inv() * goal.rotation).magnitude() < 1e-5
-        start = planner.forward(path[0]).position
+        start = planner.forward_kinematics(path[0]).position
         along = (goal.position - start) / np.linalg.norm(goal.position - start)
         for arm in path:
-            offset = planner.forward(arm).position - start
+            offset = planner.forward_kinematics(arm).position - start
             assert np.linalg.norm(offset - along * (offset @ along)) < 1e-3
 
 
 def test_moves_keep_joint_speed_and_acceleration_limits(planner):
     for goal in random_goals(30):
-        path = planner.straight(HOME, goal)
+        path = planner.plan_straight(HOME, goal)
         speed = np.diff(path, axis=0) / CONTROL_PERIOD
         # Samples are up to a fraction of a step closer in time than the control period.
         slack = len(path) / (len(path) - 1) * 1.02
@@ -70,12 +72,12 @@ def test_moves_keep_joint_speed_and_acceleration_limits(planner):
 
 def test_plans_repeat_themselves(planner):
     for goal in random_goals(5):
-        assert np.array_equal(planner.straight(HOME, goal), planner.straight(HOME, goal))
+        assert np.array_equal(planner.plan_straight(HOME, goal), planner.plan_straight(HOME, goal))
 
 
 def test_out_of_reach_is_said(planner):
     with pytest.raises(MotionPlanningError):
-        planner.straight(HOME, ToolPose(np.array([1.5, 0.0, 0.3]), DOWN))
+        planner.plan_straight(HOME, ToolPose(np.array([1.5, 0.0, 0.3]), DOWN))
 
 
 def test_joint_positions_found_for_a_pose_have_it_and_keep_the_limits(planner):
@@ -83,40 +85,40 @@ def test_joint_positions_found_for_a_pose_have_it_and_keep_the_limits(planner):
     for _ in range(60):
         begin = rng.uniform(JOINT_LOW, JOINT_HIGH)
         begin[rng.integers(7)] = 9.0  # pushed against a limit
-        goal = planner.forward(rng.uniform(JOINT_LOW, JOINT_HIGH))
-        arm = planner.inverse(begin, goal)
-        found = planner.forward(arm)
+        goal = planner.forward_kinematics(rng.uniform(JOINT_LOW, JOINT_HIGH))
+        arm = planner.inverse_kinematics(begin, goal)
+        found = planner.forward_kinematics(arm)
         assert np.abs(found.position - goal.position).max() < 2e-3
         assert (found.rotation.inv() * goal.rotation).magnitude() < 2e-3
         assert ((arm > JOINT_LOW - 1e-4) & (arm < JOINT_HIGH + 1e-4)).all()
-        assert np.array_equal(planner.inverse(begin, goal), arm)
+        assert np.array_equal(planner.inverse_kinematics(begin, goal), arm)
 
 
 def test_near_poses_need_small_joint_movements(planner):
     for goal in random_goals(30):
-        arm = planner.straight(HOME, goal)[-1]
+        arm = planner.plan_straight(HOME, goal)[-1]
         near = ToolPose(goal.position + np.array([0.01, -0.01, 0.01]), goal.rotation)
-        assert np.abs(planner.inverse(arm, near) - arm).max() < 0.2
+        assert np.abs(planner.inverse_kinematics(arm, near) - arm).max() < 0.2
 
 
 @pytest.mark.parametrize("position", [(1.5, 0, 0.3), (0, 0, 2), (3, 0, 0), (1e308, -1e308, 0)])
 def test_poses_out_of_reach_are_said_whatever_the_numbers(planner, position):
     goal = ToolPose(np.array(position, dtype=float), DOWN)
-    for plan in (planner.inverse, planner.travel):
+    for plan in (planner.inverse_kinematics, planner.plan_move):
         with pytest.raises(MotionPlanningError):
             plan(HOME, goal)
 
 
 def test_what_no_straight_line_reaches_is_reached_by_way_of_home(planner):
     place = np.array([-0.1, 0.0, 0.2])
-    twisted = planner.straight(HOME, turned(place, -2.8))[-1]
+    twisted = planner.plan_straight(HOME, turned(place, -2.8))[-1]
     # The short way round would turn the last joint beyond its limit.
     goal = turned(place, 1.6)
     with pytest.raises(MotionPlanningError, match="joint limit"):
-        planner.straight(twisted, goal)
-    path = planner.travel(twisted, goal)
+        planner.plan_straight(twisted, goal)
+    path = planner.plan_move(twisted, goal)
     assert np.abs(path - HOME).max(axis=1).min() < 1e-6
-    assert planner.forward(path[-1]).position == pytest.approx(goal.position, abs=1e-5)
+    assert planner.forward_kinematics(path[-1]).position == pytest.approx(goal.position, abs=1e-5)
 
 
 def test_a_move_to_where_one_is_takes_no_time():
@@ -133,9 +135,9 @@ def test_a_move_to_where_one_is_takes_no_time():
     ],
 )
 def test_free_moves_take_as_long_as_robomme_s(planner, travel, low, high):
-    start = planner.straight(HOME, ToolPose(np.array([-0.1, 0.0, 0.2]), DOWN))[-1]
+    start = planner.plan_straight(HOME, ToolPose(np.array([-0.1, 0.0, 0.2]), DOWN))[-1]
     goal = ToolPose(np.array([-0.1, 0.0, 0.2]) + travel, DOWN)
-    assert low <= len(planner.straight(start, goal)) <= high
+    assert low <= len(planner.plan_straight(start, goal)) <= high
 
 
 @pytest.mark.parametrize(
@@ -150,7 +152,7 @@ def test_first_picks_take_as_long_as_robomme_s(task, primitive, low, high):
         while world.elapsed < APPEAR_STEP + 8:  # containers have to be there and at rest
             world.step(HOME_ACTION)
         begun = world.elapsed
-        for piece in MotionPrimitives(world).perform(stage.primitive):
+        for piece in MotionPrimitives(world).execute(stage.primitive):
             for action in piece:
                 world.step(action)
         assert low <= world.elapsed - begun <= high

@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from roboirg.simulation.proprioception import euler_angles, unwrapped
+from roboirg.simulation.proprioception import euler_angles, unwrap_angle
 
 number = st.floats(-1.0, 1.0, width=32) | st.sampled_from([0.0, -0.0, 1.0, -1.0, 0.5, -0.5])
 
@@ -35,7 +35,7 @@ turned = st.floats(-50.0, 50.0) | st.integers(-40, 40).map(lambda number: number
 @settings(max_examples=1000)
 @given(turned, turned)
 def test_angles_without_turns_are_those_of_numpy(before, now):
-    ours = np.float64(unwrapped(before, now))
+    ours = np.float64(unwrap_angle(before, now))
     assert ours.tobytes() == np.unwrap([before, now])[1].tobytes()
 
 

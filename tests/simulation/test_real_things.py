@@ -26,7 +26,7 @@ HALF_OPEN = -0.1
 
 
 class Mistaken(ScriptedPolicy):
-    """The oracle's hands with another goal in mind."""
+    """The scripted expert with another goal."""
 
     def __init__(self, goal):
         super().__init__()
@@ -65,7 +65,7 @@ def test_a_roll_weighs_about_as_much_as_a_cube_and_lies_still():
 
 def test_a_roll_is_picked_from_outside():
     world = World(Scene((TAPE,)), visible=False)
-    execute(world, MotionPrimitives(world).perform(Primitive("pick_cube", "tape")))
+    execute(world, MotionPrimitives(world).execute(Primitive("pick_cube", "tape")))
     assert Fact("picked", "tape") in world.facts
     assert Fact("held", "tape") in world.facts
 
@@ -73,18 +73,18 @@ def test_a_roll_is_picked_from_outside():
 def test_a_roll_is_picked_by_its_wall():
     """A finger fits into the hole; the wall is what is held then."""
     world = World(Scene((TAPE,)), visible=False)
-    hands = MotionPrimitives(world)
-    rotation = hands._rotation()  # closes along y
+    expert = MotionPrimitives(world)
+    rotation = expert._rotation()  # closes along y
     middle = (object_sizes.TAPE_RADIUS + object_sizes.TAPE_HOLE_RADIUS) / 2
     above, at = (Point(0.0, middle, z) for z in (0.15, object_sizes.TAPE_HALF))
-    execute(world, [hands._move(above, rotation)], HALF_OPEN)
-    execute(world, [hands._grip(physics_settings.OPEN)], HALF_OPEN)
-    execute(world, [hands._move(at, rotation)], HALF_OPEN)
+    execute(world, [expert._move(above, rotation)], HALF_OPEN)
+    execute(world, [expert._grip(physics_settings.OPEN)], HALF_OPEN)
+    execute(world, [expert._move(at, rotation)], HALF_OPEN)
     assert world.bodies["tape"].position == pytest.approx(TAPE.position, abs=2e-3)
-    execute(world, [hands._grip(physics_settings.CLOSED)])
+    execute(world, [expert._grip(physics_settings.CLOSED)])
     wall = object_sizes.TAPE_RADIUS - object_sizes.TAPE_HOLE_RADIUS
     assert world.robot.finger_positions.sum() == pytest.approx(wall, abs=3e-3)
-    execute(world, [hands._move(above, rotation)])
+    execute(world, [expert._move(above, rotation)])
     assert Fact("picked", "tape") in world.facts
 
 
@@ -109,9 +109,9 @@ def test_beside_a_box_is_not_inside():
 def test_what_is_held_over_a_box_is_not_inside():
     episode = get_episode("PutInBox", "test", 0)
     world = World(episode.scene, visible=False)
-    hands, box = MotionPrimitives(world), f"box_{episode.goal.text('color')}"
-    execute(world, hands.perform(Primitive("pick_cube", "tape")))
-    into = hands.perform(Primitive("put_into", "tape", box))
+    expert, box = MotionPrimitives(world), f"box_{episode.goal.text('color')}"
+    execute(world, expert.execute(Primitive("pick_cube", "tape")))
+    into = expert.execute(Primitive("put_into", "tape", box))
     inside = Fact("binned", "tape", box)
     execute(world, itertools.islice(into, 2))
     assert inside not in world.facts
@@ -146,7 +146,7 @@ def test_the_other_box_is_a_failure(index):
     info = play(roboirg.make(episode, cameras=()), Mistaken(Goal.of(color=other)))
     assert info["status"] == "failure"
     assert info["cause"] == (
-        f"put the tape into the {other} box while due: put the tape into the {mine} box"
+        f"put the tape into the {other} box; expected: put the tape into the {mine} box"
     )
 
 

@@ -19,13 +19,13 @@ from roboirg.simulation.panda import BASE_LINK, CAMERA_LINK, FINGERS, Panda
 from roboirg.simulation.rendering import culling, robot_meshes, shaders
 from roboirg.simulation.rendering.cameras import Cameras
 from roboirg.simulation.rendering.render_device import render_system
-from roboirg.simulation.rendering.render_mode import FAITHFUL, LIGHT, STOCK, Rendering
+from roboirg.simulation.rendering.render_settings import FAITHFUL, LIGHT, STOCK, RenderSettings
 from roboirg.simulation.scenery import add_scenery
 from roboirg.tasks import all_tasks
 
 pytestmark = pytest.mark.sim
 
-CULLING_ALONE = Rendering(slim_shader=False, meshes="stock")
+CULLING_ALONE = RenderSettings(slim_shader=False, meshes="stock")
 
 MANY_FRAMES = bool(os.environ.get("ROBOIRG_TEST_MANY_FRAMES"))
 """Whether to compare at least 500 frames of oracle's runs over all tasks, not a sample."""
@@ -65,17 +65,17 @@ class Stage:
 
 
 def moments(task, index, pick=lambda count: np.linspace(0, count - 1, FRAMES).astype(int)):
-    """Moments of an oracle's run, by default so many from all of it."""
+    """Return evenly spaced moments of an oracle's run."""
     taken = []
 
     def note(env, _demonstration):
         world = env.session.world
-        things = world.bodies.values()
+        bodies = world.bodies.values()
         taken.append(
             (
                 world.robot.articulation.get_qpos().copy(),
-                [thing.entity.pose for thing in things],
-                [None if it.button is None else it.button.get_qpos().copy() for it in things],
+                [body.entity.pose for body in bodies],
+                [None if it.button is None else it.button.get_qpos().copy() for it in bodies],
             )
         )
 
@@ -133,15 +133,15 @@ def test_pictures_are_those_of_the_stock_path():
     assert light.levels <= MEAN_LEVELS * light.pixels
 
 
-def test_each_camera_keeps_its_record_of_what_it_draws(monkeypatch):
+def test_each_camera_keeps_the_command_buffer_of_its_bodies(monkeypatch):
     scene = get_episode("PickXtimes", "test", 2).scene
     physics_settings.apply_render_settings()
-    assert culling.keeps_records(), "SAPIEN records differently now: `Bodies.take` became slow"
+    assert culling.keeps_command_buffers(), "SAPIEN keeps no command buffers; culling became slow"
     quick, slow = Stage(scene, FAITHFUL), Stage(scene, FAITHFUL)
     for moment in moments("PickXtimes", 2):
         wanted = quick.show(moment)
         with monkeypatch.context() as patch:
-            patch.setattr(culling, "keeps_records", lambda: False)
+            patch.setattr(culling, "keeps_command_buffers", lambda: False)
             for ours, theirs in zip(slow.show(moment), wanted, strict=True):
                 assert np.array_equal(ours, theirs)
 
@@ -152,7 +152,7 @@ def test_cameras_leave_out_what_they_cannot_see(takes):
         stage.show(moment)
     links = {camera: {} for camera in CAMERAS}
     for camera, drawn in takes:
-        links[camera] |= {it.entity.name: it for it in drawn if it in stage.robot.drawables}
+        links[camera] |= {it.entity.name: it for it in drawn if it in stage.robot.cullable_bodies}
     assert {BASE_LINK, *FINGERS} <= set(links["wrist"])
     assert not {"panda_hand", CAMERA_LINK} & set(links["wrist"])
     triangles = {
@@ -166,7 +166,7 @@ def test_cameras_leave_out_what_they_cannot_see(takes):
 
 def test_a_camera_draws_again_only_when_something_in_its_view_has_moved(takes):
     scene = get_episode("PickXtimes", "test", 2).scene
-    ours, always = Stage(scene, FAITHFUL), Stage(scene, Rendering(culling=False))
+    ours, always = Stage(scene, FAITHFUL), Stage(scene, RenderSettings(culling=False))
     some = moments("PickXtimes", 2, pick=lambda _: range(10, 30))
     for moment in some:
         for mine, wanted in zip(ours.show(moment), always.show(moment), strict=True):
@@ -177,15 +177,15 @@ def test_a_camera_draws_again_only_when_something_in_its_view_has_moved(takes):
     assert drawn.count("wrist") > 0.9 * len(some)
 
 
-def test_an_unknown_shader_is_used_as_it_is(monkeypatch, caplog):
+def test_an_unknown_shader_is_used_unpatched(monkeypatch, caplog):
     scene = get_episode("PickXtimes", "test", 2).scene
-    usual = Stage(scene, Rendering(slim_shader=False))
+    usual = Stage(scene, RenderSettings(slim_shader=False))
     with monkeypatch.context() as patch:
         patch.setattr(shaders, "_STOCK_SHA256", "of another version")
         for function in (shaders.slim_shader, robot_meshes._shapes):
             function.cache_clear()
         unknown = Stage(scene, FAITHFUL)
-        assert "it is used as it is" in caplog.text
+        assert "it is used unpatched" in caplog.text
         for moment in moments("PickXtimes", 2)[::4]:
             for ours, theirs in zip(unknown.show(moment), usual.show(moment), strict=True):
                 assert np.array_equal(ours, theirs)
@@ -193,7 +193,7 @@ def test_an_unknown_shader_is_used_as_it_is(monkeypatch, caplog):
         function.cache_clear()
 
 
-def test_a_damaged_shader_in_the_cache_is_written_anew(monkeypatch, tmp_path):
+def test_a_damaged_shader_in_the_cache_is_rewritten(monkeypatch, tmp_path):
     monkeypatch.setenv("ROBOIRG_CACHE", str(tmp_path))
     folder = Path(shaders.slim_shader.__wrapped__())
     assert folder.is_relative_to(tmp_path)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from roboirg.simulation.rendering.triangles import Triangles, share_corners, unshare_corners
+from roboirg.simulation.rendering.triangles import Triangles, duplicate_vertices, index_triangles
 
 
 def hills():
@@ -20,7 +20,7 @@ def hills():
 
 def test_triangles_keep_their_places_and_normals_when_they_share_corners():
     corners, normals = hills()
-    shared = share_corners(hills())
+    shared = index_triangles(hills())
     assert np.array_equal(shared.normals[shared.triangles[:, 0]], normals)
     for given, kept in zip(corners, shared.vertices[shared.triangles], strict=True):
         assert any(np.array_equal(np.roll(given, turn, axis=0), kept) for turn in range(3))
@@ -28,15 +28,15 @@ def test_triangles_keep_their_places_and_normals_when_they_share_corners():
 
 
 def test_they_can_have_their_own_corners_again():
-    shared = share_corners(hills())
-    own = unshare_corners(shared)
+    shared = index_triangles(hills())
+    own = duplicate_vertices(shared)
     assert len(own.vertices) == 3 * len(own.triangles)
-    assert np.array_equal(own.flattened().corners, shared.flattened().corners)
-    assert np.array_equal(own.flattened().normals, hills().normals)
+    assert np.array_equal(own.to_triangles().corners, shared.to_triangles().corners)
+    assert np.array_equal(own.to_triangles().normals, hills().normals)
 
 
 def test_none_is_no_special_case():
     nothing = Triangles(np.zeros((0, 3, 3), np.float32), np.zeros((0, 3), np.float32))
-    shared = share_corners(nothing)
+    shared = index_triangles(nothing)
     assert [len(field) for field in shared] == [0, 0, 0]
-    assert len(unshare_corners(shared).flattened().corners) == 0
+    assert len(duplicate_vertices(shared).to_triangles().corners) == 0

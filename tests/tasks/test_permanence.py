@@ -233,7 +233,7 @@ def test_containers_of_button_unmask_swap_stand_in_their_ranges():
 
 @each_swap_task
 @each_difficulty
-def test_exchanges_follow_back_to_back_with_whoever_is_nearest(task, difficulty):
+def test_swaps_follow_each_other_with_the_nearest_partner(task, difficulty):
     numbers = Counter()
     for episode in episodes(task, difficulty):
         places = {one.name: one.position for one in containers(episode)}

@@ -112,7 +112,7 @@ def test_the_tape_belongs_into_the_one_box():
     wrong = judged("PutInBox", goal, [picked], [], [inside["purple"]])
     assert wrong.status is Status.FAILURE
     assert (
-        wrong.cause == "put the tape into the purple box while due: put the tape into the green box"
+        wrong.cause == "put the tape into the purple box; expected: put the tape into the green box"
     )
     assert judged("PutInBox", goal, [inside["purple"]]).status is Status.FAILURE
 
@@ -138,7 +138,7 @@ def test_as_often_as_wanted_and_then_no_more(repeats):
     assert after(*waiting(WAIT_STEPS + 1)).status is Status.SUCCESS
     again = after(*waiting(WAIT_STEPS - 1), [PICKED])
     assert again.status is Status.FAILURE
-    assert again.cause.startswith("picked up the gray tape again while due: leave the tapes")
+    assert again.cause.startswith("picked up the gray tape again; expected: leave the tapes")
     assert after([OTHER]).status is Status.FAILURE
 
 
@@ -150,7 +150,7 @@ def test_too_few_is_no_success_however_long_one_waits():
 
 def test_the_other_tape_is_not_to_be_picked():
     goal = Goal.of(color="gray", repeats=1)
-    assert judged("PickByCount", goal, [OTHER]).cause.startswith("picked up the yellow tape while")
+    assert judged("PickByCount", goal, [OTHER]).cause.startswith("picked up the yellow tape; ")
     assert judged("PickByCount", goal, [PICKED], [OTHER]).status is Status.FAILURE
     # Beside the target, and once more.
     beside = ([PICKED], [Fact("lying", "tape_gray")], *CYCLE, *waiting(WAIT_STEPS + 1))

@@ -11,14 +11,14 @@ from roboirg.core import object_sizes
 from roboirg.core.conditions import facts_of
 from roboirg.core.episode import DIFFICULTIES, ROBOT_BASE, SPLITS, Goal
 from roboirg.core.errors import SceneRejectedError
-from roboirg.core.motions import Away, Glow, Shuttle, Vanish, subjects_of
+from roboirg.core.motions import Away, Glow, Shuttle, Swap, Vanish
 from roboirg.episodes.fingerprint import plain
 from roboirg.episodes.splits import SIZES, get_episode, make_episode
 from roboirg.language.settings import settings_of
 from roboirg.tasks import every_task, get_task
 from roboirg.tasks.shared.fixtures import bin_footprint, button_footprint, cube_footprint
 from roboirg.tasks.shared.placement import Circle, overlap
-from roboirg.tasks.shared.real_table import box_footprint, tape_footprint
+from roboirg.tasks.shared.real_table import box_footprint
 from roboirg.tasks.shared.unmask import container_footprint
 
 TASKS = tuple(every_task())
@@ -127,13 +127,14 @@ def names_in(stage):
 
 def names_moved(motion):
     """Every name that a motion speaks of."""
-    spoken = set(subjects_of(motion))
     match motion:
-        case Away(under=str(cover)):
-            spoken.add(cover)
+        case Swap():
+            return {motion.first, motion.second, *motion.pinned}
+        case Away():
+            return {motion.subject, motion.under} - {None}
         case Glow(during=fact) | Vanish(when=fact) | Shuttle(stopped_by=fact):
-            spoken |= {fact.subject, fact.place} - {None}
-    return spoken
+            return {motion.subject, fact.subject, fact.place} - {None}
+    raise AssertionError(motion)
 
 
 @each_task
@@ -170,7 +171,7 @@ def solids(scene):
         "bin": bin_footprint,
         "button": button_footprint,
         "box": box_footprint,
-        "tape": tape_footprint,
+        "tape": lambda tape: Circle(*tape.position[:2], object_sizes.TAPE_RADIUS),
     }
     return [footprints[item.kind](item) for item in scene.objects if item.kind in footprints]
 

@@ -1,1 +1,1 @@
-"""Functions of records alone: rates, tables, the HTML report."""
+"""Analysis of records alone: statistics, tables, figures and the HTML page."""

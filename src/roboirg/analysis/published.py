@@ -1,4 +1,4 @@
-"""The paper's own figures, to stand beside a run's. Their source: ``published/README.md``."""
+"""Results of the paper, to compare a run with. Source: ``published_results/README.md``."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from decimal import Decimal
 from importlib import resources
 from typing import Literal, NamedTuple, get_args
 
+from roboirg.analysis.stats.option_labels import options_label, staged_options
 from roboirg.analysis.stats.rates import DIGITS
-from roboirg.analysis.stats.success_rates import EXPLICIT, SettingColumn
 from roboirg.core.errors import UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions
 
 RateTable = Literal["main", "planner", "context", "real"]
 RATE_TABLES: tuple[RateTable, ...] = get_args(RateTable)
@@ -25,7 +26,7 @@ TRIALS: Mapping[RateTable, tuple[int, int]] = {
     "context": (50, 3),
     "real": (10, 1),
 }
-"""Episodes, and model seeds on each of them, behind every published rate."""
+"""Episodes and model seeds behind every published rate."""
 
 _FILES = {"main": "main", "planner": "planner", "context": "context", "real": "real_world"}
 _MODEL_COLUMNS = ("model", "planner")
@@ -35,20 +36,20 @@ class PublishedRow(NamedTuple):
     """One row of a published table.
 
     Attributes:
-        model: the policy, or its planner where planners are compared.
-        variant: how it was told.
-        rates: percent by task; None where the setting is not defined for the task.
+        model: the policy, or its planner in the table of planners.
+        options: of the instructions.
+        rates: percent by task; None if the setting is not defined for the task.
         average: as printed.
     """
 
     model: str
-    variant: SettingColumn
+    options: InstructionOptions
     rates: Mapping[str, Decimal | None]
     average: Decimal
 
 
 class CoverageRow(NamedTuple):
-    """Which kinds of implicit reference a benchmark has.
+    """The kinds of implicit reference that a benchmark covers.
 
     Attributes:
         benchmark: its name.
@@ -63,36 +64,36 @@ class CoverageRow(NamedTuple):
 
 @functools.cache
 def published_rows(table: str) -> tuple[PublishedRow, ...]:
-    """The rows of a table, in the order of the paper.
+    """Return the rows of a table, in the order of the paper.
 
     Raises:
-        UnknownNameError: there is no such table.
+        UnknownNameError: the table does not exist.
     """
     if table not in RATE_TABLES:
         raise UnknownNameError("published table", table, RATE_TABLES)
-    grouped: dict[tuple[str, SettingColumn], dict[str, Decimal | None]] = {}
+    grouped: dict[tuple[str, InstructionOptions], dict[str, Decimal | None]] = {}
     for line in _lines(_FILES[table]):
         model = next(line[column] for column in _MODEL_COLUMNS if column in line)
         text = line["success_rate_percent"]
         rate = Decimal(text).quantize(DIGITS) if text else None
-        grouped.setdefault((model, _variant(line)), {})[line["task"]] = rate
+        grouped.setdefault((model, _options(line)), {})[line["task"]] = rate
     rows = []
-    for (model, variant), rates in grouped.items():
+    for (model, options), rates in grouped.items():
         average = rates.pop(AVERAGE)
         if average is None:
-            raise ValueError(f"{table}.csv has no average of {model}, {variant.label}")
-        rows.append(PublishedRow(model, variant, rates, average))
+            raise ValueError(f"{table}.csv has no average of {model}, {options_label(options)}")
+        rows.append(PublishedRow(model, options, rates, average))
     return tuple(rows)
 
 
 def published_tasks(table: str) -> tuple[str, ...]:
-    """The tasks of a table, in the order of the paper."""
+    """Return the tasks of a table, in the order of the paper."""
     return tuple(published_rows(table)[0].rates)
 
 
 @functools.cache
 def published_coverage() -> tuple[CoverageRow, ...]:
-    """Which benchmark covers what, in the order of the paper."""
+    """Return what each benchmark covers, in the order of the paper."""
     rows = []
     for line in _lines("coverage"):
         benchmark, kind = line.pop("benchmark"), line.pop("kind")
@@ -100,11 +101,11 @@ def published_coverage() -> tuple[CoverageRow, ...]:
     return tuple(rows)
 
 
-def _variant(line: Mapping[str, str]) -> SettingColumn:
+def _options(line: Mapping[str, str]) -> InstructionOptions:
     if "stages" in line:
         stages = tuple(map(int, line["stages"].split(",")))
-        return SettingColumn("contextual", stages=stages)
-    return EXPLICIT._replace(setting=line["setting"])
+        return staged_options()[0]._replace(stages=stages)
+    return InstructionOptions(line["setting"])
 
 
 def _covers(word: str) -> Covers:

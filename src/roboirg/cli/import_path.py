@@ -1,4 +1,4 @@
-"""Where the commands find policies that are not installed."""
+"""Import path for policies that are not installed."""
 
 from __future__ import annotations
 
@@ -6,6 +6,6 @@ import sys
 from pathlib import Path
 
 
-def see_working_directory() -> None:
-    """As `python -m` has it: policies in the working directory can be named."""
+def add_working_directory() -> None:
+    """Add the working directory to the import path, as `python -m` does."""
     sys.path.insert(0, str(Path.cwd()))

@@ -1,4 +1,4 @@
-"""The commands about words: ``roboirg language`` and ``roboirg export``."""
+"""Commands for instructions: ``roboirg language`` and ``roboirg export``."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from roboirg.cli.options import (
     Workers,
 )
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
+from roboirg.util.plurals import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -26,31 +27,31 @@ if TYPE_CHECKING:
     from roboirg.core.episode import Split
     from roboirg.language.validation import Batch, ValidationResults
 
-# Everything heavy is imported inside the commands, so that --help answers at once.
+# Heavy modules are imported inside the commands, so that --help is fast.
 
 MINIMUM_WIDTH = 150
-"""Columns to use where the output is not a terminal."""
+"""Columns of output that is not a terminal."""
 MOST_FAILURES = 10
-"""Broken rules that are spelled out."""
+"""Most broken rules to print."""
 _LINE_EVERY = 200
-"""Where there is no terminal, a line is printed after so many batches."""
+"""Without a terminal, print a line after this many batches."""
 
 Name = TypeVar("Name", bound=str)
 
-language_app = typer.Typer(no_args_is_help=True, help="Count, prove and show the words.")
-export_app = typer.Typer(no_args_is_help=True, help="Write data for other programs.")
+language_app = typer.Typer(no_args_is_help=True, help="Count, validate and show the instructions.")
+export_app = typer.Typer(no_args_is_help=True, help="Export data for other programs.")
 
 
 @export_app.callback()
 def _export() -> None:
-    # With a callback, the only command keeps its name.
+    # With a callback, a single command keeps its name.
     pass
 
 
 @export_app.command("instructions")
 def export_instructions(
-    out: Annotated[Path, typer.Option(help="The file to write.")],
-    format: Annotated[str, typer.Option(help="jsonl or parquet.")] = "jsonl",  # noqa: A002
+    out: Annotated[Path, typer.Option(help="File to write.")],
+    format: Annotated[str, typer.Option(help="File format: jsonl or parquet.")] = "jsonl",  # noqa: A002
     split: AnySplit = "test",
     tasks: Tasks = "all",
     settings: Settings = "all",
@@ -59,7 +60,8 @@ def export_instructions(
     distractor: Distractor = "neutral",
     frame: Frame = "robot",
 ) -> None:
-    """Write a row for each episode, setting and form; docs/language.md explains the columns."""
+    """Export a row per episode, setting and form (columns: see docs/language.md)."""
+    from roboirg.core.instruction_options import InstructionOptions
     from roboirg.evaluation.plan_parsing import parse_names, parse_stages
     from roboirg.language import FORMS
     from roboirg.language.export import EXPORT_FORMATS, check_export_support, row, write_rows
@@ -68,7 +70,7 @@ def export_instructions(
     kind = _known("format", format, EXPORT_FORMATS)
     check_export_support(kind)
     if out.is_dir() or not out.parent.is_dir():
-        raise InvalidValueError(f"{str(out)!r} is no name for a file in a folder that exists.")
+        raise InvalidValueError(f"{str(out)!r} is not a file in an existing folder.")
     names, chosen = _tasks(tasks), _settings(settings)
     spoken = [_known("form", one, FORMS) for one in parse_names("form", forms)]
     episodes = [
@@ -78,27 +80,29 @@ def export_instructions(
         episodes,
         chosen,
         spoken,
-        stages=parse_stages(stages),
-        distractor=distractor,
-        frame=frame,
+        InstructionOptions(stages=parse_stages(stages), distractor=distractor, frame=frame),
     )
     rows = [row(episode, instruction) for episode, instruction in said]
     if not rows:
         raise InvalidValueError(f"None of these tasks has the setting {', '.join(chosen)}.")
     write_rows(rows, out, kind)
-    typer.echo(f"{len(rows)} instructions of {len(episodes)} episodes: {out}")
+    typer.echo(f"{counted(len(rows), 'instruction')} of {counted(len(episodes), 'episode')}: {out}")
 
 
 @language_app.command()
 def stats(
     split: AnySplit = "test",
     tasks: Tasks = "all",
-    out: Annotated[Path | None, typer.Option(help="Folder for the figure, as PNG and SVG.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for a figure of the referring expressions, as PNG and SVG."),
+    ] = None,
 ) -> None:
-    """Count referring expressions, words, patterns, relations and landmarks; draw the first."""
-    from roboirg.language.expression_figure import check_figure_support, write_figure
+    """Count words, referring expressions, patterns, relations and landmarks."""
+    from roboirg.language.expression_figure import write_figure
     from roboirg.language.statistics_tables import overview_tables
     from roboirg.language.variants import instructions, split_episodes
+    from roboirg.util.figure_files import check_figure_support
 
     if out is not None:
         check_figure_support()
@@ -118,8 +122,8 @@ def stats(
             typer.echo(path)
 
 
-@language_app.command()
-def prove(
+@language_app.command("validate")
+def validate_instructions(
     seeds: Annotated[
         int, typer.Option(help="Random scenes for each task, beyond the splits.")
     ] = 100,
@@ -127,17 +131,16 @@ def prove(
     split: Annotated[str, typer.Option(help="train, val, test, all or none.")] = "all",
     workers: Workers = None,
 ) -> None:
-    """Read all words back: one goal, none without context, no leak, paired; exit code 2 if not."""
+    """Read all instructions back and check their rules; exit code 2 if one is broken."""
     from roboirg.evaluation.executors.executor import core_count
-    from roboirg.language.validation import ValidationResults, batches
-    from roboirg.language.validation import validate as examine_all
+    from roboirg.language.validation import ValidationResults, batches, validate
     from roboirg.language.validation.validation_tables import validation_tables
 
     names = _tasks(tasks)
     work = batches(names, () if split.strip().lower() == "none" else _splits(split), seeds)
     count = core_count() if workers is None else workers
     found = ValidationResults()
-    for evidence in _followed(examine_all(work, count), work):
+    for evidence in _followed(validate(work, count), work):
         found.add(evidence)
     console = _console()
     for table in validation_tables(found):
@@ -152,11 +155,11 @@ def prove(
 
 @language_app.command()
 def card(
-    out: Annotated[Path | None, typer.Option(help="File to write instead of stdout.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Write to this file instead of stdout.")] = None,
 ) -> None:
-    """Write the language card: an example of each variant, in Markdown."""
+    """Write the language card: an example of every variant, in Markdown."""
     from roboirg.language.card import language_card
-    from roboirg.records.store import write_atomically
+    from roboirg.util.atomic_write import write_atomically
 
     if out is None:
         typer.echo(language_card(), nl=False)
@@ -198,10 +201,10 @@ def _tasks(text: str) -> tuple[str, ...]:
 
 
 def _settings(text: str) -> tuple[str, ...]:
-    from roboirg.evaluation.plan_parsing import parse_names, says_all
+    from roboirg.evaluation.plan_parsing import means_all, parse_names
     from roboirg.language import setting_names
 
-    if says_all(text):
+    if means_all(text):
         return setting_names()
     return tuple(_known("setting", name, setting_names()) for name in parse_names("setting", text))
 
@@ -209,9 +212,9 @@ def _settings(text: str) -> tuple[str, ...]:
 def _splits(text: str) -> tuple[Split, ...]:
     from roboirg.core.episode import SPLITS
     from roboirg.episodes.splits import check_split
-    from roboirg.evaluation.plan_parsing import says_all
+    from roboirg.evaluation.plan_parsing import means_all
 
-    return SPLITS if says_all(text) else (check_split(text),)
+    return SPLITS if means_all(text) else (check_split(text),)
 
 
 def _known(kind: str, name: str, known: Sequence[Name]) -> Name:

@@ -1,6 +1,6 @@
-"""The options of a plan: each may stand in a plan file instead, so none has a default here.
+"""The options of a plan. They have no defaults here, because a plan file may set them.
 
-In brackets is what holds if neither says anything.
+Help texts give the default in parentheses.
 """
 
 from __future__ import annotations
@@ -10,63 +10,74 @@ from typing import Annotated
 import typer
 
 Tasks = Annotated[
-    str | None, typer.Option(help="Names of tasks or suites separated by commas, or all.  (all)")
+    str | None,
+    typer.Option(help="Tasks or suites, separated by commas; all for the whole benchmark.  (all)"),
 ]
 Settings = Annotated[
-    str | None, typer.Option(help="Names separated by commas, or all that a task has.  (all)")
+    str | None,
+    typer.Option(help="Settings, separated by commas; all for every setting of each task.  (all)"),
 ]
 Forms = Annotated[
-    str | None, typer.Option(help="implicit, resolved, or both with a comma.  (implicit)")
+    str | None, typer.Option(help="implicit, resolved, or both separated by a comma.  (implicit)")
 ]
 Split = Annotated[str | None, typer.Option(help="train, val or test.  (test)")]
 Episodes = Annotated[
-    str | None, typer.Option(help="4: the first four; or a list such as 0,3,5-9.  (4)")
+    str | None, typer.Option(help="4 for the first four, or a list such as 0,3,5-9.  (4)")
 ]
 PolicySeeds = Annotated[
-    str | None, typer.Option(help="A list of numbers; each plays every episode.  (0)")
+    str | None,
+    typer.Option(help="Seeds, separated by commas; every seed plays every episode.  (0)"),
 ]
 Stages = Annotated[
     str | None,
-    typer.Option(help="Stages of the contextual setting; several sets as 1,5;1-5.  (1-5)"),
+    typer.Option(
+        help="Stages of the contextual setting; several sets with semicolons: 1,5;1-5.  (1-5)"
+    ),
 ]
 Distractor = Annotated[
-    str | None, typer.Option(help="Kind of distractor in the contextual setting.  (neutral)")
+    str | None,
+    typer.Option(help="Distractors of the contextual setting: neutral or competing.  (neutral)"),
 ]
 Distractors = Annotated[
-    int | None, typer.Option(help="How many distractors are spoken there.  (1)")
+    int | None, typer.Option(help="Number of distractors in the contextual setting.  (1)")
 ]
 Frame = Annotated[
-    str | None, typer.Option(help="Frame of reference in the spatial setting.  (robot)")
+    str | None,
+    typer.Option(help="Frame of reference of the spatial setting: robot or camera.  (robot)"),
 ]
 MaxSteps = Annotated[
-    int | None, typer.Option(help="The policy's limit in control steps, 20 a second.  (1300)")
+    int | None, typer.Option(help="Limit in control steps, 20 per second.  (1300)")
 ]
-Actions = Annotated[
-    str | None, typer.Option(help="The action space to be played in.  (the policy's)")
-]
+Actions = Annotated[str | None, typer.Option(help="Required action space.  (the policy's own)")]
 DemonstrationFrames = Annotated[
-    str | None, typer.Option(help="Pictures of the video: all, none or n.  (as the policy says)")
+    str | None,
+    typer.Option(
+        help="Frames of the demonstration: all, none, or a number.  (the policy's choice)"
+    ),
 ]
 ObserveEvery = Annotated[
-    int | None, typer.Option(help="A picture after every n-th control step.  (as the policy says)")
+    int | None,
+    typer.Option(help="Record an observation every N control steps.  (the policy's choice)"),
 ]
-Meshes = Annotated[str | None, typer.Option(help="faithful or light.  (faithful)")]
+Meshes = Annotated[
+    str | None, typer.Option(help="Meshes for rendering: faithful or light.  (faithful)")
+]
 Video = Annotated[
-    str | None, typer.Option(help="Which episodes to film: off, failures or all.  (off)")
+    str | None, typer.Option(help="Record videos of episodes: off, failures or all.  (off)")
 ]
 PolicyTimeout = Annotated[
-    float | None, typer.Option(help="Seconds that a call of a policy may take.  (600)")
+    float | None, typer.Option(help="Time limit of one policy call, seconds.  (600)")
 ]
 EpisodeTimeout = Annotated[
-    float | None, typer.Option(help="Seconds that an episode may take.  (7200)")
+    float | None, typer.Option(help="Time limit of an episode, seconds.  (7200)")
 ]
 Tries = Annotated[
     int | None,
-    typer.Option(help="How often an episode is tried that ends in an error of --retry-on.  (2)"),
+    typer.Option(help="Attempts per episode if it ends in an error listed in --retry-on.  (2)"),
 ]
 RetryOn = Annotated[
     str | None,
     typer.Option(
-        help="Kinds of errors to try again, or none.  (connection,environment,infrastructure)"
+        help="Kinds of errors to retry, or none.  (connection,environment,infrastructure)"
     ),
 ]

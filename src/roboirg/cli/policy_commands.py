@@ -1,4 +1,4 @@
-"""The commands about policies: serve one, and check one."""
+"""Commands that serve and check a policy."""
 
 from __future__ import annotations
 
@@ -6,37 +6,60 @@ import os
 import signal
 import sys
 from types import FrameType
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
-from roboirg.cli.import_path import see_working_directory
+from roboirg.cli.import_path import add_working_directory
 from roboirg.core.errors import InvalidValueError
 
 FAILED = 2
 _STOPPED = {signal.SIGINT: 130, signal.SIGTERM: 143}
 _LOOPBACK = "127.0.0.1"
 
-PolicySpec = Annotated[str, typer.Argument(help="Built-in name, package.module:Class, or a URL.")]
+_PROTOCOLS, _URL_SCHEMES = "PROTOCOLS", "SCHEMES"
+"""Stand for the protocols, and for the schemes of all policy URLs, in help texts."""
+
+PolicySpec = Annotated[
+    str,
+    typer.Argument(help=f"Built-in name, package.module:Class, or a URL ({_URL_SCHEMES})."),
+]
+
+
+class ProtocolHelpCommand(TyperCommand):
+    """A command whose help lists the protocols; they are imported only for that."""
+
+    def get_help(self, ctx: Any) -> str:  # noqa: ANN401 - typer does not export its base class
+        """Return the help text."""
+        from roboirg.policies.policy_classes import url_schemes
+        from roboirg.policies.protocols import protocols_by_scheme
+
+        urls = ", ".join(f"{scheme}://…" for scheme in url_schemes())
+        for parameter in self.params:
+            words = getattr(parameter, "help", None) or ""
+            words = words.replace(_PROTOCOLS, ", ".join(protocols_by_scheme()))
+            vars(parameter)["help"] = words.replace(_URL_SCHEMES, urls)
+        return super().get_help(ctx)
 
 
 def serve(
     policy: PolicySpec,
     protocol: Annotated[
-        str, typer.Option(help="openpi, mme-vla, challenge or challenge+http.")
+        str, typer.Option(help=f"Protocol of the clients: one of {_PROTOCOLS}.")
     ] = "mme-vla",
     host: Annotated[str, typer.Option(help="Address to listen at.")] = _LOOPBACK,
-    port: Annotated[int, typer.Option(help="0 takes any that is free.")] = 8000,
+    port: Annotated[int, typer.Option(help="0 for any free port.")] = 8000,
     seed: Annotated[int, typer.Option(help="Of the policy's random choices.")] = 0,
     api_key_env: Annotated[
         str | None,
-        typer.Option(help="Environment variable with the key that clients have to send."),
+        typer.Option(help="Environment variable with the key that clients must send."),
     ] = None,
 ) -> None:
-    """Serve a policy to this benchmark and to any other client of the protocol."""
-    from roboirg.policies.serving import open_server
+    """Serve a policy to this benchmark and other clients of a protocol."""
+    from roboirg.policies.serving.policy_server import open_server
 
-    see_working_directory()
+    add_working_directory()
     key = None if api_key_env is None else os.environ.get(api_key_env)
     if api_key_env is not None and not key:
         raise InvalidValueError(f"The environment variable {api_key_env} holds no key.")
@@ -44,7 +67,9 @@ def serve(
     for number in _STOPPED:
         signal.signal(number, _stop)
     if host not in (_LOOPBACK, "localhost", "::1") and key is None:
-        typer.echo(f"Whoever reaches {host} can use it: there is no --api-key-env.", err=True)
+        typer.echo(
+            f"Every client that reaches {host} can use it, as there is no --api-key-env.", err=True
+        )
     typer.echo(f"{policy} at {server.url}; Ctrl-C stops.")
     server.listening.serve_forever()
 
@@ -53,21 +78,21 @@ def check_policy(
     policy: PolicySpec,
     seed: Annotated[int, typer.Option(help="Of the policy's random choices.")] = 0,
 ) -> None:
-    """Check that a policy keeps the contract, on made-up observations; needs no simulator."""
+    """Check a policy on synthetic episodes, without a simulator."""
     from rich.console import Console
 
     from roboirg.policies.policy_check import FAIL, print_check_results
     from roboirg.policies.policy_check import check_policy as check
 
-    see_working_directory()
-    findings = check(policy, seed=seed)
-    print_check_results(findings, Console())
-    if any(finding.verdict == FAIL for finding in findings):
+    add_working_directory()
+    results = check(policy, seed=seed)
+    print_check_results(results, Console())
+    if any(result.verdict == FAIL for result in results):
         raise typer.Exit(FAILED)
 
 
 def _stop(number: int, frame: FrameType | None) -> None:
     del frame
-    # Connections may be in the middle of something that takes long; there is nothing to save.
+    # A connection may be in the middle of a long call; there is nothing to save.
     sys.stdout.flush()
     os._exit(_STOPPED[signal.Signals(number)])

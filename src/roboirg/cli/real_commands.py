@@ -1,4 +1,4 @@
-"""Studies with a real robot: ``roboirg real plan``, ``run``, ``score`` and ``figure``."""
+"""Commands for studies with a real robot: ``roboirg real``."""
 
 from __future__ import annotations
 
@@ -9,41 +9,46 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from roboirg.util.plurals import counted
+
 if TYPE_CHECKING:
     from roboirg.real.pages.operator_console import OperatorConsole
     from roboirg.real.study.study_plan import StudyPlan
     from roboirg.real.study.study_run import Study
 
-# Everything heavy is imported inside the commands, so that --help answers at once.
+# Heavy modules are imported inside the commands, so that --help is fast.
 
 USAGE_ERROR, INTERRUPTED = 2, 130
 
 real_app = typer.Typer(
     name="real",
-    help="A study with a real robot, or its twin: plan, run, score.",
+    help="Run a study with a real robot or its simulated twin.",
     no_args_is_help=True,
 )
 
-Folder = Annotated[str, typer.Argument(help="The --out folder of roboirg real plan.")]
+Folder = Annotated[str, typer.Argument(help="Folder of the study, made by roboirg real plan.")]
 
 
 @real_app.command()
 def plan(
     policy: Annotated[
-        list[str], typer.Option(help="A spec, NAME=SPEC, or a label; repeatable.", metavar="SPEC")
+        list[str],
+        typer.Option(help="Policy: a spec, NAME=SPEC, or a label; repeatable.", metavar="SPEC"),
     ],
     out: Annotated[str, typer.Option(help="Folder of the study.")],
-    tasks: Annotated[str, typer.Option(help="Names separated by commas.")] = "real",
-    settings: Annotated[str, typer.Option(help="Names separated by commas, or all.")] = "all",
-    trials: Annotated[int, typer.Option(help="Arrangements per task.")] = 10,
-    demonstrations: Annotated[int, typer.Option(help="Per task, explicit only.")] = 50,
-    seed: Annotated[int, typer.Option(help="Of the orders; nothing else depends on it.")] = 0,
-    split: Annotated[str, typer.Option(help="Whose episodes the trials are.")] = "val",
-    max_steps: Annotated[int, typer.Option(help="Control periods of a trial.")] = 1300,
-    sheet: Annotated[bool, typer.Option(help="Draw the printable sheet.")] = True,
+    tasks: Annotated[str, typer.Option(help="Tasks or suites, separated by commas.")] = "real",
+    settings: Annotated[str, typer.Option(help="Settings, separated by commas, or all.")] = "all",
+    trials: Annotated[int, typer.Option(help="Object arrangements per task.")] = 10,
+    demonstrations: Annotated[
+        int, typer.Option(help="Demonstrations per task, explicit setting only.")
+    ] = 50,
+    seed: Annotated[int, typer.Option(help="Random seed of the trial order.")] = 0,
+    split: Annotated[str, typer.Option(help="Split that the episodes are taken from.")] = "val",
+    max_steps: Annotated[int, typer.Option(help="Limit of a trial in control steps.")] = 1300,
+    sheet: Annotated[bool, typer.Option(help="Write the printable sheet.")] = True,
 ) -> None:
-    """Write a study's plan: plan.json, CSV, and a sheet to print."""
-    from roboirg.evaluation.plan_parsing import parse_names, says_all
+    """Plan a study: write plan.json, CSV files and a sheet to print."""
+    from roboirg.evaluation.plan_parsing import means_all, parse_names
     from roboirg.real.pages.trial_sheet import check_sheet_support
     from roboirg.real.study.study_plan import make_study
     from roboirg.tasks import find_tasks
@@ -53,7 +58,7 @@ def plan(
     made = make_study(
         policy,
         tasks=find_tasks(parse_names("task", tasks)),
-        settings=None if says_all(settings) else parse_names("setting", settings),
+        settings=None if means_all(settings) else parse_names("setting", settings),
         trials=trials,
         demonstrations=demonstrations,
         seed=seed,
@@ -64,11 +69,11 @@ def plan(
 
 
 def _write(made: StudyPlan, folder: Path, *, sheet: bool) -> None:
-    """Write the files of a plan, and say which."""
+    """Write the files of a plan and print their names."""
     from roboirg.real.pages.trial_sheet import SHEET_FILE, write_sheet
     from roboirg.real.study import plan_csv
     from roboirg.real.study.study_plan import write_study
-    from roboirg.records.store import write_atomically
+    from roboirg.util.atomic_write import write_atomically
 
     typer.echo(write_study(made, folder))
     for name, text in (
@@ -80,15 +85,15 @@ def _write(made: StudyPlan, folder: Path, *, sheet: bool) -> None:
             typer.echo(folder / name)
     if sheet:
         count = write_sheet(made, folder / SHEET_FILE)
-        typer.echo(f"{folder / SHEET_FILE} ({count} pages)")
+        typer.echo(f"{folder / SHEET_FILE} ({counted(count, 'page')})")
     typer.echo(_size(made))
 
 
 def _size(made: StudyPlan) -> str:
     blocks = made.trials[-1].block
     return (
-        f"{len(made.trials)} trials in {blocks} blocks, {len(made.demonstrations)} demonstrations, "
-        f"plan {made.fingerprint}"
+        f"{counted(len(made.trials), 'trial')} in {counted(blocks, 'block')}, "
+        f"{counted(len(made.demonstrations), 'demonstration')}, plan {made.fingerprint}"
     )
 
 
@@ -98,42 +103,43 @@ def run(
     policy: Annotated[
         list[str] | None,
         typer.Option(
-            help="Play this policy's trials only (NAME or NAME=SPEC); repeatable.", metavar="SPEC"
+            help="Play only the trials of this policy (NAME or NAME=SPEC); repeatable.",
+            metavar="SPEC",
         ),
     ] = None,
     robot: Annotated[
-        str, typer.Option(help="twin, or lerobot:package.module:function?options.")
+        str, typer.Option(help="Robot: twin, or lerobot:package.module:function?options.")
     ] = "twin",
-    real_time: Annotated[bool, typer.Option(help="Let the twin's time pass as it does.")] = False,
+    real_time: Annotated[bool, typer.Option(help="Run the twin in real time.")] = False,
     limits: Annotated[
-        Path | None, typer.Option(help="JSON file of limits other than the usual.")
+        Path | None, typer.Option(help="JSON file that overrides default limits.")
     ] = None,
     score: Annotated[
-        str, typer.Option(help="Who says how trials ended: judge (the twin's) or operator.")
+        str, typer.Option(help="Who scores the trials: judge (only with the twin) or operator.")
     ] = "",
     retry_errors: Annotated[
-        bool, typer.Option(help="Play again what ended in an error or was void.")
+        bool, typer.Option(help="Play trials again that ended in an error or were void.")
     ] = True,
 ) -> None:
-    """Play the trials of a plan on a robot or its twin, in order."""
+    """Play the trials of a study in order, on a robot or its twin."""
     from roboirg.real.control.limits import read_limits
-    from roboirg.real.control.robot_specs import check_scorer, make_robot
+    from roboirg.real.control.robot_loading import make_robot
     from roboirg.real.pages.operator_console import OperatorConsole
     from roboirg.real.study.study_plan import read_study
-    from roboirg.real.study.study_run import Study
+    from roboirg.real.study.study_run import Study, select_scorer
 
     path = Path(folder)
     made = read_study(path)
     console = OperatorConsole(made)
-    device = make_robot(robot, real_time=real_time, arrange=console.arrange)
+    device = make_robot(robot, real_time=real_time, arrange=console.request_arrangement)
     study = Study(
         made,
         path,
         device,
         read_limits(limits),
-        check_scorer(score, device),
-        console.ended if robot != "twin" else lambda: False,
-        console.tell,
+        select_scorer(score, device),
+        console.stop_requested if robot != "twin" else lambda: False,
+        console.report,
     )
     _play(study, console, policy or [], retry=retry_errors)
 
@@ -141,18 +147,20 @@ def run(
 @real_app.command()
 def score(
     folder: Folder,
-    operator: Annotated[str, typer.Option(help="Who judges, for the records.")] = "operator",
-    port: Annotated[int, typer.Option(help="Of this machine; 0 for any that is free.")] = 0,
+    operator: Annotated[
+        str, typer.Option(help="Name of the operator, for the records.")
+    ] = "operator",
+    port: Annotated[int, typer.Option(help="Port to listen on; 0 for any free port.")] = 0,
 ) -> None:
-    """Serve the operator's page: one trial at a time, by keyboard, every verdict stored at once."""
+    """Serve the scoring page: one trial at a time, by keyboard, each verdict stored at once."""
     from roboirg.real.pages.score_server import ScoreServer
     from roboirg.real.study.study_plan import read_study
 
     path = Path(folder)
     server = ScoreServer(read_study(path), path, operator, port)
-    server.ledger()  # complain now if the records cannot be read
+    server.read_trial_log()  # fail now if the records cannot be read
     typer.echo(f"Open {server.url}")
-    typer.echo("Ctrl-C ends it; everything is stored.")
+    typer.echo("Press Ctrl-C to stop; all verdicts are stored.")
     sys.stdout.flush()
     try:
         server.serve_forever()
@@ -166,10 +174,10 @@ def score(
 def figure(
     runs: Annotated[list[str], typer.Argument(help="Folders of studies.", metavar="RUN")],
     out: Annotated[str, typer.Option(help="Folder for real.png and real.svg.")],
-    published: Annotated[bool, typer.Option(help="Put the paper's own bars beside these.")] = True,
+    published: Annotated[bool, typer.Option(help="Show the paper's results beside these.")] = True,
 ) -> None:
     """Draw success by setting, with 95 % intervals, as PNG and SVG."""
-    from roboirg.analysis.stats.samples import gather
+    from roboirg.analysis.stats.cells import gather
     from roboirg.real.pages.study_figure import write_figure
     from roboirg.records.store import read_results
 
@@ -179,16 +187,20 @@ def figure(
 
 
 def _play(study: Study, console: OperatorConsole, policies: list[str], *, retry: bool) -> None:
-    """Play a study and say how it went; an error among the trials is an exit code."""
-    # Whoever ends the command ends it with the arm at rest.
+    """Play a study and print a summary; exits with 2 if a trial ended in an error."""
+    # SIGTERM stops the run like Ctrl-C, with the arm at rest.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         records = study.run(policies, retry_errors=retry)
     except KeyboardInterrupt:
-        typer.echo(f"Stopped; {study.folder} keeps what ended. The same command goes on.", err=True)
+        typer.echo(
+            f"Stopped; finished trials are stored in {study.folder}. Run the same command to "
+            "resume.",
+            err=True,
+        )
         sys.exit(INTERRUPTED)
-    faulty = console.faulty
-    typer.echo(f"{len(records)} trials were played, {len(faulty)} of them ended in an error.")
-    if faulty:
-        typer.echo(f"roboirg: the first error: {faulty[0]}", err=True)
+    errors = console.errors
+    typer.echo(f"Played {counted(len(records), 'trial')}; {len(errors)} ended in an error.")
+    if errors:
+        typer.echo(f"roboirg: first error: {errors[0]}", err=True)
         sys.exit(USAGE_ERROR)

@@ -1,4 +1,4 @@
-"""The commands that tell results: ``report``, ``view``, ``tables``, ``figures`` and ``compare``."""
+"""The commands that show results: ``report``, ``view``, ``tables``, ``figures``, ``compare``."""
 
 from __future__ import annotations
 
@@ -11,16 +11,14 @@ import typer
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 
 if TYPE_CHECKING:
-    from roboirg.analysis.stats.samples import Samples
+    from roboirg.analysis.stats.cells import Cells
     from roboirg.analysis.tables.table import Table
     from roboirg.records.record import Job, Result
 
-# Everything heavy is imported inside the commands, so that --help answers at once.
+# Heavy modules are imported inside the commands, so that --help answers at once.
 
 MINIMUM_WIDTH = 120
-"""Columns to use where the output is not a terminal."""
-SEED = 20_240_607
-"""Of the bootstrap; the same records give the same words."""
+"""Columns to use if the output is not a terminal."""
 _ALL = "all"
 
 
@@ -29,7 +27,7 @@ def report(
     against: Annotated[
         str | None, typer.Option(help="Another run, to compare with episode by episode.")
     ] = None,
-    videos: Annotated[bool, typer.Option(help="Put the films into the page.")] = True,
+    videos: Annotated[bool, typer.Option(help="Embed the videos in the page.")] = True,
 ) -> None:
     """Print the table of a run and write RUN/report.html, one self-contained page."""
     from roboirg.analysis.page.report import check_report_support, write_report
@@ -50,9 +48,9 @@ def report(
 
 def view(
     folder: Annotated[str, typer.Argument(help="The --out folder of a run.", metavar="RUN")],
-    port: Annotated[int, typer.Option(help="On loopback; 0 chooses a free one.")] = 0,
+    port: Annotated[int, typer.Option(help="Port on loopback; 0 chooses a free one.")] = 0,
 ) -> None:
-    """Serve the page of a run with its films on this machine, until Ctrl-C."""
+    """Serve the page of a run with its videos on this machine, until Ctrl-C."""
     from roboirg.analysis.page.page_server import PageServer
     from roboirg.analysis.page.report import make_view
     from roboirg.cli import run_commands
@@ -63,9 +61,9 @@ def view(
         return make_view(path, run_commands.planned_jobs(path))
 
     with PageServer(path, make_page, port) as server:
-        # What is wrong with the run is said here, not in the browser.
+        # Problems of the run are errors here, not in the browser.
         server.page()
-        typer.echo(f"{server.address}  Ctrl-C ends it.")
+        typer.echo(f"{server.address}  Press Ctrl-C to stop.")
         try:
             server.serve_forever()
         except KeyboardInterrupt:
@@ -74,19 +72,19 @@ def view(
 
 def figures(
     runs: Annotated[list[str], typer.Argument(help="The --out folders of runs.", metavar="RUN...")],
-    out: Annotated[Path, typer.Option(help="Folder for the pictures; made if it is missing.")],
+    out: Annotated[Path, typer.Option(help="Folder for the figures; created if missing.")],
     which: Annotated[
         str,
         typer.Option(
-            help="averages, forms, expressions, context, failures; several with commas, or all "
-            "that apply."
+            help="averages, forms, expressions, context, failures (several separated by commas), "
+            "or all that apply."
         ),
     ] = _ALL,
-    published: Annotated[bool, typer.Option(help="Put the paper's own values in.")] = False,
+    published: Annotated[bool, typer.Option(help="Add the paper's values.")] = False,
 ) -> None:
     """Draw the paper's figures of one or several runs, as PNG, SVG and PDF."""
     from roboirg.analysis.figures import FIGURES, FigureData, write_figures
-    from roboirg.analysis.figures.figure_style import check_figure_support
+    from roboirg.util.figure_files import check_figure_support
 
     check_figure_support()
     names = FIGURES if which == _ALL else tuple(word.strip() for word in which.split(","))
@@ -106,41 +104,42 @@ def tables(
     format: Annotated[  # noqa: A002
         str, typer.Option(help="terminal, markdown, latex or csv.")
     ] = "terminal",
-    published: Annotated[bool, typer.Option(help="Put the paper's own rows beside these.")] = False,
+    published: Annotated[bool, typer.Option(help="Add the paper's rows.")] = False,
     chance: Annotated[
-        bool, typer.Option(help="Add what the forgetful listener reaches on average.")
+        bool, typer.Option(help="Add the expected success of the forgetful listener.")
     ] = False,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for a file of each table, instead of printing.")
+        Path | None, typer.Option(help="Folder for a file of each table; prints without it.")
     ] = None,
 ) -> None:
-    """Print the paper's tables, made of the records of one or several runs."""
+    """Print the paper's tables for the records of one or several runs."""
     from roboirg.analysis.tables.rendering import get_format
 
-    drawing = get_format(format)
-    found = _tables(which, _samples(runs or []), published=published, chance=chance)
+    output = get_format(format)
+    found = _tables(which, _cells(runs or []), published=published, chance=chance)
     if out is not None:
-        _write(found, out, drawing.suffix, format)
+        _write(found, out, output.suffix, format)
     elif format == "terminal":
         _print(found)
     else:
-        typer.echo("\n".join(drawing.draw(table) for table in found), nl=False)
+        typer.echo("\n".join(output.draw(table) for table in found), nl=False)
 
 
 def compare(
     first: Annotated[str, typer.Argument(help="A run's folder, or RUN:policy.", metavar="A")],
     second: Annotated[str, typer.Argument(help="Another, or the same run.", metavar="B")],
 ) -> None:
-    """Say which of two policies is better where, on the same episodes, or that nobody can tell."""
+    """Compare two policies on the same episodes and say where one is clearly better."""
     import numpy as np
     from rich.console import Console
     from rich.text import Text
 
-    from roboirg.analysis.stats.comparison import compare as compare_samples
+    from roboirg.analysis.stats.comparison import compare as compare_cells
     from roboirg.analysis.stats.comparison_text import sentences
+    from roboirg.analysis.stats.intervals import SEED
 
     ours, theirs = _one_policy(first), _one_policy(second)
-    found = compare_samples(ours, theirs, np.random.default_rng(SEED))
+    found = compare_cells(ours, theirs, np.random.default_rng(SEED))
     names = [found.first.policy, found.second.policy]
     if names[0] == names[1]:
         names = [f"{names[0]} ({first})", f"{names[1]} ({second})"]
@@ -151,26 +150,23 @@ def compare(
         console.print(Text(sentence), highlight=False)
 
 
-def _tables(which: str, samples: Samples, *, published: bool, chance: bool) -> list[Table]:
-    from roboirg.analysis.tables.paper_tables import WHICH, has_something_to_say, make_table
+def _tables(which: str, cells: Cells, *, published: bool, chance: bool) -> list[Table]:
+    from roboirg.analysis.tables.paper_tables import WHICH, is_informative, make_table
 
     if which == _ALL:
-        wanted: list[str] = [
-            one for one in WHICH if published or has_something_to_say(one, samples)
-        ]
+        wanted: list[str] = [one for one in WHICH if published or is_informative(one, cells)]
     elif which in WHICH:
         wanted = [which]
     else:
         raise UnknownNameError("table", which, (*WHICH, _ALL))
-    if which not in (_ALL, "coverage") and not published and not samples:
+    if which not in (_ALL, "coverage") and not published and not cells:
         raise InvalidValueError(
-            f"There is no run to make the table {which!r} of; give a folder, or --published."
+            f"The table {which!r} needs a run; give its folder, or --published."
         )
-    found = [make_table(one, samples, published=published, chance=chance) for one in wanted]
+    found = [make_table(one, cells, published=published, chance=chance) for one in wanted]
     if which not in (_ALL, "coverage") and not found[0].rows:
         raise InvalidValueError(
-            f"The runs hold nothing that belongs into the table {which!r}; --which all shows what "
-            "they have."
+            f"The runs have no results for the table {which!r}; --which all shows what they have."
         )
     return found
 
@@ -189,7 +185,8 @@ def _print(found: list[Table]) -> None:
 
 def _write(found: list[Table], folder: Path, suffix: str, name: str) -> None:
     from roboirg.analysis.tables.rendering import get_format
-    from roboirg.records.store import StoreError, write_atomically
+    from roboirg.records.store import StoreError
+    from roboirg.util.atomic_write import write_atomically
 
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -201,14 +198,14 @@ def _write(found: list[Table], folder: Path, suffix: str, name: str) -> None:
         typer.echo(path)
 
 
-def _samples(runs: list[str]) -> Samples:
-    from roboirg.analysis.stats.samples import gather
+def _cells(runs: list[str]) -> Cells:
+    from roboirg.analysis.stats.cells import gather
 
     return gather(*_runs(runs))
 
 
 def _runs(runs: list[str]) -> tuple[list[tuple[str, Sequence[Result]]], list[Job]]:
-    """The results of runs, each with its folder, and the jobs of their plans."""
+    """Return the results of runs, each with its folder, and the jobs of their plans."""
     from roboirg.evaluation.plan import read_plan
     from roboirg.records.store import read_results
 
@@ -222,16 +219,16 @@ def _runs(runs: list[str]) -> tuple[list[tuple[str, Sequence[Result]]], list[Job
     return results, planned
 
 
-def _one_policy(text: str) -> Samples:
-    """The samples of a run's folder, or of RUN:policy; policies may have colons in their names."""
+def _one_policy(text: str) -> Cells:
+    """Return the cells of a run's folder or of RUN:policy; policy names may contain colons."""
     folder, policy = _split(text)
-    samples = _samples([folder])
+    cells = _cells([folder])
     if policy is None:
-        return samples
-    names = list(dict.fromkeys(who.policy for who, _, _ in samples))
+        return cells
+    names = list(dict.fromkeys(key.policy_run.policy for key in cells))
     if policy not in names:
         raise UnknownNameError(f"policy in {folder}", policy, names)
-    return {key: sample for key, sample in samples.items() if key[0].policy == policy}
+    return {key: cell for key, cell in cells.items() if key.policy_run.policy == policy}
 
 
 def _split(text: str) -> tuple[str, str | None]:

@@ -1,4 +1,4 @@
-"""The commands that play episodes and handle their records."""
+"""Commands that play episodes and handle their records."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from roboirg.cli import plan_options as options
-from roboirg.cli.import_path import see_working_directory
+from roboirg.cli.import_path import add_working_directory
 from roboirg.cli.options import Workers
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.util.plurals import counted
 
 if TYPE_CHECKING:
     from roboirg.evaluation.executors.executor import Executor
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from roboirg.evaluation.runner import RunSummary
     from roboirg.records.record import Job
 
-# Everything heavy is imported inside the commands, so that --help answers at once.
+# Heavy modules are imported inside the commands, so that --help is fast.
 
 USAGE_ERROR, INTERRUPTED, TERMINATED = 2, 130, 143
 EXECUTORS = ("local", "ray")
@@ -29,17 +30,17 @@ Policies = Annotated[
     list[str] | None,
     typer.Option(
         "--policy",
-        help="Built-in name, package.module:Class or address; or NAME=one of these; repeatable.",
+        help="Built-in name, package.module:Class or address, or NAME=one of these; repeatable.",
     ),
 ]
 PlanName = Annotated[
     str | None,
-    typer.Option("--plan", help="A YAML file, or paper, paper-context, paper-planners, quick."),
+    typer.Option("--plan", help="YAML file, or paper, paper-context, paper-planners or quick."),
 ]
-Out = Annotated[str, typer.Option(help="Folder of the run; give the same again to go on.")]
-Folder = Annotated[str, typer.Argument(help="The --out folder of a run.")]
+Out = Annotated[str, typer.Option(help="Output folder; give the same folder again to resume.")]
+Folder = Annotated[str, typer.Argument(help="Output folder of a run.")]
 RetryErrors = Annotated[
-    bool, typer.Option(help="Play episodes again whose newest record is an error.")
+    bool, typer.Option(help="Play episodes again if their newest record is an error.")
 ]
 
 
@@ -68,13 +69,15 @@ def run(
     tries: options.Tries = None,
     retry_on: options.RetryOn = None,
     workers: Workers = None,
-    executor: Annotated[str, typer.Option(help="local or ray.")] = "local",
-    address: Annotated[str | None, typer.Option(help="Of the Ray cluster.")] = None,
+    executor: Annotated[str, typer.Option(help="Where to play: local or ray.")] = "local",
+    address: Annotated[str | None, typer.Option(help="Address of the Ray cluster.")] = None,
     retry_errors: RetryErrors = True,
-    dry_run: Annotated[bool, typer.Option(help="Print the cells and how long they take.")] = False,
+    dry_run: Annotated[
+        bool, typer.Option(help="Only count the episodes and estimate the time.")
+    ] = False,
 ) -> None:
-    """Play episodes and append one record for each to OUT/records.jsonl; resumes by itself."""
-    typed = _given(
+    """Play episodes and store a record of each in OUT/records.jsonl; resumes where it stopped."""
+    typed = _typed_options(
         policies=policy,
         tasks=tasks,
         settings=settings,
@@ -98,62 +101,65 @@ def run(
         retry_on=retry_on,
     )
     folder = folder_of(out)
-    see_working_directory()
+    add_working_directory()
     made = _plan(plan, typed)
     if dry_run:
         _print_estimate(made, folder, workers)
         return
     summary = play(made, folder, _executor(made, executor, address, workers), retry=retry_errors)
     print_tables_of(folder)
-    complain(summary, folder)
+    report_problems(summary, folder)
 
 
 def merge(
-    runs: Annotated[list[str], typer.Argument(help="The --out folders of runs.")],
-    out: Annotated[str, typer.Option(help="Folder that gets all their records and films.")],
+    runs: Annotated[list[str], typer.Argument(help="Output folders of runs.")],
+    out: Annotated[str, typer.Option(help="Folder for all their records and videos.")],
 ) -> None:
-    """Put the records of several runs into one folder."""
+    """Merge the records and videos of several runs into one folder."""
     from roboirg.records.merging import merge_runs
 
     merged = merge_runs([folder_of(run) for run in runs], folder_of(out))
-    typer.echo(f"{merged.added} records came to {out}; {merged.doubled} were there already.")
-    if merged.disputed:
-        first = merged.disputed[0]
+    typer.echo(
+        f"Added {counted(merged.added, 'record')} to {out}; {merged.duplicates:,} already there."
+    )
+    if merged.conflicts:
+        first = merged.conflicts[0]
         typer.echo(
-            f"{len(merged.disputed)} episodes have another verdict in a later run, and the first "
-            f"one stays; for example {first.slug}: {first.outcome}.",
+            f"The verdicts of {counted(len(merged.conflicts), 'episode')} differ between runs; "
+            f"kept the first verdict of each. For example, not kept: {first.slug}: "
+            f"{first.outcome}.",
             err=True,
         )
 
 
 def export_records(
     run: Folder,
-    out: Annotated[Path, typer.Option(help="The Parquet file to write.")],
+    out: Annotated[Path, typer.Option(help="Parquet file to write.")],
 ) -> None:
-    """Write a run's records as a Parquet table; docs/running.md explains the columns."""
+    """Export the records of a run as a Parquet table (columns: see docs/running.md)."""
     from roboirg.records.parquet import check_parquet_support, write_parquet
     from roboirg.records.store import read_records
 
     check_parquet_support()
     if out.is_dir() or not out.parent.is_dir():
-        raise InvalidValueError(f"{str(out)!r} is no name for a file in a folder that exists.")
+        raise InvalidValueError(f"{str(out)!r} is not a file in an existing folder.")
     count = write_parquet(read_records(folder_of(run)), out)
-    typer.echo(f"{count} records: {out}")
+    typer.echo(f"{counted(count, 'record')}: {out}")
 
 
 def folder_of(text: str) -> Path:
-    """The folder that is meant.
+    """Return the path of a folder.
 
     Raises:
-        InvalidValueError: an empty text.
+        InvalidValueError: the text is empty.
     """
     if not text.strip():
-        raise InvalidValueError("The folder of the run is an empty text; give it a name.")
+        raise InvalidValueError("The name of the run's folder is empty.")
     return Path(text)
 
 
 def play(plan: Plan, out: Path, executor: Executor, *, retry: bool) -> RunSummary:
-    """Play a plan with a progress bar; ends the process when it is interrupted."""
+    """Play a plan with a progress bar; exits the process when it is interrupted."""
     from rich.console import Console
 
     from roboirg.evaluation.progress import ConsoleReporter
@@ -163,67 +169,71 @@ def play(plan: Plan, out: Path, executor: Executor, *, retry: bool) -> RunSummar
 
     if plan.video != "off":
         check_video_support()
-    player = EpisodeRunner(
+    play_job = EpisodeRunner(
         out, plan.video, policy_timeout_s=plan.policy_timeout_s, plan=plan.fingerprint
     )
     try:
         with ConsoleReporter(Console()) as reporter:
-            return run_plan(plan, out, player, executor, retry_errors=retry, reporter=reporter)
+            return run_plan(plan, out, play_job, executor, retry_errors=retry, reporter=reporter)
     except KeyboardInterrupt as interrupt:
         typer.echo(
-            f"Stopped; {out} keeps what ended. The same command goes on from there.", err=True
+            f"Stopped; finished episodes are stored in {out}. Run the same command to resume.",
+            err=True,
         )
         sys.exit(TERMINATED if isinstance(interrupt, Terminated) else INTERRUPTED)
 
 
 def print_tables_of(folder: Path) -> None:
-    """Print the table of a run, and the episodes that did not succeed."""
+    """Print the table of a run and its unsuccessful episodes."""
     from rich.console import Console
 
-    from roboirg.analysis.stats.success_rates import make_panels
-    from roboirg.analysis.tables.run_tables import print_failures, print_tables
+    from roboirg.analysis.tables.run_tables import (
+        make_run_tables,
+        print_failures,
+        print_run_tables,
+    )
 
     results, console = _results(folder), Console()
-    print_tables(make_panels(results, planned_jobs(folder)), console)
+    print_run_tables(make_run_tables(results, planned_jobs(folder)), console)
     print_failures(results, console)
 
 
 def planned_jobs(folder: Path) -> tuple[Job, ...]:
-    """The jobs of a run's newest plan; none if it has none that can be understood."""
+    """Return the jobs of a run's newest plan; none if the plan is missing or cannot be read."""
     from roboirg.evaluation.plan import read_plan
 
     plan = read_plan(folder)
     return plan.jobs() if plan else ()
 
 
-def complain(summary: RunSummary, folder: Path) -> None:
-    """Say on stderr what is lacking in a run; a run that lacks something exits with 2."""
-    if summary.unfilmed:
+def report_problems(summary: RunSummary, folder: Path) -> None:
+    """Print errors and missing episodes of a run on stderr; exits with 2 if there are any."""
+    if summary.video_errors:
         typer.echo(
-            f"{len(summary.unfilmed)} of {summary.played} films could not be written, the verdicts "
-            f"stand; the first: {summary.unfilmed[0]}",
+            f"{len(summary.video_errors):,} of {counted(summary.played, 'video')} could not be "
+            f"written; the verdicts are not affected. First error: {summary.video_errors[0]}",
             err=True,
         )
     if summary.errors:
         first = summary.errors[0]
         typer.echo(
-            f"roboirg: {len(summary.errors)} of {summary.total} episodes ended in an error "
-            f"and are in no rate; the first ({first.task} {first.split}/{first.episode} "
-            f"{first.setting}): {first.cause}",
+            f"roboirg: {len(summary.errors):,} of {counted(summary.total, 'episode')} ended in an "
+            f"error and are not counted in the rates; the first ({first.task} "
+            f"{first.split}/{first.episode} {first.setting}): {first.cause}",
             err=True,
         )
     if summary.missing:
         typer.echo(
-            f"roboirg: {summary.missing} of {summary.total} episodes have not been played; the "
-            f"same command goes on with them in {folder}.",
+            f"roboirg: {summary.missing:,} of {counted(summary.total, 'episode')} were not played; "
+            f"run the same command to play them in {folder}.",
             err=True,
         )
     if summary.errors or summary.missing:
         sys.exit(USAGE_ERROR)
 
 
-def _given(**options: object) -> dict[str, Any]:
-    """The options that were typed."""
+def _typed_options(**options: object) -> dict[str, Any]:
+    """Return the options that were typed."""
     return {name: value for name, value in options.items() if value not in (None, [])}
 
 
@@ -234,14 +244,14 @@ def _results(folder: Path) -> Any:  # noqa: ANN401 - imported where it is needed
 
 
 def _plan(name: str | None, typed: dict[str, Any]) -> Plan:
-    """The plan of a file, where nothing else is typed, and what is typed."""
+    """Return the plan of a file, overridden by the options that were typed."""
     from roboirg.evaluation.plan import make_plan
     from roboirg.evaluation.plan_file import read_plan_file
 
     chosen = {**({} if name is None else read_plan_file(name)), **typed}
     policies = chosen.pop("policies", None)
     if not policies:
-        raise InvalidValueError("No policy is given; name one with --policy, such as oracle.")
+        raise InvalidValueError("No policy given; name one with --policy, such as oracle.")
     frames = chosen.get("demonstration_frames")
     if isinstance(frames, str) and frames.isdigit():
         chosen["demonstration_frames"] = int(frames)
@@ -256,7 +266,7 @@ def _executor(plan: Plan, name: str, address: str | None, workers: int | None) -
 
         return RayCluster(workers, address, plan.episode_timeout_s)
     if address is not None:
-        raise InvalidValueError(f"address is {address!r}; only --executor ray has one.")
+        raise InvalidValueError(f"--address {address!r} needs --executor ray.")
     from roboirg.evaluation.executors.executor import choose_executor
 
     return choose_executor(workers, plan.episode_timeout_s)

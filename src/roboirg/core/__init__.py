@@ -1,1 +1,1 @@
-"""Plain data and rules that every other room may import."""
+"""Plain data and rules that every other package may import."""

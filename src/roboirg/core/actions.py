@@ -1,4 +1,4 @@
-"""The action spaces: what an action holds, how it is checked, and its limits."""
+"""The action spaces: the numbers of an action, their limits, and checks."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ POSE_SIZE = 6
 
 JOINT_LOW = np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973])
 JOINT_HIGH = np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973])
-"""Joint limits of the Franka Panda, rad. Targets beyond them are accepted; the joints stop."""
+"""Joint limits of the Franka Panda, rad. Targets beyond them are accepted; joints stop there."""
 
 REACH_LOW = np.array([-1.7, -1.1, 0.0])
 REACH_HIGH = np.array([0.5, 1.1, 1.4])
-"""Box around all that the tool reaches above the table, world frame, m."""
+"""Box around all points above the table that the tool reaches, world frame, m."""
 
 
 class ActionSpace(NamedTuple):
     """One way to command the robot.
 
     Attributes:
-        name: as policies and environments name it.
-        low: smallest sensible value of each number; smaller ones are not refused.
+        name: the name in policies and environments.
+        low: smallest sensible value of each number; smaller ones are accepted.
         high: largest sensible value of each number.
-        describe: what the numbers are, in words.
+        describe: the numbers in words.
     """
 
     name: str
@@ -41,7 +41,7 @@ class ActionSpace(NamedTuple):
 
     @property
     def size(self) -> int:
-        """How many numbers an action has."""
+        """Number of values in an action."""
         return len(self.low)
 
 
@@ -61,7 +61,7 @@ EE_POSE = ActionSpace("ee_pose", _POSE_LOW, _POSE_HIGH, f"{_POSE} in [-1, 1]")
 """Pose of the tool center, world frame, extrinsic x-y-z angles; one control step."""
 
 WAYPOINT = ActionSpace("waypoint", _POSE_LOW, _POSE_HIGH, f"{_POSE}, -1 to close it, +1 to open it")
-"""The same pose, reached in a straight move of many steps; then the gripper closes or opens."""
+"""The same pose, reached by a straight move of many steps; then the gripper closes or opens."""
 
 ACTION_SPACES: Mapping[str, ActionSpace] = {
     space.name: space for space in (JOINT_ANGLE, EE_POSE, WAYPOINT)
@@ -69,7 +69,7 @@ ACTION_SPACES: Mapping[str, ActionSpace] = {
 
 
 def find_action_space(name: object) -> ActionSpace:
-    """The action space of that name.
+    """Return the action space of that name.
 
     Raises:
         UnknownNameError: there is none.
@@ -80,7 +80,7 @@ def find_action_space(name: object) -> ActionSpace:
 
 
 def check_action(action: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> NDArray[np.float64]:
-    """The action as finite numbers of the space's size.
+    """Return the action as finite numbers of the space's size.
 
     Raises:
         InvalidActionError: it is not numeric, of another shape, or not finite.
@@ -95,7 +95,7 @@ def check_action(action: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> NDArray
 
 
 def check_chunk(actions: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> NDArray[np.float64]:
-    """A policy's answer as a chunk of shape (n, size), n >= 1; one action is a chunk of one.
+    """Return a policy's answer as a chunk of shape (n, size), n >= 1; one action is a chunk of one.
 
     Raises:
         InvalidActionError: it is not numeric, of another shape, or not finite.
@@ -128,6 +128,6 @@ def _finite(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
     if len(bad):
         raise InvalidActionError(
             f"Action value {bad[0][-1]} is {numbers[tuple(bad[0])]}; "
-            "every value has to be a finite number."
+            "every value must be a finite number."
         )
     return numbers

@@ -1,79 +1,47 @@
 """Facts of the world and conditions on them: what stages expect and forbid, as plain data.
 
-A condition is evaluated once after each control step, from the facts that hold then and from
-what has happened before; `roboirg.judging` does it.
+`roboirg.judging` evaluates conditions once after each control step, from the facts that hold then
+and from what has happened before.
 """
 
 from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-FactKind = Literal[
-    "picked",
-    "lying",
-    "placed",
-    "over",
-    "binned",
-    "lifted",
-    "put_down",
-    "reached",
-    "held",
-    "pressed",
-    "hovering",
-    "near",
-    "stopped",
-    "still",
-    "home",
-]
-
+from roboirg.core.fact_traits import FactKind, FactTraits, fact_traits
 
 GroundingFailure = Literal[
     "wrong_object", "wrong_count", "wrong_order", "wrong_time", "wrong_place"
 ]
-"""Something else was done than what was meant."""
+"""The policy did something else than the instruction means."""
 
 ExecutionFailure = Literal[
     "nothing_reached", "missed_grasp", "dropped", "misplaced", "out_of_time", "unreachable"
 ]
-"""What was meant was not brought off."""
-
-LASTING_KINDS: frozenset[FactKind] = frozenset({"binned"})
-"""Facts of these kinds never cease to hold."""
+"""The policy did not complete what the instruction means."""
 
 
 class Fact(NamedTuple):
     """Something that is true in the world at one evaluation, one after each control step.
 
-    | kind | subject, place | true while |
-    | --- | --- | --- |
-    | ``picked`` | cube or tape | it is above z 0.05 and grasped |
-    | ``lying`` | cube or tape | it lies released, z <= 0.035 |
-    | ``placed`` | cube or tape, target or site | it lies released within 0.05 (xy) of the place |
-    | ``over`` | cube, target | it came within 0.03 (xy) below z 0.12, until beyond 0.04 or z 0.3 |
-    | ``binned`` | cube or tape, bin or box | from the moment on at which it has fallen in: \
-released within 0.05 (xy), z <= 0.035, fingers more than 0.02 open, the hand more than 0.02 away |
-    | ``lifted`` | container | its origin is above z 0.15 |
-    | ``put_down`` | container | its origin is at z <= 0.07, released, the hand above z 0.05 |
-    | ``reached`` | cube, tape or container | the tool center is within 0.03 of its origin |
-    | ``held`` | cube, tape or container | both fingers grasp it, at whatever height |
-    | ``pressed`` | button | its cap is more than 0.005 down |
-    | ``hovering`` | robot, button | the hand is within 0.03 (xy) of the button and below z 0.2 |
-    | ``near`` | shuttle, target | its center is within 0.06 (xy) of the target's |
-    | ``stopped`` | shuttle, target | it has been stopped for good, and is near |
-    | ``still`` | ``"robot"`` | no arm joint moves faster than 0.2 rad/s |
-    | ``home`` | ``"robot"`` | all nine joints are within 0.01 of the home position |
-
-    Thresholds, meters: RoboMME, evaluation mode. ``reached`` and ``held`` are our own: no stage
-    asks for them, they tell how something failed.
+    Attributes:
+        kind: what is true; `roboirg.core.fact_traits` defines each kind.
+        subject: name of the object it is about, or ``"robot"``.
+        place: name of the second object, if the kind has one.
     """
 
     kind: FactKind
     subject: str
     place: str | None = None
 
+    @property
+    def traits(self) -> FactTraits:
+        """What its kind means."""
+        return fact_traits(self.kind)
+
 
 class FactCount(NamedTuple):
-    """So many of the facts hold now: at least `least`, and at most `most` if that is given."""
+    """A condition on how many of the facts hold now: at least `least`, at most `most` if given."""
 
     facts: tuple[Fact, ...]
     least: int = 1
@@ -81,12 +49,12 @@ class FactCount(NamedTuple):
 
 
 class OccurrenceCount(NamedTuple):
-    """The facts, taken together, have begun to hold at least so often.
+    """A condition on how many times the facts, taken together, have started to hold.
 
     Attributes:
         facts: which ones are counted.
-        least: how often.
-        until: only beginnings at or before this control step since reset count; None for all.
+        least: the smallest count that meets the condition.
+        until: only starts at or before this control step since reset count; None for all.
     """
 
     facts: tuple[Fact, ...]
@@ -95,11 +63,11 @@ class OccurrenceCount(NamedTuple):
 
 
 class Elapsed(NamedTuple):
-    """So many control steps have passed, since reset or since a stage's timer started.
+    """A condition on the control steps that have passed since reset or since a timer started.
 
     Attributes:
-        least: no fewer.
-        most: and no more; None for no bound.
+        least: the fewest.
+        most: the most; None for no bound.
         timer: name of the timer, started by the first evaluation of the first stage that has it;
             None counts from reset.
     """
@@ -110,7 +78,7 @@ class Elapsed(NamedTuple):
 
 
 class All(NamedTuple):
-    """Every one of several conditions."""
+    """A condition that is met when each of its parts is."""
 
     of: tuple[Fact | FactCount | OccurrenceCount | Elapsed, ...]
 
@@ -119,13 +87,14 @@ Condition = Fact | FactCount | OccurrenceCount | Elapsed | All
 
 
 class Rule(NamedTuple):
-    """A condition that fails the episode, and how to tell what was wrong.
+    """A condition that fails the episode, and how to describe the failure.
 
     Attributes:
         condition: must not hold.
-        cause: what happened, in words, for records: ``"pressed the button too early"``.
-        failure: what it means that this rule is broken; None if the facts in it tell, as they do
-            where a stage forbids a fact. It judges nothing.
+        cause: what was done, verb and object in the past tense, for records: ``"pressed the button
+            too early"``.
+        failure: name of the failure; None to conclude it from the facts, as for a fact that a
+            stage forbids. It does not affect the verdict.
     """
 
     condition: Condition
@@ -134,12 +103,12 @@ class Rule(NamedTuple):
 
 
 def absent(fact: Fact) -> FactCount:
-    """The condition that a fact does not hold."""
+    """Return the condition that a fact does not hold."""
     return FactCount((fact,), least=0, most=0)
 
 
 def facts_of(condition: Condition | Rule) -> tuple[Fact, ...]:
-    """All facts that a condition speaks of."""
+    """Return all facts in a condition."""
     match condition:
         case Fact():
             return (condition,)

@@ -1,4 +1,4 @@
-"""The errors a user can meet: one sentence each, naming the thing, its value and what is right.
+"""The errors a user can see: one sentence each, with the name, its value and a valid value.
 
 | error | raised when | on the command line |
 | --- | --- | --- |
@@ -10,8 +10,8 @@
 | `SceneRejectedError` | a seed yields no valid scene (callers try the next seed) | never seen |
 | `PolicyConnectionError` | a policy's server or model cannot be reached | recorded as an error |
 | `PolicyTimeoutError` | a policy does not answer in time | recorded as an error |
-| `PolicyReplyError` | a policy's server or model answers something else | recorded as an error |
-| `MotionPlanningError` | the oracle's hands find no path | recorded as an error |
+| `PolicyReplyError` | a policy's server or model sends an invalid answer | recorded as an error |
+| `MotionPlanningError` | the oracle finds no path | recorded as an error |
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from collections.abc import Iterable
 
 
 class RoboIRGError(Exception):
-    """Base class: everything that is reported as one sentence, without a traceback."""
+    """Base class of errors that are reported as one sentence, without a traceback."""
 
 
 class InvalidValueError(RoboIRGError, ValueError):
-    """A value is outside what is allowed; the sentence says what would be right."""
+    """A value is out of range; the sentence names the valid ones."""
 
 
 class UnknownNameError(InvalidValueError):
     """A name that is not in its registry.
 
     Args:
-        kind: what was looked up, for example ``"task"``.
-        name: what the caller asked for.
+        kind: of the name, for example ``"task"``.
+        name: the unknown name.
         known: every valid name.
     """
 
@@ -48,11 +48,11 @@ class UnknownNameError(InvalidValueError):
 
 
 class InvalidActionError(RoboIRGError, ValueError):
-    """An action that the robot cannot execute: wrong shape, wrong type, or not finite."""
+    """An action has a wrong shape or type, or is not finite."""
 
 
 class MissingDependencyError(RoboIRGError, ImportError):
-    """Something that has to be installed is not; the sentence says how."""
+    """A required package or file is not installed; the sentence says how to install it."""
 
 
 class RenderDeviceError(RoboIRGError, RuntimeError):
@@ -60,7 +60,7 @@ class RenderDeviceError(RoboIRGError, RuntimeError):
 
 
 class SceneRejectedError(RoboIRGError):
-    """The sampler found no place for an object; the next seed is to be tried."""
+    """The sampler found no place for an object; callers try the next seed."""
 
 
 class MotionPlanningError(RoboIRGError, RuntimeError):
@@ -68,12 +68,12 @@ class MotionPlanningError(RoboIRGError, RuntimeError):
 
 
 class PolicyConnectionError(RoboIRGError, ConnectionError):
-    """The server or model behind a policy cannot be reached, or went away."""
+    """The server or model of a policy cannot be reached, or the connection was lost."""
 
 
 class PolicyTimeoutError(RoboIRGError, TimeoutError):
-    """The server or model behind a policy did not answer within the time it has."""
+    """The server or model of a policy did not answer in time."""
 
 
 class PolicyReplyError(RoboIRGError, RuntimeError):
-    """The server or model behind a policy answered with an error or with something else."""
+    """The server or model of a policy answered with an error or an invalid reply."""

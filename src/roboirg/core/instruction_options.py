@@ -11,17 +11,17 @@ DEFAULT_FRAME = "robot"
 
 
 class InstructionOptions(NamedTuple):
-    """How an episode is told. Two equal values give the same words for the same episode.
+    """The options of an instruction. Equal options give the same words for the same episode.
 
     Attributes:
         setting: name of the setting, for example ``"direct"``.
         form: ``implicit``, or ``resolved`` with the command's referring expressions replaced by
-            what they stand for.
+            their meaning.
         stages: of the contextual setting: 1 introduction, 2 reinforcement, 3 distractor, 4 cue,
             5 command.
         distractor: of the contextual setting: ``neutral`` or ``competing``.
-        distractors: of the contextual setting: how many.
-        frame: of the spatial setting: whose left and right are meant, ``robot`` or ``camera``.
+        distractors: of the contextual setting: their number.
+        frame: of the spatial setting: the frame of left and right, ``robot`` or ``camera``.
     """
 
     setting: str = "explicit"

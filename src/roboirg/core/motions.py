@@ -1,7 +1,7 @@
-"""Scripted movements of objects, whatever the robot does: plain data that the world plays.
+"""Scripted movements of objects, independent of the robot: plain data that the world plays.
 
-Steps count control steps before the physics of a step, since reset, or since a stage of the
-demonstration became due. Source of all rules and figures: RoboMME.
+Steps are control steps before the physics of a step, counted since reset or since a stage of the
+demonstration began. Source of all rules and figures: RoboMME.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ class Point(NamedTuple):
 
 
 class Away(NamedTuple):
-    """An object is out of the world for a while, then back at once.
+    """An object leaves the world for a while, then returns at once.
 
     Attributes:
         subject: name of the object.
         start: first step at which it is away.
-        end: the step at which it is back: at its place in the scene, or at the place (xy) that
-            `under` then has, with its own height and yaw.
+        end: the step at which it returns: to its place in the scene, or to the position (xy) that
+            `under` has then, with its own height and yaw.
         under: name of the object whose place it takes; None for its own.
     """
 
@@ -45,10 +45,10 @@ class Swap(NamedTuple):
     Attributes:
         first: name of an object.
         second: name of the other.
-        start: the step at which the positions are taken, since reset or since `stage` was due.
-        steps: how long it takes; from `start` to `start + steps`, both included.
+        start: the step at which the positions are read, since reset or since `stage` began.
+        steps: duration; the movement lasts from `start` to `start + steps`, both included.
         lane: sideways swing, m.
-        pinned: names of objects that are held where they are meanwhile.
+        pinned: names of objects that are held in place meanwhile.
         stage: index of the demonstration's stage from whose first step `start` counts; None
             counts from reset.
     """
@@ -63,16 +63,16 @@ class Swap(NamedTuple):
 
 
 class Shuttle(NamedTuple):
-    """An object runs to and fro on a straight line, slower towards the ends.
+    """An object moves back and forth on a straight line, slower near the ends.
 
     In a pass with tau = 0 to 1 it is at begin + (3 tau^2 - 2 tau^3) (end - begin).
 
     Attributes:
         subject: name of the object.
-        begin: where it starts.
-        end: where the first pass leads.
+        begin: where the first pass starts.
+        end: where the first pass ends.
         interval: steps of one pass.
-        passes: how many passes, to and fro in turn; afterwards it rests.
+        passes: number of passes, in alternate directions; afterwards it rests.
         stopped_by: the fact that stops it for good.
     """
 
@@ -85,12 +85,12 @@ class Shuttle(NamedTuple):
 
 
 class Glow(NamedTuple):
-    """An object that is only seen while a fact holds, and a little longer.
+    """An object is visible while a fact holds, and a little longer.
 
     Attributes:
         subject: name of the object; it appears at its place in the scene.
         during: the fact.
-        linger: control steps for which it is still seen afterwards.
+        linger: control steps for which it stays visible afterwards.
     """
 
     subject: str
@@ -99,17 +99,10 @@ class Glow(NamedTuple):
 
 
 class Vanish(NamedTuple):
-    """An object leaves the world for ever once a fact holds."""
+    """An object leaves the world for good once a fact holds."""
 
     subject: str
     when: Fact
 
 
 Motion = Away | Swap | Shuttle | Glow | Vanish
-
-
-def subjects_of(motion: Motion) -> tuple[str, ...]:
-    """Names of all objects that a motion moves or holds."""
-    if isinstance(motion, Swap):
-        return motion.first, motion.second, *motion.pinned
-    return (motion.subject,)

@@ -1,4 +1,4 @@
-"""Sizes of the objects, as RoboMME builds them; of boxes and tapes, our own. Meters."""
+"""Sizes of the objects, meters: RoboMME's, except for boxes and tapes."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ CUBE_HALF = 0.02
 """Half side of a cube (ManiSkill's pick-cube configuration for the Panda)."""
 
 HIDDEN_CUBE_HALF = CUBE_HALF / 1.2
-"""Half side of a cube that a container can stand over."""
+"""Half side of a cube that fits under a container."""
 
 TARGET_THICKNESS = 0.005
-"""Thickness of a target disc, unless its scene says otherwise."""
+"""Default thickness of a target disc."""
 
 TARGET_HEIGHT = TARGET_THICKNESS
 """Height of a target disc's center above the table: it floats by half its thickness."""
 
 MARKER_HALF_THICKNESS = 0.014
 MARKER_DEPTH = 0.01
-"""How far the center of a marker is below the center of the target that it lights up."""
+"""Distance of a marker's center below the center of the target that it lights up."""
 MARKER_RADIUS_SHARE = 1.003
 """Radius of a marker, in radii of its target."""
 
@@ -26,7 +26,7 @@ BIN_HOLE_HALF = 0.04
 BIN_WALL = BIN_HALF - BIN_HOLE_HALF
 BIN_HEIGHT = 0.05
 BIN_FLOOR_HEIGHT = 0.025
-"""How high the black floor is drawn; things fall through it to the table."""
+"""Height at which the black floor is drawn; objects fall through it to the table."""
 
 BUTTON_SCALE = 1.5
 BUTTON_BASE_HALF = (0.025 * BUTTON_SCALE, 0.025 * BUTTON_SCALE, 0.005 * BUTTON_SCALE)
@@ -36,7 +36,7 @@ BUTTON_TRAVEL = 0.1 * BUTTON_SCALE
 BUTTON_HEIGHT = BUTTON_BASE_HALF[2]
 """Height of the button's origin, the center of its base."""
 BUTTON_KEEP_OUT_HALF = 1.5 * BUTTON_BASE_HALF[0]
-"""Half side of the square around a button that stays free of other things."""
+"""Half side of the square around a button that stays free of other objects."""
 
 CONTAINER_INNER = 2.5 * CUBE_HALF
 CONTAINER_WALL = 0.005
@@ -52,14 +52,14 @@ BOX_HALF = 0.065
 """Half the outer side of an open box."""
 BOX_WALL = 0.005
 BOX_HEIGHT = 0.04
-"""Low enough that the hand, 0.2 wide, may pick a tape right beside it."""
+"""Low enough for the hand, 0.2 wide, to pick a tape right beside it."""
 BOX_FLOOR = 0.002
 
 TAPE_RADIUS = 0.0275
 """Outer radius of a roll of tape: open fingers are 0.08 apart."""
 TAPE_HOLE_RADIUS = 0.015
 TAPE_HALF = 0.0175
-"""Half the width of the tape, and the height of the middle of a roll that lies. However the roll
-leans on the walls of a box, its middle stays below 0.035."""
+"""Half the width of the tape, and the height of the middle of a roll that lies flat. A roll that
+leans on the walls of a box has its middle below 0.035."""
 TAPE_SIDES = 12
-"""A roll is a ring of so many sides: opposite ones are parallel, as the fingers are."""
+"""Sides of the ring that is a roll: an even number, since the fingers are parallel."""

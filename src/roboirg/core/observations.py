@@ -1,4 +1,4 @@
-"""What a policy gets to see: which pictures, one moment, and what was shown before."""
+"""Observations: cameras, the data of one step, and the demonstration."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ FRONT, WRIST = "front", "wrist"
 CAMERAS = (FRONT, WRIST)
 
 DemonstrationFrames = Literal["all", "none"] | int
-"""Which pictures of the video there are: all, none, or every n-th, the first included."""
+"""Which frames of the video are included: all, none, or every n-th, the first included."""
 
 
 def check_cameras(cameras: object) -> tuple[str, ...]:
-    """The names of cameras that somebody asks for.
+    """Return a value as names of cameras.
 
     Raises:
         InvalidValueError: it is no tuple or list, or names a camera twice.
@@ -28,7 +28,7 @@ def check_cameras(cameras: object) -> tuple[str, ...]:
         raise InvalidValueError(f"cameras is the text {cameras!r}; write ({cameras!r},).")
     if not isinstance(cameras, tuple | list):
         raise InvalidValueError(
-            f"cameras is of type {type(cameras).__name__}; it has to be a tuple such as "
+            f"cameras is of type {type(cameras).__name__}; it must be a tuple such as "
             "('front',) or ()."
         )
     for camera in cameras:
@@ -39,42 +39,42 @@ def check_cameras(cameras: object) -> tuple[str, ...]:
     return tuple(cameras)
 
 
-def check_demonstration_frames(wish: object) -> DemonstrationFrames:
-    """Which pictures of the video somebody asks for.
+def check_demonstration_frames(value: object) -> DemonstrationFrames:
+    """Return a value as a choice of frames of the video.
 
     Raises:
         InvalidValueError: it is neither ``"all"`` nor ``"none"`` nor a whole number from 1 on.
     """
-    if wish == "all":
+    if value == "all":
         return "all"
-    if wish == "none":
+    if value == "none":
         return "none"
-    if type(wish) is int and wish >= 1:
-        return wish
+    if type(value) is int and value >= 1:
+        return value
     raise InvalidValueError(
-        f"demonstration_frames is {wish!r}; it has to be 'all', 'none' or a whole number of at "
+        f"demonstration_frames is {value!r}; it must be 'all', 'none' or a whole number of at "
         "least 1."
     )
 
 
-def check_observe_every(wish: object) -> int | None:
-    """After how many control steps somebody wants observations from within a chunk.
+def check_observe_every(value: object) -> int | None:
+    """Return a value as the number of control steps between observations within a chunk.
 
     Raises:
         InvalidValueError: it is neither None nor a whole number from 1 on.
     """
-    if wish is None or (type(wish) is int and wish >= 1):
-        return wish
+    if value is None or (type(value) is int and value >= 1):
+        return value
     raise InvalidValueError(
-        f"observe_every is {wish!r}; it has to be None or a whole number of at least 1."
+        f"observe_every is {value!r}; it must be None or a whole number of at least 1."
     )
 
 
 class Observation(TypedDict):
-    """What the robot sees and feels now.
+    """Camera images, robot state and instruction of one step.
 
-    Pictures are uint8 (256, 256, 3), present for the cameras that the policy asks for. Depth and
-    calibration are there for the same cameras if the environment was made with ``depth=True``,
+    Images are uint8 (256, 256, 3), present for the cameras that the policy requires. Depth and
+    calibration are present for the same cameras if the environment was made with ``depth=True``,
     ``calibration=True``.
     """
 
@@ -88,7 +88,7 @@ class Observation(TypedDict):
     """(6,) x, y, z (m) and roll, pitch, yaw (rad, extrinsic x-y-z) of the tool center, world."""
     instruction: str
     front_depth: NotRequired[NDArray[np.int16]]
-    """(256, 256, 1) distance along the viewing direction, mm; 0 where nothing is seen."""
+    """(256, 256, 1) distance along the viewing direction, mm; 0 where nothing is in view."""
     wrist_depth: NotRequired[NDArray[np.int16]]
     front_extrinsic: NotRequired[NDArray[np.float32]]
     """(3, 4) from the world's frame to the camera's (OpenCV: x right, y down, z forward)."""
@@ -101,8 +101,8 @@ class Observation(TypedDict):
 
 
 Demonstration = Mapping[str, NDArray[Any]]
-"""As `Observation` without instruction and history, one more leading axis T: what was shown before.
+"""The video: as `Observation` without instruction and history, with a leading axis T.
 
-T is 0 in tasks without a video. The frame that follows it is the first observation. Pictures are
-drawn when they are read for the first time, and then kept; so nobody waits for what is not read.
+T is 0 in tasks without a video. The first observation follows the last frame. Images are rendered
+when they are first read, and then kept; images that are not read cost no time.
 """

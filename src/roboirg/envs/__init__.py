@@ -1,1 +1,1 @@
-"""The Gymnasium environment and its registration."""
+"""The Gymnasium environment, `make`, and registration with Gymnasium."""

@@ -1,4 +1,4 @@
-"""The Gymnasium environment: an episode and an instruction in, observations out."""
+"""The Gymnasium environment of one episode and one instruction."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from roboirg.core.actions import JOINT_ANGLE, check_action, check_chunk, find_action_space
 from roboirg.core.episode import Episode, Stage
 from roboirg.core.errors import InvalidValueError, MotionPlanningError, UnknownNameError
+from roboirg.core.instruction_options import ALL_STAGES, InstructionOptions
 from roboirg.core.observations import CAMERAS, DemonstrationFrames
 from roboirg.episodes.splits import get_episode
 from roboirg.judging import Event, Status, plain_subgoal
@@ -30,12 +31,12 @@ from roboirg.simulation.observation_builder import (
     observation_space,
 )
 from roboirg.simulation.rendering.pixel_grounding import PixelGrounding
-from roboirg.simulation.rendering.render_device import describe, find_render_device
-from roboirg.simulation.rendering.render_mode import find_rendering
+from roboirg.simulation.rendering.render_device import describe_device, find_render_device
+from roboirg.simulation.rendering.render_settings import find_render_settings
 
 MAX_STEPS = 1300
 """Control steps a policy has, as in RoboMME's published experiments."""
-LONGEST_INSTRUCTION = 100_000
+MAX_INSTRUCTION_LENGTH = 100_000
 PRINTABLE = "".join(chr(code) for code in range(32, 127))
 COMPLETED = "all tasks completed"
 """The subgoal after the last stage."""
@@ -44,60 +45,40 @@ FrameHook = Callable[["RoboIRGEnv", bool], None]
 
 
 class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
-    """One episode of one task, stated in one setting.
+    """One episode of one task, with an instruction in one setting.
 
-    Observation: `front_rgb` and `wrist_rgb` uint8 (256, 256, 3) for the cameras asked for;
+    Observation: `front_rgb` and `wrist_rgb` uint8 (256, 256, 3) for the requested cameras;
     `joint_positions` float32 (7,) rad; `gripper` float32 (2,) m; `end_effector` float64 (6,)
     position (m) and extrinsic x-y-z angles (rad) of the tool center in the world frame;
     `instruction` text. With `depth`, `front_depth` and `wrist_depth` int16 (256, 256, 1) mm; with
-    `calibration`, `front_extrinsic` float32 (3, 4), `front_intrinsic` (3, 3), and of the wrist.
-    With `observe_every`, `history`: a tuple of such observations.
+    `calibration`, `front_extrinsic` float32 (3, 4), `front_intrinsic` (3, 3), and the same for the
+    wrist. With `observe_every`, `history`: a tuple of such observations.
 
-    Action: of the space that `actions` names. `joint_angle` (8,): absolute joint targets in rad
-    and the gripper, +1 open to -1 closed; one control step of 0.05 s. `ee_pose` (7,): position (m)
-    and extrinsic x-y-z angles (rad) of the tool center in the world frame and the gripper; one
-    control step. `waypoint` (7,): the same pose, reached in a straight move of many control steps;
-    there -1 closes the gripper and +1 opens it in six more, anything else leaves it. The episode
-    fails at a pose that cannot be reached.
+    Action: in the space named by `actions`. `joint_angle` (8,): absolute joint targets in rad and
+    the gripper, +1 open to -1 closed; one control step of 0.05 s. `ee_pose` (7,): position (m) and
+    extrinsic x-y-z angles (rad) of the tool center in the world frame, and the gripper; one control
+    step. `waypoint` (7,): the same pose, reached by a straight move of many control steps; then
+    -1 closes the gripper and +1 opens it in six more steps, and any other value leaves it. The
+    episode fails if a pose cannot be reached.
 
     Reward: 1 at the step that completes the task, else 0.
 
     Episode end: terminated on success or failure, truncated after `max_steps`.
 
     Info: `status` (ongoing, success, failure, timeout), `cause`, `steps` of the policy,
-    `elapsed_steps` since the world began, `events` since the last call, `subgoal` in words, with
-    `grounded` also `grounded_subgoal`; at reset `demonstration`, arrays as in the observation with
-    a leading axis T (pictures are drawn when they are read), and `demonstration_subgoals`, T texts.
+    `elapsed_steps` since the start of the world, `events` since the last call, `subgoal` in words,
+    and `grounded_subgoal` with `grounded`. At reset also `demonstration`, arrays as in the
+    observation with a leading axis T (pictures are drawn when they are read), and
+    `demonstration_subgoals`, T texts.
 
-    Args:
-        task: name of the task, or an episode made by hand (then `split` and `episode` are its own).
-        setting: explicit, direct, reasoning, contextual or spatial.
-        form: implicit, or resolved for its paired explicit counterpart.
-        split: train, val or test.
-        episode: number of the episode in the split, from 0.
-        stages: which of the five stages of a contextual instruction are spoken.
-        distractor: neutral or competing.
-        distractors: how many distractors are spoken.
-        frame: whose left and right a spatial instruction uses: robot or camera.
-        actions: joint_angle, ee_pose or waypoint.
-        cameras: which pictures observations hold; () plays without drawing.
-        depth: whether observations hold depth for the same cameras.
-        calibration: whether observations hold the matrices of the same cameras.
-        grounded: whether info names the pixels of the subgoal's object; costs drawing.
-        demonstration_frames: which pictures the video has: "all", "none", or n for every n-th.
-        observe_every: n adds `history`, the observations after every n-th control step since the
-            last observation, to each.
-        history_cameras: whose pictures those have; the same as observations by default.
-        meshes: "faithful", or "light" for quicker pictures that differ a little from RoboMME's.
-        max_steps: control steps that the policy has.
-        render_mode: None or "rgb_array" (front and wrist side by side).
+    The arguments are those of `roboirg.make`, which documents them.
 
     Raises:
         UnknownNameError: a task, setting, split, form, action space or camera does not exist.
         InvalidValueError: the split has no such episode, or the combination is not defined.
     """
 
-    metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium declares it so
+    metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium declares it this way
         "render_modes": ["rgb_array"],
         "render_fps": 20,
     }
@@ -111,7 +92,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         split: str = "test",
         episode: int = 0,
         *,
-        stages: Sequence[int] = (1, 2, 3, 4, 5),
+        stages: Sequence[int] = ALL_STAGES,
         distractor: str = "neutral",
         distractors: int = 1,
         frame: str = "robot",
@@ -128,33 +109,24 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         render_mode: str | None = None,
     ) -> None:
         self.episode = task if isinstance(task, Episode) else get_episode(task, split, episode)
-        self.instruction = instruct(
-            self.episode,
-            setting,
-            form,
-            stages=stages,
-            distractor=distractor,
-            distractors=distractors,
-            frame=frame,
-        )
+        options = InstructionOptions(setting, form, tuple(stages), distractor, distractors, frame)
+        self.instruction = instruct(self.episode, **options._asdict())
         self._space = find_action_space(actions)
         self.actions = self._space.name
-        self._wishes = ObservationSpec(
+        self._spec = ObservationSpec(
             cameras,
             depth,
             calibration,
             demonstration_frames,
             observe_every,
             history_cameras,
-            find_rendering(meshes),
-        ).checked()
-        self.cameras = tuple(self._wishes.cameras)
+            find_render_settings(meshes),
+        ).validated()
+        self.cameras = tuple(self._spec.cameras)
         self.demonstration_frames, self.observe_every = demonstration_frames, observe_every
-        self.history_cameras = tuple(self._wishes.of_history.cameras)
+        self.history_cameras = tuple(self._spec.for_history.cameras)
         if not isinstance(max_steps, int) or max_steps < 1:
-            raise InvalidValueError(
-                f"max_steps is {max_steps!r}; it has to be a whole number of at least 1."
-            )
+            raise InvalidValueError(f"max_steps is {max_steps!r}; it must be an integer >= 1.")
         if render_mode not in (None, "rgb_array"):
             raise UnknownNameError("render mode", render_mode, ["rgb_array"])
         self.max_steps = max_steps
@@ -162,56 +134,60 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         self.observation_space = self._make_observation_space()
         self.action_space = spaces.Box(self._space.low, self._space.high, dtype=np.float64)
         self.grounded = grounded
-        self._play: EpisodeState | None = None
+        self._state: EpisodeState | None = None
         self._frame_hook: FrameHook | None = None
         self._hook_period = 1
 
     @property
     def session(self) -> EpisodeSession:
-        """The episode being played.
+        """The current episode session.
 
         Raises:
-            ResetNeeded: `reset` has not been called yet.
+            ResetNeeded: `reset` has not been called.
         """
-        return self._playing.session
+        return self._current.session
 
     @property
     def status(self) -> str:
-        """ongoing, success, failure or timeout."""
+        """Episode status: ongoing, success, failure or timeout."""
         status = self.session.status
-        if status is Status.ONGOING and self._playing.steps >= self.max_steps:
+        if status is Status.ONGOING and self._current.steps >= self.max_steps:
             return "timeout"
         return str(status)
 
     @property
     def subgoal(self) -> str:
-        """What is to be done now, in words; with `grounded`, with the pixels of what is meant."""
-        play, stage = self._playing, self.session.judge.published
-        if play.grounding is not None:
-            return play.grounding.text
+        """The current subgoal in words; with `grounded`, with the pixel of its object."""
+        state, stage = self._current, self.session.judge.published
+        if state.pixel_grounding is not None:
+            return state.pixel_grounding.text
         return COMPLETED if stage is None else plain_subgoal(stage)
 
     @property
     def events(self) -> Sequence[Event]:
-        """Everything that happened since reset, the demonstration included."""
+        """All events since reset, including those of the demonstration."""
         return tuple(self.session.events)
 
     @property
     def render_device(self) -> str:
-        """The device that draws the pictures, or "none" while nothing is drawn."""
-        return describe(find_render_device()).name if self._visible else "none"
+        """Name of the render device, or "none" if nothing is rendered."""
+        return describe_device(find_render_device()).name if self._renders else "none"
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Begin the episode anew; it is the same each time, whatever the seed."""
+        """Start the episode again. The episode is the same for every seed."""
         super().reset(seed=seed, options=options)
-        recording = replay_or_plan(self.episode, self._show, watched=self._frame_hook is not None)
-        self._follow(self.session.judge.published)
-        play = self._playing
+        recording = replay_or_plan(
+            self.episode, self._play_demonstration, watched=self._frame_hook is not None
+        )
+        self._after_step(self.session.judge.published)
+        state = self._current
         shown = {
-            "demonstration": make_video(self.episode, recording, self._wishes, play.felt),
-            "demonstration_subgoals": play.labels,
+            "demonstration": make_video(
+                self.episode, recording, self._spec, state.video_proprioception
+            ),
+            "demonstration_subgoals": state.video_subgoals,
         }
         return self._observe(), {**self._info(), **shown}
 
@@ -220,23 +196,23 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
 
         Raises:
             InvalidActionError: wrong shape, not numeric or not finite; nothing has moved.
-            ResetNeeded: the episode is over or has not begun.
+            ResetNeeded: the episode is over or has not been reset.
         """
         return self.step_chunk(check_action(action, self._space)[None])
 
     def step_chunk(
         self, actions: ArrayLike
     ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        """Execute several actions, as far as the episode lasts, and observe once at the end.
+        """Execute several actions, stopping if the episode ends, and observe once at the end.
 
-        Like so many calls of `step`, without the pictures that nobody would look at.
+        Equivalent to one call of `step` per action, but renders only the last observation.
 
         Args:
             actions: (n, 8), in the other spaces (n, 7), n >= 1.
 
         Raises:
             InvalidActionError: wrong shape, not numeric or not finite; nothing has moved.
-            ResetNeeded: the episode is over or has not begun.
+            ResetNeeded: the episode is over or has not been reset.
         """
         chunk = check_chunk(actions, self._space)
         if self.status != "ongoing":
@@ -251,96 +227,99 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         return self._observe(), reward, terminated, status == "timeout", self._info()
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Front and wrist picture side by side, uint8 (256, 512, 3); None without render mode."""
+        """Return the front and wrist pictures side by side, uint8 (256, 512, 3).
+
+        Returns None without a render mode.
+        """
         if self.render_mode is None:
             return None
         return np.hstack([self.picture(camera) for camera in CAMERAS])
 
     def picture(self, camera: str) -> NDArray[np.uint8]:
-        """What a camera sees now, uint8 (256, 256, 3).
+        """Return the current picture of a camera, uint8 (256, 256, 3).
 
         Raises:
-            InvalidValueError: there is no such camera, or nothing is drawn in this environment.
+            UnknownNameError: the camera does not exist.
+            InvalidValueError: this environment renders nothing.
         """
         return self.session.world.picture(camera)
 
     def set_frame_hook(self, hook: FrameHook, every: int = 1) -> None:
-        """Call ``hook(env, is_demonstration)`` after every so many control steps.
+        """Call ``hook(env, is_demonstration)`` after every n-th control step and at the end.
 
-        It also makes pictures available where observations hold none; takes effect at the
-        next reset.
+        Also makes pictures available if observations hold none. Takes effect at the next reset.
         """
         self._frame_hook, self._hook_period = hook, every
 
     def close(self) -> None:
-        """Forget the episode being played."""
-        self._play = None
+        """Release the current episode."""
+        self._state = None
 
     @property
-    def _visible(self) -> bool:
+    def _renders(self) -> bool:
         drawn = bool(self.cameras) or self.grounded or self.render_mode is not None
         return drawn or self._frame_hook is not None
 
     @property
-    def _playing(self) -> EpisodeState:
-        if self._play is None:
-            raise gymnasium.error.ResetNeeded("Call reset() before anything else.")
-        return self._play
+    def _current(self) -> EpisodeState:
+        if self._state is None:
+            raise gymnasium.error.ResetNeeded("Call reset() first.")
+        return self._state
 
     def _make_observation_space(self) -> spaces.Dict:
-        said = {"instruction": spaces.Text(LONGEST_INSTRUCTION, charset=PRINTABLE)}
-        fields = {**observation_space(self._wishes), **said}
+        instruction = spaces.Text(MAX_INSTRUCTION_LENGTH, charset=PRINTABLE)
+        fields = {**observation_space(self._spec), "instruction": instruction}
         if self.observe_every is not None:
-            recalled = spaces.Dict({**history_space(self._wishes), **said})
-            fields["history"] = spaces.Sequence(recalled)
+            entry = spaces.Dict({**history_space(self._spec), "instruction": instruction})
+            fields["history"] = spaces.Sequence(entry)
         return spaces.Dict(fields)
 
-    def _show(self, recording: Recording | None) -> Recording:
-        """Begin the episode and play its demonstration."""
-        play = self._play = self._begin()
+    def _play_demonstration(self, recording: Recording | None) -> Recording:
+        """Start the episode and play its demonstration."""
+        state = self._state = self._start_episode()
 
-        def follow(stage: Stage) -> None:
-            self._follow(stage, demonstration=True)
-            play.felt.append(play.senses.feel())
-            play.labels.append(play.label(stage))
+        def record_step(stage: Stage) -> None:
+            self._after_step(stage, demonstration=True)
+            state.video_proprioception.append(state.observation_builder.read_proprioception())
+            state.video_subgoals.append(state.describe_stage(stage))
 
-        return play.session.play_demonstration(follow, recording)
+        return state.session.play_demonstration(record_step, recording)
 
-    def _begin(self) -> EpisodeState:
+    def _start_episode(self) -> EpisodeState:
         session = EpisodeSession(
-            self.episode, visible=self._visible, rendering=self._wishes.rendering
+            self.episode, visible=self._renders, rendering=self._spec.rendering
         )
         world = session.world
         return EpisodeState(
             session,
-            ObservationBuilder(world, self._wishes),
+            ObservationBuilder(world, self._spec),
             make_controller(self._space, world.robot),
             PixelGrounding(world.bodies, world.cameras) if self.grounded else None,
         )
 
     def _execute(self, action: NDArray[np.float64]) -> None:
-        """One checked action, as far as the episode lasts."""
+        """Execute one validated action, stopping if the episode ends."""
         try:
-            for piece in self._playing.controller.pieces(action):
-                for row in piece:
+            for trajectory in self._current.controller.trajectories(action):
+                for row in trajectory:
                     self.session.step(row)
-                    self._playing.steps += 1
-                    self._follow(self.session.judge.published)
-                    self._remember()
+                    self._current.steps += 1
+                    self._after_step(self.session.judge.published)
+                    self._record_history()
                     if self.status != "ongoing":
                         return
         except MotionPlanningError as error:
-            # An outcome, not a fault: it is the policy's choice where to go.
+            # The policy chose a pose that cannot be reached: a failure, not an error.
             self.session.judge.fail(str(error))
 
-    def _follow(self, stage: Stage | None, *, demonstration: bool = False) -> None:
-        """What has to be done after each control step.
+    def _after_step(self, stage: Stage | None, *, demonstration: bool = False) -> None:
+        """Update the state and call the frame hook after a control step.
 
         Args:
-            stage: whose label is current.
-            demonstration: whether it belongs to the video.
+            stage: the stage whose subgoal is published.
+            demonstration: whether the step belongs to the video.
         """
-        self._playing.follow(stage)
+        self._current.after_step(stage)
         self._call_hook(demonstration=demonstration)
 
     def _call_hook(self, *, demonstration: bool) -> None:
@@ -348,29 +327,32 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         if self._frame_hook is not None and (due or self.status != "ongoing"):
             self._frame_hook(self, demonstration)
 
-    def _remember(self) -> None:
-        """Keep an observation from within a chunk, if one is wanted now."""
-        if self.observe_every is not None and self._playing.steps % self.observe_every == 0:
-            recalled = self._playing.senses.recall()
-            self._playing.history.append({**recalled, "instruction": self.instruction.text})
+    def _record_history(self) -> None:
+        """Append an observation to the history after every n-th control step."""
+        if self.observe_every is not None and self._current.steps % self.observe_every == 0:
+            entry = self._current.observation_builder.read_history_entry()
+            self._current.history.append({**entry, "instruction": self.instruction.text})
 
     def _observe(self) -> dict[str, Any]:
-        observation = {**self._playing.senses.read(), "instruction": self.instruction.text}
+        observation = {
+            **self._current.observation_builder.read(),
+            "instruction": self.instruction.text,
+        }
         if self.observe_every is not None:
-            observation["history"] = tuple(self._playing.history)
-            self._playing.history.clear()
+            observation["history"] = tuple(self._current.history)
+            self._current.history.clear()
         return observation
 
     def _info(self) -> dict[str, Any]:
-        play, judge = self._playing, self.session.judge
+        state, judge = self._current, self.session.judge
         info = {
             "status": self.status,
             "cause": judge.cause,
-            "steps": play.steps,
+            "steps": state.steps,
             "elapsed_steps": self.session.world.elapsed,
-            "events": [event.as_dict() for event in play.fresh_events()],
+            "events": [event.as_dict() for event in state.take_new_events()],
             "subgoal": COMPLETED if judge.published is None else plain_subgoal(judge.published),
         }
-        if play.grounding is not None:
-            info["grounded_subgoal"] = play.grounding.text
+        if state.pixel_grounding is not None:
+            info["grounded_subgoal"] = state.pixel_grounding.text
         return info

@@ -1,7 +1,7 @@
-"""Makes the environments known to Gymnasium when it is imported, as Gymnasium's convention is.
+"""Registers every task's environment with Gymnasium when imported.
 
 ``gymnasium.make("roboirg.envs.registration:RoboIRG/PickXtimes-v0", setting="spatial")`` imports
-it.
+this module.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ NAMESPACE = "RoboIRG"
 
 
 def environment_id(task: str) -> str:
-    """The registered id of a task's environment."""
+    """Return the registered id of a task's environment."""
     return f"{NAMESPACE}/{task}-v{ENVIRONMENT_VERSION}"
 
 

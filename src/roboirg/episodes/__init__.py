@@ -1,1 +1,1 @@
-"""The splits: which episodes there are, and fingerprints that notice a change."""
+"""The splits: the episodes of the benchmark, and fingerprints that detect changes."""

@@ -1,4 +1,4 @@
-"""A number that changes whenever an episode does: SHA-256 over its plain data."""
+"""Fingerprint: a SHA-256 hash that changes whenever an episode changes."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from collections.abc import Iterable
 from roboirg.core.episode import Episode
 
 Plain = str | int | float | bool | None | list["Plain"] | dict[str, "Plain"]
-"""What JSON can hold."""
+"""Data that JSON can hold."""
 
 DECIMALS = 9
 
-NOT_COUNTED = frozenset({("Rule", "failure")})
-"""Type and name of fields that say how a failure is called and change no score: two episodes that
-differ in nothing else are the same."""
+NOT_COUNTED = frozenset({("Rule", "cause"), ("Rule", "failure")})
+"""Type and name of fields that describe a failure and change no score: two episodes that differ
+in nothing else are the same."""
 
 
 def fingerprint(episodes: Iterable[Episode]) -> str:
-    """SHA-256, in hexadecimal, over the canonical JSON of whole episodes, in their order.
+    """Return the SHA-256 hash, in hexadecimal, of the canonical JSON of episodes, in their order.
 
-    Floats count to nine decimals: the last bits of a sine differ between mathematics libraries.
+    Floats are rounded to nine decimals: the last bits of a sine differ between math libraries.
     """
     digest = hashlib.sha256()
     for episode in episodes:
@@ -32,10 +32,10 @@ def fingerprint(episodes: Iterable[Episode]) -> str:
 
 
 def plain(value: object) -> Plain:
-    """Dataclasses and named tuples, to any depth, as what JSON can hold; each says its type.
+    """Convert nested dataclasses and named tuples to data for JSON, with their type names.
 
     Raises:
-        TypeError: there is something in it that is no plain data, such as a NumPy number.
+        TypeError: the value contains something else, such as a NumPy number.
     """
     if type(value) is float:
         return round(value, DECIMALS)
@@ -48,7 +48,7 @@ def plain(value: object) -> Plain:
         if not names:
             return [plain(item) for item in value]
     else:
-        raise TypeError(f"{value!r} of {type(value).__name__} is no plain data")
+        raise TypeError(f"{value!r} of {type(value).__name__} is not plain data")
     kind = type(value).__name__
     counted = (name for name in names if (kind, name) not in NOT_COUNTED)
     return {"type": kind, **{name: plain(getattr(value, name)) for name in counted}}

@@ -1,11 +1,10 @@
-"""Train, validation and test episodes: which seeds, which difficulty.
+"""The splits: seed and difficulty of every train, validation and test episode.
 
-An episode's seed is ``base + 100 * index + rejected``, where the base depends on split and task
-and `rejected` counts the seeds that were passed over: those that give no valid scene, those with a
-setting that cannot be expressed, and those that the oracle does not solve. The counts are shipped
-in ``splits.json``, with a fingerprint of every task's episodes that tells when scenes have
-changed; ``roboirg build-splits`` finds them anew. Difficulties repeat easy, easy, medium, hard
-(RoboMME's cycle).
+The seed of an episode is ``base + 100 * index + rejected``. The base depends on split and task;
+`rejected` is the number of seeds passed over: those without a valid scene, those with a setting
+that cannot be expressed, and those that the oracle does not solve. ``splits.json`` holds these
+numbers, with a fingerprint of the episodes of each task that detects changes of scenes;
+``roboirg build-splits`` writes it. Difficulties repeat easy, easy, medium, hard, as in RoboMME.
 """
 
 from __future__ import annotations
@@ -29,19 +28,19 @@ SIZES: Mapping[Split, int] = {"train": 100, "val": 50, "test": 50}
 CYCLE: tuple[Difficulty, ...] = ("easy", "easy", "medium", "hard")
 SEED_STRIDE = 100
 MAX_REJECTED = SEED_STRIDE - 1
-"""Seeds that may be passed over for an episode; the next one is the next episode's first.
+"""Limit of seeds passed over for an episode; the seed after that belongs to the next episode.
 
-VideoPlaceOrder needs many: on about three of four tables with three cubes not all fits.
+VideoPlaceOrder needs many: about three of four of its tables with three cubes have no valid scene.
 """
 SPLITS_FILE = "splits.json"
 
 
 class TaskSplits(NamedTuple):
-    """What is shipped about the splits of a task.
+    """Shipped data of the splits of a task.
 
     Attributes:
-        sha256: of all its episodes, see `roboirg.episodes.fingerprint`.
-        passed_over: seeds that were, by episode (``"train/3"``); episodes with none are left out.
+        sha256: fingerprint of all its episodes, see `roboirg.episodes.fingerprint`.
+        passed_over: numbers of seeds passed over, by episode (``"train/3"``), without zeros.
     """
 
     sha256: str
@@ -49,29 +48,29 @@ class TaskSplits(NamedTuple):
 
 
 def base_seed(task: Task, split: Split) -> int:
-    """Seed of the first slot of a split."""
+    """Return the first seed of a split."""
     if split == "train":
         return 1000 * task.code
     return (1_000_000 if split == "val" else 500_000) + 10_000 * task.code
 
 
 def slot_seed(task: Task, split: Split, index: int) -> int:
-    """The first seed that is tried for an episode."""
+    """Return the first seed to try for an episode."""
     return base_seed(task, split) + SEED_STRIDE * index
 
 
 def slot_difficulty(index: int) -> Difficulty:
-    """The difficulty of an episode of any split."""
+    """Return the difficulty of an episode; all splits share the cycle."""
     return CYCLE[index % len(CYCLE)]
 
 
 def slot_key(split: Split, index: int) -> str:
-    """The name of an episode among those of its task, for example ``"test/3"``."""
+    """Return the name of an episode among those of its task, for example ``"test/3"``."""
     return f"{split}/{index}"
 
 
 def check_split(split: str) -> Split:
-    """The name as a split.
+    """Return the name as a split.
 
     Raises:
         UnknownNameError: there is no such split.
@@ -85,7 +84,7 @@ def check_split(split: str) -> Split:
 def make_episode(
     task_name: str, seed: int, difficulty: Difficulty, split: Split = "test", index: int = 0
 ) -> Episode:
-    """The episode that a seed gives, whether or not it belongs to a split.
+    """Make the episode of a seed, whether or not it belongs to a split.
 
     Raises:
         UnknownNameError: there is no such task.
@@ -108,21 +107,21 @@ def make_episode(
 
 @functools.cache
 def shipped_splits() -> Mapping[str, TaskSplits]:
-    """What is shipped about the splits, by task."""
+    """Return the shipped data of the splits, by task."""
     text = resources.files("roboirg.episodes").joinpath(SPLITS_FILE).read_text(encoding="utf-8")
     return {task: TaskSplits(**entry) for task, entry in json.loads(text).items()}
 
 
 def splits_text(splits: Mapping[str, TaskSplits]) -> str:
-    """The text of ``splits.json``: JSON, a line for each task."""
+    """Return the text of ``splits.json``: JSON with a line for each task."""
     lines = [f"{json.dumps(task)}: {json.dumps(entry._asdict())}" for task, entry in splits.items()]
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
 def get_episode(task_name: str, split: str, index: SupportsIndex) -> Episode:
-    """Episode number `index` (from 0) of a split of a task.
+    """Return episode number `index` (from 0) of a split of a task.
 
-    A task that is not in ``splits.json`` has the episodes of the first seeds.
+    A task that is not in ``splits.json`` uses the first seed of each episode.
 
     Raises:
         UnknownNameError: there is no such task or split.
@@ -133,7 +132,7 @@ def get_episode(task_name: str, split: str, index: SupportsIndex) -> Episode:
 
 
 def fingerprint_of(task_name: str, passed_over: Mapping[str, int]) -> str:
-    """The fingerprint of all episodes of a task, given how many seeds each passed over.
+    """Return the fingerprint of all episodes of a task, given the numbers of seeds passed over.
 
     Raises:
         SceneRejectedError: one of the seeds yields no valid scene.

@@ -1,1 +1,1 @@
-"""Plans, rollouts, records: from a command line to a file that survives."""
+"""Evaluation: plans, rollouts and the runner that stores their records."""

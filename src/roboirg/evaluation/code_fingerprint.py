@@ -1,4 +1,4 @@
-"""Which code played: a fingerprint of the installed package."""
+"""Fingerprint of the installed package, for the records."""
 
 from __future__ import annotations
 
@@ -6,18 +6,15 @@ import functools
 import hashlib
 from pathlib import Path
 
-import roboirg
-
-FINGERPRINT_LENGTH = 12
-"""Hexadecimal digits."""
+from roboirg.util.short_hash import DIGITS
 
 
 @functools.cache
 def code_fingerprint() -> str:
-    """SHA-256 over the names and bytes of the package's Python files, shortened."""
+    """Return a shortened SHA-256 of the names and bytes of the package's Python files."""
     digest = hashlib.sha256()
-    root = Path(roboirg.__file__).parent
+    root = Path(__file__).parents[1]
     for path in sorted(root.rglob("*.py")):
         digest.update(f"{path.relative_to(root).as_posix()}\0".encode())
         digest.update(path.read_bytes() + b"\0")
-    return digest.hexdigest()[:FINGERPRINT_LENGTH]
+    return digest.hexdigest()[:DIGITS]

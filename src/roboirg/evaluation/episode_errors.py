@@ -1,4 +1,4 @@
-"""Whose fault it is that an episode cannot be judged."""
+"""Errors that end an episode without a verdict, and what caused them."""
 
 from __future__ import annotations
 
@@ -18,61 +18,62 @@ from roboirg.records.record import ErrorKind
 
 ErrorSource = Literal["policy", "environment"]
 
-LONGEST_CAUSE = 400
+MAX_CAUSE_LENGTH = 400
 
 
 class EpisodeError(Exception):
-    """Something other than the policy's skill ended the episode.
+    """An error ended the episode before it could be judged.
 
     Attributes:
-        kind: whose fault it was.
-        cause: the same with what happened, in one line.
+        kind: kind of error.
+        cause: kind and message in one line.
         details: the traceback.
     """
 
-    def __init__(self, kind: ErrorKind, what: str, details: str) -> None:
-        super().__init__(what)
+    def __init__(self, kind: ErrorKind, message: str, details: str) -> None:
+        super().__init__(message)
         self.kind = kind
-        self.cause = format_cause(kind, what)
+        self.cause = format_cause(kind, message)
         self.details = details
 
 
-def format_cause(kind: ErrorKind, what: str) -> str:
-    """A record's cause: who is to blame, and for what."""
-    return f"{kind.replace('_', ' ')}: {what}"
+def format_cause(kind: ErrorKind, message: str) -> str:
+    """Return a record's cause: kind of error and message."""
+    return f"{kind.replace('_', ' ')}: {message}"
 
 
 @contextmanager
-def attribute_errors(whom: ErrorSource) -> Iterator[None]:
-    """Turn what is raised inside into a fault.
+def attribute_errors(source: ErrorSource) -> Iterator[None]:
+    """Turn every exception raised inside into an `EpisodeError` of this source.
 
     Raises:
-        Fault: whatever was raised.
-        RenderDeviceError: would end every other episode just the same, so the run stops.
+        EpisodeError: an exception was raised.
+        RenderDeviceError: unchanged, because every other episode would end the same way.
         MissingDependencyError: likewise.
     """
     try:
         yield
     except (RenderDeviceError, MissingDependencyError, EpisodeError):
         raise
-    except (Exception, SystemExit) as error:  # the boundary: anything is possible in there
-        raise EpisodeError(_kind(whom, error), one_line(error), traceback.format_exc()) from error
+    except (Exception, SystemExit) as error:  # policies and simulators may raise anything
+        kind = _error_kind(source, error)
+        raise EpisodeError(kind, one_line(error), traceback.format_exc()) from error
 
 
-def _kind(whom: ErrorSource, error: BaseException) -> ErrorKind:
+def _error_kind(source: ErrorSource, error: BaseException) -> ErrorKind:
     if isinstance(error, InvalidActionError):
         return "invalid_action"
-    if whom == "policy":
-        # A policy may be a client of something far away.
+    if source == "policy":
+        # A policy may be the client of a remote server.
         if isinstance(error, TimeoutError):
             return "timeout"
         if isinstance(error, ConnectionError):
             return "connection"
-    return whom
+    return source
 
 
 def one_line(error: BaseException) -> str:
-    """An exception as one line that is the same in every process."""
+    """Return an exception as one line that is the same in every process."""
     words = str(error) if isinstance(error, RoboIRGError) else f"{type(error).__name__}: {error}"
     words = re.sub(r"0x[0-9a-fA-F]{6,}", "0x…", " ".join(words.split())).rstrip(": ")
-    return words.encode("utf-8", "replace").decode()[:LONGEST_CAUSE]
+    return words.encode("utf-8", "replace").decode()[:MAX_CAUSE_LENGTH]

@@ -1,4 +1,4 @@
-"""What a plan amounts to, before it is played."""
+"""Estimate how long a plan takes before it is played."""
 
 from __future__ import annotations
 
@@ -9,34 +9,34 @@ from typing import NamedTuple
 
 from roboirg.records.record import Job
 from roboirg.records.record_codec import RecordIndexEntry
+from roboirg.util.plurals import counted
 
 ASSUMED_STEPS = 450
-"""Control steps of an episode if nothing is known: the oracle's mean over the test split, 236,
-about doubled, since policies are slower and some use up their limit."""
+"""Assumed control steps of an episode: the oracle's mean over the test split, 236, about doubled,
+because policies are slower and some use up their limit."""
 STEP_S = 0.002
-"""Seconds of a control step with its share of a pair of pictures every 16 steps, on a core of a
-laptop (docs/performance.md); the policy's own time is not known."""
+"""Seconds per control step on one laptop core, with two pictures every 16 steps
+(docs/performance.md); the policy's own time is unknown."""
 
 
 class Estimate(NamedTuple):
-    """How long a plan takes.
+    """Estimated time of a plan.
 
     Attributes:
-        episodes: to be played.
-        seconds: on all workers together, side by side.
-        most_steps: control steps if every episode used up its limit.
-        is_measured: whether it rests on episodes that have been played, else on a simulator whose
-            policies take no time.
+        episodes: number of episodes to play.
+        seconds: wall-clock time with all workers in parallel.
+        max_steps: control steps if every episode uses up its limit.
+        is_measured: whether it is based on stored episodes; otherwise policies take no time in it.
     """
 
     episodes: int
     seconds: float
-    most_steps: int
+    max_steps: int
     is_measured: bool
 
 
 def cell_sizes(jobs: Iterable[Job]) -> Mapping[tuple[str, str], Mapping[str, Counter[str]]]:
-    """How many episodes there are by policy and task, in these by setting, in these by form."""
+    """Return the number of episodes by (policy, task), then by setting, then by form."""
     sizes: defaultdict[tuple[str, str], defaultdict[str, Counter[str]]]
     sizes = defaultdict(lambda: defaultdict(Counter))
     for job in jobs:
@@ -45,50 +45,49 @@ def cell_sizes(jobs: Iterable[Job]) -> Mapping[tuple[str, str], Mapping[str, Cou
 
 
 def estimate(jobs: Iterable[Job], played: Iterable[RecordIndexEntry], workers: int) -> Estimate:
-    """How long jobs take.
+    """Estimate how long jobs take.
 
     Args:
-        jobs: to be played.
-        played: episodes whose durations are known; those of the same policy and task count most.
-        workers: how many processes.
+        jobs: jobs to play.
+        played: episodes with known durations; those of the same policy and task are preferred.
+        workers: number of processes.
     """
-    durations = _Durations(played)
+    durations = _MeanDurations(played)
     total, known, steps, count = 0.0, True, 0, 0
     for job in jobs:
-        duration = durations.of(job)
+        duration = durations.mean(job)
         known = known and duration is not None
-        total += _assumed(job) if duration is None else duration
+        total += _assumed_duration(job) if duration is None else duration
         steps += job.max_steps
         count += 1
     return Estimate(count, total / max(workers, 1), steps, known and count > 0)
 
 
 def estimate_text(found: Estimate, planned: int, workers: int) -> tuple[str, ...]:
-    """An estimate as lines to read."""
-    lines = [f"{planned} episodes, {planned - found.episodes} of them are there already."]
+    """Return an estimate as lines of text."""
+    lines = [f"{counted(planned, 'episode')}, {planned - found.episodes:,} already stored."]
     if found.episodes:
         basis = (
-            "judging by the episodes that are there"
+            "based on the stored episodes"
             if found.is_measured
-            else f"at {ASSUMED_STEPS} steps an episode, without the policy's own time"
+            else f"assuming {ASSUMED_STEPS} steps per episode and no time for the policy"
         )
         lines.append(
-            f"The other {found.episodes} take about {_clock(found.seconds)} on {workers} "
-            f"worker{'' if workers == 1 else 's'}, {basis}; at most {found.most_steps} control "
-            "steps."
+            f"The other {found.episodes:,} take about {_format_duration(found.seconds)} on "
+            f"{counted(workers, 'worker')}, {basis}; at most {found.max_steps:,} control steps."
         )
     return tuple(lines)
 
 
-def _clock(seconds: float) -> str:
+def _format_duration(seconds: float) -> str:
     minutes = round(seconds / 60)
     if minutes < 1:
         return f"{max(round(seconds), 1)} s"
     return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"  # noqa: PLR2004
 
 
-class _Durations:
-    """Mean durations of episodes that have been played."""
+class _MeanDurations:
+    """Mean durations of stored episodes."""
 
     def __init__(self, played: Iterable[RecordIndexEntry]) -> None:
         self._known: defaultdict[tuple[str, str | None], list[float]] = defaultdict(list)
@@ -97,13 +96,13 @@ class _Durations:
                 for key in ((one.policy, one.task), (one.policy, None)):
                     self._known[key].append(one.duration_s)
 
-    def of(self, job: Job) -> float | None:
-        """Of the same policy and task, or of the same policy; None if it never played."""
+    def mean(self, job: Job) -> float | None:
+        """Return the mean of the same policy and task, else of the same policy, else None."""
         for key in ((job.policy, job.task), (job.policy, None)):
             if key in self._known:
                 return fmean(self._known[key])
         return None
 
 
-def _assumed(job: Job) -> float:
+def _assumed_duration(job: Job) -> float:
     return STEP_S * min(job.max_steps, ASSUMED_STEPS)

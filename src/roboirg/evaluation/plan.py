@@ -1,8 +1,7 @@
-"""What is to be played, checked before anything starts."""
+"""Plans: which episodes to play, checked before anything starts."""
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Literal, get_args
@@ -17,6 +16,7 @@ from roboirg.core.instruction_options import (
     DEFAULT_DISTRACTOR,
     DEFAULT_DISTRACTORS,
     DEFAULT_FRAME,
+    InstructionOptions,
 )
 from roboirg.core.observations import (
     DemonstrationFrames,
@@ -25,18 +25,20 @@ from roboirg.core.observations import (
 )
 from roboirg.episodes import splits
 from roboirg.evaluation.plan_parsing import (
-    WHOLE,
+    ALL,
+    means_all,
+    name_and_spec,
     parse_episodes,
     parse_names,
     parse_numbers,
     parse_policies,
     parse_stage_sets,
-    says_all,
-    split_name,
 )
 from roboirg.language.instruction import FORMS, Instruction
+from roboirg.language.settings import all_settings
 from roboirg.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, ERROR_KINDS, ErrorKind, Job
-from roboirg.records.store import write_atomically
+from roboirg.util.atomic_write import write_atomically
+from roboirg.util.short_hash import short_hash
 
 PLAN_FILE = "plan.json"
 
@@ -46,37 +48,35 @@ VIDEO_MODES: tuple[VideoMode, ...] = get_args(VideoMode)
 MESHES = ("faithful", "light")
 
 RETRYABLE: tuple[ErrorKind, ...] = ("connection", "environment", "infrastructure")
-"""Errors that may be gone when the episode is tried again."""
-
-FINGERPRINT_LENGTH = 12
-"""Hexadecimal digits."""
+"""Kinds of errors that may not occur again when the episode is retried."""
 
 
 class Plan(BaseModel):
-    """Which policies play which episodes, told how.
+    """Which policies play which episodes, with which instructions.
 
     Attributes:
-        policies: built-in names, ``package.module:Class``, or addresses, each perhaps with a name
-            of its own before it, ``NAME=SPEC``.
-        tasks: names.
-        settings: names, or ``"all"`` for those in which each episode can be told.
+        policies: built-in names, ``package.module:Class``, or addresses; each may be given a name
+            of its own as ``NAME=SPEC``.
+        tasks: names of tasks.
+        settings: names, or ``"all"`` for every setting that can express the episode.
         forms: implicit, resolved or both.
         split: train, val or test.
         episodes: 0-based positions in the split.
-        policy_seeds: each plays every episode.
-        stages: of the discourse, for the contextual setting; every set of them is played.
-        distractor: for the contextual setting.
-        distractors: how many of them are spoken in the contextual setting.
-        frame: for the spatial setting.
+        policy_seeds: every seed plays every episode.
+        stages: sets of stages for settings that read them; every set is played.
+        distractor: kind of distractor, for settings that read it.
+        distractors: number of distractors, for settings that read it.
+        frame: frame of reference, for settings that read it.
         max_steps: the policy's limit, control steps.
-        actions: the action space to be played in; None for each policy's own.
-        demonstration_frames: which pictures of the video there are; None as each policy says.
-        observe_every: after how many control steps there is a picture; None as each policy says.
+        actions: required action space; None for each policy's own.
+        demonstration_frames: which frames of the video policies get; None for each policy's choice.
+        observe_every: control steps between observations; None for each policy's choice.
         meshes: faithful or light.
-        video: which episodes are filmed. Not part of a record's identity, like all that follows.
+        video: which episodes get a video. This and all that follows is not part of a record's
+            identity.
         policy_timeout_s: seconds that one call of a policy may take.
         episode_timeout_s: seconds that an episode may take.
-        tries: how often an episode is tried that ends in one of the errors `retry_on`.
+        tries: how often an episode is played if it ends in an error of a kind in `retry_on`.
         retry_on: kinds of errors.
     """
 
@@ -106,13 +106,13 @@ class Plan(BaseModel):
 
     @property
     def specs(self) -> dict[str, str]:
-        """What makes each policy, by its name.
+        """The spec of each policy by name.
 
         Raises:
             InvalidValueError: two policies have the same name.
         """
         specs: dict[str, str] = {}
-        for name, spec in map(split_name, self.policies):
+        for name, spec in map(name_and_spec, self.policies):
             if specs.setdefault(name, spec) != spec:
                 raise InvalidValueError(
                     f"Two policies are named {name!r}: {specs[name]} and {spec}."
@@ -121,14 +121,15 @@ class Plan(BaseModel):
 
     @property
     def fingerprint(self) -> str:
-        """Tells this plan from every other."""
-        return hashlib.sha256(self.model_dump_json().encode()).hexdigest()[:FINGERPRINT_LENGTH]
+        """Hash of all fields."""
+        return short_hash(self.model_dump_json())
 
     def checked(self) -> Plan:
-        """This plan, if all of it can be played.
+        """Return this plan if all of it can be played.
 
         Raises:
-            UnknownNameError: a policy, task, setting, … does not exist; names the nearest.
+            UnknownNameError: a policy, task, setting, … does not exist; the message suggests the
+                nearest.
             InvalidValueError: a number is out of range, or a task lacks a setting.
         """
         for spec in self.specs.values():
@@ -138,13 +139,12 @@ class Plan(BaseModel):
             for index in (min(self.episodes), max(self.episodes)):
                 splits.get_episode(task, self.split, index)
             self._check_settings(task)
-        for said in self._distinct_words():
-            # Whether it can be said so is the language's to judge.
-            instruct_job(said)
+        for job in self._instruction_jobs():
+            instruct_job(job)  # raises if the options cannot express the episode
         return self
 
     def jobs(self) -> tuple[Job, ...]:
-        """Every episode to play, once: by policy, task, episode, setting, form, seed."""
+        """Return every job, ordered by policy, task, episode, setting, form, stages and seed."""
         return tuple(
             job
             for policy in self.specs.items()
@@ -154,7 +154,7 @@ class Plan(BaseModel):
         )
 
     def settings_of(self, task: str, episode: int) -> tuple[str, ...]:
-        """The settings in which an episode is to be played."""
+        """Return the settings in which an episode is played."""
         if self.settings == "all":
             return language.expressible(splits.get_episode(task, self.split, episode))
         return self.settings
@@ -163,39 +163,45 @@ class Plan(BaseModel):
         self, policy: tuple[str, str], task: str, episode: int, *, seeds: tuple[int, ...]
     ) -> Iterator[Job]:
         name, spec = policy
-        # Options that say nothing in a setting keep their defaults there: the same words are
-        # the same job, and are played once.
         for setting in self.settings_of(task, episode):
-            contextual, spatial = setting == "contextual", setting == "spatial"
-            for form in self.forms if setting != "explicit" else ("implicit",):
-                for stages in self.stages if contextual else (ALL_STAGES,):
-                    job = Job(
-                        policy=name,
-                        task=task,
-                        split=self.split,
-                        episode=episode,
-                        setting=setting,
-                        form=form,
-                        stages=stages,
-                        distractor=self.distractor if contextual else DEFAULT_DISTRACTOR,
-                        distractors=self.distractors if contextual else DEFAULT_DISTRACTORS,
-                        frame=self.frame if spatial else DEFAULT_FRAME,
-                        policy_seed=seeds[0],
-                        max_steps=self.max_steps,
-                        actions=self.actions,
-                        demonstration_frames=self.demonstration_frames,
-                        observe_every=self.observe_every,
-                        meshes=self.meshes,
-                        spec=None if spec == name else spec,
-                    )
-                    yield job
-                    # Copying is quicker, and there may be very many.
-                    for seed in seeds[1:]:
-                        yield job.model_copy(update={"policy_seed": seed})
+            for options in self._options_of(setting):
+                job = Job(
+                    policy=name,
+                    task=task,
+                    split=self.split,
+                    episode=episode,
+                    **options._asdict(),
+                    policy_seed=seeds[0],
+                    max_steps=self.max_steps,
+                    actions=self.actions,
+                    demonstration_frames=self.demonstration_frames,
+                    observe_every=self.observe_every,
+                    meshes=self.meshes,
+                    spec=None if spec == name else spec,
+                )
+                yield job
+                # Copying is faster, and there may be very many.
+                for seed in seeds[1:]:
+                    yield job.model_copy(update={"policy_seed": seed})
 
-    def _distinct_words(self) -> Iterator[Job]:
-        """One job for each way of telling that could turn out not to be possible."""
-        # In all settings and in the usual way an episode is told only as it can be.
+    def _options_of(self, setting: str) -> Iterator[InstructionOptions]:
+        """Yield the instruction options to play in a setting.
+
+        An option that the setting does not read keeps its default, so that equal words are one job.
+        """
+        rule, usual = all_settings()[setting], InstructionOptions(setting)
+        chosen = {
+            option: getattr(self, option)
+            for option in ("distractor", "distractors", "frame")
+            if option in rule.reads
+        }
+        for form in self.forms if rule.implicit else (usual.form,):
+            for stages in self.stages if "stages" in rule.reads else (usual.stages,):
+                yield usual._replace(form=form, stages=stages, **chosen)
+
+    def _instruction_jobs(self) -> Iterator[Job]:
+        """Yield one job for each instruction that the language may not be able to express."""
+        # All settings with the default frame are only those that can express the episode.
         usual = self.settings == "all" and self.frame == DEFAULT_FRAME
         for task in self.tasks:
             for episode in self.episodes[:1] if usual else self.episodes:
@@ -233,8 +239,8 @@ class Plan(BaseModel):
 def make_plan(
     policies: Iterable[str],
     *,
-    tasks: str = WHOLE,
-    settings: str = WHOLE,
+    tasks: str = ALL,
+    settings: str = ALL,
     forms: str = "implicit",
     episodes: str = "4",
     policy_seeds: str = "0",
@@ -242,21 +248,21 @@ def make_plan(
     retry_on: str = ",".join(RETRYABLE),
     **options: object,
 ) -> Plan:
-    """A checked plan from words as they are typed.
+    """Return a checked plan from options as typed on the command line.
 
     Args:
         policies: names or addresses; names may be separated by commas.
-        tasks: names separated by commas, or ``all``, alone or among them.
-        settings: names separated by commas, or ``all``, alone or among them.
+        tasks: names separated by commas; ``all`` anywhere selects all.
+        settings: names separated by commas; ``all`` anywhere selects all.
         forms: names separated by commas.
         episodes: ``4`` for the first four, or a list such as ``0,3,5-9``.
         policy_seeds: a list of numbers.
-        stages: a list of numbers, or several with semicolons.
+        stages: a list of numbers, or several lists separated by semicolons.
         retry_on: kinds of errors separated by commas, or ``none``.
         **options: other fields of `Plan`.
 
     Raises:
-        UnknownNameError: something does not exist; names the nearest.
+        UnknownNameError: a name does not exist; the message suggests the nearest.
         InvalidValueError: a number or combination is out of range.
     """
     video, split = options.get("video", "off"), str(options.get("split", "test"))
@@ -266,7 +272,7 @@ def make_plan(
         plan = Plan(
             policies=parse_policies(policies),
             tasks=_task_names(tasks),
-            settings="all" if says_all(settings) else parse_names("setting", settings),
+            settings="all" if means_all(settings) else parse_names("setting", settings),
             forms=parse_names("form", forms),
             episodes=parse_episodes(episodes, split),
             policy_seeds=parse_numbers("policy seed", policy_seeds),
@@ -282,12 +288,12 @@ def make_plan(
 
 
 def write_plan(plan: Plan, folder: Path) -> None:
-    """Keep the newest plan of a folder beside its records."""
+    """Write the newest plan of a folder beside its records."""
     write_atomically(folder / PLAN_FILE, plan.model_dump_json(indent=2) + "\n")
 
 
 def read_plan(folder: Path) -> Plan | None:
-    """The newest plan of a folder; None if it has none that this version understands."""
+    """Return the newest plan of a folder; None if it is missing or of an unknown version."""
     try:
         return Plan.model_validate_json((folder / PLAN_FILE).read_bytes())
     except (OSError, ValidationError):
@@ -295,20 +301,13 @@ def read_plan(folder: Path) -> Plan | None:
 
 
 def instruct_job(job: Job) -> Instruction:
-    """The instruction of a job.
+    """Return the instruction of a job.
 
     Raises:
-        InvalidValueError: it cannot be said so.
+        InvalidValueError: the setting and options cannot express the episode.
     """
-    return language.instruct(
-        splits.get_episode(job.task, job.split, job.episode),
-        job.setting,
-        job.form,
-        stages=job.stages,
-        distractor=job.distractor,
-        distractors=job.distractors,
-        frame=job.frame,
-    )
+    episode = splits.get_episode(job.task, job.split, job.episode)
+    return language.instruct_with(episode, job.options)
 
 
 def _task_names(text: str) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Plans as YAML files, and those that come with the package."""
+"""Read plans from YAML files and from the package."""
 
 from __future__ import annotations
 
@@ -28,37 +28,37 @@ _LISTS = frozenset(
         "retry_on",
     }
 )
-"""Keys whose values are typed as lists on the command line."""
+"""Keys whose values are lists on the command line."""
 
 
 def named_plans() -> tuple[str, ...]:
-    """The names of the plans that come with the package."""
+    """Return the names of the plans that come with the package."""
     names = (Path(file.name) for file in _folder().iterdir())
     return tuple(sorted(name.stem for name in names if name.suffix in _SUFFIXES))
 
 
 def read_plan_file(name: str) -> dict[str, Any]:
-    """A plan file as options of `make_plan`.
+    """Read a plan file as options of `make_plan`.
 
-    Lists become words as they are typed on the command line: ``[1, 5]`` is ``"1,5"`` and
-    ``[[1, 5], [1, 2, 5]]`` is ``"1,5;1,2,5"``.
+    Lists become text as typed on the command line: ``[1, 5]`` becomes ``"1,5"``, and
+    ``[[1, 5], [1, 2, 5]]`` becomes ``"1,5;1,2,5"``.
 
     Args:
-        name: of a plan that comes with the package, or path of a YAML file.
+        name: name of a plan that comes with the package, or path of a YAML file.
 
     Raises:
-        UnknownNameError: there is no plan of this name, or it has a key that no plan has.
-        InvalidValueError: the file cannot be read, or is no mapping.
+        UnknownNameError: there is no such plan, or it has an unknown key.
+        InvalidValueError: the file cannot be read or is not a mapping.
     """
     data = _load(name)
     if not isinstance(data, Mapping):
         raise InvalidValueError(
-            f"The plan {name!r} is of type {type(data).__name__}; it has to be a mapping such as "
+            f"The plan {name!r} is of type {type(data).__name__}; it must be a mapping such as "
             "'tasks: all'."
         )
     for key in data:
         if key not in Plan.model_fields:
-            raise UnknownNameError(f"key of a plan (in {name!r})", key, Plan.model_fields)
+            raise UnknownNameError(f"plan key (in {name!r})", key, Plan.model_fields)
     return {key: _as_typed(key, value) for key, value in data.items() if value is not None}
 
 
@@ -69,7 +69,7 @@ def _load(name: str) -> object:
         raise InvalidValueError(f"The plan {name!r} cannot be read: {error}.") from error
     except yaml.YAMLError as error:
         words = " ".join(str(error).split())
-        raise InvalidValueError(f"The plan {name!r} is no YAML: {words}.") from error
+        raise InvalidValueError(f"The plan {name!r} is not valid YAML: {words}.") from error
 
 
 def _find(name: str) -> Path | Traversable:
@@ -87,7 +87,7 @@ def _folder() -> Traversable:
 
 def _as_typed(key: str, value: object) -> object:
     if value is False:
-        return "off"  # as YAML 1.1 reads the word
+        return "off"  # YAML 1.1 reads the word as false
     if key not in _LISTS:
         return value
     if not isinstance(value, list):
@@ -97,5 +97,5 @@ def _as_typed(key: str, value: object) -> object:
     if key == "stages" and any(isinstance(one, list) for one in value):
         return ";".join(str(_as_typed(key, one)) for one in value)
     typed = ",".join(map(str, value))
-    # Alone, a number of episodes would be that of the first ones.
+    # A single number without a comma would mean the first n episodes.
     return f"{typed}," if key == "episodes" and len(value) == 1 else typed

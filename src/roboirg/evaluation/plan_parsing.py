@@ -1,4 +1,4 @@
-"""Lists and numbers as they are typed on a command line or in a plan file."""
+"""Parse names, numbers and ranges from a command line or a plan file."""
 
 from __future__ import annotations
 
@@ -9,17 +9,21 @@ from roboirg import language
 from roboirg.core.errors import InvalidValueError
 from roboirg.episodes import splits
 
-WHOLE = "all"
-"""The word for all of them."""
+ALL = "all"
+"""The name that selects everything."""
 
-_MOST_NUMBERS = 10_000
-_MOST_DIGITS = 18
-_LONGEST_WORD = 40
+_MAX_NUMBERS = 10_000
+_MAX_DIGITS = 18
+_MAX_QUOTED_LENGTH = 40
 _NUMBERS_HINT = "write numbers and ranges such as 0,3,5-9"
 
 
 def parse_names(kind: str, text: str) -> tuple[str, ...]:
-    """Names separated by commas, each once.
+    """Parse names separated by commas; repeated names count once.
+
+    Args:
+        kind: what the names are, for the error.
+        text: as typed.
 
     Raises:
         InvalidValueError: there is none.
@@ -31,12 +35,12 @@ def parse_names(kind: str, text: str) -> tuple[str, ...]:
 
 
 def parse_policies(specs: Iterable[str]) -> tuple[str, ...]:
-    """Policies, each once; several names may stand in one text, separated by commas.
+    """Parse policies; one text may hold several names separated by commas.
 
     Raises:
         InvalidValueError: there is none.
     """
-    # Addresses and their options have commas of their own.
+    # Addresses and their options may contain commas.
     parts = (
         (spec.strip(),) if "://" in spec or "?" in spec else parse_names("policy", spec)
         for spec in specs
@@ -47,23 +51,23 @@ def parse_policies(specs: Iterable[str]) -> tuple[str, ...]:
     return policies
 
 
-def split_name(policy: str) -> tuple[str, str]:
-    """A policy's name and its spec; without a name of its own, that is the spec."""
+def name_and_spec(policy: str) -> tuple[str, str]:
+    """Split ``NAME=SPEC`` into name and spec; without a name, the spec is the name."""
     found = re.fullmatch(r"([\w.+ -]+)=(.+)", policy)
     return (policy, policy) if found is None else (found[1].strip(), found[2].strip())
 
 
-def says_all(text: str) -> bool:
-    """Whether a list of names is, or contains, the word for all of them."""
-    return WHOLE in (word.strip().lower() for word in text.split(","))
+def means_all(text: str) -> bool:
+    """Return whether a list of names contains ``all``."""
+    return ALL in (word.strip().lower() for word in text.split(","))
 
 
 def parse_episodes(text: str, split: str = "test") -> tuple[int, ...]:
-    """``4`` is the first four episodes; with a comma or a dash it is a list of positions.
+    """Parse episodes: ``4`` is the first four; with a comma or a dash it is a list of positions.
 
     Raises:
         UnknownNameError: there is no such split.
-        InvalidValueError: it is neither, no episode at all, or the split has fewer.
+        InvalidValueError: the text is neither a number nor a list, or the split has fewer episodes.
     """
     size = splits.SIZES[splits.check_split(split)]
     found = re.fullmatch(r"\s*(-?)(\d+)\s*", text)
@@ -86,29 +90,29 @@ def parse_episodes(text: str, split: str = "test") -> tuple[int, ...]:
 
 
 def parse_stages(text: str) -> tuple[int, ...]:
-    """Stages of the contextual setting, such as ``1,5``.
+    """Parse stages of the contextual setting, such as ``1,5``.
 
     Raises:
-        InvalidValueError: it is no list of numbers.
+        InvalidValueError: the text is not a list of numbers.
     """
     sets = "; ".join(",".join(map(str, stages)) for stages in language.STAGE_SETS)
-    return _union(_parse_ranges("list of stages", text, f"the four are {sets}"))
+    return _union(_parse_ranges("list of stages", text, f"the possible lists are {sets}"))
 
 
 def parse_stage_sets(text: str) -> tuple[tuple[int, ...], ...]:
-    """Several lists of stages, such as ``1,5; 1-5``, each once.
+    """Parse several lists of stages, such as ``1,5; 1-5``.
 
     Raises:
-        InvalidValueError: one of them is no list of numbers.
+        InvalidValueError: one of them is not a list of numbers.
     """
     return tuple(dict.fromkeys(map(parse_stages, text.split(";"))))
 
 
 def parse_numbers(kind: str, text: str) -> tuple[int, ...]:
-    """Numbers and ranges separated by commas, such as ``0,3,5-9``, each once, in order.
+    """Parse numbers and ranges separated by commas, such as ``0,3,5-9``.
 
     Raises:
-        InvalidValueError: it is something else, or a very long list.
+        InvalidValueError: the text is something else, or a very long list.
     """
     return _union(_parse_ranges(kind, text, _NUMBERS_HINT))
 
@@ -119,7 +123,7 @@ def _parse_ranges(kind: str, text: str, hint: str) -> list[range]:
         found = re.fullmatch(r"(\d+)(?:\s*-\s*(\d+))?", part)
         first, last = (-1, -2) if found is None else _ends(kind, found[1], found[2])
         if last < first:
-            raise InvalidValueError(f"{_short(part)!r} is no {kind}; {hint}.")
+            raise InvalidValueError(f"{_shorten(part)!r} is not a valid {kind}; {hint}.")
         ranges.append(range(first, last + 1))
     return ranges
 
@@ -129,22 +133,22 @@ def _ends(kind: str, first: str, last: str | None) -> tuple[int, int]:
 
 
 def _number(kind: str, digits: str) -> int:
-    if len(digits) > _MOST_DIGITS:
+    if len(digits) > _MAX_DIGITS:
         raise InvalidValueError(
-            f"The {kind} {_short(digits)} has {len(digits)} digits; "
-            f"it must have at most {_MOST_DIGITS}."
+            f"The {kind} {_shorten(digits)} has {len(digits)} digits; "
+            f"it must have at most {_MAX_DIGITS}."
         )
     return int(digits)
 
 
 def _union(ranges: Sequence[range]) -> tuple[int, ...]:
     count = sum(map(len, ranges))
-    if count > _MOST_NUMBERS:
+    if count > _MAX_NUMBERS:
         raise InvalidValueError(
-            f"A list of {count} numbers is too long; at most {_MOST_NUMBERS} are allowed."
+            f"The list has {count:,} numbers; at most {_MAX_NUMBERS:,} are allowed."
         )
     return tuple(dict.fromkeys(number for numbers in ranges for number in numbers))
 
 
-def _short(text: str) -> str:
-    return text if len(text) <= _LONGEST_WORD else f"{text[:_LONGEST_WORD]}…"
+def _shorten(text: str) -> str:
+    return text if len(text) <= _MAX_QUOTED_LENGTH else f"{text[:_MAX_QUOTED_LENGTH]}…"

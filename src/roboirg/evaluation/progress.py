@@ -1,4 +1,4 @@
-"""Telling how a run goes while it goes: a bar on a terminal, plain lines elsewhere."""
+"""Show the progress of a run: a bar on a terminal, plain lines elsewhere."""
 
 from __future__ import annotations
 
@@ -14,38 +14,44 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.text import Text
 
 from roboirg.records.record import Record
+from roboirg.util.plurals import counted
 
 _MINUTE = 60
 
 
 class Reporter(Protocol):
-    """Hears how a run goes."""
+    """Interface for progress reports of a run."""
 
-    def begin(self, total: int, done: int) -> None:
-        """So many episodes are in the plan, so many of them were there before."""
+    def start(self, total: int, done: int) -> None:
+        """Start a run.
+
+        Args:
+            total: episodes in the plan.
+            done: episodes stored before.
+        """
 
     def advance(self, record: Record, *, is_new: bool = True) -> None:
-        """This record is stored; it is not new if the episode was only tried again."""
+        """Report a stored record; it is not new if the episode was retried."""
 
-    def notice(self, text: str) -> None:
-        """A sentence that a person should read now."""
+    def warn(self, text: str) -> None:
+        """Show a sentence that the user should read now."""
 
 
 class SilentReporter:
-    """Says nothing."""
+    """Reports nothing."""
 
-    def begin(self, total: int, done: int) -> None:
-        """Nothing."""
+    def start(self, total: int, done: int) -> None:
+        """Do nothing."""
 
     def advance(self, record: Record, *, is_new: bool = True) -> None:
-        """Nothing."""
+        """Do nothing."""
 
-    def notice(self, text: str) -> None:
-        """Nothing."""
+    def warn(self, text: str) -> None:
+        """Do nothing."""
 
 
 class ProgressCounter:
-    """Episodes so far: successes and valid episodes per setting, errors, pace."""
+    """Counts successes and valid episodes per setting and errors, and measures the pace."""
 
     def __init__(self) -> None:
         self.successes: Counter[str] = Counter()
@@ -64,18 +70,18 @@ class ProgressCounter:
         self.successes[record.setting] += record.outcome == "success"
 
     def pace(self) -> float:
-        """Episodes per minute since the beginning."""
+        """Return the episodes per minute since the start."""
         return _MINUTE * self.played / max(time.monotonic() - self._start, 1e-9)
 
     def time_left(self, remaining: int) -> str:
-        """``m:ss`` at this pace."""
+        """Return the remaining time at this pace as ``m:ss``."""
         if not self.played:
             return "-:--"
         seconds = round(_MINUTE * remaining / self.pace())
         return f"{seconds // _MINUTE}:{seconds % _MINUTE:02d}"
 
-    def line(self) -> str:
-        """Successes per setting in one line."""
+    def summary(self) -> str:
+        """Return the successes per setting in one line."""
         parts = [f"{name} {self.successes[name]}/{count}" for name, count in self.valid.items()]
         if self.errors:
             parts.append(f"errors {self.errors}")
@@ -83,11 +89,11 @@ class ProgressCounter:
 
 
 class ConsoleReporter:
-    """A progress bar on a terminal, one line per episode elsewhere. A context manager."""
+    """Progress bar on a terminal, one line per episode elsewhere; a context manager."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
-        self._score = ProgressCounter()
+        self._counter = ProgressCounter()
         self._bar = Progress(
             TextColumn("[bold]{task.description}"),
             BarColumn(),
@@ -97,29 +103,29 @@ class ConsoleReporter:
             console=console,
         )
         self._task = self._bar.add_task("episodes", total=None, left="-:--", pace=0.0)
-        # The score has a line of its own: on a narrow terminal the bar's line is full.
+        # The successes have their own line, because the bar fills a narrow terminal.
         self._live = Live(console=console, get_renderable=self._render)
         self._total = self._done = 0
 
-    def begin(self, total: int, done: int) -> None:
-        """Start counting; the pace is that of this run alone."""
-        self._score = ProgressCounter()
+    def start(self, total: int, done: int) -> None:
+        """Start counting; the pace is that of this run only."""
+        self._counter = ProgressCounter()
         self._total, self._done = total, done
         self._bar.update(self._task, total=total, completed=done)
         if done:
-            self._console.print(f"{done} of {total} episodes are already there.")
+            self._console.print(f"{done} of {counted(total, 'episode')} already stored.")
 
     def advance(self, record: Record, *, is_new: bool = True) -> None:
-        """Move on by one."""
+        """Advance the bar, or print a line."""
         self._done += is_new
-        self._score.add(record)
-        left = self._score.time_left(self._total - self._done)
+        self._counter.add(record)
+        left = self._counter.time_left(self._total - self._done)
         if self._console.is_terminal:
             self._bar.update(
                 self._task,
                 completed=self._done,
                 left=left,
-                pace=self._score.pace(),
+                pace=self._counter.pace(),
             )
             return
         self._console.print(
@@ -128,8 +134,8 @@ class ConsoleReporter:
             highlight=False,
         )
 
-    def notice(self, text: str) -> None:
-        """A line on stderr; a bar that is being drawn stays below it."""
+    def warn(self, text: str) -> None:
+        """Print a line on stderr, above the bar."""
         sys.stderr.write(f"{text}\n")
 
     def __enter__(self) -> Self:
@@ -141,7 +147,7 @@ class ConsoleReporter:
         self._live.stop()
 
     def _render(self) -> RenderableType:
-        return Group(self._bar, Text(self._score.line(), "dim"))
+        return Group(self._bar, Text(self._counter.summary(), "dim"))
 
 
 def _summary(record: Record) -> str:

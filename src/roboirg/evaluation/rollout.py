@@ -1,14 +1,14 @@
-"""One job, played to its record.
+"""Play one job and return its record.
 
 | what goes wrong | outcome | kind of error |
 | --- | --- | --- |
-| the task's rules are broken, or time is up | failure | |
-| the policy raises, or wants to exit | error | policy |
+| the policy breaks the task's rules or runs out of steps | failure | |
+| the policy raises or calls `sys.exit` | error | policy |
 | the policy's action cannot be executed | error | invalid_action |
-| the policy's server does not answer in time, or at all | error | timeout, connection |
-| the world or the demonstration raises | error | environment |
+| the policy's server answers too late or not at all | error | timeout, connection |
+| the environment or the demonstration raises | error | environment |
 | no Vulkan device, a missing dependency | none: the run stops | |
-| a film cannot be written, a policy cannot say what it cost | as without it | |
+| a video cannot be written, a policy cannot report its costs | unchanged | |
 """
 
 from __future__ import annotations
@@ -50,26 +50,28 @@ if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
 PlayJob = Callable[[Job], Record]
-"""Plays one job. Executors send it to other processes, so it must pickle."""
+"""Function that plays one job. Executors send it to other processes, so it must be picklable."""
 
 VIDEO_FOLDER = "videos"
-NOTHING_DRAWN = "none"
+NO_RENDER_DEVICE = "none"
+"""Name of the device of an environment that renders nothing."""
 
-MOST_ROWS = 10_000
-"""Actions that a policy may give at once; an episode has 1300 steps."""
-MOST_METADATA = 65_536
-"""Characters of JSON that a policy may say of itself."""
+MAX_ROWS = 10_000
+"""Most actions that a policy may return at once; an episode has 1300 steps."""
+
+MAX_METADATA_LENGTH = 65_536
+"""Most characters of JSON in a policy's metadata."""
 
 
 @dataclass(frozen=True, slots=True)
 class EpisodeRunner:
-    """Plays jobs with the real environment and policies.
+    """Plays jobs with the simulator and real policies.
 
     Attributes:
-        folder: of the run; films go to ``videos/`` in it.
-        video: which episodes are filmed.
-        options: how they are filmed.
-        policy_timeout_s: seconds that a call of the policy may take, where there is a supervisor.
+        folder: output folder of the run; videos go to ``videos/`` in it.
+        video: which episodes get a video.
+        options: format of the videos.
+        policy_timeout_s: seconds that one call of the policy may take, if a supervisor watches.
         plan: fingerprint of the plan, for the records.
     """
 
@@ -80,7 +82,7 @@ class EpisodeRunner:
     plan: str | None = None
 
     def in_folder(self, folder: Path) -> EpisodeRunner:
-        """The same, for another folder."""
+        """Return a copy that writes its videos to another folder."""
         return replace(self, folder=folder)
 
     def __call__(self, job: Job) -> Record:
@@ -88,44 +90,45 @@ class EpisodeRunner:
 
         Raises:
             RenderDeviceError: no Vulkan device can render.
-            MissingDependencyError: something has to be installed first.
+            MissingDependencyError: a package has to be installed first.
         """
         started_at, start = utc_now(), time.monotonic()
-        film = None
+        writer = None
         if self.video != "off":
-            film = VideoWriter(self.folder / VIDEO_FOLDER / f"{job.slug}.mp4", self.options)
-        course = play_episode(job, film, self.policy_timeout_s)
-        video = self._keep(film, course)
-        lost = None if film is None or film.trouble is None else one_line(film.trouble)
+            writer = VideoWriter(self.folder / VIDEO_FOLDER / f"{job.slug}.mp4", self.options)
+        result = play_episode(job, writer, self.policy_timeout_s)
+        video = self._finish_video(writer, result)
+        error = None if writer is None else writer.error
         return make_record(
             job,
-            course,
+            result,
             video=video,
-            film_lost=lost,
+            video_error=None if error is None else one_line(error),
             started_at=started_at,
             duration_s=round(time.monotonic() - start, 3),
             plan=self.plan,
         )
 
-    def _keep(self, film: VideoWriter | None, course: RolloutResult) -> str | None:
-        if film is None:
+    def _finish_video(self, writer: VideoWriter | None, result: RolloutResult) -> str | None:
+        """Keep or discard the video; return its path relative to the folder, or None."""
+        if writer is None:
             return None
-        wanted = self.video == "all" or course.outcome != "success"
-        if wanted and film.finish():
-            return film.path.relative_to(self.folder).as_posix()
-        film.discard()
+        wanted = self.video == "all" or result.outcome != "success"
+        if wanted and writer.finish():
+            return writer.path.relative_to(self.folder).as_posix()
+        writer.discard()
         return None
 
 
 class EnvRequirements(NamedTuple):
-    """What a policy needs of its environment.
+    """What a policy needs from its environment.
 
     Attributes:
-        cameras: whose pictures.
-        actions: the space in which it acts.
-        demonstration_frames: which pictures of the video.
-        observe_every: after how many control steps it wants to look.
-        history_cameras: whose pictures it wants of that; None for all of them.
+        cameras: names of the cameras that it reads.
+        actions: its action space.
+        demonstration_frames: which frames of the video it gets.
+        observe_every: control steps between two observations in ``history``; None for no history.
+        history_cameras: cameras recorded in the history; None for all of `cameras`.
         grounded: whether it passes on subgoals with pixels.
     """
 
@@ -137,11 +140,11 @@ class EnvRequirements(NamedTuple):
     grounded: bool = False
 
 
-class _Phases:
-    """Calls of policy and world: blamed, watched and timed."""
+class _CallGuard:
+    """Attributes errors of policy and environment calls, watches their time and measures it."""
 
-    def __init__(self, course: RolloutResult, policy_timeout_s: float | None) -> None:
-        self._timings = course.timings
+    def __init__(self, result: RolloutResult, policy_timeout_s: float | None) -> None:
+        self._timings = result.timings
         self._limit_s = policy_timeout_s
 
     @contextlib.contextmanager
@@ -150,8 +153,8 @@ class _Phases:
             yield
 
     @contextlib.contextmanager
-    def world(self, name: str) -> Iterator[None]:
-        with attribute_errors("environment"), watched("world"), self._timed(name):
+    def environment(self, name: str) -> Iterator[None]:
+        with attribute_errors("environment"), watched("environment"), self._timed(name):
             yield
 
     @contextlib.contextmanager
@@ -165,44 +168,49 @@ class _Phases:
 
 
 def play_episode(
-    job: Job, film: VideoWriter | None = None, policy_timeout_s: float | None = None
+    job: Job, writer: VideoWriter | None = None, policy_timeout_s: float | None = None
 ) -> RolloutResult:
-    """Play one job and say how it went; every fault of policy or world ends up in the cause.
+    """Play one job; errors of the policy or the environment end up in the result.
+
+    Args:
+        job: what to play.
+        writer: gets the frames of a video.
+        policy_timeout_s: seconds that one call of the policy may take, if a supervisor watches.
 
     Raises:
         RenderDeviceError: no Vulkan device can render.
-        MissingDependencyError: something has to be installed first.
+        MissingDependencyError: a package has to be installed first.
     """
-    course = RolloutResult()
-    phases = _Phases(course, policy_timeout_s)
+    result = RolloutResult()
+    guard = _CallGuard(result, policy_timeout_s)
     policy, env = None, None
     try:
-        with phases.policy("policy's constructor", "policy_load"):
+        with guard.policy("policy's constructor", "policy_load"):
             policy = load_policy(job)
             needs = env_requirements(policy, job)
-        with phases.world("env_reset"):
+        with guard.environment("env_reset"):
             env = make_env(job, needs)
-        _play(job, env, policy, needs.actions, film, course, phases)
-    except EpisodeError as fault:
-        course.fail(fault.kind, fault.cause, fault.details)
+        _play_to_end(env, policy, needs.actions, job.max_steps, writer, result, guard)
+    except EpisodeError as error:
+        result.record_error(error.kind, error.cause, error.details)
     finally:
         if policy is not None:
-            _say_goodbye(policy, course, phases)
+            _close_policy(policy, result, guard)
         if env is not None:
             env.close()
-    return course
+    return result
 
 
 def env_requirements(policy: Policy, job: Job) -> EnvRequirements:
-    """What a policy needs, where the job prescribes nothing else.
+    """Return what the policy needs; what the job prescribes takes precedence.
 
     Raises:
-        InvalidValueError: it acts in another action space than is prescribed.
+        InvalidValueError: the job prescribes another action space than the policy's.
     """
     actions = wanted_actions(policy)
     if job.actions not in (None, actions.name):
         raise InvalidValueError(
-            f"the policy acts in {actions.name!r}, but {job.actions!r} is prescribed."
+            f"the policy's action space is {actions.name!r}, but the plan requires {job.actions!r}."
         )
     frames, every = job.demonstration_frames, job.observe_every
     return EnvRequirements(
@@ -216,19 +224,14 @@ def env_requirements(policy: Policy, job: Job) -> EnvRequirements:
 
 
 def make_env(job: Job, needs: EnvRequirements) -> RoboIRGEnv:
-    """The environment of a job, for a policy that needs it so."""
-    import roboirg
+    """Return the environment of a job with what the policy needs."""
+    from roboirg.envs.factory import make
 
-    return roboirg.make(
+    return make(
         job.task,
-        setting=job.setting,
-        form=job.form,
         split=job.split,
         episode=job.episode,
-        stages=job.stages,
-        distractor=job.distractor,
-        distractors=job.distractors,
-        frame=job.frame,
+        **job.options._asdict(),
         cameras=needs.cameras,
         actions=needs.actions.name,
         grounded=needs.grounded,
@@ -241,89 +244,91 @@ def make_env(job: Job, needs: EnvRequirements) -> RoboIRGEnv:
 
 
 def load_policy(job: Job) -> Policy:
-    """A fresh policy, so that nothing of an earlier episode is left in it.
+    """Return a new policy object, so that no state of an earlier episode remains.
 
-    Its seed is made of the run's and the episode's: the same in every setting, another in every
-    episode.
+    Its seed is derived from the run's policy seed and the episode's seed: the same in every
+    setting, another in every episode.
     """
     episode = get_episode(job.task, job.split, job.episode)
     seeds = np.random.SeedSequence((job.policy_seed, episode.seed))
     return policies.make_policy(job.policy_spec, seed=int(seeds.generate_state(1)[0]))
 
 
-def _play(
-    job: Job,
+def _play_to_end(
     env: RoboIRGEnv,
     policy: Policy,
     actions: ActionSpace,
-    film: VideoWriter | None,
-    course: RolloutResult,
-    phases: _Phases,
+    max_steps: int,
+    writer: VideoWriter | None,
+    result: RolloutResult,
+    guard: _CallGuard,
 ) -> None:
-    with phases.world("env_reset"):
-        if film is not None:
-            film.caption = env.instruction.text
-            env.set_frame_hook(film.shoot, every=film.options.every)
+    """Play the environment's episode with the policy to its end."""
+    with guard.environment("env_reset"):
+        result.instruction = env.instruction
+        if writer is not None:
+            writer.caption = env.instruction.text
+            env.set_frame_hook(writer.add_frame, every=writer.options.every)
         observation, info = env.reset()
-        if film is not None:
-            film.shoot(env)  # what the policy sees first
+        if writer is not None:
+            writer.add_frame(env)  # the policy's first observation
         device = str(env.render_device)
-        course.render_device = None if device == NOTHING_DRAWN else device
-        course.demonstration_steps = len(info["demonstration"]["joint_positions"])
-        course.turn = int(info["elapsed_steps"])
-        course.note(info)
-        instruction = env.instruction.text
-    with phases.policy("policy's reset()", "policy_reset"):
+        result.render_device = None if device == NO_RENDER_DEVICE else device
+        result.demonstration_steps = len(info["demonstration"]["joint_positions"])
+        result.policy_start_step = int(info["elapsed_steps"])
+        result.add_events(info)
+    with guard.policy("policy's reset()", "policy_reset"):
         if isinstance(policy, PrivilegedPolicy):
             policy.attach(env)
-        policy.reset(instruction, info["demonstration"])
-        course.policy_metadata = _metadata_of(policy)
+        policy.reset(env.instruction.text, info["demonstration"])
+        result.policy_metadata = _policy_metadata(policy)
     status, cause = "ongoing", None
     while status == "ongoing":
-        with phases.policy("policy's act()", "policy_act"):
+        with guard.policy("policy's act()", "policy_act"):
             rows = _next_actions(policy, observation, actions)
-        with phases.world("env_step"):
+        with guard.environment("env_step"):
             observation, *_, info = env.step_chunk(rows)
-        course.steps = int(info["steps"])
-        course.note(info)
+        result.steps = int(info["steps"])
+        result.add_events(info)
         status, cause = info["status"], info.get("cause")
-    if not course.settle(status, cause, job.max_steps):
-        course.cause = f"environment: the episode ended with status {status!r}"
+    if not result.record_status(status, cause, max_steps):
+        result.cause = f"environment: the episode ended with status {status!r}"
 
 
 def _next_actions(
     policy: Policy, observation: dict[str, Any], space: ActionSpace
 ) -> NDArray[np.float64]:
-    """The policy's next rows, all of them valid.
+    """Return the policy's next actions, checked.
 
     Raises:
-        InvalidActionError: they are not, or too many.
+        InvalidActionError: an action is invalid, or there are too many.
     """
     rows = policy.act(cast("Observation", observation))
     count = len(rows) if hasattr(rows, "__len__") else 0
-    if count > MOST_ROWS:
-        raise InvalidActionError(f"{count} actions at once are too many; at most {MOST_ROWS}.")
+    if count > MAX_ROWS:
+        raise InvalidActionError(f"{count} actions at once are too many; at most {MAX_ROWS}.")
     return check_chunk(rows, space)
 
 
-def _metadata_of(policy: Policy) -> dict[str, JsonValue]:
-    """What a policy says of itself, as a reader of the record will find it."""
+def _policy_metadata(policy: Policy) -> dict[str, JsonValue]:
+    """Return the policy's metadata exactly as a reader of the record gets them."""
     text = json.dumps(dict(getattr(policy, "metadata", {})), allow_nan=False)
-    if len(text) > MOST_METADATA:
+    if len(text) > MAX_METADATA_LENGTH:
         raise InvalidValueError(
-            f"the policy's metadata are {len(text)} characters of JSON; at most {MOST_METADATA}."
+            f"the policy's metadata have {len(text)} characters of JSON; "
+            f"at most {MAX_METADATA_LENGTH} are allowed."
         )
     return cast("dict[str, JsonValue]", json.loads(text))
 
 
-def _say_goodbye(policy: Policy, course: RolloutResult, phases: _Phases) -> None:
-    """Ask what it cost and close it; trouble with that leaves the verdict as it is."""
+def _close_policy(policy: Policy, result: RolloutResult, guard: _CallGuard) -> None:
+    """Read the policy's costs and close it; errors there do not change the outcome."""
     try:
-        with phases.policy("policy's close()", "policy_close"):
+        with guard.policy("policy's close()", "policy_close"):
             if hasattr(policy, "usage"):
                 usage = {str(name): float(value) for name, value in policy.usage().items()}
-                course.usage = {name: cost for name, cost in usage.items() if math.isfinite(cost)}
+                result.usage = {name: cost for name, cost in usage.items() if math.isfinite(cost)}
             if hasattr(policy, "close"):
                 policy.close()
-    except EpisodeError as fault:
-        course.details = course.details or fault.details
+    except EpisodeError as error:
+        result.details = result.details or error.details

@@ -1,4 +1,4 @@
-"""How an episode went, and its record."""
+"""The result of one rollout, and the record made from it."""
 
 from __future__ import annotations
 
@@ -6,19 +6,18 @@ import datetime as dt
 import importlib.metadata
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, cast
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
 from pydantic import JsonValue
 
 from roboirg import language
-from roboirg.core.conditions import Fact, FactKind
+from roboirg.core.conditions import Fact
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.code_fingerprint import code_fingerprint
 from roboirg.evaluation.plan import instruct_job
-from roboirg.judging import Event
-from roboirg.judging.attribution import attribute_failure
+from roboirg.judging import Event, attribute_failure
 from roboirg.policies.loading import is_privileged, policy_version
 from roboirg.records.record import (
     Attribution,
@@ -34,23 +33,24 @@ from roboirg.records.record import (
 
 @dataclass
 class RolloutResult:
-    """How an episode went; filled while it goes, so that an error leaves what was before it.
+    """What happened in an episode; filled in step by step, so that an error keeps what came before.
 
     Attributes:
         outcome: success, failure or error.
-        error: whose fault an error is.
-        cause: why not success.
-        timed_out: whether the policy's steps were used up.
+        error: kind of the error; read only if the outcome is one.
+        cause: why it is not a success.
+        timed_out: whether the policy used up its steps.
         steps: control steps of the policy.
-        demonstration_steps: frames of the video shown before.
-        turn: control steps of the world before the policy's turn.
-        elapsed: control steps of the world in all.
-        events: what happened.
-        render_device: driver's name, None if the episode did not get that far.
+        demonstration_steps: frames of the video shown before the policy's turn.
+        policy_start_step: control steps of the episode before the policy's turn.
+        elapsed_steps: control steps of the episode in all.
+        instruction: what the policy was told; None if the episode did not get that far.
+        events: facts that became true or ceased to be.
+        render_device: the driver's name; None if nothing was rendered.
         details: traceback of an error.
-        policy_metadata: what the policy says of itself.
-        usage: what the policy says that the episode cost.
-        timings: seconds spent in the policy and in the world, by phase.
+        policy_metadata: what the policy reports about itself.
+        usage: what the policy reports that the episode cost.
+        timings: seconds spent in the policy and in the environment, by phase.
     """
 
     outcome: Outcome = "error"
@@ -59,8 +59,9 @@ class RolloutResult:
     timed_out: bool = False
     steps: int = 0
     demonstration_steps: int = 0
-    turn: int = 0
-    elapsed: int = 0
+    policy_start_step: int = 0
+    elapsed_steps: int = 0
+    instruction: language.Instruction | None = None
     events: list[EventRecord] = field(default_factory=list)
     render_device: str | None = None
     details: str | None = None
@@ -68,31 +69,37 @@ class RolloutResult:
     usage: dict[str, float] = field(default_factory=dict)
     timings: dict[str, float] = field(default_factory=dict)
 
-    def fail(self, kind: ErrorKind, cause: str, details: str | None = None) -> None:
-        """Nobody knows what the policy would have done."""
+    def record_error(self, kind: ErrorKind, cause: str, details: str | None = None) -> None:
+        """Record that the episode ended in an error and cannot be judged."""
         self.outcome, self.error, self.cause, self.details = "error", kind, cause, details
 
-    def settle(self, status: str, cause: str | None, steps: int) -> bool:
-        """Take down how an episode ended after so many steps; whether the status is an end."""
+    def record_status(self, status: str, cause: str | None, max_steps: int) -> bool:
+        """Record the final status. Returns False while the episode is running.
+
+        Args:
+            status: as the environment reports it.
+            cause: of a failure, if the environment gives one.
+            max_steps: the policy's limit, for the cause of a timeout.
+        """
         if status == "success":
             self.outcome, self.cause = "success", None
         elif status == "timeout":
             self.outcome, self.timed_out = "failure", True
-            self.cause = cause or f"not done after {steps} steps"
+            self.cause = cause or f"not done after {max_steps} steps"
         elif status == "failure":
             self.outcome, self.cause = "failure", cause or "the judge gave no cause"
         else:
             return False
         return True
 
-    def note(self, info: Mapping[str, Any]) -> None:
-        """Keep the events that the environment reports, and how far the world is."""
-        self.elapsed = int(info.get("elapsed_steps", self.elapsed))
+    def add_events(self, info: Mapping[str, Any]) -> None:
+        """Add the events and the elapsed steps in an environment's info."""
+        self.elapsed_steps = int(info.get("elapsed_steps", self.elapsed_steps))
         for event in info.get("events", ()):
             place = event.get("place")
             self.events.append(
                 EventRecord(
-                    step=int(event["step"]) - self.turn,
+                    step=int(event["step"]) - self.policy_start_step,
                     kind=str(event["kind"]),
                     subject=str(event["subject"]),
                     place=None if place is None else str(place),
@@ -103,89 +110,87 @@ class RolloutResult:
 
 def make_record(
     job: Job,
-    course: RolloutResult,
+    result: RolloutResult,
     *,
     started_at: str,
     duration_s: float = 0.0,
     video: str | None = None,
-    film_lost: str | None = None,
+    video_error: str | None = None,
     plan: str | None = None,
 ) -> Record:
-    """The record of a job that went so. Needs no simulator."""
+    """Return the record of a job; needs no simulator.
+
+    Args:
+        job: what was played.
+        result: how it went.
+        started_at: ISO 8601, UTC.
+        duration_s: wall-clock seconds.
+        video: path of the video relative to the records file.
+        video_error: why the requested video could not be written.
+        plan: fingerprint of the plan.
+    """
     episode = get_episode(job.task, job.split, job.episode)
-    instruction, plain = instruct_job(job), language.instruct(episode, "explicit")
+    # An episode that failed before its reset has a record with the words it would have had.
+    instruction = result.instruction or instruct_job(job)
+    explicit = language.instruct(episode)
     return Record(
         **dict(job),
         seed=episode.seed,
         difficulty=episode.difficulty,
-        outcome=course.outcome,
-        error=course.error if course.outcome == "error" else None,
-        cause=course.cause,
-        attribution=_attribution(episode, course),
-        steps=course.steps,
-        demonstration_steps=course.demonstration_steps,
-        instruction=tuple(
-            UtteranceRecord(stage=u.stage, text=u.text) for u in instruction.utterances
-        ),
-        mentions=tuple(
-            MentionSpan(
-                utterance=mention.utterance,
-                start=mention.start,
-                end=mention.end,
-                role=mention.role,
-                expression=mention.expression,
-                slot=mention.slot,
-                value=mention.value,
-            )
-            for mention in instruction.mentions
-        ),
-        command=plain.text,
+        outcome=result.outcome,
+        error=result.error if result.outcome == "error" else None,
+        cause=result.cause,
+        attribution=_attribution(episode, result),
+        steps=result.steps,
+        demonstration_steps=result.demonstration_steps,
+        instruction=tuple(UtteranceRecord(**asdict(one)) for one in instruction.utterances),
+        mentions=tuple(MentionSpan(**asdict(one)) for one in instruction.mentions),
+        command=explicit.text,
         goal=dict(episode.goal.as_mapping()),
-        # Exactly what a reader of the file will find.
+        # Exactly what a reader of the file gets.
         metadata=json.loads(json.dumps(dict(instruction.metadata))),
         privileged=is_privileged(job.policy_spec),
         policy_version=policy_version(job.policy_spec),
-        policy_metadata=course.policy_metadata,
-        events=tuple(course.events),
+        policy_metadata=result.policy_metadata,
+        events=tuple(result.events),
         video=video,
-        film_lost=film_lost,
-        details=course.details,
-        render_device=course.render_device,
+        video_error=video_error,
+        details=result.details,
+        render_device=result.render_device,
         language_version=str(language.LANGUAGE_VERSION),
         environment_version=ENVIRONMENT_VERSION,
         package_version=importlib.metadata.version("roboirgbench"),
         code=code_fingerprint(),
         plan=plan,
-        usage=course.usage,
-        timings=course.timings,
+        usage=result.usage,
+        timings=result.timings,
         started_at=started_at,
         duration_s=duration_s,
     )
 
 
-def _attribution(episode: Episode, course: RolloutResult) -> Attribution | None:
-    """Why the episode failed, if it did."""
-    if course.outcome != "failure":
+def _attribution(episode: Episode, result: RolloutResult) -> Attribution | None:
+    """Return why the episode failed; None if it did not or the cause is unclear."""
+    if result.outcome != "failure":
         return None
     found = attribute_failure(
         episode,
         [
-            # The kinds are those that the world reported.
             Event(
-                event.step + course.turn,
-                Fact(cast("FactKind", event.kind), event.subject, event.place),
+                event.step + result.policy_start_step,
+                Fact(event.kind, event.subject, event.place),
                 event.holds,
             )
-            for event in course.events
+            for event in result.events
         ],
-        timed_out=course.timed_out,
-        turn=course.turn,
-        elapsed=course.elapsed,
-        cause=course.cause,
+        timed_out=result.timed_out,
+        policy_start_step=result.policy_start_step,
+        elapsed_steps=result.elapsed_steps,
+        cause=result.cause,
     )
     return None if found is None else Attribution(**found._asdict())
 
 
 def utc_now() -> str:
-    """The time, ISO 8601, to the second."""
+    """Return the time in ISO 8601, to the second."""
     return dt.datetime.now(dt.UTC).isoformat(timespec="seconds")

@@ -1,4 +1,4 @@
-"""A run: the plan, less what is already stored, played and stored."""
+"""Run a plan: play the episodes that are not stored yet and store their records."""
 
 from __future__ import annotations
 
@@ -23,26 +23,27 @@ from roboirg.policies.loading import policy_version
 from roboirg.records.record import Job, Record
 from roboirg.records.record_codec import RecordIndexEntry, identity_key
 from roboirg.records.store import TORN_FILE, RecordStore, StoreError
+from roboirg.util.plurals import counted
 
 UNREACHABLE_AFTER = 20
-"""So many episodes of a policy in a row without a connection, and its others are left for later."""
+"""After this many consecutive connection errors, skip the rest of this policy."""
 
 
 class Terminated(KeyboardInterrupt):
-    """The process was asked to go (SIGTERM); handled like Ctrl-C."""
+    """The process received SIGTERM; handled like Ctrl-C."""
 
 
 class RunSummary(NamedTuple):
-    """What a run found and did.
+    """Result of a run.
 
     Attributes:
-        total: jobs in the plan.
-        played: how many episodes were played now, further tries not counted.
-        errors: of the plan's records, those that are neither success nor failure.
-        missing: jobs of the plan that have no record.
-        torn_bytes: of a line that a kill had cut short, moved to ``records.torn``.
-        unfilmed: why films of new records could not be written.
-        unreachable: policies that could not be reached again and again.
+        total: number of jobs in the plan.
+        played: number of episodes played in this run, retries not counted.
+        errors: records of the plan whose outcome is an error.
+        missing: number of jobs of the plan without a record.
+        torn_bytes: length of an unfinished line that was moved to ``records.torn``.
+        video_errors: why videos of new records could not be written.
+        unreachable: policies skipped after too many connection errors.
     """
 
     total: int
@@ -50,7 +51,7 @@ class RunSummary(NamedTuple):
     errors: tuple[RecordIndexEntry, ...]
     missing: int
     torn_bytes: int
-    unfilmed: tuple[str, ...]
+    video_errors: tuple[str, ...]
     unreachable: tuple[str, ...]
 
 
@@ -63,29 +64,29 @@ def run_plan(
     retry_errors: bool = True,
     reporter: Reporter | None = None,
 ) -> RunSummary:
-    """Play what the plan has and the folder lacks; store each record the moment it arrives.
+    """Play the jobs of a plan that the folder lacks; store each record as soon as it arrives.
 
-    An episode that ends in an error of one of the kinds `Plan.retry_on` is tried again after all
-    others, up to `Plan.tries` times; the newest record counts.
+    An episode that ends in an error of a kind in `Plan.retry_on` is retried after all others, at
+    most `Plan.tries` times in all; the newest record counts.
 
     Args:
-        plan: what should be there in the end.
-        folder: of the run; holds the records.
+        plan: what to play.
+        folder: output folder of the run; holds the records.
         play: plays one job.
-        executor: where.
+        executor: where jobs are played.
         retry_errors: play jobs again whose newest record is an error.
-        reporter: hears of each record, and at once of a line that a kill had cut short.
+        reporter: is told of every record, and first of any damage in the file.
 
     Raises:
-        StoreError: another run writes there, the records cannot be read or written, or they
-            are of another language, environment, scene or policy than today's.
-        RoboIRGError: what would end every episode (no Vulkan device, …).
-        KeyboardInterrupt: Ctrl-C, or SIGTERM as `Terminated`; all that ended is stored.
+        StoreError: another run writes to the folder, the records cannot be read or written, or
+            they belong to another version of language, environment, scene or policy.
+        RoboIRGError: an error that would end every episode (no Vulkan device, …).
+        KeyboardInterrupt: Ctrl-C, or SIGTERM as `Terminated`; all finished episodes are stored.
     """
-    listener = reporter or SilentReporter()
+    reporter = reporter or SilentReporter()
     jobs = plan.jobs()
     with _sigterm_interrupts(), RecordStore(folder) as store:
-        _tell_damage(store, listener)
+        _report_damage(store, reporter)
         _check_versions(store.stored.values(), folder)
         _check_policies(plan, store.stored.values(), folder)
         write_plan(plan, folder)
@@ -93,112 +94,113 @@ def run_plan(
         todo = [
             job
             for job, key in zip(jobs, keys, strict=True)
-            if _is_due(store.stored.get(key), retry_errors=retry_errors)
+            if _should_play(store.stored.get(key), retry_errors=retry_errors)
         ]
-        listener.begin(len(jobs), len(jobs) - len(todo))
-        course = _Run(plan, store, listener)
-        course.play(todo, play, executor)
+        reporter.start(len(jobs), len(jobs) - len(todo))
+        loop = _RunLoop(plan, store, reporter)
+        loop.play(todo, play, executor)
         found = [store.stored.get(key) for key in keys]
         return RunSummary(
             total=len(jobs),
-            played=len(course.tries),
+            played=len(loop.tries),
             errors=tuple(one for one in found if one is not None and one.outcome == "error"),
             missing=found.count(None),
             torn_bytes=len(store.torn),
-            unfilmed=tuple(course.unfilmed),
-            unreachable=tuple(course.unreachable),
+            video_errors=tuple(loop.video_errors),
+            unreachable=tuple(loop.unreachable),
         )
 
 
-class _Run:
-    """What a run has done so far.
+class _RunLoop:
+    """Plays the jobs of a run, stores their records and retries errors.
 
     Attributes:
-        tries: of each job, in this run.
-        unfilmed: why films were lost.
-        unreachable: policies that could not be reached again and again.
+        tries: how often each job was played in this run.
+        video_errors: why videos could not be written.
+        unreachable: policies skipped after too many connection errors.
     """
 
-    def __init__(self, plan: Plan, store: RecordStore, listener: Reporter) -> None:
-        self._plan, self._store, self._listener = plan, store, listener
-        self._unconnected: Counter[str] = Counter()
+    def __init__(self, plan: Plan, store: RecordStore, reporter: Reporter) -> None:
+        self._plan, self._store, self._reporter = plan, store, reporter
+        self._connection_errors: Counter[str] = Counter()
         self.tries: Counter[Job] = Counter()
-        self.unfilmed: list[str] = []
+        self.video_errors: list[str] = []
         self.unreachable: list[str] = []
 
     def play(self, todo: Sequence[Job], play: PlayJob, executor: Executor) -> None:
-        """Play jobs, and once more what ended in an error that may pass."""
+        """Play jobs, and retry those that ended in an error of a retryable kind."""
         while todo:
             todo = self._play_once(todo, play, executor)
 
     def _play_once(self, todo: Sequence[Job], play: PlayJob, executor: Executor) -> list[Job]:
-        """Play jobs; those that are to be played afterwards."""
+        """Play jobs once. Returns the jobs to play next."""
         open_jobs, again = {identity_key(job): job for job in todo}, []
         with contextlib.closing(_iterate(executor, todo, play)) as records:
             for record in records:
                 job = open_jobs.pop(identity_key(record))
-                self._keep(job, record)
-                if self._is_to_be_tried_again(job, record):
+                self._store_record(job, record)
+                if self._should_retry(job, record):
                     again.append(job)
-                if self._has_lost_touch(record):
-                    # The rest of the world goes on without it.
-                    self._tell_unreachable(record)
+                if self._count_connection_error(record):
+                    # Start again with the jobs of the other policies.
+                    self._report_unreachable(record)
                     again += open_jobs.values()
                     break
         return [job for job in again if job.policy not in self.unreachable]
 
-    def _keep(self, job: Job, record: Record) -> None:
+    def _store_record(self, job: Job, record: Record) -> None:
         before = self._store.stored.get(identity_key(job))
         if before is not None:
             record = record.model_copy(update={"attempt": before.attempt + 1})
         self._store.append(record)
         self.tries[job] += 1
-        self._listener.advance(record, is_new=self.tries[job] == 1)
-        if record.film_lost:
-            self.unfilmed.append(record.film_lost)
+        self._reporter.advance(record, is_new=self.tries[job] == 1)
+        if record.video_error:
+            self.video_errors.append(record.video_error)
 
-    def _is_to_be_tried_again(self, job: Job, record: Record) -> bool:
+    def _should_retry(self, job: Job, record: Record) -> bool:
         return record.error in self._plan.retry_on and self.tries[job] < self._plan.tries
 
-    def _has_lost_touch(self, record: Record) -> bool:
+    def _count_connection_error(self, record: Record) -> bool:
+        """Count consecutive connection errors of a policy. Returns True at the limit."""
         if record.error == "connection":
-            self._unconnected[record.policy] += 1
+            self._connection_errors[record.policy] += 1
         else:
-            self._unconnected[record.policy] = 0
-        return self._unconnected[record.policy] >= UNREACHABLE_AFTER
+            self._connection_errors[record.policy] = 0
+        return self._connection_errors[record.policy] >= UNREACHABLE_AFTER
 
-    def _tell_unreachable(self, record: Record) -> None:
+    def _report_unreachable(self, record: Record) -> None:
         self.unreachable.append(record.policy)
-        self._listener.notice(
+        self._reporter.warn(
             f"{record.policy} could not be reached in {UNREACHABLE_AFTER} episodes in a row "
-            f"({record.cause}); its other episodes are left for another run."
+            f"({record.cause}); this run skips its remaining episodes."
         )
 
 
-def _is_due(stored: RecordIndexEntry | None, *, retry_errors: bool) -> bool:
+def _should_play(stored: RecordIndexEntry | None, *, retry_errors: bool) -> bool:
     return stored is None or (retry_errors and stored.outcome == "error")
 
 
-def _tell_damage(store: RecordStore, listener: Reporter) -> None:
+def _report_damage(store: RecordStore, reporter: Reporter) -> None:
     if store.torn:
-        listener.notice(
-            f"An earlier run was stopped in the middle of a line; its {len(store.torn)} bytes "
-            f"were moved to {store.folder / TORN_FILE}."
+        reporter.warn(
+            f"An earlier run was stopped while it wrote a record; moved the unfinished line "
+            f"({counted(len(store.torn), 'byte')}) to {store.folder / TORN_FILE}."
         )
     if store.damaged:
-        listener.notice(
-            f"{store.path} has {len(store.damaged)} damaged lines, the first is line "
+        reporter.warn(
+            f"{store.path} has {counted(len(store.damaged), 'damaged line')}, first line "
             f"{store.damaged[0]}; their episodes are played again."
         )
 
 
 def _check_versions(records: Iterable[RecordIndexEntry], folder: Path) -> None:
-    """Refuse to mix words or worlds of two versions: rates of different things are no rate."""
+    """Refuse records of another language or environment version: rates must not mix them."""
     records = tuple(records)
     for language in {record.language_version for record in records} - {LANGUAGE_VERSION}:
         raise StoreError(
-            f"{folder} holds episodes told in language version {language}, but this roboirg "
-            f"speaks {LANGUAGE_VERSION}; choose another --out."
+            f"{folder} holds episodes of language version {language}, but this roboirg has "
+            f"version {LANGUAGE_VERSION}; choose another --out."
         )
     for world in {record.environment_version for record in records} - {ENVIRONMENT_VERSION}:
         raise StoreError(
@@ -211,25 +213,25 @@ def _check_versions(records: Iterable[RecordIndexEntry], folder: Path) -> None:
         expected = _seed(task, split, episode)
         if seed != expected:
             raise StoreError(
-                f"{folder} holds {task} {split}/{episode} with the scene of seed {seed}, but in "
-                f"this roboirg it has {expected}; choose another --out."
+                f"{folder} holds {task} {split}/{episode} with scene seed {seed}, but this roboirg "
+                f"has {expected}; choose another --out."
             )
 
 
 def _check_policies(plan: Plan, records: Iterable[RecordIndexEntry], folder: Path) -> None:
-    """Refuse to mix what two policies of the same name did."""
+    """Refuse records of another version of a policy of the same name."""
     versions = {name: policy_version(spec) for name, spec in plan.specs.items()}
     for policy, version in {(record.policy, record.policy_version) for record in records}:
         now = versions.get(policy, version)
         if version != now:
             raise StoreError(
-                f"{folder} holds episodes of {policy} in version {version}, but it has changed "
-                f"since (now {now}); choose another --out."
+                f"{folder} holds episodes of {policy} version {version}, but the policy is now "
+                f"version {now}; choose another --out."
             )
 
 
 def _seed(task: str, split: str, episode: int) -> str | int:
-    """The seed of an episode's scene, or in words that there is none."""
+    """Return the seed of an episode's scene, or a phrase if there is no such episode."""
     try:
         return get_episode(task, split, episode).seed
     except InvalidValueError:
@@ -244,9 +246,9 @@ def _iterate(
 
 @contextlib.contextmanager
 def _sigterm_interrupts() -> Iterator[None]:
-    """Stop at SIGTERM as at Ctrl-C: workers ended, records kept."""
+    """Treat SIGTERM like Ctrl-C: end the workers and keep the records."""
     if threading.current_thread() is not threading.main_thread():
-        yield  # only the main thread hears signals
+        yield  # only the main thread can handle signals
         return
 
     def interrupt(_number: int, _frame: FrameType | None) -> None:

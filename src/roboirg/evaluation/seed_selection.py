@@ -1,4 +1,4 @@
-"""Which seeds enter a split: scene, words and oracle have to agree."""
+"""Select the seeds of the splits: scene, language and oracle must all accept a seed."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-import roboirg
 from roboirg.core.episode import SPLITS, Difficulty, Episode, Split, episode_key
 from roboirg.core.errors import (
     InvalidValueError,
     MotionPlanningError,
     SceneRejectedError,
 )
+from roboirg.envs.factory import make
 from roboirg.episodes.splits import (
     MAX_REJECTED,
     SIZES,
@@ -24,7 +24,8 @@ from roboirg.episodes.splits import (
     slot_key,
     slot_seed,
 )
-from roboirg.language import expressible, settings_of
+from roboirg.language import find_refusals
+from roboirg.language.settings import ACCEPTANCE_SETTINGS
 from roboirg.policies import make_policy, play
 from roboirg.tasks import every_task, get_task
 from roboirg.util.parallel_map import parallel_map
@@ -34,12 +35,13 @@ REASONS: tuple[Reason, ...] = ("no room", "not expressible", "oracle failed")
 
 
 class Rejection(NamedTuple):
-    """Why a seed is passed over.
+    """Why a seed is rejected.
 
     Attributes:
         seed: the seed.
-        reason: what kind of thing is amiss.
-        cause: what exactly: the object without a place, the settings, the oracle's failure.
+        reason: kind of reason.
+        cause: details: the object without a place, the settings with their reasons, or the
+            oracle's failure.
     """
 
     seed: int
@@ -49,7 +51,7 @@ class Rejection(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class EpisodeSlot:
-    """An episode whose seed is looked for."""
+    """An episode that needs a seed."""
 
     task: str
     split: Split
@@ -57,30 +59,30 @@ class EpisodeSlot:
 
     @property
     def difficulty(self) -> Difficulty:
-        """Of its scene."""
+        """Difficulty of the scene."""
         return slot_difficulty(self.index)
 
     @property
     def key(self) -> str:
-        """The short unique name of the episode."""
+        """Short unique name of the episode."""
         return episode_key(self.task, self.split, self.index)
 
 
 class SelectedSeed(NamedTuple):
-    """A slot and the seeds that had to be passed over for it, in order."""
+    """A slot and the seeds rejected for it, in order."""
 
     slot: EpisodeSlot
     rejections: tuple[Rejection, ...]
 
 
-Judge = Callable[[EpisodeSlot, int], Rejection | None]
-"""Says why a seed cannot be taken for a slot; None if it can."""
+SeedCheck = Callable[[EpisodeSlot, int], Rejection | None]
+"""Returns why a seed is rejected for a slot; None if it is accepted."""
 
 
 def episode_slots(
     tasks: Sequence[str], splits: Sequence[Split] = SPLITS
 ) -> tuple[EpisodeSlot, ...]:
-    """Every episode of the splits of the tasks, in order."""
+    """Return a slot for every episode of the tasks' splits, in order."""
     return tuple(
         EpisodeSlot(task, split, index)
         for task in tasks
@@ -90,18 +92,18 @@ def episode_slots(
 
 
 def check_words(slot: EpisodeSlot, seed: int) -> Rejection | None:
-    """Why scene or words rule a seed out; needs no simulator."""
+    """Return why the scene or the language rejects a seed; needs no simulator."""
     try:
         episode = _episode(slot, seed)
     except SceneRejectedError as error:
         return Rejection(seed, "no room", str(error))
-    sayable = expressible(episode)
-    unsaid = [name for name in settings_of(get_task(slot.task)) if name not in sayable]
-    return Rejection(seed, "not expressible", ", ".join(unsaid)) if unsaid else None
+    refused = find_refusals(episode)
+    causes = [f"{name}: {refused[name]}" for name in ACCEPTANCE_SETTINGS if name in refused]
+    return Rejection(seed, "not expressible", "; ".join(causes)) if causes else None
 
 
 def check_seed(slot: EpisodeSlot, seed: int) -> Rejection | None:
-    """Why scene, words or oracle rule a seed out; the oracle plays without pictures."""
+    """Return why the scene, the language or the oracle rejects a seed."""
     rejection = check_words(slot, seed)
     if rejection is None:
         failure = oracle_failure(_episode(slot, seed))
@@ -110,8 +112,8 @@ def check_seed(slot: EpisodeSlot, seed: int) -> Rejection | None:
 
 
 def oracle_failure(episode: Episode) -> str | None:
-    """Why the oracle does not solve an episode, played without pictures; None if it does."""
-    env = roboirg.make(episode, cameras=())
+    """Return why the oracle fails in an episode, played without pictures; None if it succeeds."""
+    env = make(episode, cameras=())
     try:
         info = play(env, make_policy("oracle", 0))
     except MotionPlanningError as error:
@@ -119,43 +121,48 @@ def oracle_failure(episode: Episode) -> str | None:
     return None if info["status"] == "success" else str(info["cause"] or info["status"])
 
 
-def find_seed(slot: EpisodeSlot, judge: Judge = check_seed) -> SelectedSeed:
-    """The first seed of a slot that can be taken.
+def find_seed(slot: EpisodeSlot, check: SeedCheck = check_seed) -> SelectedSeed:
+    """Find the first seed of a slot that is accepted.
 
     Raises:
-        SceneRejectedError: there is none; names the episode.
+        SceneRejectedError: there is none; the message names the episode.
     """
     first = slot_seed(get_task(slot.task), slot.split, slot.index)
     rejections: list[Rejection] = []
     for seed in range(first, first + MAX_REJECTED + 1):
-        rejection = judge(slot, seed)
+        rejection = check(slot, seed)
         if rejection is None:
             return SelectedSeed(slot, tuple(rejections))
         rejections.append(rejection)
     raise SceneRejectedError(
-        f"No seed from {first} to {first + MAX_REJECTED} gives episode {slot.key}; "
-        f"the last one: {rejections[-1].reason} ({rejections[-1].cause})."
+        f"No seed from {first} to {first + MAX_REJECTED} is accepted for episode {slot.key}; "
+        f"the last rejection: {rejections[-1].reason} ({rejections[-1].cause})."
     )
 
 
 def find_seeds(
-    slots: Sequence[EpisodeSlot], workers: int, judge: Judge = check_seed
+    slots: Sequence[EpisodeSlot], workers: int, check: SeedCheck = check_seed
 ) -> Iterator[SelectedSeed]:
-    """`find_seed` for every slot, as they end, in so many processes; 0 for this one.
+    """Find a seed for every slot; yields the results as they finish.
+
+    Args:
+        slots: the episodes.
+        workers: number of processes; 0 works in this process.
+        check: accepts or rejects a seed.
 
     Raises:
         InvalidValueError: a negative number of workers.
         SceneRejectedError: an episode has no seed.
         RoboIRGError: a process died.
     """
-    found = parallel_map(functools.partial(find_seed, judge=judge), slots, workers)
+    found = parallel_map(functools.partial(find_seed, check=check), slots, workers)
     yield from (outcome for _, outcome in found)
 
 
-def check_kept(
+def check_kept_splits(
     tasks: Sequence[str], splits: Sequence[Split], known: Mapping[str, TaskSplits]
 ) -> None:
-    """See that the splits that are not built again can be kept.
+    """Check that the splits that are not rebuilt can be kept.
 
     Raises:
         InvalidValueError: they were never built, or their scenes have changed since.
@@ -167,12 +174,15 @@ def check_kept(
         first = slot_seed(get_task(slot.task), slot.split, slot.index)
         if entry is None or check_words(slot, first + passed_over) is not None:
             raise InvalidValueError(
-                f"There is no valid episode {slot.key} to keep; build all splits of {slot.task}."
+                f"Episode {slot.key} cannot be kept, because it is not valid; build all splits of "
+                f"{slot.task}."
             )
 
 
-def merged(found: Sequence[SelectedSeed], known: Mapping[str, TaskSplits]) -> dict[str, TaskSplits]:
-    """What is to be shipped: what was found, and what is known about everything else."""
+def merge_splits(
+    found: Sequence[SelectedSeed], known: Mapping[str, TaskSplits]
+) -> dict[str, TaskSplits]:
+    """Return the splits to ship: the selected seeds, and the known ones of other episodes."""
     splits = {task: known[task] for task in every_task() if task in known}
     for task in dict.fromkeys(one.slot.task for one in found):
         old = known[task].passed_over if task in known else {}

@@ -1,4 +1,4 @@
-"""Telling how a search for seeds goes, and how many were passed over and why."""
+"""Show the progress of seed selection, and summarize which seeds were rejected and why."""
 
 from __future__ import annotations
 
@@ -17,15 +17,18 @@ MINIMUM_WIDTH = 120
 """Columns to use where the output is not a terminal."""
 
 _LINE_EVERY = 50
-"""Where there is no terminal, a line is printed after so many episodes."""
+"""Without a terminal, print a line after this many episodes."""
 
 
 def follow_progress(
     found: Iterable[SelectedSeed], slots: Sequence[EpisodeSlot], console: Console
 ) -> tuple[SelectedSeed, ...]:
-    """All that is found, in the order of the slots, however it comes.
+    """Collect results in the order of the slots, and show the progress meanwhile.
 
-    Meanwhile a bar or, without a terminal, a line now and then tells how far it is.
+    Args:
+        found: results in any order.
+        slots: the episodes.
+        console: shows a bar on a terminal, a line now and then elsewhere.
     """
     total = len(slots)
     bar = Progress(
@@ -50,11 +53,11 @@ def follow_progress(
 
 
 def summary_table(found: Sequence[SelectedSeed]) -> Table:
-    """By task and difficulty: episodes, seeds tried, and how many were passed over and why."""
-    table = Table(title="Seeds passed over", title_justify="left", title_style="bold")
+    """Return a table by task and difficulty: episodes, seeds tried, and rejections by reason."""
+    table = Table(title="Rejected seeds", title_justify="left", title_style="bold")
     table.add_column("task")
     table.add_column("difficulty")
-    for name in ("episodes", "seeds tried", *REASONS, "passed over"):
+    for name in ("episodes", "seeds tried", *REASONS, "rejected"):
         table.add_column(name, justify="right")
     for task in dict.fromkeys(one.slot.task for one in found):
         table.add_section()
@@ -71,7 +74,7 @@ def summary_table(found: Sequence[SelectedSeed]) -> Table:
 
 
 def cause_lines(found: Sequence[SelectedSeed]) -> list[str]:
-    """The exact causes by task, for all but want of room, each with a seed that shows it."""
+    """Return the causes by task, each with an example; without those for lack of room."""
     counts: Counter[tuple[str, str, str]] = Counter()
     examples: dict[tuple[str, str, str], str] = {}
     for one in found:
@@ -87,7 +90,7 @@ def cause_lines(found: Sequence[SelectedSeed]) -> list[str]:
 
 
 def print_summary(found: Sequence[SelectedSeed], console: Console) -> None:
-    """The table and, below, the exact causes."""
+    """Print the table and, below it, the causes."""
     if not console.is_terminal:
         console.width = max(console.width, MINIMUM_WIDTH)
     console.print(summary_table(found))

@@ -1,4 +1,4 @@
-"""Films of episodes: small H.264 files that appear under their name only when complete."""
+"""Videos of episodes: small H.264 files that appear under their name only when complete."""
 
 from __future__ import annotations
 
@@ -23,29 +23,29 @@ if TYPE_CHECKING:
 Frame = NDArray[np.uint8]
 
 DEMONSTRATION_COLOR = (255, 176, 32)
-"""RGB of the border around what was shown before the policy's turn."""
+"""RGB of the border around the frames of the demonstration."""
 
 BORDER = 6
 GAP = 4
-"""Pixels of the black line between two pictures; even, as H.264 wants the width."""
+"""Pixels of the black line between two pictures; even, because H.264 needs an even width."""
 LAST_FRAME_REPEATS = 8
-"""The end is what one wants to see: it stays for most of a second."""
+"""The last frame stays for most of a second, so that a viewer sees how the episode ended."""
 
 POSTER_SUFFIX = ".jpg"
 
 _TEXT_SCALE, _TEXT_LINE, _TEXT_MARGIN = 0.4, 16, 6
-_MOST_LINES = 12
-_INK, _PAPER = (31, 35, 40), 255
+_MAX_LINES = 12
+_TEXT_COLOR, _BACKGROUND = (31, 35, 40), 255
 
 
 @dataclass(frozen=True, slots=True)
 class VideoOptions:
-    """How episodes are filmed.
+    """Format of a video.
 
     Attributes:
         every: control steps between two frames (20 control steps are one second).
-        rate: frames per second in the film; 10 with every 8th step is fourfold speed.
-        cameras: drawn side by side, 256 pixels each, a black line of `GAP` between them.
+        rate: frames per second of the video; 10 with every 8th step is fourfold speed.
+        cameras: shown side by side, 256 pixels each, with a black line of `GAP` between them.
         quality: x264's constant rate factor; higher is smaller.
     """
 
@@ -56,14 +56,14 @@ class VideoOptions:
 
 
 class PictureSource(Protocol):
-    """Whatever draws a picture on request, as the environment does."""
+    """Source of camera pictures, such as the environment."""
 
     def picture(self, camera: str) -> Frame:
-        """The camera's picture now, uint8 (256, 256, 3)."""
+        """Return the camera's current picture, uint8 (256, 256, 3)."""
 
 
 def check_video_support() -> None:
-    """Complain now if films cannot be written.
+    """Check that videos can be written.
 
     Raises:
         MissingDependencyError: PyAV is not installed.
@@ -72,20 +72,20 @@ def check_video_support() -> None:
         import av  # noqa: F401 - an extra, and slow to import
     except ImportError as error:
         raise MissingDependencyError(
-            f"Films need PyAV, which is not installed ({error}); run: "
+            f"Videos need PyAV, which is not installed ({error}); run: "
             "pip install 'roboirgbench[sim]', or play with --video off."
         ) from error
 
 
-def compose(
+def compose_frame(
     pictures: Sequence[Frame], caption: str = "", *, is_demonstration: bool = False
 ) -> Frame:
-    """Pictures side by side, a line between them; what was shown before has a colored border.
+    """Return one frame with the pictures side by side and a line between them.
 
     Args:
         pictures: uint8 (height, width, 3), all of one height.
-        caption: goes below, broken into lines.
-        is_demonstration: whether it was shown before the policy's turn.
+        caption: text below the pictures, wrapped into lines.
+        is_demonstration: draw the border that marks the demonstration.
     """
     line = np.zeros((pictures[0].shape[0], GAP, 3), np.uint8)
     parts = [part for picture in pictures for part in (line, picture)][1:]
@@ -94,87 +94,87 @@ def compose(
         color = np.array(DEMONSTRATION_COLOR, np.uint8)
         frame[:BORDER] = frame[-BORDER:] = color
         frame[:, :BORDER] = frame[:, -BORDER:] = color
-    return np.concatenate([frame, _bar(caption, frame.shape[1])]) if caption else frame
+    return np.concatenate([frame, _caption_bar(caption, frame.shape[1])]) if caption else frame
 
 
 @functools.lru_cache(maxsize=8)
-def _bar(caption: str, width: int) -> Frame:
-    """A caption on paper; its height is even, as H.264 wants it."""
-    lines = wrap_text(caption, width - 2 * _TEXT_MARGIN, _TEXT_SCALE)[:_MOST_LINES]
+def _caption_bar(caption: str, width: int) -> Frame:
+    """Return a caption as an image; its height is even, because H.264 needs that."""
+    lines = wrap_text(caption, width - 2 * _TEXT_MARGIN, _TEXT_SCALE)[:_MAX_LINES]
     height = len(lines) * _TEXT_LINE + 2 * _TEXT_MARGIN
-    bar: Frame = np.full((height, width, 3), _PAPER, np.uint8)
+    bar: Frame = np.full((height, width, 3), _BACKGROUND, np.uint8)
     for number, text in enumerate(lines, start=1):
-        draw_text(bar, text, _TEXT_MARGIN, number * _TEXT_LINE, _TEXT_SCALE, _INK)
+        draw_text(bar, text, _TEXT_MARGIN, number * _TEXT_LINE, _TEXT_SCALE, _TEXT_COLOR)
     return bar
 
 
 @dataclass
 class VideoWriter:
-    """A film in the making. Nothing exists under `path` until `finish`.
+    """Writes one video. Nothing exists under `path` until `finish`.
 
-    A film that cannot be written is given up, whatever FFmpeg or the disk does: what is filmed
-    goes on as if there were no film.
+    An error of FFmpeg or the disk ends the video, never the episode: it is kept in `error`, and
+    later frames are ignored.
 
     Args:
         path: of the finished MP4; a poster of the last frame gets the same name with ``.jpg``.
-        options: how to film.
+        options: format of the video.
 
     Attributes:
-        caption: below the pictures; set before the first of them.
-        trouble: why it was given up, or None.
+        caption: text below the pictures; set before the first frame.
+        error: why the video could not be written, or None.
     """
 
     path: Path
     options: VideoOptions = field(default_factory=VideoOptions)
     caption: str = field(default="", init=False)
-    trouble: Exception | None = field(default=None, init=False)
+    error: Exception | None = field(default=None, init=False)
     _container: OutputContainer | None = field(default=None, init=False, repr=False)
     _stream: VideoStream | None = field(default=None, init=False, repr=False)
     _last: Frame | None = field(default=None, init=False, repr=False)
 
     @property
     def partial(self) -> Path:
-        """Where the film grows; a later film of the same name overwrites what a kill left."""
+        """Path of the unfinished video; a later video of the same name overwrites it."""
         return self.path.with_name(f".{self.path.name}.part")
 
-    def shoot(self, world: PictureSource, is_demonstration: bool = False) -> None:
-        """Add the world as it looks now.
+    def add_frame(self, source: PictureSource, is_demonstration: bool = False) -> None:
+        """Add a frame with the current pictures.
 
         Raises:
             RenderDeviceError: no Vulkan device can render.
-            MissingDependencyError: something has to be installed first.
+            MissingDependencyError: a package has to be installed first.
         """
-        if self.trouble is not None:
+        if self.error is not None:
             return
         try:
-            pictures = [world.picture(camera) for camera in self.options.cameras]
-            self._add(compose(pictures, self.caption, is_demonstration=is_demonstration))
+            pictures = [source.picture(camera) for camera in self.options.cameras]
+            self._encode(compose_frame(pictures, self.caption, is_demonstration=is_demonstration))
         except (RenderDeviceError, MissingDependencyError):
             raise
         except Exception as error:  # noqa: BLE001 - see the class
-            self._give_up(error)
+            self._abandon(error)
 
     def finish(self) -> bool:
-        """Complete the film and give it its name; False if it has no frame or was given up."""
+        """Complete the video. Returns False if it has no frame or could not be written."""
         if self._last is None:
             return False
         poster = self.path.with_suffix(POSTER_SUFFIX)
         try:
             for _ in range(LAST_FRAME_REPEATS):
-                self._add(self._last)
+                self._encode(self._last)
             last = self._last
             self._close()
             write_poster(last, poster)
             self.partial.replace(self.path)
         except Exception as error:  # noqa: BLE001 - see the class
-            self._give_up(error)
+            self._abandon(error)
             with contextlib.suppress(OSError):
                 poster.unlink(missing_ok=True)
             return False
         return True
 
     def discard(self) -> None:
-        """Throw away an unfinished film; never raises."""
+        """Delete an unfinished video; never raises."""
         container = self._container
         self._container = self._stream = self._last = None
         if container is not None:
@@ -183,12 +183,12 @@ class VideoWriter:
         with contextlib.suppress(OSError):
             self.partial.unlink(missing_ok=True)
 
-    def _give_up(self, error: Exception) -> None:
-        self.trouble = error
+    def _abandon(self, error: Exception) -> None:
+        self.error = error
         self.discard()
 
-    def _add(self, frame: Frame) -> None:
-        """Add a frame, uint8 (height, width, 3), both even; all of one size."""
+    def _encode(self, frame: Frame) -> None:
+        """Encode a frame, uint8 (height, width, 3), both even; all of one size."""
         container, stream = self._open(frame)
         import av
 
@@ -201,7 +201,7 @@ class VideoWriter:
         import av
 
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        # The index goes to the front, so that a player can start before it has read everything.
+        # The index goes to the front, so that a player can start before it has read the whole file.
         container = av.open(
             str(self.partial), "w", format="mp4", options={"movflags": "+faststart"}
         )

@@ -1,7 +1,7 @@
-"""Stages and events give a verdict, without a simulator, and say why an episode failed."""
+"""Judge episodes from facts, without a simulator, and attribute failures."""
 
-from roboirg.judging.attribution import attribute_failure
 from roboirg.judging.events import Event, changes
+from roboirg.judging.failure_analysis import attribute_failure
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING, FailureAttribution
 from roboirg.judging.judge import Judge, Status, plain_subgoal
 

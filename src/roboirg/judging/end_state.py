@@ -1,183 +1,196 @@
-"""What the end of an episode looks like that broke no rule: what was done instead, or how far."""
+"""Conclude a failure from the end of an episode that violated no rule."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from roboirg.core.conditions import LASTING_KINDS, Elapsed, Fact, Rule, facts_of
-from roboirg.judging.episode_replay import GRIPS, EpisodeReplay, FactInterval
+from roboirg.core.conditions import Elapsed, Fact, Rule, facts_of
+from roboirg.core.fact_traits import FactRole, raised_kind
+from roboirg.judging.episode_replay import EpisodeReplay, FactInterval
 from roboirg.judging.fact_history import FactHistory
 from roboirg.judging.failure_attribution import FailureAttribution, FailureName
-from roboirg.judging.grounding_errors import RELEASES, classify_grounding_error
-from roboirg.judging.judge import describe_object
+from roboirg.judging.grounding_errors import classify_grounding_error
+from roboirg.judging.judge import describe_act, describe_object
 from roboirg.judging.release_errors import describe_missed_grasp, describe_release, expected_action
 
-ATTENDED = ("hovering",)
-"""Facts that say that the hand is where a press is due."""
 AT_REST = Fact("still", "robot")
 REST_STEPS = 100
-"""A robot that has been at rest for so many control steps, five seconds, at the end has stopped."""
-TOUCHES = ("reached", "held", "picked", "lifted", "pressed")
+"""Control steps (five seconds) that the robot must rest at the end to count as stopped."""
 
 
-def describe_end_state(trace: EpisodeReplay) -> FailureAttribution:
-    """How the end of an episode reads.
+def describe_end_state(replay: EpisodeReplay) -> FailureAttribution:
+    """Return the failure that the end of an episode shows.
 
     | the end | is |
     | --- | --- |
-    | something is in the hand, or done, that is not due | as `classify_grounding_error` says |
-    | what was to be carried is not in the hand | ``dropped`` or ``misplaced`` |
-    | what was to be picked was reached, or held, and is not in the hand | ``missed_grasp`` |
-    | it stopped where a shorter task would have ended | ``wrong_count`` |
-    | no stage was completed, and nothing that is due was reached | ``nothing_reached`` |
+    | an act stands that is not expected | as `classify_grounding_error` says |
+    | an object that was to be carried is not in the hand | ``dropped`` or ``misplaced`` |
+    | an object that was to be picked was reached, or held, and is not in the hand | \
+``missed_grasp`` |
+    | the robot stopped where a shorter task would have ended | ``wrong_count`` |
+    | no stage was completed, and nothing expected was reached | ``nothing_reached`` |
     | otherwise | ``out_of_time`` |
     """
-    wanted = trace.unmet()
-    instead, held = _instead(trace, wanted), _in_hand(trace, wanted)
-    if held is not None:
-        return instead or _stopped_short(trace) or held
+    wanted = replay.unmet()
+    unexpected, in_hand = _unexpected_act(replay, wanted), _in_hand(replay, wanted)
+    if in_hand is not None:
+        return unexpected or _stopped_short(replay) or in_hand
     return (
-        instead
-        or _let_go(trace, wanted)
-        or describe_missed_grasp(trace, wanted)
-        or _stopped_short(trace)
-        or _nothing(trace, wanted)
+        unexpected
+        or _released(replay, wanted)
+        or describe_missed_grasp(replay, wanted)
+        or _stopped_short(replay)
+        or _nothing_done(replay, wanted)
     )
 
 
-def _instead(trace: EpisodeReplay, wanted: tuple[Fact, ...]) -> FailureAttribution | None:
-    """The last thing that was done and was not due, if it still stands."""
-    for spell in reversed(list(_standing(trace))):
-        name = spell.fact.subject
-        if name in {fact.subject for fact in wanted}:
-            failure = _unfit(trace, name) if spell.fact.kind in GRIPS else None
+def _unexpected_act(replay: EpisodeReplay, wanted: tuple[Fact, ...]) -> FailureAttribution | None:
+    """Return the last act that stands and is not expected."""
+    for interval in reversed(list(_standing_acts(replay))):
+        fact = interval.fact
+        if fact.subject in {other.subject for other in wanted}:
+            failure = _future_violation(replay, fact.subject) if fact.traits.grips else None
         else:
-            failure = _unfit(trace, name) or _mistake(trace, spell.fact, wanted)
+            failure = _future_violation(replay, fact.subject) or _classify(replay, fact, wanted)
         if failure is not None:
-            thing = describe_object(name, trace.episode.scene)
-            words = f"{_VERBS[spell.fact.kind]} {thing} {expected_action(trace)}"
-            return FailureAttribution.of(failure, name, spell.begin, words)
+            words = f"{describe_act(fact, replay.episode.scene)}; {expected_action(replay)}"
+            return FailureAttribution.of(failure, fact.subject, interval.start, words)
     return None
 
 
-_VERBS = {
-    "picked": "picked up",
-    "lifted": "lifted",
-    "held": "took hold of",
-    "placed": "placed",
-    "pressed": "pressed",
-}
+def _standing_acts(replay: EpisodeReplay) -> Iterator[FactInterval]:
+    """Yield the acts that have not been undone.
 
-
-def _standing(trace: EpisodeReplay) -> Iterator[FactInterval]:
-    """Acts that have not been undone: what is in the hand, and what was done since the last stage.
-
-    A container that was lifted too early counts even when it has been put down again, and a press
-    where another button is due.
+    They are what is in the hand, and what was done in the current stage: looking under a container
+    that a later stage expects, a press where the stage expects another button, and placing an
+    object that was picked up.
     """
-    later = {fact for stage in trace.stages[trace.due + 1 :] for fact in facts_of(stage.expects)}
-    presses = any(f.kind == "pressed" for f in facts_of(trace.stages[trace.due].expects))
-    picked = {spell.fact.subject for spell in trace.begun("picked", after=trace.due_since)}
-    for spell in trace.begun(*_VERBS, after=trace.turn):
-        kind, fresh = spell.fact.kind, spell.begin > trace.due_since
-        if (
-            (kind in GRIPS and spell.end is None)
-            or (kind == "lifted" and fresh and spell.fact in later)
-            or (kind == "pressed" and fresh and presses)
-            # Without a pick it was there before and has only been touched.
-            or (kind == "placed" and fresh and spell.end is None and spell.fact.subject in picked)
-        ):
-            yield spell
+    since, roles = replay.expected_since, FactRole
+    ahead = replay.stages[replay.expected_stage + 1 :]
+    later = {fact for stage in ahead for fact in facts_of(stage.expects)}
+    current = facts_of(replay.stages[replay.expected_stage].expects)
+    expects_press = any(fact.traits.role is roles.PRESS for fact in current)
+    # An object that was not picked up was there before and has only been touched.
+    raised = {one.fact.subject for one in replay.started(roles.RAISE, after=since)}
+    acts = (roles.GRIP, roles.RAISE, roles.PLACING, roles.PRESS)
+    for interval in replay.started(*acts, after=replay.policy_start_step):
+        fact, traits = interval.fact, interval.fact.traits
+        stands = {
+            roles.RAISE: not traits.undone_by_release and fact in later,
+            roles.PRESS: expects_press,
+            roles.PLACING: interval.end is None and not traits.lasts and fact.subject in raised,
+        }
+        in_hand = traits.grips and interval.end is None
+        if in_hand or (interval.start > since and stands.get(traits.role, False)):
+            yield interval
 
 
-def _mistake(trace: EpisodeReplay, fact: Fact, wanted: tuple[Fact, ...]) -> FailureName | None:
-    """What an act is that is not due; taking hold of a thing is what lifting it would be."""
+def _classify(replay: EpisodeReplay, fact: Fact, wanted: tuple[Fact, ...]) -> FailureName | None:
+    """Classify an act; taking hold of an object counts as lifting it."""
     if fact in wanted:
         return None
-    if fact.kind == "held":
-        kind = trace.episode.scene[fact.subject].kind
-        fact = Fact("lifted" if kind == "container" else "picked", fact.subject)
-    return classify_grounding_error(fact, trace.stages, trace.due)
+    if fact.traits.role is FactRole.GRIP:
+        kind = raised_kind(replay.episode.scene[fact.subject].kind)
+        fact = fact if kind is None else Fact(kind, fact.subject)
+    return classify_grounding_error(fact, replay.stages, replay.expected_stage)
 
 
-def _unfit(trace: EpisodeReplay, name: str) -> FailureName | None:
-    """Which rule a thing would break for good where it is due, or will be."""
-    ahead = trace.stages[trace.due :]
+def _future_violation(replay: EpisodeReplay, name: str) -> FailureName | None:
+    """Return the failure of the rule that an object would violate for good at its places."""
+    ahead = replay.stages[replay.expected_stage :]
     expected = {fact for stage in ahead for fact in facts_of(stage.expects)}
-    there = {f for f in expected if f.subject == name and f.kind in LASTING_KINDS}
-    if not there:
+    placed = {fact for fact in expected if fact.subject == name and fact.traits.lasts}
+    if not placed:
         return None
     history = FactHistory()
-    history.follow(0, trace.facts[-1] | there)
+    history.update(0, replay.facts[-1] | placed)
     rules = (one for stage in ahead for one in stage.forbids if isinstance(one, Rule))
-    return next((rule.failure for rule in rules if _forbids(rule, there, history)), None)
+    return next((rule.failure for rule in rules if _is_violated(rule, placed, history)), None)
 
 
-def _forbids(rule: Rule, there: set[Fact], history: FactHistory) -> bool:
+def _is_violated(rule: Rule, placed: set[Fact], history: FactHistory) -> bool:
+    """Return whether placed objects violate a rule; they cannot violate one against too few."""
     least = getattr(rule.condition, "least", 1)
-    return bool(least and there & set(facts_of(rule)) and history.holds(rule.condition))
+    return bool(least and placed & set(facts_of(rule)) and history.holds(rule.condition))
 
 
-def _in_hand(trace: EpisodeReplay, wanted: tuple[Fact, ...]) -> FailureAttribution | None:
-    now = trace.facts[-1]
+def _in_hand(replay: EpisodeReplay, wanted: tuple[Fact, ...]) -> FailureAttribution | None:
+    """Return ``out_of_time`` if the expected object is in the hand."""
     names = {fact.subject for fact in wanted}
-    held = sorted(fact.subject for fact in now if fact.kind in GRIPS and fact.subject in names)
+    gripped = (fact.subject for fact in replay.facts[-1] if fact.traits.grips)
+    held = sorted(name for name in gripped if name in names)
     if not held:
         return None
-    thing = describe_object(held[0], trace.episode.scene)
-    words = f"time was up with {thing} in the hand {expected_action(trace)}"
-    return FailureAttribution.of("out_of_time", held[0], trace.end, words)
+    item = describe_object(held[0], replay.episode.scene)
+    words = f"ran out of time with {item} in the hand; {expected_action(replay)}"
+    return FailureAttribution.of("out_of_time", held[0], replay.last_step, words)
 
 
-def _let_go(trace: EpisodeReplay, wanted: tuple[Fact, ...]) -> FailureAttribution | None:
-    """Something that was picked, and was to be carried or let go elsewhere, is not in the hand."""
-    if any(fact.kind in ("picked", "lifted") for fact in wanted):
+def _released(replay: EpisodeReplay, wanted: tuple[Fact, ...]) -> FailureAttribution | None:
+    """Return the failure if an object that was to be carried is not in the hand."""
+    if any(fact.traits.role is FactRole.RAISE for fact in wanted):
         return None
     names = {fact.subject for fact in wanted}
-    grips = [
-        s for s in trace.begun("picked", "lifted", after=trace.turn) if s.fact.subject in names
-    ]
+    lifts = replay.started(FactRole.RAISE, after=replay.policy_start_step)
+    grips = [interval for interval in lifts if interval.fact.subject in names]
     if not grips:
         return None
-    last = max(grips, key=lambda spell: spell.begin)
-    rests = trace.begun("lying", "put_down", after=last.begin)
-    step = next((s.begin for s in rests if s.fact.subject == last.fact.subject), last.end)
-    return describe_release(trace, last, trace.end if step is None else step)
+    last = max(grips, key=lambda interval: interval.start)
+    rests = replay.started(FactRole.RELEASE, after=last.start)
+    own = (rest.start for rest in rests if rest.fact.subject == last.fact.subject)
+    step = next(own, last.end)
+    return describe_release(replay, last, replay.last_step if step is None else step)
 
 
-def _stopped_short(trace: EpisodeReplay) -> FailureAttribution | None:
-    """It stopped where a shorter task of the same sort would have ended.
-
-    That is where the last stage asks to leave everything alone for so long, and so it was; or
-    where what was done last is of the sort that the task ends with, and the robot is at rest.
-    """
-    kinds = [{fact.kind for fact in facts_of(stage.expects)} for stage in trace.stages]
-    done = [some for some in kinds[: trace.due] if not some <= RELEASES]
-    last, since = trace.stages[-1].expects, None
-    if done and isinstance(last, Elapsed):
-        touches = (spell for spell in trace.spells if spell.fact.kind in TOUCHES)
-        touched = max((trace.end if s.end is None else s.end for s in touches), default=0)
-        since = touched if trace.end - touched >= last.least else None
-    elif done and done[-1] == kinds[-1]:
-        rests = (s for s in trace.spells if s.fact == AT_REST and s.end is None)
-        since = next((s.begin for s in rests if trace.end - s.begin >= REST_STEPS), None)
+def _stopped_short(replay: EpisodeReplay) -> FailureAttribution | None:
+    """Return ``wrong_count`` if the robot stopped where a shorter task would have ended."""
+    acts = [
+        {fact.kind for fact in facts_of(stage.expects)}
+        for stage in replay.stages[: replay.expected_stage]
+        if not all(fact.traits.role is FactRole.RELEASE for fact in facts_of(stage.expects))
+    ]
+    last = replay.stages[-1].expects
+    if not acts:
+        return None
+    if isinstance(last, Elapsed):
+        since = _untouched_since(replay, last.least)
+    elif acts[-1] == {fact.kind for fact in facts_of(last)}:
+        since = _at_rest_since(replay)
+    else:
+        return None
     if since is None:
         return None
     return FailureAttribution.of(
-        "wrong_count", None, since, f"came to rest {expected_action(trace)}"
+        "wrong_count", None, since, f"came to rest; {expected_action(replay)}"
     )
 
 
-def _nothing(trace: EpisodeReplay, wanted: tuple[Fact, ...]) -> FailureAttribution:
-    attended = {fact.subject for fact in wanted} | {fact.place for fact in wanted}
+def _untouched_since(replay: EpisodeReplay, steps: int) -> int | None:
+    """Return when the hand last touched an object, if it left all alone for some steps."""
+    touches = (one for one in replay.intervals if one.fact.traits.touches)
+    ends = (replay.last_step if one.end is None else one.end for one in touches)
+    touched = max(ends, default=0)
+    return touched if replay.last_step - touched >= steps else None
+
+
+def _at_rest_since(replay: EpisodeReplay) -> int | None:
+    """Return since when the robot rests, if that is long enough to count as stopped."""
+    rests = (one for one in replay.intervals if one.fact == AT_REST and one.end is None)
+    long_rests = (one.start for one in rests if replay.last_step - one.start >= REST_STEPS)
+    return next(long_rests, None)
+
+
+def _nothing_done(replay: EpisodeReplay, wanted: tuple[Fact, ...]) -> FailureAttribution:
+    """Return ``nothing_reached`` or ``out_of_time``."""
+    names = {fact.subject for fact in wanted} | {fact.place for fact in wanted}
+    start = replay.policy_start_step
     tried = any(
-        spell.fact.place in attended
-        for spell in trace.spells
-        if spell.fact.kind in ATTENDED and (spell.end is None or spell.end > trace.turn)
+        one.fact.place in names and (one.end is None or one.end > start)
+        for one in replay.intervals
+        if one.fact.traits.role is FactRole.APPROACH
     )
-    if trace.due == 0 and wanted and not tried:
-        words = f"reached nothing that was due, {expected_action(trace).removeprefix('while ')}"
-        return FailureAttribution.of("nothing_reached", None, trace.end, words)
-    return FailureAttribution.of(
-        "out_of_time", None, trace.end, f"time was up {expected_action(trace)}"
-    )
+    if replay.expected_stage == 0 and wanted and not tried:
+        words = f"reached none of the objects it needs; {expected_action(replay)}"
+        return FailureAttribution.of("nothing_reached", None, replay.last_step, words)
+    words = f"ran out of time; {expected_action(replay)}"
+    return FailureAttribution.of("out_of_time", None, replay.last_step, words)

@@ -1,4 +1,4 @@
-"""What happened in a whole episode, found again from its events: a second run of the judge."""
+"""Replay a whole episode from its events by running the judge again."""
 
 from __future__ import annotations
 
@@ -8,25 +8,23 @@ from typing import NamedTuple
 
 from roboirg.core.conditions import All, Condition, Fact, facts_of
 from roboirg.core.episode import Episode, Stage
+from roboirg.core.fact_traits import FactRole
 from roboirg.judging.events import Event
 from roboirg.judging.fact_history import FactHistory
 from roboirg.judging.judge import Judge
 
-GRIPS = ("picked", "lifted", "held")
-"""Facts of something that is in the hand."""
-
 
 class FactInterval(NamedTuple):
-    """A fact held from one evaluation to another.
+    """The steps in which a fact holds without a break.
 
     Attributes:
-        fact: which.
-        begin: the first step at which it held.
-        end: the first at which it no longer did; None if it held to the last.
+        fact: the fact.
+        start: the first step at which it holds.
+        end: the first step at which it no longer does; None if it holds to the last.
     """
 
     fact: Fact
-    begin: int
+    start: int
     end: int | None
 
 
@@ -35,101 +33,113 @@ class EpisodeReplay:
     """One episode, step by step. Steps count since the world began.
 
     Attributes:
-        episode: which.
-        turn: steps of the world before the policy's turn.
-        dues: at each step the index of the stage that was due when its evaluation began, counted
+        episode: the episode.
+        policy_start_step: steps of the world before the policy's turn.
+        expected_stages: for each step, the index of the stage that its evaluation tests, counted
             from the policy's first stage (negative in the demonstration).
-        facts: at each step all that held.
-        spells: of all facts, in the order in which they began.
+        facts: for each step, all facts that hold.
+        intervals: of all facts, in the order of their starts.
         judge: after the last evaluation.
     """
 
     episode: Episode
-    turn: int
-    dues: tuple[int, ...]
+    policy_start_step: int
+    expected_stages: tuple[int, ...]
     facts: tuple[frozenset[Fact], ...]
-    spells: tuple[FactInterval, ...]
+    intervals: tuple[FactInterval, ...]
     judge: Judge
 
     @property
-    def end(self) -> int:
+    def last_step(self) -> int:
         """The last step."""
         return len(self.facts) - 1
 
     @property
     def stages(self) -> tuple[Stage, ...]:
-        """Those of the policy."""
+        """The policy's stages."""
         return self.episode.stages
 
     @property
-    def due(self) -> int:
-        """Index of the stage that is due at the end, or at the verdict."""
+    def expected_stage(self) -> int:
+        """Index of the stage that is expected at the end, or at the verdict."""
         return self.judge.index - len(self.episode.demonstration)
 
     @property
-    def due_since(self) -> int:
-        """From which step on that stage was due in the policy's turn."""
-        return max(self.dues.index(self.due) if self.due in self.dues else self.end, self.turn)
+    def expected_since(self) -> int:
+        """The step of the policy's turn from which on that stage is expected."""
+        if self.expected_stage not in self.expected_stages:
+            return max(self.last_step, self.policy_start_step)
+        return max(self.expected_stages.index(self.expected_stage), self.policy_start_step)
 
     def completed(self, step: int) -> Stage | None:
-        """The policy's stage that was completed at a step, if one was."""
-        due = self.dues[step]
-        after = self.dues[step + 1] if step < self.end else self.due
-        return self.stages[due] if 0 <= due < after else None
+        """Return the policy's stage that is completed at a step; None if none is."""
+        now = self.expected_stages[step]
+        later = step < self.last_step
+        after = self.expected_stages[step + 1] if later else self.expected_stage
+        return self.stages[now] if 0 <= now < after else None
 
-    def begun(self, *kinds: str, after: int) -> Iterator[FactInterval]:
-        """What began later than a step, of some kinds."""
-        return (s for s in self.spells if s.begin > after and s.fact.kind in kinds)
+    def started(self, *roles: FactRole, after: int) -> Iterator[FactInterval]:
+        """Yield the intervals of facts with some roles that start later than a step."""
+        return (
+            one for one in self.intervals if one.start > after and one.fact.traits.role in roles
+        )
 
     def unmet(self) -> tuple[Fact, ...]:
-        """The facts of all parts of what is due that are not met at the end."""
+        """Return the facts in all parts of the expected condition that are not met at the end."""
         history = FactHistory()
         for step, facts in enumerate(self.facts):
-            history.follow(step, facts)
-        expects = self.stages[self.due].expects
+            history.update(step, facts)
+        expects = self.stages[self.expected_stage].expects
         parts: tuple[Condition, ...] = expects.of if isinstance(expects, All) else (expects,)
         return tuple(f for part in parts if not history.holds(part) for f in facts_of(part))
 
 
-def rejudge(episode: Episode, events: Sequence[Event], turn: int, elapsed: int) -> EpisodeReplay:
+def rejudge(
+    episode: Episode, events: Sequence[Event], policy_start_step: int, elapsed_steps: int
+) -> EpisodeReplay:
     """Judge an episode again.
 
     Args:
-        episode: which.
-        events: all that changed since the world began.
-        turn: steps of the world before the policy's turn.
-        elapsed: steps of the world in all; the last evaluation was after it.
+        episode: the episode.
+        events: all changes since the world began, in order.
+        policy_start_step: steps of the world before the policy's turn.
+        elapsed_steps: steps of the world in all; the last evaluation comes after them.
     """
-    facts = facts_by_step(events, elapsed)
+    facts = facts_by_step(events, elapsed_steps)
     judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
-    dues: list[int] = []
+    expected_stages: list[int] = []
     for step, now in enumerate(facts):
-        dues.append(judge.index - len(episode.demonstration))
+        expected_stages.append(judge.index - len(episode.demonstration))
         judge.update(step, now)
-    return EpisodeReplay(episode, turn, tuple(dues), facts, _spells(events), judge)
+    return EpisodeReplay(
+        episode, policy_start_step, tuple(expected_stages), facts, _intervals(events), judge
+    )
 
 
-def facts_by_step(events: Sequence[Event], elapsed: int) -> tuple[frozenset[Fact], ...]:
-    """All that held, after 0 to `elapsed` steps."""
+def facts_by_step(events: Sequence[Event], elapsed_steps: int) -> tuple[frozenset[Fact], ...]:
+    """Return all facts that hold after 0, 1, ... `elapsed_steps` steps.
+
+    Steps without an event share one set.
+    """
     by_step: dict[int, list[Event]] = {}
     for event in events:
         by_step.setdefault(event.step, []).append(event)
     now: frozenset[Fact] = frozenset()
-    course: list[frozenset[Fact]] = []
-    for step in range(elapsed + 1):
+    all_facts: list[frozenset[Fact]] = []
+    for step in range(elapsed_steps + 1):
         for event in by_step.get(step, ()):
             now = now | {event.fact} if event.holds else now - {event.fact}
-        course.append(now)
-    return tuple(course)
+        all_facts.append(now)
+    return tuple(all_facts)
 
 
-def _spells(events: Sequence[Event]) -> tuple[FactInterval, ...]:
-    open_: dict[Fact, int] = {}
-    spells: list[FactInterval] = []
+def _intervals(events: Sequence[Event]) -> tuple[FactInterval, ...]:
+    starts: dict[Fact, int] = {}
+    intervals: list[FactInterval] = []
     for event in events:
         if event.holds:
-            open_[event.fact] = event.step
+            starts[event.fact] = event.step
         else:
-            spells.append(FactInterval(event.fact, open_.pop(event.fact), event.step))
-    spells += [FactInterval(fact, begin, None) for fact, begin in open_.items()]
-    return tuple(sorted(spells, key=lambda spell: (spell.begin, spell.fact.kind)))
+            intervals.append(FactInterval(event.fact, starts.pop(event.fact), event.step))
+    intervals += [FactInterval(fact, start, None) for fact, start in starts.items()]
+    return tuple(sorted(intervals, key=lambda interval: (interval.start, interval.fact.kind)))

@@ -1,4 +1,4 @@
-"""Events: facts that begin or cease to hold, each with its step."""
+"""Events: facts that start or cease to hold, each with its step."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from roboirg.core.conditions import Fact
 
 
 class Event(NamedTuple):
-    """A fact began to hold (`holds`) or ceased to, at the evaluation after `step` steps."""
+    """A fact that started to hold (`holds`) or ceased to, at the evaluation after `step` steps."""
 
     step: int
     fact: Fact
     holds: bool
 
     def as_dict(self) -> dict[str, str | int | bool | None]:
-        """The event as plain JSON values, for records."""
+        """Return the event as plain JSON values, for records."""
         kind, subject, place = self.fact
         return {
             "step": self.step,
@@ -28,10 +28,10 @@ class Event(NamedTuple):
 
 
 def changes(step: int, before: AbstractSet[Fact], now: AbstractSet[Fact]) -> tuple[Event, ...]:
-    """What changed between two evaluations, in a fixed order."""
-    begun = [Event(step, fact, True) for fact in sorted(now - before, key=_order)]
+    """Return the events between two evaluations: first the facts that ceased, then the new ones."""
+    started = [Event(step, fact, True) for fact in sorted(now - before, key=_order)]
     ceased = [Event(step, fact, False) for fact in sorted(before - now, key=_order)]
-    return (*ceased, *begun)
+    return (*ceased, *started)
 
 
 def _order(fact: Fact) -> tuple[str, str, str]:

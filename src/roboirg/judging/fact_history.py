@@ -1,4 +1,4 @@
-"""What has happened so far, as far as conditions ask for it."""
+"""The history of facts that conditions need."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from roboirg.core.conditions import All, Condition, Elapsed, Fact, FactCount, Oc
 
 
 class FactHistory:
-    """Follows the facts from evaluation to evaluation and answers conditions.
+    """Records the facts of each evaluation and tests conditions.
 
     Attributes:
         step: control steps since reset at the last evaluation.
@@ -19,38 +19,38 @@ class FactHistory:
     def __init__(self) -> None:
         self.step = 0
         self.facts: AbstractSet[Fact] = frozenset()
-        self._begun: dict[Fact, list[int]] = {}
+        self._start_steps: dict[Fact, list[int]] = {}
         self._timers: dict[str, int] = {}
 
-    def follow(self, step: int, facts: AbstractSet[Fact]) -> None:
-        """Take note of an evaluation."""
+    def update(self, step: int, facts: AbstractSet[Fact]) -> None:
+        """Record the facts of an evaluation."""
         if facts is not self.facts:
             for fact in facts - self.facts:
-                self._begun.setdefault(fact, []).append(step)
+                self._start_steps.setdefault(fact, []).append(step)
         self.step, self.facts = step, facts
 
     def start_timer(self, name: str) -> None:
-        """Start a timer at this evaluation, unless it runs already."""
+        """Start a timer at this evaluation, unless it is running."""
         self._timers.setdefault(name, self.step)
 
     def holds(self, condition: Condition) -> bool:
-        """Whether a condition is met at the last evaluation."""
+        """Return whether a condition is met at the last evaluation."""
         match condition:
             case Fact():
                 return condition in self.facts
             case FactCount(facts, least, most):
                 return _within(sum(fact in self.facts for fact in facts), least, most)
             case OccurrenceCount(facts, least, until):
-                return sum(self._beginnings(fact, until) for fact in facts) >= least
+                return sum(self._occurrences(fact, until) for fact in facts) >= least
             case Elapsed(least, most, timer):
                 start = 0 if timer is None else self._timers.get(timer)
                 return start is not None and _within(self.step - start, least, most)
             case All(of):
                 return all(self.holds(part) for part in of)
 
-    def _beginnings(self, fact: Fact, until: int | None) -> int:
-        """How often a fact has begun, at or before a step."""
-        steps = self._begun.get(fact, [])
+    def _occurrences(self, fact: Fact, until: int | None) -> int:
+        """Return how many times a fact has started to hold, at or before a step if one is given."""
+        steps = self._start_steps.get(fact, [])
         return len(steps) if until is None else bisect.bisect_right(steps, until)
 
 

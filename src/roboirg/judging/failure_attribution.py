@@ -1,4 +1,4 @@
-"""What an attribution says, and the names it uses."""
+"""The result of a failure analysis, and the names of failures."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class FailureAttribution(NamedTuple):
     """Why an episode failed.
 
     Attributes:
-        kind: ``grounding`` (something else was done than what was meant) or ``execution`` (it was
-            not brought off).
+        kind: ``grounding`` (the policy did something else than the instruction means) or
+            ``execution`` (it did not complete what the instruction means).
         failure: which of the kind, one of `GROUNDING` or `EXECUTION`.
         subject: name of the object that it is about, if there is one.
         step: control step of the policy's turn at which it showed.
@@ -34,7 +34,7 @@ class FailureAttribution(NamedTuple):
     def of(
         cls, failure: FailureName, subject: str | None, step: int, words: str
     ) -> FailureAttribution:
-        """A finding of the kind to which the failure belongs; its words become a sentence."""
+        """Return an attribution of the kind of the failure; the words become a sentence."""
         kind: Literal["grounding", "execution"] = (
             "grounding" if failure in GROUNDING else "execution"
         )

@@ -1,53 +1,65 @@
-"""Which grounding failure an act is that was not due."""
+"""Classify an act that the current stage does not expect."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from roboirg.core.conditions import Fact, FactKind, GroundingFailure, facts_of
+from roboirg.core.conditions import Fact, GroundingFailure, facts_of
 from roboirg.core.episode import Stage
-
-RELEASES: frozenset[FactKind] = frozenset({"lying", "put_down"})
-"""Facts of something that has merely been let go."""
-CLOSING: FactKind = "pressed"
-"""The act that says that all has been done."""
+from roboirg.core.fact_traits import FactRole
 
 
-def classify_grounding_error(fact: Fact, stages: Sequence[Stage], due: int) -> GroundingFailure:
-    """What it means that something was done while something else was due.
+def classify_grounding_error(
+    fact: Fact, stages: Sequence[Stage], expected_stage: int
+) -> GroundingFailure:
+    """Return the grounding failure of an act that another stage expects, or none.
 
     | the act | is |
     | --- | --- |
-    | is due later, and is the press that ends the task: too few of the others were done | \
+    | is expected later, and is the press that ends the task: some acts before it are missing | \
 ``wrong_count`` |
-    | is due later, otherwise or with nothing left but to let go | ``wrong_order`` |
-    | is due with another object | ``wrong_object`` |
-    | was due before: once too often | ``wrong_count`` |
-    | is due with the same object at another place | ``wrong_place`` |
-    | is never due | ``wrong_object`` |
+    | is expected later, otherwise or with nothing but a release before it | ``wrong_order`` |
+    | is expected with another object | ``wrong_object`` |
+    | was expected before: once too often | ``wrong_count`` |
+    | is expected with the same object at another place | ``wrong_place`` |
+    | is never expected | ``wrong_object`` |
 
     Args:
-        fact: that came to hold.
+        fact: the act, a fact that starts to hold.
         stages: of the policy.
-        due: index of the stage that was due.
+        expected_stage: index of the current stage.
     """
     expected = [facts_of(stage.expects) for stage in stages]
-    now = expected[due]
-    again = due > 0 and fact in expected[due - 1] and fact not in now
-    later = [index for index in range(due + 1, len(stages)) if fact in expected[index]]
-    if later and not (again and _same_subject(fact, now)):
-        skipped = {other.kind for facts in expected[due : later[0]] for other in facts}
-        early = fact.kind == CLOSING and not skipped <= RELEASES
-        return "wrong_count" if early else "wrong_order"
+    now, past = expected[expected_stage], expected[:expected_stage]
+    later = range(expected_stage + 1, len(stages))
+    next_use = next((index for index in later if fact in expected[index]), None)
+    if next_use is not None and not _repeats(fact, now, past):
+        return _classify_early(fact, expected[expected_stage:next_use])
     if any(other.kind == fact.kind and other.subject != fact.subject for other in now):
         return "wrong_object"
-    if any(fact in facts for facts in expected[:due]):
+    if any(fact in facts for facts in past):
         return "wrong_count"
-    elsewhere = (other for facts in expected for other in facts if other.kind == fact.kind)
-    if any(other.subject == fact.subject and other.place != fact.place for other in elsewhere):
-        return "wrong_place"
-    return "wrong_object"
+    return "wrong_place" if _is_misplaced(fact, expected) else "wrong_object"
 
 
-def _same_subject(fact: Fact, now: tuple[Fact, ...]) -> bool:
-    return any(other.kind == fact.kind and other.subject == fact.subject for other in now)
+def _repeats(fact: Fact, now: tuple[Fact, ...], past: Sequence[tuple[Fact, ...]]) -> bool:
+    """Return whether the last stage expected the act and this one expects it at another place."""
+    again = bool(past) and fact in past[-1] and fact not in now
+    return again and any(_is_alike(fact, one) for one in now)
+
+
+def _classify_early(fact: Fact, skipped: Sequence[tuple[Fact, ...]]) -> GroundingFailure:
+    """Classify an act before its time by the expected acts that it skips."""
+    only_releases = all(one.traits.role is FactRole.RELEASE for facts in skipped for one in facts)
+    ends_task = fact.traits.role is FactRole.PRESS
+    return "wrong_count" if ends_task and not only_releases else "wrong_order"
+
+
+def _is_misplaced(fact: Fact, expected: Sequence[tuple[Fact, ...]]) -> bool:
+    """Return whether any stage expects the same act with the same object at another place."""
+    alike = (one for facts in expected for one in facts if _is_alike(fact, one))
+    return any(one.place != fact.place for one in alike)
+
+
+def _is_alike(fact: Fact, other: Fact) -> bool:
+    return other.kind == fact.kind and other.subject == fact.subject

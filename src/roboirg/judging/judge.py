@@ -1,8 +1,8 @@
-"""The judge: a list of stages and the facts of each step give a status.
+"""The judge: follow the facts of each step through a list of stages.
 
-The rule is RoboMME's: at each evaluation what the current stage forbids is tested first, then
-what it expects; at most one stage is completed per evaluation, so what ends one stage is never
-held against the next one in the same step.
+As in RoboMME, each evaluation first tests what the current stage forbids, then what it expects.
+It completes at most one stage, so an act that completes one never violates the next in the same
+step.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from roboirg.judging.fact_history import FactHistory
 
 
 class Status(StrEnum):
-    """How the episode stands."""
+    """Status of an episode."""
 
     ONGOING = "ongoing"
     SUCCESS = "success"
@@ -25,19 +25,20 @@ class Status(StrEnum):
 
 
 class Judge:
-    """Follows one episode.
+    """Judges one episode.
 
     Args:
         stages: what has to happen, in order, the demonstration's stages included.
-        scene: lets the cause call things by what they are instead of by their names.
+        scene: lets the cause describe objects instead of naming them.
 
     Attributes:
         status: success and failure are final.
         index: number of completed stages.
-        published: the stage that was due when the last evaluation began, or None when all are
+        published: the current stage when the last evaluation began, or None when all are
             completed: labels change one step after the stage (RoboMME).
         cause: why the episode failed; None before that.
-        broken: what was forbidden and came to hold; None before that, or if `fail` ended it.
+        violation: the forbidden fact or rule that came to hold; None before that, or if `fail`
+            ended the episode.
     """
 
     def __init__(self, stages: Sequence[Stage], scene: Scene | None = None) -> None:
@@ -47,36 +48,32 @@ class Judge:
         self.index = 0
         self.published = self.current
         self.cause: str | None = None
-        self.broken: Fact | Rule | None = None
+        self.violation: Fact | Rule | None = None
         self._history = FactHistory()
         self._held_since: int | None = None
 
     @property
     def current(self) -> Stage | None:
-        """The stage that is due, or None when all are completed."""
+        """The stage to complete next, or None when all are completed."""
         return self.stages[self.index] if self.index < len(self.stages) else None
 
     def update(self, step: int, facts: AbstractSet[Fact]) -> Status:
-        """Evaluate once.
+        """Evaluate once and return the status.
 
         Args:
             step: control steps since reset.
             facts: all that hold now.
-
-        Returns:
-            The status after the evaluation.
         """
         stage = self.current
         if self.status is not Status.ONGOING or stage is None:
             return self.status
         self.published = stage
-        self._history.follow(step, facts)
+        self._history.update(step, facts)
         if stage.timer is not None:
             self._history.start_timer(stage.timer)
-        broken = next((rule for rule in stage.forbids if self._is_broken(rule)), None)
-        if broken is not None:
-            self.broken = broken
-            self.fail(describe_violation(broken, stage, self._scene))
+        self.violation = next((rule for rule in stage.forbids if self._is_violated(rule)), None)
+        if self.violation is not None:
+            self.fail(describe_violation(self.violation, stage, self._scene))
         elif self._completed(step, stage):
             self.index += 1
             self._held_since = None
@@ -85,11 +82,11 @@ class Judge:
         return self.status
 
     def fail(self, cause: str) -> None:
-        """End the episode as a failure, unless it is over already."""
+        """End the episode as a failure, unless it is over."""
         if self.status is Status.ONGOING:
             self.status, self.cause = Status.FAILURE, cause
 
-    def _is_broken(self, rule: Fact | Rule) -> bool:
+    def _is_violated(self, rule: Fact | Rule) -> bool:
         return self._history.holds(rule.condition if isinstance(rule, Rule) else rule)
 
     def _completed(self, step: int, stage: Stage) -> bool:
@@ -101,23 +98,26 @@ class Judge:
         return step - self._held_since >= stage.lasting
 
 
-_VERBS = {"picked": "picked up", "lifted": "lifted", "pressed": "pressed"}
+def describe_violation(violation: Fact | Rule, stage: Stage, scene: Scene) -> str:
+    """Return what was done and what the stage expects, in one line, as for a record's cause."""
+    if isinstance(violation, Rule):
+        return f"{violation.cause}; {describe_expected(stage)}"
+    return f"{describe_act(violation, scene)}; {describe_expected(stage)}"
 
 
-def describe_violation(broken: Fact | Rule, stage: Stage, scene: Scene) -> str:
-    """What happened and what was due, in one line, for example for a record's cause."""
-    what = broken.cause if isinstance(broken, Rule) else _describe_fact(broken, scene)
-    return f"{what} while due: {plain_subgoal(stage)}"
+def describe_expected(stage: Stage) -> str:
+    """Return what the stage expects, to follow an act: ``"expected: press the button"``."""
+    return f"expected: {plain_subgoal(stage)}"
 
 
-def _describe_fact(fact: Fact, scene: Scene) -> str:
-    verb = _VERBS.get(fact.kind, fact.kind.replace("_", " "))
-    place = f" on {describe_object(fact.place, scene)}" if fact.place else ""
-    return f"{verb} {describe_object(fact.subject, scene)}{place}"
+def describe_act(fact: Fact, scene: Scene) -> str:
+    """Return the act that makes a fact hold, in the past tense."""
+    place = describe_object(fact.place, scene) if fact.place else ""
+    return fact.traits.past.format(subject=describe_object(fact.subject, scene), place=place)
 
 
 def describe_object(name: str, scene: Scene) -> str:
-    """An object as a person would point it out; its bare name if the scene does not have it."""
+    """Return words for an object, or its name if the scene does not have it."""
     item = next((item for item in scene.objects if item.name == name), None)
     if item is None:
         return name
@@ -129,5 +129,5 @@ def describe_object(name: str, scene: Scene) -> str:
 
 
 def plain_subgoal(stage: Stage) -> str:
-    """The stage's simple subgoal: its words without the slot for a pixel."""
+    """Return the stage's simple subgoal: its words without the slot for a pixel."""
     return stage.subgoal.replace("{at} ", "").replace(" {at}", "")

@@ -1,9 +1,9 @@
-"""Releases beside the place, failed grasps, and what they excuse.
+"""Releases beside the expected place, failed grasps, and the early acts that they excuse.
 
-An act that comes too early may be right after all: a policy that has let its cube fall beside the
-target and goes on has counted well. So the episode is judged a second time as if each release had
-been where it was due; where the act is then allowed, the first release is to blame. Likewise an act
-after a grasp that failed, if nothing but what needs that grasp was left out.
+An act that comes too early may be right: a policy that drops its cube beside the target and goes
+on has counted correctly. So the episode is judged again as if each release had been at its
+expected place. If the act is allowed then, the first such release is the failure. An act after a
+failed grasp is excused if it skips nothing but what needs that grasp.
 """
 
 from __future__ import annotations
@@ -11,125 +11,125 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from roboirg.core.conditions import LASTING_KINDS, Fact, facts_of
+from roboirg.core.conditions import Fact, facts_of
+from roboirg.core.fact_traits import FactRole
 from roboirg.judging.episode_replay import EpisodeReplay, FactInterval
 from roboirg.judging.failure_attribution import FailureAttribution
-from roboirg.judging.judge import Judge, Status, describe_object, plain_subgoal
-
-PLACINGS = ("placed", "binned")
+from roboirg.judging.judge import Judge, Status, describe_expected, describe_object
 
 
 class MisplacedRelease(NamedTuple):
-    """Something that was picked came to lie elsewhere than where it was due.
+    """A picked object that came to lie beside its expected place.
 
     Attributes:
-        missing: the fact that was due and would have begun.
-        grip: the last spell of its being picked.
-        begin: the step from which it lay there.
-        until: the step at which it was picked again; None if it was not.
+        missing: the placing that the stage expected.
+        grip: the last interval in which the object was picked.
+        start: the step from which on it lay there.
+        end: the step at which it was picked again; None if it was not.
     """
 
     missing: Fact
     grip: FactInterval
-    begin: int
-    until: int | None
+    start: int
+    end: int | None
 
 
-def find_excusing_release(trace: EpisodeReplay, act: Fact) -> FailureAttribution | None:
-    """The failed execution without which an act would not have come too early, if there is one."""
-    due = trace.due
+def find_excusing_release(replay: EpisodeReplay, act: Fact) -> FailureAttribution | None:
+    """Return the execution failure but for which an act would not be too early, if there is one."""
+    current = replay.expected_stage
     later = [
         index
-        for index in range(due + 1, len(trace.stages))
-        if act in facts_of(trace.stages[index].expects)
+        for index in range(current + 1, len(replay.stages))
+        if act in facts_of(replay.stages[index].expects)
     ]
     if not later:
         return None
-    slips = list(_slips(trace))
-    if slips and _allowed(trace, slips):
-        return describe_release(trace, slips[0].grip, slips[0].begin)
-    expects = trace.stages[due].expects
-    if [stage.expects for stage in trace.stages[due : later[0]]].count(expects) == 1:
-        return describe_missed_grasp(trace, facts_of(expects))
+    releases = list(_misplaced_releases(replay))
+    if releases and _is_allowed(replay, releases):
+        return describe_release(replay, releases[0].grip, releases[0].start)
+    expects = replay.stages[current].expects
+    if [stage.expects for stage in replay.stages[current : later[0]]].count(expects) == 1:
+        return describe_missed_grasp(replay, facts_of(expects))
     return None
 
 
 def describe_missed_grasp(
-    trace: EpisodeReplay, wanted: tuple[Fact, ...]
+    replay: EpisodeReplay, wanted: tuple[Fact, ...]
 ) -> FailureAttribution | None:
-    """The last attempt to take hold of something since the present stage is due."""
-    subjects = {fact.subject for fact in wanted if fact.kind in ("picked", "lifted")}
-    tries = trace.begun("reached", "held", after=trace.due_since)
-    spell = max(
-        (spell for spell in tries if spell.fact.subject in subjects),
-        key=lambda spell: spell.begin,
+    """Return the last failed attempt in the current stage to pick something up, if there is one."""
+    subjects = {fact.subject for fact in wanted if fact.traits.role is FactRole.RAISE}
+    attempts = replay.started(FactRole.TOUCH, FactRole.GRIP, after=replay.expected_since)
+    attempt = max(
+        (interval for interval in attempts if interval.fact.subject in subjects),
+        key=lambda interval: interval.start,
         default=None,
     )
-    if spell is None:
+    if attempt is None:
         return None
-    name = spell.fact.subject
-    words = f"reached {describe_object(name, trace.episode.scene)} without lifting it"
+    name = attempt.fact.subject
+    words = f"reached {describe_object(name, replay.episode.scene)} without lifting it"
     return FailureAttribution.of(
-        "missed_grasp", name, spell.begin, f"{words} {expected_action(trace)}"
+        "missed_grasp", name, attempt.start, f"{words}; {expected_action(replay)}"
     )
 
 
-def describe_release(trace: EpisodeReplay, grip: FactInterval, step: int) -> FailureAttribution:
-    """What was picked has been let go elsewhere than where it was due.
+def describe_release(replay: EpisodeReplay, grip: FactInterval, step: int) -> FailureAttribution:
+    """Return the failure of an object that was released beside its expected place.
 
     Args:
-        trace: of the episode.
-        grip: the last spell of its being picked or lifted, which is over.
+        replay: of the episode.
+        grip: the last interval in which the object was picked or lifted, which has ended.
         step: when it lay there.
     """
     name = grip.fact.subject
-    thing = describe_object(name, trace.episode.scene)
-    due = expected_action(trace, trace.dues[step])
-    if grip.end is not None and Fact("held", name) in trace.facts[grip.end]:
+    words = describe_object(name, replay.episode.scene)
+    expected = expected_action(replay, replay.expected_stages[step])
+    if grip.end is not None and Fact("held", name) in replay.facts[grip.end]:
         return FailureAttribution.of(
-            "misplaced", name, step, f"put {thing} down outside its place {due}"
+            "misplaced", name, step, f"put {words} down beside its place; {expected}"
         )
-    return FailureAttribution.of("dropped", name, step, f"dropped {thing} {due}")
+    return FailureAttribution.of("dropped", name, step, f"dropped {words}; {expected}")
 
 
-def expected_action(trace: EpisodeReplay, due: int | None = None) -> str:
-    """What was due, in words."""
-    stage = trace.stages[max(trace.due if due is None else due, 0)]
-    return f"while due: {plain_subgoal(stage)}"
+def expected_action(replay: EpisodeReplay, stage: int | None = None) -> str:
+    """Return what a stage expects, in words; by default the one that is current at the end."""
+    index = replay.expected_stage if stage is None else stage
+    return describe_expected(replay.stages[max(index, 0)])
 
 
-def _slips(trace: EpisodeReplay) -> Iterator[MisplacedRelease]:
-    picks = list(trace.begun("picked", after=trace.turn))
-    for spell in trace.begun("lying", after=trace.turn):
-        name, begin = spell.fact.subject, spell.begin
+def _misplaced_releases(replay: EpisodeReplay) -> Iterator[MisplacedRelease]:
+    picks = list(replay.started(FactRole.RAISE, after=replay.policy_start_step))
+    for rest in replay.started(FactRole.RELEASE, after=replay.policy_start_step):
+        name, start = rest.fact.subject, rest.start
         own = [pick for pick in picks if pick.fact.subject == name]
-        grips = [pick for pick in own if pick.end is not None and pick.end <= begin]
-        again = min((pick.begin for pick in own if pick.begin > begin), default=None)
-        missing = _missing(trace, name, begin)
-        if grips and missing is not None and not _came(trace, missing, begin, again):
-            yield MisplacedRelease(missing, max(grips, key=lambda pick: pick.begin), begin, again)
+        grips = [pick for pick in own if pick.end is not None and pick.end <= start]
+        end = min((pick.start for pick in own if pick.start > start), default=None)
+        missing = _expected_placing(replay, name, start)
+        if grips and missing is not None and not _occurs(replay, missing, start, end):
+            yield MisplacedRelease(missing, max(grips, key=lambda pick: pick.start), start, end)
 
 
-def _missing(trace: EpisodeReplay, name: str, step: int) -> Fact | None:
-    """Where a thing was due at a step, if it was."""
-    due = facts_of(trace.stages[max(trace.dues[step], 0)].expects)
-    return next((f for f in due if f.kind in PLACINGS and f.subject == name), None)
+def _expected_placing(replay: EpisodeReplay, name: str, step: int) -> Fact | None:
+    """Return the placing of an object that is expected at a step, if there is one."""
+    stage = replay.stages[max(replay.expected_stages[step], 0)]
+    placings = (f for f in facts_of(stage.expects) if f.traits.role is FactRole.PLACING)
+    return next((fact for fact in placings if fact.subject == name), None)
 
 
-def _came(trace: EpisodeReplay, fact: Fact, begin: int, until: int | None) -> bool:
-    """Whether a fact held at any step from one to another."""
-    return any(fact in facts for facts in trace.facts[begin:until])
+def _occurs(replay: EpisodeReplay, fact: Fact, start: int, end: int | None) -> bool:
+    """Return whether a fact holds at any step from `start` until before `end`."""
+    return any(fact in facts for facts in replay.facts[start:end])
 
 
-def _allowed(trace: EpisodeReplay, slips: list[MisplacedRelease]) -> bool:
-    """Whether no rule is broken if each release was where it was due."""
-    judge = Judge((*trace.episode.demonstration, *trace.stages), trace.episode.scene)
-    for step, facts in enumerate(trace.facts):
-        credit = {slip.missing for slip in slips if _holds(slip, step)}
+def _is_allowed(replay: EpisodeReplay, releases: list[MisplacedRelease]) -> bool:
+    """Return whether no rule is violated if each release was at its expected place."""
+    judge = Judge((*replay.episode.demonstration, *replay.stages), replay.episode.scene)
+    for step, facts in enumerate(replay.facts):
+        credit = {release.missing for release in releases if _is_credited(release, step)}
         judge.update(step, facts | credit if credit else facts)
     return judge.status is not Status.FAILURE
 
 
-def _holds(slip: MisplacedRelease, step: int) -> bool:
-    lasts = slip.until is None or slip.missing.kind in LASTING_KINDS
-    return slip.begin <= step and (lasts or step < (slip.until or 0))
+def _is_credited(release: MisplacedRelease, step: int) -> bool:
+    lasts = release.end is None or release.missing.traits.lasts
+    return release.start <= step and (lasts or step < (release.end or 0))

@@ -1,8 +1,8 @@
-"""The words: an episode and a setting give an instruction; the resolver reads it back."""
+"""Instructions: generate them from episodes, and interpret them independently."""
 
 from __future__ import annotations
 
-from roboirg.language.generator import expressible, instruct
+from roboirg.language.generator import expressible, find_refusals, instruct, instruct_with
 from roboirg.language.instruction import FORMS, Instruction, Mention, Utterance
 from roboirg.language.interpreter import Interpretation, interpret
 from roboirg.language.request import STAGE_SETS
@@ -18,7 +18,9 @@ __all__ = [
     "Mention",
     "Utterance",
     "expressible",
+    "find_refusals",
     "instruct",
+    "instruct_with",
     "interpret",
     "setting_names",
     "settings_of",

@@ -1,4 +1,4 @@
-"""What a set of instructions is made of: referring expressions, lengths, patterns, landmarks."""
+"""Statistics of instructions: referring expressions, lengths, patterns, landmarks."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ class Lengths(NamedTuple):
     longest: int
 
 
-Counts = Mapping[str, Mapping[str, int]]
-"""By setting, then by what is counted."""
+ClassCounts = Mapping[str, Mapping[str, int]]
+"""ClassCounts by group (setting or task), then by class."""
 
 
 def expressions(instruction: Instruction) -> frozenset[str]:
-    """The classes of referring expressions that an instruction contains, each once."""
+    """Return the classes of referring expressions in an instruction."""
     return frozenset(
         mention.expression for mention in instruction.mentions if mention.expression is not None
     )
 
 
-def expression_counts(instructions: Iterable[Instruction]) -> Counts:
-    """In how many scenes each expression class occurs, by setting.
+def expression_counts(instructions: Iterable[Instruction]) -> ClassCounts:
+    """Count the scenes with each expression class, by setting.
 
-    A scene counts once for a setting, however many instructions it has there.
+    A scene counts once for a setting, even if it has several instructions there.
     """
     scenes = {
         (instruction.setting, instruction.episode, expression)
@@ -45,20 +45,20 @@ def expression_counts(instructions: Iterable[Instruction]) -> Counts:
     return counts
 
 
-def expression_order(counts: Counts) -> tuple[str, ...]:
-    """The classes that occur at all, in the order of their definition."""
+def expression_order(counts: ClassCounts) -> tuple[str, ...]:
+    """Return the classes that occur, in the order of their definition."""
     found = {name for one in counts.values() for name in one}
     return tuple(name for name in get_args(Expression) if name in found)
 
 
 def scene_counts(instructions: Iterable[Instruction]) -> Mapping[str, int]:
-    """How many scenes there are, by setting."""
+    """Count the scenes by setting."""
     scenes = {(instruction.setting, instruction.episode) for instruction in instructions}
     return Counter(setting for setting, _ in scenes)
 
 
 def word_counts(instructions: Iterable[Instruction]) -> Mapping[str, Lengths]:
-    """Lengths of the prompts in words, by setting."""
+    """Return the lengths of the prompts in words, by setting."""
     found: dict[str, list[int]] = {}
     for instruction in instructions:
         found.setdefault(instruction.setting, []).append(len(instruction.text.split()))
@@ -68,24 +68,24 @@ def word_counts(instructions: Iterable[Instruction]) -> Mapping[str, Lengths]:
     }
 
 
-def pattern_counts(instructions: Iterable[Instruction]) -> Counts:
-    """How many instructions use each reasoning pattern as their main one, by task."""
+def pattern_counts(instructions: Iterable[Instruction]) -> ClassCounts:
+    """Count the instructions by task and main reasoning pattern."""
     return _tally(instructions, lambda one: _texts(one.metadata.get("pattern")))
 
 
-def relation_counts(instructions: Iterable[Instruction]) -> Counts:
-    """How many instructions use each relation of numbers, by task."""
+def relation_counts(instructions: Iterable[Instruction]) -> ClassCounts:
+    """Count the instructions by task and relation to the reference."""
     return _tally(instructions, lambda one: _texts(one.metadata.get("relation")))
 
 
-def landmark_counts(instructions: Iterable[Instruction]) -> Counts:
-    """How many targets are told by each landmark class, by task."""
+def landmark_counts(instructions: Iterable[Instruction]) -> ClassCounts:
+    """Count the targets by task and landmark class."""
     return _tally(instructions, lambda one: _texts(one.metadata.get("landmark_classes")))
 
 
 def _tally(
     instructions: Iterable[Instruction], values: Callable[[Instruction], Sequence[str]]
-) -> Counts:
+) -> ClassCounts:
     counts: dict[str, Counter[str]] = {}
     for instruction in instructions:
         for value in values(instruction):

@@ -1,7 +1,7 @@
-"""Instructions as a table: one row for each episode, setting and form, in JSON lines or Parquet.
+"""Export of instructions: one row for each episode, setting and form, in JSON lines or Parquet.
 
-Every row has the same columns of the same types, so that pandas and Hugging Face `datasets` load
-it as it is; `docs/language.md` explains the columns.
+All rows have the same columns and types, so that pandas and Hugging Face `datasets` load them
+directly; `docs/language.md` explains the columns.
 """
 
 from __future__ import annotations
@@ -14,20 +14,21 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from roboirg.core.episode import Episode
-from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.core.errors import MissingDependencyError
 from roboirg.language.instruction import Instruction
 from roboirg.tasks import get_task
+from roboirg.util.atomic_write import write_atomically
 
-Format = Literal["jsonl", "parquet"]
-EXPORT_FORMATS: tuple[Format, ...] = get_args(Format)
+ExportFormat = Literal["jsonl", "parquet"]
+EXPORT_FORMATS: tuple[ExportFormat, ...] = get_args(ExportFormat)
 
-Row = dict[str, Any]
+ExportRow = dict[str, Any]
 """Plain JSON values by column."""
 
 
-def row(episode: Episode, instruction: Instruction) -> Row:
-    """All that is known about one instruction; the columns are in `docs/language.md`."""
-    about: Mapping[str, Any] = instruction.metadata
+def row(episode: Episode, instruction: Instruction) -> ExportRow:
+    """Return an instruction as a row; `docs/language.md` explains the columns."""
+    metadata: Mapping[str, Any] = instruction.metadata
     return {
         "id": f"{episode.key}/{instruction.setting}/{instruction.form}",
         "task": episode.task,
@@ -43,25 +44,25 @@ def row(episode: Episode, instruction: Instruction) -> Row:
         "turns": _turns(instruction),
         "mentions": _mentions(instruction),
         "words": len(instruction.text.split()),
-        # As text, because every task has slots of its own.
+        # As text, because each task has its own slots.
         "goal": json.dumps(episode.goal.as_mapping()),
-        "pattern": about["pattern"],
-        "patterns": about["patterns"],
-        "relation": about["relation"],
-        "references": _texts(about["reference"]),
-        "landmarks": about["landmarks"],
-        "landmark_classes": about["landmark_classes"],
-        "frame": about["frame"],
-        "stages": about["stages"],
-        "distractor": about["distractor"],
-        "distractors": about["distractors"],
-        "templates": about["templates"],
-        "language_version": about["language_version"],
+        "pattern": metadata["pattern"],
+        "patterns": metadata["patterns"],
+        "relation": metadata["relation"],
+        "references": _texts(metadata["reference"]),
+        "landmarks": metadata["landmarks"],
+        "landmark_classes": metadata["landmark_classes"],
+        "frame": metadata["frame"],
+        "stages": metadata["stages"],
+        "distractor": metadata["distractor"],
+        "distractors": metadata["distractors"],
+        "templates": metadata["templates"],
+        "language_version": metadata["language_version"],
     }
 
 
-def _turns(instruction: Instruction) -> list[Row]:
-    """Each utterance, and where in the prompt it begins."""
+def _turns(instruction: Instruction) -> list[ExportRow]:
+    """Return the utterances, each with its position in the prompt."""
     lengths = [len(utterance.text) + 1 for utterance in instruction.utterances]
     starts = itertools.accumulate(lengths, initial=0)
     return [
@@ -70,8 +71,8 @@ def _turns(instruction: Instruction) -> list[Row]:
     ]
 
 
-def _mentions(instruction: Instruction) -> list[Row]:
-    """Each mention; its span counts in the whole prompt."""
+def _mentions(instruction: Instruction) -> list[ExportRow]:
+    """Return the mentions, with their positions in the prompt."""
     starts = [turn["start"] for turn in _turns(instruction)]
     return [
         {
@@ -94,20 +95,22 @@ def _texts(value: object) -> list[str]:
     return [str(one) for one in (value if isinstance(value, list) else [value])]
 
 
-def encoded(rows: Iterable[Row], kind: Format) -> bytes:
-    """The rows as a file; the same rows give the same bytes (Parquet: with the same pyarrow).
+def encode(rows: Iterable[ExportRow], kind: ExportFormat) -> bytes:
+    """Return the content of a file with the rows; the same rows give the same bytes.
+
+    In Parquet, the bytes also depend on the version of pyarrow.
 
     Raises:
-        MissingDependencyError: Parquet needs pyarrow.
+        MissingDependencyError: the format is Parquet, and pyarrow is not installed.
     """
     return _ENCODERS[kind](rows)
 
 
-def check_export_support(kind: Format) -> None:
-    """See before the work starts that a format can be written.
+def check_export_support(kind: ExportFormat) -> None:
+    """Check early that a format can be written.
 
     Raises:
-        MissingDependencyError: Parquet needs pyarrow.
+        MissingDependencyError: the format is Parquet, and pyarrow is not installed.
     """
     if kind != "parquet":
         return
@@ -120,11 +123,11 @@ def check_export_support(kind: Format) -> None:
         ) from error
 
 
-def _jsonl(rows: Iterable[Row]) -> bytes:
+def _jsonl(rows: Iterable[ExportRow]) -> bytes:
     return "".join(f"{json.dumps(one, ensure_ascii=False)}\n" for one in rows).encode()
 
 
-def _parquet(rows: Iterable[Row]) -> bytes:
+def _parquet(rows: Iterable[ExportRow]) -> bytes:
     check_export_support("parquet")
     import pyarrow as pa
     from pyarrow import parquet
@@ -152,29 +155,23 @@ def _parquet(rows: Iterable[Row]) -> bytes:
     return file.getvalue()
 
 
-def _struct(*fields: tuple[str, Any]) -> Any:  # noqa: ANN401 - it ships no types
+def _struct(*fields: tuple[str, Any]) -> Any:  # noqa: ANN401 - pyarrow ships no types
     import pyarrow as pa
 
     return pa.struct(list(fields))
 
 
-_ENCODERS: Mapping[Format, Callable[[Iterable[Row]], bytes]] = {
+_ENCODERS: Mapping[ExportFormat, Callable[[Iterable[ExportRow]], bytes]] = {
     "jsonl": _jsonl,
     "parquet": _parquet,
 }
 
 
-def write_rows(rows: Iterable[Row], path: Path, kind: Format) -> None:
-    """Write the rows to a file, which is replaced whole.
+def write_rows(rows: Iterable[ExportRow], path: Path, kind: ExportFormat) -> None:
+    """Write the rows to a file, atomically.
 
     Raises:
-        MissingDependencyError: Parquet needs pyarrow.
-        InvalidValueError: the file cannot be written.
+        MissingDependencyError: the format is Parquet, and pyarrow is not installed.
+        InvalidValueError: the file is not writable.
     """
-    data = encoded(rows, kind)
-    partial = path.with_name(f".{path.name}.part")
-    try:
-        partial.write_bytes(data)
-        partial.replace(path)
-    except OSError as error:
-        raise InvalidValueError(f"Cannot write {path}: {error.strerror}.") from error
+    write_atomically(path, encode(rows, kind))

@@ -1,4 +1,4 @@
-"""The referring expressions of each setting as a picture."""
+"""Figure of the referring expressions in each setting."""
 
 from __future__ import annotations
 
@@ -6,54 +6,32 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.language.corpus_statistics import expression_counts, expression_order, scene_counts
 from roboirg.language.instruction import Instruction
-from roboirg.language.settings import setting_names
+from roboirg.language.settings import all_settings
+from roboirg.util.figure_files import save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLORS = {
-    "direct": "#0072B2",
-    "reasoning": "#D55E00",
-    "contextual": "#009E73",
-    "spatial": "#CC79A7",
-}
-"""Of Okabe and Ito, told apart by color-blind people too."""
 FORMATS = ("png", "svg")
 PANEL_INCHES, SIDE_INCHES = 2.6, 0.9
 ROW_INCHES, MARGIN_INCHES = 0.29, 1.25
 DOTS_PER_INCH = 200
-ROOM = 1.25
-"""The width of a panel in units of the longest bar, so that the number behind it fits."""
-
-
-def check_figure_support() -> None:
-    """See before the work starts that pictures can be drawn.
-
-    Raises:
-        MissingDependencyError: matplotlib is not installed.
-    """
-    try:
-        import matplotlib as mpl  # noqa: F401
-    except ImportError as error:
-        raise MissingDependencyError(
-            "The figure needs matplotlib: pip install 'roboirgbench[report]'; "
-            "without --out the tables alone are printed."
-        ) from error
+PANEL_RANGE = 1.25
+"""Width of a panel in units of the longest bar; leaves space for its number."""
 
 
 def write_figure(
-    said: Sequence[Instruction], folder: Path, name: str, title: str
+    instructions: Sequence[Instruction], folder: Path, name: str, title: str
 ) -> tuple[Path, ...]:
-    """Draw in how many scenes each class of referring expression occurs, as PNG and SVG.
+    """Draw the number of scenes with each class of referring expression, as PNG and SVG.
 
     Args:
-        said: the instructions to count in.
-        folder: made if it is missing.
-        name: of the files, without ending.
+        instructions: the instructions to count in.
+        folder: created if it is missing.
+        name: of the files, without extension.
         title: above the panels.
 
     Returns:
@@ -61,32 +39,25 @@ def write_figure(
 
     Raises:
         MissingDependencyError: matplotlib is not installed.
-        InvalidValueError: the folder cannot be written to.
+        InvalidValueError: the folder is not writable.
     """
-    check_figure_support()
-    import matplotlib as mpl
-
-    # The ids in an SVG file are random without it.
-    with mpl.rc_context({"svg.hashsalt": "roboirg", "font.family": "DejaVu Sans", "font.size": 9}):
-        figure = _drawn(said, title)
-        paths = tuple(folder / f"{name}.{ending}" for ending in FORMATS)
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            for path in paths:
-                metadata = {"Date": None} if path.suffix == ".svg" else None
-                figure.savefig(path, dpi=DOTS_PER_INCH, metadata=metadata)
-        except OSError as error:
-            raise InvalidValueError(f"Cannot write to {folder}: {error.strerror}.") from error
-    return paths
+    return save_figure(
+        lambda: _draw(instructions, title),
+        folder,
+        name,
+        formats=FORMATS,
+        dots_per_inch=DOTS_PER_INCH,
+        style={"font.size": 9},
+    )
 
 
-def _drawn(said: Sequence[Instruction], title: str) -> Figure:
-    # Not by pyplot: that would keep every figure and look for a display.
+def _draw(instructions: Sequence[Instruction], title: str) -> Figure:
+    # Without pyplot, which keeps every figure and looks for a display.
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    counts, scenes = expression_counts(said), scene_counts(said)
-    settings = [setting for setting in setting_names() if setting in counts]
+    counts, scenes = expression_counts(instructions), scene_counts(instructions)
+    settings = [setting for setting in all_settings() if setting in counts]
     classes = expression_order(counts)
     size = (
         PANEL_INCHES * max(1, len(settings)) + SIDE_INCHES,
@@ -95,14 +66,14 @@ def _drawn(said: Sequence[Instruction], title: str) -> Figure:
     figure = Figure(figsize=size, layout=ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.08))
     figure.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold")
     if settings:
-        # One scale: lengths of bars compare across the panels.
+        # One scale, to compare bars across panels.
         panels = figure.subplots(1, len(settings), sharex=True, sharey=True, squeeze=False)[0]
         for panel, setting in zip(panels, settings, strict=True):
             numbers = [counts[setting].get(one, 0) for one in classes]
-            _draw_panel(panel, classes, numbers, COLORS[setting])
+            _draw_panel(panel, classes, numbers, all_settings()[setting].color)
             panel.set_title(f"{setting} ({scenes[setting]} scenes)", fontsize=10)
         most = max(number for one in counts.values() for number in one.values())
-        panels[0].set_xlim(0, ROOM * most)
+        panels[0].set_xlim(0, PANEL_RANGE * most)
         panels[0].invert_yaxis()
         figure.supxlabel("scenes in which the expression occurs", fontsize=9)
     return figure

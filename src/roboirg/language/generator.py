@@ -1,24 +1,28 @@
-"""From an episode to an instruction."""
+"""Generate the instruction of an episode."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TypeVar
+from collections.abc import Mapping, Sequence
 
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.instruction_options import (
+    ALL_STAGES,
+    DEFAULT_DISTRACTOR,
+    DEFAULT_DISTRACTORS,
+    DEFAULT_FRAME,
+    InstructionOptions,
+)
 from roboirg.language.instruction import FORMS, Instruction, Mention, Utterance
 from roboirg.language.landmarks import FRAMES
 from roboirg.language.phrases import speak
 from roboirg.language.request import DISTRACTORS, STAGE_SETS, InstructionRequest, InstructionSpec
-from roboirg.language.settings import all_settings, get_setting, settings_of
+from roboirg.language.settings import get_setting, settings_of
 from roboirg.language.template_sampler import TemplateSampler
 from roboirg.language.templates import LANGUAGE_VERSION
 from roboirg.tasks import get_task
 
-Name = TypeVar("Name", bound=str)
-
-_UNSAID: dict[str, object] = {
+_DEFAULT_METADATA: dict[str, object] = {
     "pattern": None,
     "patterns": [],
     "relation": None,
@@ -30,7 +34,7 @@ _UNSAID: dict[str, object] = {
     "landmark_classes": [],
     "frame": None,
 }
-"""The metadata of an instruction to which a key does not apply."""
+"""The metadata that apply to some settings only."""
 
 
 def instruct(
@@ -38,124 +42,124 @@ def instruct(
     setting: str = "explicit",
     form: str = "implicit",
     *,
-    stages: Sequence[int] = (1, 2, 3, 4, 5),
-    distractor: str = "neutral",
-    distractors: int = 1,
-    frame: str = "robot",
+    stages: Sequence[int] = ALL_STAGES,
+    distractor: str = DEFAULT_DISTRACTOR,
+    distractors: int = DEFAULT_DISTRACTORS,
+    frame: str = DEFAULT_FRAME,
 ) -> Instruction:
-    """The instruction of an episode: the same arguments give the same bytes, always.
+    """Return the instruction of an episode; the same arguments always give the same bytes.
 
     Args:
-        episode: what is to be said.
-        setting: ``explicit``, ``direct``, ``reasoning``, ``contextual`` or ``spatial``.
-        form: ``implicit``, or ``resolved`` with the command's referring expressions replaced by
-            what they stand for. An explicit instruction is its own resolved form.
+        episode: what to say.
+        setting: name of a setting; `setting_names` lists them.
+        form: ``implicit``, or ``resolved``, in which the command names the referents of its
+            referring expressions. An explicit instruction is its own resolved form.
         stages: of the contextual setting: 1 introduction, 2 reinforcement, 3 distractor, 4 cue,
-            5 command. Other settings do not read it, nor the next two.
+            5 command. Each option from here on changes only the settings that read it.
         distractor: ``neutral`` remarks, or ``competing`` ones that name other values.
-        distractors: how many of them.
-        frame: whose left and right the spatial setting means, ``robot`` or ``camera``.
+        distractors: number of remarks.
+        frame: of left and right, ``robot`` or ``camera``.
 
     Raises:
         UnknownNameError: a name does not exist.
-        InvalidValueError: the setting is not defined for the task, the stages are none of the
-            four sets, there are no distractors, or no landmark tells the place.
+        InvalidValueError: the task lacks the setting, the stages are none of `STAGE_SETS`, the
+            number of distractors is below 1, or the setting cannot express the episode.
     """
-    rule = get_setting(setting, get_task(episode.task))
-    request = _request(episode, form, stages, distractor, distractors, frame)
-    refused = rule.refusal(request)
-    if refused is not None:
+    return instruct_with(
+        episode,
+        InstructionOptions(setting, form, tuple(stages), distractor, distractors, frame),
+    )
+
+
+def instruct_with(episode: Episode, options: InstructionOptions) -> Instruction:
+    """Return the instruction of an episode; like `instruct`, with all options in one value."""
+    setting = get_setting(options.setting, get_task(episode.task))
+    request = _request(episode, options)
+    reason = setting.refusal(request)
+    if reason is not None:
         raise InvalidValueError(
-            f"The {setting} setting cannot express episode {episode.key} (seed {episode.seed}): "
-            f"{refused}."
+            f"The {setting.name} setting cannot express episode {episode.key} "
+            f"(seed {episode.seed}): {reason}."
         )
-    return _instruction(request, rule.name, rule.say(request))
+    return _instruction(request, setting.say(request))
 
 
-def expressible(episode: Episode, *, frame: str = "robot") -> tuple[str, ...]:
-    """The settings in which this episode can be told; all of its task's, or all but spatial.
+def find_refusal(episode: Episode, options: InstructionOptions) -> str | None:
+    """Return why a setting of the task cannot express an episode; None if it can."""
+    setting = get_setting(options.setting, get_task(episode.task))
+    return setting.refusal(_request(episode, options))
+
+
+def find_refusals(episode: Episode, *, frame: str = DEFAULT_FRAME) -> Mapping[str, str]:
+    """Return the settings of the task that cannot express an episode, each with the reason.
 
     Args:
-        episode: what is to be said.
-        frame: whose left and right the spatial setting would mean, ``robot`` or ``camera``.
+        episode: what to say.
+        frame: of left and right, ``robot`` or ``camera``.
     """
-    request = _request(episode, "implicit", STAGE_SETS[-1], "neutral", 1, frame)
-    return tuple(
-        name
+    reasons = {
+        name: find_refusal(episode, InstructionOptions(name, frame=frame))
         for name in settings_of(get_task(episode.task))
-        if all_settings()[name].refusal(request) is None
-    )
+    }
+    return {name: reason for name, reason in reasons.items() if reason is not None}
 
 
-def can_express(
-    episode: Episode,
-    setting: str,
-    *,
-    stages: Sequence[int] = (1, 2, 3, 4, 5),
-    distractor: str = "neutral",
-    distractors: int = 1,
-    frame: str = "robot",
-) -> bool:
-    """Whether an episode can be told in a setting of its task, with the options of `instruct`."""
-    request = _request(episode, "implicit", stages, distractor, distractors, frame)
-    return get_setting(setting, get_task(episode.task)).refusal(request) is None
+def expressible(episode: Episode, *, frame: str = DEFAULT_FRAME) -> tuple[str, ...]:
+    """Return the settings of the task that can express an episode.
+
+    Args:
+        episode: what to say.
+        frame: of left and right, ``robot`` or ``camera``.
+    """
+    refused = find_refusals(episode, frame=frame)
+    return tuple(name for name in settings_of(get_task(episode.task)) if name not in refused)
 
 
-def _request(
-    episode: Episode,
-    form: str,
-    stages: Sequence[int],
-    distractor: str,
-    distractors: int,
-    frame: str,
-) -> InstructionRequest:
-    if tuple(stages) not in STAGE_SETS:
-        sets = ", ".join(str(one) for one in STAGE_SETS)
-        raise InvalidValueError(f"The stages {tuple(stages)} are none of the four sets: {sets}.")
-    if isinstance(distractors, bool) or not isinstance(distractors, int) or distractors < 1:
-        raise InvalidValueError(f"distractors is {distractors!r}; it must be a number from 1 on.")
+def _request(episode: Episode, options: InstructionOptions) -> InstructionRequest:
+    _check_options(options)
     task = get_task(episode.task)
-    return InstructionRequest(
-        episode=episode,
-        task=task,
-        form=_one_of("form", form, FORMS),
-        stages=tuple(stages),
-        distractor=_one_of("distractor", distractor, DISTRACTORS),
-        distractors=distractors,
-        frame=_one_of("frame", frame, FRAMES),
-        chooser=TemplateSampler(f"{LANGUAGE_VERSION}|{task.name}|{episode.seed}"),
-    )
+    sampler = TemplateSampler(f"{LANGUAGE_VERSION}|{task.name}|{episode.seed}")
+    return InstructionRequest(episode, task, options, sampler)
 
 
-def _instruction(request: InstructionRequest, setting: str, draft: InstructionSpec) -> Instruction:
-    utterances, mentions = _spoken(draft)
+def _check_options(options: InstructionOptions) -> None:
+    if options.stages not in STAGE_SETS:
+        sets = ", ".join(str(one) for one in STAGE_SETS)
+        raise InvalidValueError(f"The stages {options.stages} must be one of {sets}.")
+    count: object = options.distractors
+    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
+        raise InvalidValueError(f"distractors is {count!r}; it must be a whole number from 1 on.")
+    for kind, name, known in (
+        ("form", options.form, FORMS),
+        ("distractor", options.distractor, DISTRACTORS),
+        ("frame", options.frame, FRAMES),
+    ):
+        if name not in known:
+            raise UnknownNameError(kind, name, known)
+
+
+def _instruction(request: InstructionRequest, spec: InstructionSpec) -> Instruction:
+    utterances, mentions = _spoken(spec)
     return Instruction(
         task=request.task.name,
         episode=request.episode.key,
-        setting=setting,
-        form=request.form,
+        setting=request.options.setting,
+        form="resolved" if request.resolved else "implicit",
         utterances=utterances,
         mentions=mentions,
         metadata={
-            **_UNSAID,
-            **draft.notes,
+            **_DEFAULT_METADATA,
+            **spec.notes,
             "language_version": LANGUAGE_VERSION,
-            "templates": list(request.chooser.log),
+            "templates": list(request.sampler.log),
         },
     )
 
 
-def _one_of(kind: str, name: str, known: Sequence[Name]) -> Name:
-    for one in known:
-        if name == one:
-            return one
-    raise UnknownNameError(kind, name, known)
-
-
-def _spoken(draft: InstructionSpec) -> tuple[tuple[Utterance, ...], tuple[Mention, ...]]:
+def _spoken(spec: InstructionSpec) -> tuple[tuple[Utterance, ...], tuple[Mention, ...]]:
     utterances: list[Utterance] = []
     mentions: list[Mention] = []
-    for index, (stage, phrase) in enumerate(draft.said):
+    for index, (stage, phrase) in enumerate(spec.utterances):
         utterance, found = speak(index, stage, phrase)
         utterances.append(utterance)
         mentions += found

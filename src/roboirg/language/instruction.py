@@ -1,4 +1,4 @@
-"""What an instruction is: utterances, each with its stage, and the mentions in them."""
+"""The data of an instruction: utterances with their stages, and the mentions in them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,12 @@ FORMS: tuple[Form, ...] = get_args(Form)
 
 @dataclass(frozen=True, slots=True)
 class Utterance:
-    """One turn of the speaker: a stage of the discourse and its text."""
+    """One turn of the speaker.
+
+    Attributes:
+        stage: its part in the discourse.
+        text: its words.
+    """
 
     stage: UtteranceStage
     text: str
@@ -35,9 +40,9 @@ class Mention:
         end: one past the last character.
         role: antecedent or anaphor.
         expression: class of an anaphor; None for an antecedent.
-        slot: name of the goal slot, or ``reference`` for what only leads to the goal: two colors
-            or moments, the one of them that was chosen, the quantity or position to count from.
-        value: what it stands for: of a goal slot one of the goal's values, or all of them
+        slot: name of the goal slot, or ``reference`` for values that only lead to the goal: two
+            colors or moments, the chosen one of them, the quantity or position to count from.
+        value: the referent: for a goal slot one of the goal's values, or all of them
             (``red and green``) for a plural.
     """
 
@@ -52,14 +57,14 @@ class Mention:
 
 @dataclass(frozen=True, slots=True)
 class Instruction:
-    """All that is said to the robot in one episode.
+    """Everything said to the robot in one episode.
 
     Attributes:
         task: name of the task.
         episode: the episode's key, ``task/split/index``.
         setting: name of the setting, for example ``"direct"``.
-        form: ``implicit``, or ``resolved`` with each referring expression of the command
-            replaced by what it stands for. The explicit setting is its own resolved form.
+        form: ``implicit``, or ``resolved``, in which the command names the referents of its
+            referring expressions. The explicit setting is its own resolved form.
         utterances: in the order of speaking; the last one is the command.
         mentions: in the order of their position.
         metadata: reasoning pattern, context stages, landmarks, frame of reference, template
@@ -76,19 +81,19 @@ class Instruction:
 
     @property
     def text(self) -> str:
-        """The single prompt that policies see: all utterances joined by one space."""
+        """The prompt for policies: all utterances, joined by spaces."""
         return " ".join(utterance.text for utterance in self.utterances)
 
     @property
     def turns(self) -> tuple[str, ...]:
-        """The utterances' texts."""
+        """The texts of the utterances."""
         return tuple(utterance.text for utterance in self.utterances)
 
     @property
     def command(self) -> str:
-        """The final utterance, which says what to do."""
+        """The text of the last utterance, which states the task."""
         return self.utterances[-1].text
 
     def span(self, mention: Mention) -> str:
-        """The characters of a mention."""
+        """Return the text of a mention."""
         return self.utterances[mention.utterance].text[mention.start : mention.end]

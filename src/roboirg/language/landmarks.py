@@ -1,8 +1,8 @@
-"""Places in words: landmarks that pick one object out of its like, by a clear margin.
+"""Landmarks: words for places that single out one object of its kind, by a clear margin.
 
-Left and right are the robot's unless the frame is ``camera``: then they are those of the picture
-of the front camera, which looks at the robot. Near and far are always told from the robot: "you",
-or "the robot" in the camera frame, so that one instruction has one point of view.
+Left and right are the robot's, or in the frame ``camera`` those in the picture of the front
+camera, which faces the robot. Near and far always refer to the robot, which is "you", or "the
+robot" in the camera frame, so that one instruction has one point of view.
 """
 
 from __future__ import annotations
@@ -12,38 +12,37 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Literal, NamedTuple
 
-from roboirg.core.episode import Scene, SceneObject
+from roboirg.core.episode import ObjectKind, Scene, SceneObject
 from roboirg.core.motions import Away
-from roboirg.tasks.task import Thing
 
 MARGIN = 0.03
-"""Meters by which a landmark's object must win over any other in the quantity compared."""
+"""Meters by which a landmark's object must exceed all others in the compared quantity."""
 COLUMN_MARGIN = 6.0
 """The same in columns of the front camera's picture (256 pixels wide)."""
 
 WORK_AREA = {"near": -0.3, "far": 0.2, "left": 0.25, "right": -0.25}
-"""World x of its near and far edge, y of its left and right one."""
+"""World x of the near and far edges, y of the left and right ones, in meters."""
 TABLE = {"near": -0.7402, "far": 0.4689, "left": 1.2030, "right": -1.2149}
-"""The same of the table's top."""
+"""The same for the table top."""
 
 Frame = Literal["robot", "camera"]
 FRAMES: tuple[Frame, ...] = ("robot", "camera")
 
 ORDINALS = {1: "second", 2: "third"}
-PAIRED: tuple[Thing, ...] = ("box", "tape")
-"""Things of which there are always two."""
+PAIRED: tuple[ObjectKind, ...] = ("box", "tape")
+"""Kinds of objects that always come in pairs."""
 
 
 class Landmark(NamedTuple):
-    """A place that tells one object from all others of its kind.
+    """Words for a place that single out one object of its kind.
 
     Attributes:
-        phrase: what follows the noun: "the cube *at the far left*".
+        phrase: words after the noun: "the cube *at the far left*".
         level: class, in the order of preference: 1 extremes and the sides of a pair, 2 corners,
             3 ranks, 4 fixtures, 5 cubes of another color, 6 nearest to an object of class 1 or 2,
-            7 to one of class 3, 8 second nearest to one of class 1 or 2, 9 third nearest to one of
-            those.
-        sided: whether the words name left or right, so that it matters whose.
+            7 nearest to one of class 3, 8 second nearest to one of class 1 or 2, 9 third nearest
+            to one of class 1 or 2.
+        sided: whether the words name left or right, so that the frame matters.
     """
 
     phrase: str
@@ -51,14 +50,14 @@ class Landmark(NamedTuple):
     sided: bool = False
 
 
-class Reading(NamedTuple):
-    """A way to compare: large quantities first, clear from `margin` on."""
+class Ranking(NamedTuple):
+    """A quantity to rank objects by, largest first; differences count from `margin` on."""
 
     quantity: Callable[[SceneObject], float]
     margin: float = MARGIN
 
-    def selected(self, candidates: Sequence[SceneObject], rank: int) -> SceneObject | None:
-        """The candidate of that rank (from 0), or None if it is not clear which."""
+    def select(self, candidates: Sequence[SceneObject], rank: int) -> SceneObject | None:
+        """Return the candidate of a rank (from 0); None unless it is clear by the margin."""
         if rank >= len(candidates):
             return None
         values = [(self.quantity(item), position) for position, item in enumerate(candidates)]
@@ -71,50 +70,50 @@ class Reading(NamedTuple):
 
 
 class Selector(NamedTuple):
-    """A landmark and how it selects: the `rank`-th of the candidates.
+    """A landmark and its meaning: the candidate of rank `rank`.
 
-    Words that can be read in several ways select only what all readings agree on.
+    Ambiguous words select an object only if all their rankings agree on it.
     """
 
     landmark: Landmark
-    readings: tuple[Reading, ...]
+    rankings: tuple[Ranking, ...]
     candidates: tuple[SceneObject, ...]
     rank: int = 0
 
-    def selected(self) -> SceneObject | None:
-        """The object it picks out, or None if it is not clear which."""
-        first, *others = (reading.selected(self.candidates, self.rank) for reading in self.readings)
+    def select(self) -> SceneObject | None:
+        """Return the object that the landmark singles out; None if it is unclear."""
+        first, *others = (ranking.select(self.candidates, self.rank) for ranking in self.rankings)
         return first if all(other is first for other in others) else None
 
 
-# Kept, because the forms of an episode ask the same.
+# Cached: all forms of an episode ask for the same.
 @functools.lru_cache(maxsize=64)
 def landmarks(
-    scene: Scene, thing: Thing, target: SceneObject, frame: Frame = "robot"
+    scene: Scene, thing: ObjectKind, target: SceneObject, frame: Frame = "robot"
 ) -> tuple[Landmark, ...]:
-    """The landmarks of the best available class that tell the target; empty if none does.
+    """Return the landmarks of the best available class that single out the target; maybe none.
 
     Args:
-        scene: everything on the table.
-        thing: the kind of the candidates.
+        scene: the scene.
+        thing: kind of the candidates.
         target: one of the candidates.
-        frame: whose left and right.
+        frame: of left and right.
     """
     found: list[Landmark] = []
     for selector in selectors(scene, thing, frame):
         if found and selector.landmark.level > found[0].level:
             break
-        if selector.selected() is target:
+        if selector.select() is target:
             found.append(selector.landmark)
     return tuple(found)
 
 
-def selectors(scene: Scene, thing: Thing, frame: Frame) -> Iterator[Selector]:
-    """Every selector, from the best class to the last.
+def selectors(scene: Scene, thing: ObjectKind, frame: Frame) -> Iterator[Selector]:
+    """Yield every selector, from the best class to the last.
 
-    Boxes and tapes stand in pairs, one on either side of the robot, and are told by their side.
+    Boxes and tapes stand in pairs, one on each side of the robot; only their sides are used.
     """
-    candidates = seen(scene, thing)
+    candidates = candidates_in(scene, thing)
     if thing in PAIRED:
         yield from _sides(candidates, frame)
         return
@@ -129,8 +128,8 @@ def selectors(scene: Scene, thing: Thing, frame: Frame) -> Iterator[Selector]:
     yield from _chains(thing, candidates, named, level=9, rank=2)
 
 
-def seen(scene: Scene, thing: Thing) -> tuple[SceneObject, ...]:
-    """What a listener can check: the cubes that are there at first, or all things of a kind."""
+def candidates_in(scene: Scene, thing: ObjectKind) -> tuple[SceneObject, ...]:
+    """Return the visible candidates: all objects of a kind, without cubes that arrive later."""
     if thing != "cube":
         return scene.of_kind(thing)
     late = {
@@ -142,47 +141,52 @@ def seen(scene: Scene, thing: Thing) -> tuple[SceneObject, ...]:
 class _Direction(NamedTuple):
     extreme: str
     rank: str
-    reading: Reading
+    ranking: Ranking
     sided: bool = False
 
 
 def _directions(frame: Frame) -> tuple[_Direction, ...]:
     if frame == "robot":
         robot = "you"
-        left = Reading(lambda item: item.position.y)
+        left = Ranking(lambda item: item.position.y)
     else:
         robot = "the robot"
-        left = Reading(lambda item: -_column(item), COLUMN_MARGIN)
-    right = Reading(_negated(left.quantity), left.margin)
+        left = Ranking(lambda item: -_column(item), COLUMN_MARGIN)
+    right = Ranking(_negated(left.quantity), left.margin)
     near, far = f"closest to {robot}", f"farthest from {robot}"
     return (
         _Direction("at the far left", "from the left", left, sided=True),
         _Direction("at the far right", "from the right", right, sided=True),
-        _Direction(near, near, Reading(lambda item: -item.position.x)),
-        _Direction(far, far, Reading(lambda item: item.position.x)),
+        _Direction(near, near, Ranking(lambda item: -item.position.x)),
+        _Direction(far, far, Ranking(lambda item: item.position.x)),
     )
 
 
 def _column(item: SceneObject) -> float:
-    """Where the front camera sees an object: it stands at (0.3, 0, 0.4), looks at (0, 0, -0.2)."""
+    """Return an object's column in the picture of the front camera.
+
+    The camera stands at (0.3, 0, 0.4) and looks at (0, 0, -0.2).
+    """
     x, y, z = item.position.x, item.position.y, 0.02
     depth = 0.49194 - 0.44721 * x - 0.89443 * z
     return 128.0 + 128.0 * y / depth
 
 
 def _extremes(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
-    for way in _directions(frame):
-        yield Selector(Landmark(way.extreme, 1, way.sided), (way.reading,), candidates)
+    for direction in _directions(frame):
+        yield Selector(
+            Landmark(direction.extreme, 1, direction.sided), (direction.ranking,), candidates
+        )
 
 
 def _sides(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
-    left, right = (way.reading for way in _directions(frame) if way.sided)
-    for side, reading in (("left", left), ("right", right)):
-        yield Selector(Landmark(f"on the {side}", 1, sided=True), (reading,), candidates)
+    left, right = (direction.ranking for direction in _directions(frame) if direction.sided)
+    for side, ranking in (("left", left), ("right", right)):
+        yield Selector(Landmark(f"on the {side}", 1, sided=True), (ranking,), candidates)
 
 
 def _corners(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
-    # The words leave open which corner is meant: of the table, or of the part that is in use.
+    # The words can mean the corner of the table, or of the work area.
     for side, mirrored in (("left", "right"), ("right", "left")):
         for depth, reach in (("near", "near"), ("far", "far from")):
             if frame == "robot":
@@ -191,18 +195,18 @@ def _corners(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Sele
                 phrase = f"closest to the {side} corner of the table that is {reach} the robot"
                 y = mirrored
             corners = [(area[depth], area[y]) for area in (WORK_AREA, TABLE)]
-            readings = tuple(_nearness(corner) for corner in corners)
-            yield Selector(Landmark(phrase, 2, sided=True), readings, candidates)
+            rankings = tuple(_nearness(corner) for corner in corners)
+            yield Selector(Landmark(phrase, 2, sided=True), rankings, candidates)
 
 
 def _ranks(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
     for rank, ordinal in ORDINALS.items():
-        # The last of a row is an extreme of the other end.
+        # The last one in a row is the extreme of the other end.
         if rank > len(candidates) - 2:
             continue
-        for way in _directions(frame):
-            landmark = Landmark(f"{ordinal} {way.rank}", 3, way.sided)
-            yield Selector(landmark, (way.reading,), candidates, rank)
+        for direction in _directions(frame):
+            landmark = Landmark(f"{ordinal} {direction.rank}", 3, direction.sided)
+            yield Selector(landmark, (direction.ranking,), candidates, rank)
 
 
 def _fixtures(scene: Scene, candidates: tuple[SceneObject, ...]) -> Iterator[Selector]:
@@ -212,8 +216,8 @@ def _fixtures(scene: Scene, candidates: tuple[SceneObject, ...]) -> Iterator[Sel
             continue
         away = _distance(fixtures[0].position)
         near = Landmark(f"closest to the {kind}", 4)
-        yield Selector(near, (Reading(_negated(away)),), candidates)
-        yield Selector(Landmark(f"farthest from the {kind}", 4), (Reading(away),), candidates)
+        yield Selector(near, (Ranking(_negated(away)),), candidates)
+        yield Selector(Landmark(f"farthest from the {kind}", 4), (Ranking(away),), candidates)
 
 
 def _other_colors(candidates: Sequence[SceneObject]) -> Iterator[Selector]:
@@ -233,11 +237,11 @@ def _chains(
     rank: int = 0,
 ) -> Iterator[Selector]:
     for selector in anchors:
-        anchor = selector.selected()
+        anchor = selector.select()
         if anchor is None:
             continue
         others = _without(candidates, anchor)
-        # The last of a row is not "second nearest" to anybody.
+        # The last one in a row is not called "second nearest".
         if rank and rank >= len(others) - 1:
             continue
         nearest = f"{ORDINALS[rank]} nearest" if rank else "nearest"
@@ -250,8 +254,8 @@ def _without(candidates: Sequence[SceneObject], anchor: SceneObject) -> tuple[Sc
     return tuple(item for item in candidates if item is not anchor)
 
 
-def _nearness(place: Sequence[float]) -> Reading:
-    return Reading(_negated(_distance(place)))
+def _nearness(place: Sequence[float]) -> Ranking:
+    return Ranking(_negated(_distance(place)))
 
 
 def _distance(place: Sequence[float]) -> Callable[[SceneObject], float]:

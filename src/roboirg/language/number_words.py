@@ -13,20 +13,20 @@ ADVERBS = {1: "once", 2: "twice"}
 
 
 def plural(noun: str) -> str:
-    """The plural of the name of a thing: ``cubes``, ``boxes``."""
+    """Return the plural of a noun: ``cubes``, ``boxes``."""
     return f"{noun}es" if noun.endswith("x") else f"{noun}s"
 
 
 def cardinal(number: int) -> str:
-    """A number from 0 to 10 as a word."""
+    """Return a number from 0 to 10 as a word."""
     return CARDINALS[number]
 
 
 def ordinal(number: int) -> str:
-    """A position from 1 to 10 as a word: ``first``, ``second``, ..."""
+    """Return a position from 1 to 10 as a word: ``first``, ``second``, etc."""
     return ORDINALS[number]
 
 
 def times(number: int) -> str:
-    """How often: ``once``, ``twice``, ``three times``, ..."""
+    """Return a number of repetitions in words: ``once``, ``twice``, ``three times``, etc."""
     return ADVERBS.get(number, f"{cardinal(number)} times")

@@ -1,4 +1,4 @@
-"""Phrases that know which of their words refer: filling templates, and exact mention spans.
+"""Fill templates with phrases, and keep the exact spans of mentions.
 
 A template is a sentence with fields and alternatives: ``{cube}`` takes a phrase, and
 ``[was|were]`` takes its first form in the singular and its second in the plural.
@@ -16,7 +16,7 @@ _MARK = re.compile(r"\{(?P<field>[a-z_.0-9]+)\}|\[(?P<one>[^\[\]|]*)\|(?P<many>[
 
 
 class Tag(NamedTuple):
-    """What a piece of text refers to; see `Mention`."""
+    """The referent of a piece of text; see `Mention`."""
 
     role: Role
     expression: Expression | None
@@ -24,68 +24,68 @@ class Tag(NamedTuple):
     value: str | int
 
 
-class Piece(NamedTuple):
-    """A run of characters that is one mention (with a tag) or none."""
+class TaggedText(NamedTuple):
+    """A run of characters: one mention if it has a tag, else none."""
 
     text: str
     tag: Tag | None = None
 
 
-Phrase = tuple[Piece, ...]
+Phrase = tuple[TaggedText, ...]
 
 
 def plain(text: str) -> Phrase:
-    """Words that refer to nothing."""
-    return (Piece(text),)
+    """Return words that are no mention."""
+    return (TaggedText(text),)
 
 
 def antecedent(text: str, slot: str, value: str | int) -> Phrase:
-    """Words that introduce a slot value."""
-    return (Piece(text, Tag("antecedent", None, slot, value)),)
+    """Return words that introduce a slot value."""
+    return (TaggedText(text, Tag("antecedent", None, slot, value)),)
 
 
 def anaphor(text: str, expression: Expression, slot: str, value: str | int) -> Phrase:
-    """Words that point back at a slot value."""
-    return (Piece(text, Tag("anaphor", expression, slot, value)),)
+    """Return words that point back at a slot value."""
+    return (TaggedText(text, Tag("anaphor", expression, slot, value)),)
 
 
 def fill(template: str, fields: Mapping[str, Phrase], *, plural: bool = False) -> Phrase:
-    """The template with its fields filled and its alternatives decided.
+    """Fill the fields of a template, and choose singular or plural alternatives.
 
     Raises:
-        KeyError: the template has a field that is not given.
+        KeyError: a field of the template is missing.
     """
-    pieces: list[Piece] = []
+    pieces: list[TaggedText] = []
     end = 0
     for mark in _MARK.finditer(template):
-        pieces.append(Piece(template[end : mark.start()]))
+        pieces.append(TaggedText(template[end : mark.start()]))
         name = mark["field"]
         if name is not None:
             pieces.extend(fields[name])
         else:
-            pieces.append(Piece(mark["many"] if plural else mark["one"]))
+            pieces.append(TaggedText(mark["many"] if plural else mark["one"]))
         end = mark.end()
-    pieces.append(Piece(template[end:]))
+    pieces.append(TaggedText(template[end:]))
     return tuple(piece for piece in pieces if piece.text)
 
 
 def listed(phrases: Sequence[Phrase]) -> Phrase:
-    """``a``, ``a and b``, ``a, b and c``."""
-    pieces: list[Piece] = []
+    """Join phrases into a list: ``a``, ``a and b``, ``a, b and c``."""
+    pieces: list[TaggedText] = []
     for position, phrase in enumerate(phrases):
         if position:
             last = position == len(phrases) - 1
-            pieces.append(Piece(" and " if last else ", "))
+            pieces.append(TaggedText(" and " if last else ", "))
         pieces.extend(phrase)
     return tuple(pieces)
 
 
 def sentences(phrases: Iterable[Phrase]) -> Phrase:
-    """Complete sentences one after the other, with a space in between."""
-    pieces: list[Piece] = []
+    """Join complete sentences with spaces."""
+    pieces: list[TaggedText] = []
     for phrase in phrases:
         if pieces:
-            pieces.append(Piece(" "))
+            pieces.append(TaggedText(" "))
         pieces.extend(phrase)
     return tuple(pieces)
 
@@ -93,7 +93,7 @@ def sentences(phrases: Iterable[Phrase]) -> Phrase:
 def speak(
     index: int, stage: UtteranceStage, phrase: Phrase
 ) -> tuple[Utterance, tuple[Mention, ...]]:
-    """The utterance that a phrase becomes as number `index`, and where its mentions are."""
+    """Turn a phrase into the utterance of number `index`, and its tags into mentions."""
     mentions: list[Mention] = []
     start = 0
     for piece in phrase:
@@ -106,5 +106,5 @@ def speak(
 
 
 def _capitalized(text: str) -> str:
-    """A capital at the start of every sentence; no character is added or removed."""
+    """Capitalize every sentence, without adding or removing characters."""
     return re.sub(r"(^|[.!?] )([a-z])", lambda found: found[1] + found[2].upper(), text)

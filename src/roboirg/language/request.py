@@ -1,15 +1,16 @@
-"""What a setting is asked for, and what it hands back."""
+"""The request to put an episode into words, and what a setting returns for it."""
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, cast
 
 from roboirg.core.episode import Color, Episode, Goal, Scene, SceneObject
 from roboirg.core.errors import InvalidValueError
-from roboirg.language.instruction import Form, UtteranceStage
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.language.instruction import UtteranceStage
 from roboirg.language.landmarks import Frame
 from roboirg.language.phrases import Phrase, fill
 from roboirg.language.template_sampler import TemplateSampler
@@ -29,80 +30,92 @@ SLOT_TYPE_NAMES: Mapping[str, SlotTypeName] = {
     "placement": "placement",
     "relation": "relation",
 }
-"""What kind of value each goal slot holds; colors that have counts are amounts with them."""
+"""The type of each goal slot; counted colors are amounts, together with their counts."""
 COLOR_SLOTS = ("color", "colors")
 
 
 class GoalValue(NamedTuple):
-    """One value of the goal that an instruction has to convey.
+    """One value of the goal that an instruction conveys.
 
     Attributes:
         field: its field in the task's commands, ``repeats`` or ``colors.1``.
         slot: name of the goal slot.
-        kind: what kind of value it is.
+        slot_type: type of the slot.
         value: the value.
     """
 
     field: str
     slot: str
-    kind: SlotTypeName
+    slot_type: SlotTypeName
     value: str | int
 
     @property
     def color(self) -> str:
-        """The value of a part that is a color."""
+        """The value, if it is a color."""
         return str(self.value)
 
     @property
     def number(self) -> int:
-        """The value of a part that is a number."""
+        """The value, if it is a number."""
         return int(self.value)
 
 
 @dataclass(frozen=True, slots=True)
 class InstructionRequest:
-    """What is to be put into words, and how; see `instruct` for the options."""
+    """An episode, how to instruct it, and the random choice of wordings.
+
+    Attributes:
+        episode: the episode.
+        task: its task.
+        options: valid ones; see `roboirg.language.instruct`.
+        sampler: picks the wordings.
+    """
 
     episode: Episode
     task: Task
-    form: Form
-    stages: tuple[int, ...]
-    distractor: Distractor
-    distractors: int
-    frame: Frame
-    chooser: TemplateSampler
+    options: InstructionOptions
+    sampler: TemplateSampler
 
     @property
     def resolved(self) -> bool:
-        """Whether the command is to name what its referring expressions stand for."""
-        return self.form == "resolved"
+        """Whether the command names the referents of its referring expressions."""
+        return self.options.form == "resolved"
 
     @property
-    def parts(self) -> tuple[GoalValue, ...]:
+    def frame(self) -> Frame:
+        """The frame of left and right."""
+        return cast("Frame", self.options.frame)
+
+    @property
+    def goal_values(self) -> tuple[GoalValue, ...]:
         """The values of the goal, in the order of its slots."""
-        return _parts(self.episode.goal)
+        return _goal_values(self.episode.goal)
 
-    def parts_of(self, kind: SlotTypeName) -> tuple[GoalValue, ...]:
-        """The parts of one kind."""
-        return tuple(part for part in self.parts if part.kind == kind)
+    def values_of(self, slot_type: SlotTypeName) -> tuple[GoalValue, ...]:
+        """Return the goal values of one slot type."""
+        return tuple(one for one in self.goal_values if one.slot_type == slot_type)
 
     @property
-    def colored(self) -> tuple[GoalValue, ...]:
-        """The parts that are colors, counted or not."""
-        return tuple(part for part in self.parts if part.slot in COLOR_SLOTS)
+    def color_values(self) -> tuple[GoalValue, ...]:
+        """The goal values that are colors, counted or not."""
+        return tuple(one for one in self.goal_values if one.slot in COLOR_SLOTS)
 
     def count_of(self, color: GoalValue) -> int:
-        """How many things of a color are wanted; one unless the goal counts them."""
+        """Return how many things of a color the goal wants; 1 unless it counts them."""
         _, _, index = color.field.partition(".")
-        counts = {part.field: part for part in self.parts if part.slot == "counts"}
+        counts = {one.field: one for one in self.goal_values if one.slot == "counts"}
         return counts[f"counts.{index}"].number if counts else 1
 
-    def numbers_instead(self, slot: str) -> tuple[tuple[int, ...], ...]:
-        """What a slot of numbers could hold in this scene, all other slots being as they are."""
-        return _numbers_instead(self.task.name, self.episode.scene, self.episode.goal, slot)
+    def alternative_numbers(self, slot: str) -> tuple[tuple[int, ...], ...]:
+        """Return all numbers that a slot can hold in this scene if the other slots keep theirs."""
+        return _alternative_numbers(self.task.name, self.episode.scene, self.episode.goal, slot)
 
     def other_colors(self, color: str) -> tuple[Color, ...]:
-        """The colors that the task speaks of, without this one."""
+        """Return the colors in the task's vocabulary, without this one.
+
+        Raises:
+            InvalidValueError: the task's vocabulary lacks this color.
+        """
         colors = self.task.commands.colors
         if color not in colors:
             raise InvalidValueError(
@@ -111,28 +124,28 @@ class InstructionRequest:
         return tuple(other for other in colors if other != color)
 
     def by_color(self, cube: Phrase) -> Phrase:
-        """The thing to handle, told by its cube."""
+        """Return words for the object to handle, given words for its cube."""
         return fill(self.task.commands.by_color, {"cube": cube})
 
     def by_place(self, place: Phrase, *, plural: bool = False) -> Phrase:
-        """The thing to handle, told by its place."""
+        """Return words for the object to handle, given words for its place."""
         return fill(self.task.commands.by_place, {"place": place}, plural=plural)
 
-    def targets(self, part: GoalValue) -> tuple[SceneObject, ...]:
-        """The objects that a color part may want handled: cubes, or the container over one."""
+    def targets(self, color: GoalValue) -> tuple[SceneObject, ...]:
+        """Return the objects to handle for a color: the cubes, or the containers over them."""
         scene = self.episode.scene
-        cubes = [item for item in scene.objects if item.color == part.value]
+        cubes = [item for item in scene.objects if item.color == color.value]
         return tuple(cube if cube.inside is None else scene[cube.inside] for cube in cubes)
 
     def command(self, fields: Mapping[str, Phrase]) -> Phrase:
-        """The task's command with its fields filled; the same wording in all settings."""
-        handled = max(1, len(self.parts_of("color")))
+        """Fill the task's command, which has the same wording in all settings."""
+        handled = max(1, len(self.values_of("color")))
         wordings = [one for one in self.task.commands.wordings if one.parts == handled]
-        return fill(self.chooser.pick(f"command-{handled}", wordings).text, fields)
+        return fill(self.sampler.pick(f"command-{handled}", wordings).text, fields)
 
 
 class UtteranceSpec(NamedTuple):
-    """One utterance to be."""
+    """One utterance: its stage, and its words with their mentions."""
 
     stage: UtteranceStage
     phrase: Phrase
@@ -140,36 +153,42 @@ class UtteranceSpec(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class InstructionSpec:
-    """What a setting says, in order, and what it wants noted in the metadata."""
+    """The words of an instruction.
 
-    said: tuple[UtteranceSpec, ...]
+    Attributes:
+        utterances: in the order of speaking; the last one is the command.
+        notes: entries of the metadata.
+    """
+
+    utterances: tuple[UtteranceSpec, ...]
     notes: Mapping[str, object] = field(default_factory=dict)
 
 
-# Kept, because the settings and forms of an episode ask the same.
+# Cached: all settings and forms of an episode ask for the same.
 @functools.lru_cache(maxsize=256)
-def _parts(goal: Goal) -> tuple[GoalValue, ...]:
-    parts: list[GoalValue] = []
+def _goal_values(goal: Goal) -> tuple[GoalValue, ...]:
+    found: list[GoalValue] = []
     counted = "counts" in dict(goal.slots)
-    for slot, value in goal.slots:
-        kind = "amount" if counted and slot in COLOR_SLOTS else SLOT_TYPE_NAMES[slot]
-        if isinstance(value, tuple):
-            several: tuple[str | int, ...] = value
-            fields = (f"{slot}.{index}" for index in range(len(several)))
-            parts += [
-                GoalValue(field, slot, kind, one)
-                for field, one in zip(fields, several, strict=True)
+    for slot, content in goal.slots:
+        slot_type = "amount" if counted and slot in COLOR_SLOTS else SLOT_TYPE_NAMES[slot]
+        if isinstance(content, tuple):
+            several: tuple[str | int, ...] = content
+            found += [
+                GoalValue(f"{slot}.{index}", slot, slot_type, value)
+                for index, value in enumerate(several)
             ]
         else:
-            parts.append(GoalValue(slot, slot, kind, value))
-    return tuple(parts)
+            found.append(GoalValue(slot, slot, slot_type, content))
+    return tuple(found)
 
 
 @functools.lru_cache(maxsize=64)
-def _numbers_instead(task: str, scene: Scene, goal: Goal, slot: str) -> tuple[tuple[int, ...], ...]:
-    mine = dict(goal.slots) | {slot: 0}
-    choices = [dict(one.slots) for one in get_task(task).goals(scene)]
-    values = [choice[slot] for choice in choices if choice | {slot: 0} == mine]
+def _alternative_numbers(
+    task: str, scene: Scene, goal: Goal, slot: str
+) -> tuple[tuple[int, ...], ...]:
+    same = dict(goal.slots) | {slot: 0}
+    goals = [dict(one.slots) for one in get_task(task).goals(scene)]
+    values = [one[slot] for one in goals if one | {slot: 0} == same]
     return tuple(
         tuple(int(one) for one in (value if isinstance(value, tuple) else (value,)))
         for value in values

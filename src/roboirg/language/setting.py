@@ -1,12 +1,13 @@
-"""What a setting is: everything that the rest of the benchmark derives from it."""
+"""The definition of a setting, from which the rest of the benchmark derives everything."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from roboirg.core.episode import Goal
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.instruction import Instruction
 from roboirg.language.request import InstructionRequest, InstructionSpec
 from roboirg.tasks import Task
@@ -14,15 +15,23 @@ from roboirg.tasks import Task
 OptionName = Literal["stages", "distractor", "distractors", "frame"]
 """An option of `roboirg.language.instruct` that a setting may read."""
 
+Instruct = Callable[[InstructionOptions], Instruction]
+"""Returns an instruction of the episode at hand."""
+
 
 def never_refuses(_request: InstructionRequest) -> str | None:
-    """Return None: every episode of the tasks can be told."""
+    """Return None: the setting can express every episode of its tasks."""
     return None
 
 
 def all_slots(_instruction: Instruction, goal: Goal) -> frozenset[str]:
     """Return every slot of the goal."""
     return frozenset(goal.as_mapping())
+
+
+def no_pairing_rules(_instruct: Instruct) -> Iterable[str]:
+    """Return no complaint."""
+    return ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,18 +42,21 @@ class Setting:
         name: in the command line, records and tables, for example ``"direct"``.
         order: position in lists and tables; explicit is 0.
         summary: one line for docs and help, without a final stop.
-        color: in figures, as ``"#rrggbb"``.
-        say: the words for a request.
-        applies_to: whether the setting is defined for a task.
-        refusal: why a request cannot be told in words that follow "cannot express the episode:",
-            or None if it can.
+        color: in figures, as ``"#rrggbb"``; ours are from the palette of Okabe and Ito, which
+            color-blind readers can tell apart.
+        say: returns the words for a request.
+        applies_to: whether a task has the setting.
+        refusal: returns why the setting cannot express a request, in words that follow "cannot
+            express the episode:" and name no object of the scene; None if it can.
         hidden_slots: the goal slots that the command of an implicit form must not state.
         implicit: whether the command leaves something to its context.
         reads: the options of `instruct` that change its words.
-        variants: every combination of those options that validation goes through.
-        hides_only_color: whether its commands state numbers and hide colors, so that a scene
-            with a single fitting goal gives it away.
-        example: number of the test episode that shows it in the language card.
+        variants: every combination of those options that validation checks.
+        hides_only_color: whether an instruction states numbers and hides colors, so that the
+            command gives the goal away where the scene has one such goal.
+        pairing_rules: yields how the words of an episode differ from those of another setting
+            with which they must agree; nothing if they agree.
+        example: index of the test episode that shows the setting in the language card.
     """
 
     name: str
@@ -59,4 +71,10 @@ class Setting:
     reads: frozenset[OptionName] = frozenset()
     variants: Sequence[Mapping[str, Any]] = ({},)
     hides_only_color: Callable[[Instruction], bool] = lambda _instruction: False
+    pairing_rules: Callable[[Instruct], Iterable[str]] = no_pairing_rules
     example: int = 0
+
+    @property
+    def may_refuse(self) -> bool:
+        """Whether the setting cannot express some episodes of its tasks."""
+        return self.refusal is not never_refuses

@@ -1,4 +1,4 @@
-"""What the words of a split are made of, as tables for the terminal."""
+"""Tables of instruction statistics for the terminal."""
 
 from __future__ import annotations
 
@@ -7,35 +7,35 @@ from collections.abc import Iterator, Mapping, Sequence
 from rich.table import Table
 
 from roboirg.language import corpus_statistics
-from roboirg.language.corpus_statistics import Counts
+from roboirg.language.corpus_statistics import ClassCounts
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import setting_names
 from roboirg.language.templates import RELATIONS, STEPS
 from roboirg.tasks import every_task
 
 
-def overview_tables(said: Sequence[Instruction]) -> Iterator[Table]:
-    """Expressions, lengths, patterns, relations and landmark classes."""
-    yield _lengths(corpus_statistics.word_counts(said))
-    yield expression_table(corpus_statistics.expression_counts(said))
+def overview_tables(instructions: Sequence[Instruction]) -> Iterator[Table]:
+    """Yield tables of lengths, expressions, patterns, relations and landmark classes."""
+    yield _lengths(corpus_statistics.word_counts(instructions))
+    yield expression_table(corpus_statistics.expression_counts(instructions))
     by_task = (
-        ("Reasoning patterns (scenes)", corpus_statistics.pattern_counts(said), None),
-        ("Relations (scenes)", corpus_statistics.relation_counts(said), _RELATIONS),
-        ("Landmark classes (targets told)", corpus_statistics.landmark_counts(said), None),
+        ("Reasoning patterns (scenes)", corpus_statistics.pattern_counts(instructions), None),
+        ("Relations (scenes)", corpus_statistics.relation_counts(instructions), _RELATIONS),
+        ("Landmark classes (targets)", corpus_statistics.landmark_counts(instructions), None),
     )
     for title, counts, order in by_task:
         if counts:
-            yield _tallied(title, "task", counts, [*every_task()], order or _found(counts))
+            yield _count_table(title, "task", counts, [*every_task()], order or _found(counts))
 
 
 _RELATIONS = [*(one.name for one in (*RELATIONS, *STEPS)), "neighbor"]
 
 
-def expression_table(counts: Counts) -> Table:
-    """In how many scenes each class of referring expression occurs, by setting."""
+def expression_table(counts: ClassCounts) -> Table:
+    """Return the number of scenes with each class of referring expression, by setting."""
     classes = corpus_statistics.expression_order(counts)
     title = "Referring expressions (each once per scene)"
-    return _tallied(title, "setting", counts, setting_names(), classes)
+    return _count_table(title, "setting", counts, setting_names(), classes)
 
 
 def _lengths(lengths: Mapping[str, corpus_statistics.Lengths]) -> Table:
@@ -47,8 +47,8 @@ def _lengths(lengths: Mapping[str, corpus_statistics.Lengths]) -> Table:
     return table
 
 
-def _tallied(
-    title: str, kind: str, counts: Counts, rows: Sequence[str], columns: Sequence[str]
+def _count_table(
+    title: str, kind: str, counts: ClassCounts, rows: Sequence[str], columns: Sequence[str]
 ) -> Table:
     used = [name for name in columns if any(name in one for one in counts.values())]
     table = _table(title, kind, used)
@@ -58,7 +58,7 @@ def _tallied(
     return table
 
 
-def _found(counts: Counts) -> list[str]:
+def _found(counts: ClassCounts) -> list[str]:
     return sorted({name for one in counts.values() for name in one})
 
 

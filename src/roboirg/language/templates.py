@@ -1,6 +1,6 @@
-"""The wordings that all tasks share. Changing any of them needs a new `LANGUAGE_VERSION`.
+"""The wordings that all tasks share. Every change needs a new `LANGUAGE_VERSION`.
 
-Fields and alternatives are explained in `phrases`. American spelling, as in the data that
+`phrases` explains fields and alternatives. American spelling, as in the data that
 policies are trained on. Neutral distractors and cues must name no color, number, ordinal, side
 or place; a test reads them.
 """
@@ -40,7 +40,7 @@ REFERENCE_AMOUNT_INTRODUCTIONS = (
     "My nephew owns {things}.",
     "The box at home holds {things}.",
 )
-"""Amounts that only lead to the goal; there may be more of them than cubes on the table."""
+"""Amounts that only lead to the goal; they may exceed the cubes on the table."""
 VISIT_INTRODUCTIONS = (
     "I was just thinking about {which}.",
     "Everybody here is waiting for {which}.",
@@ -86,13 +86,13 @@ CAMERA_PLACE_INTRODUCTIONS = (
     "In the picture of the front camera, {things} [is|are] hard to miss.",
     "I am looking at {things}, going by left and right in the front camera.",
 )
-"""The same with the sides of the camera, which faces the robot."""
+"""The same with left and right of the camera, which faces the robot."""
 MOVED_INTRODUCTIONS = (
     "I mean how things stood before anything moved.",
     "I am talking about the places before anything moved.",
     "That is where things stood before anything moved.",
 )
-"""What is added to these where things change places."""
+"""Added to place introductions where objects change places."""
 
 COLOR_REINFORCEMENTS = (
     "{ref} [was a present|were presents] from my aunt.",
@@ -115,7 +115,7 @@ VIDEO_REINFORCEMENTS = (
     "I have told everybody about {ref}.",
     "I would recognize {ref} anywhere.",
 )
-"""Of placements and moments."""
+"""For placements and moments."""
 
 NEUTRAL_DISTRACTORS = (
     "The coffee machine is making a strange noise.",
@@ -183,9 +183,9 @@ EXCLUSIONS = (
 )
 PAIR_ANAPHORS = ("that pair", "those two")
 COMPLEMENTS = ("the {thing} in {other}", "the {thing} with {other}")
-"""The second pick: of the two excluded colors, the one that was not chosen."""
+"""For the second pick: of the two excluded colors, the one that was not chosen."""
 AMOUNT_PAIR_ANAPHORS = ("that pair",)
-"""Next to numbers of cubes *those two* would be two cubes."""
+"""Next to numbers of cubes, *those two* would mean two cubes."""
 AMOUNT_EXCLUSIONS = (
     "{thing}[|s] of a color other than {pair}",
     "{thing}[|s] whose color is different from {pair}",
@@ -199,21 +199,20 @@ MOMENT_COMPLEMENTS = (
     "whichever of the two moments is not {single}",
 )
 NEIGHBOR = "the placement that is a direct neighbor of {single}"
-"""Of two placements each is the other's neighbor; *earlier* or *later* would tell which."""
+"""Of two placements, each is the other's neighbor; *earlier* would give it away."""
 
 
 class Relation(NamedTuple):
-    """A number told by another one.
+    """The relation of a number to a reference quantity.
 
     Attributes:
         name: for records.
-        times: how often, told by a reference quantity.
-        cubes: how many cubes of a color.
-        value: which number.
+        times: words for a number of repetitions.
+        cubes: words for a number of cubes of a color.
+        value: words for a number.
         offset: the result is ``factor * reference + offset``.
         factor: see `offset`.
-        spells: the number that the words themselves contain; a result of this value would be
-            given away.
+        spells: the number that the words contain; they would give away a result of this value.
     """
 
     name: str
@@ -225,13 +224,13 @@ class Relation(NamedTuple):
     spells: int | None = None
 
     def reference(self, result: int) -> int | None:
-        """The quantity to introduce, or None if there is no whole one."""
+        """Return the quantity to introduce; None if it is no whole number."""
         reference = (result - self.offset) / self.factor
         return int(reference) if reference.is_integer() else None
 
 
 MAX_REFERENCE = 10
-"""The largest number that is introduced."""
+"""The largest quantity to introduce."""
 
 RELATIONS = (
     Relation(
@@ -285,11 +284,11 @@ RELATIONS = (
 
 
 class Step(NamedTuple):
-    """An element of a series told by another one.
+    """The relation of an element of a series to a reference element.
 
     Attributes:
         name: for records.
-        words: what follows the noun.
+        words: words after the noun.
         offset: from the reference to the result.
         spells: as in `Relation`.
     """
@@ -310,4 +309,4 @@ NEIGHBORS = {
     1: Step("neighbor", "that is a direct neighbor of {reference}", -1),
     2: Step("neighbor", "that is a direct neighbor of {reference}", 1),
 }
-"""Of a series of two elements, by position."""
+"""The steps in a series of two elements, by position."""

@@ -1,17 +1,17 @@
-"""Every variant there is, and every way in which one episode can be told."""
+"""All variants of the benchmark, and all instructions of an episode."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
 
 from roboirg.core.episode import Episode, Split
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.episodes.splits import SIZES, get_episode
-from roboirg.language.generator import can_express, expressible, instruct
-from roboirg.language.instruction import FORMS, Form, Instruction
-from roboirg.language.landmarks import FRAMES
-from roboirg.language.settings import EXPLICIT, all_settings, settings_of
+from roboirg.language.generator import find_refusal, instruct_with
+from roboirg.language.instruction import FORMS, Instruction
+from roboirg.language.settings import all_settings, settings_of
 from roboirg.tasks import all_tasks, get_task
 
 
@@ -22,68 +22,53 @@ class Variant(NamedTuple):
     setting: str
 
 
-class Telling(NamedTuple):
-    """One way to tell an episode: the arguments of `instruct`."""
-
-    setting: str
-    form: Form
-    options: Mapping[str, Any]
-
-    @property
-    def implicit(self) -> bool:
-        """Whether the command leaves something to its context."""
-        return self.form == "implicit" and self.setting != EXPLICIT
-
-    def of(self, episode: Episode) -> Instruction:
-        """What is said in an episode."""
-        return instruct(episode, self.setting, self.form, **self.options)
-
-
 def all_variants() -> tuple[Variant, ...]:
-    """Every variant of the benchmark, as the registry of tasks yields them."""
+    """Return every variant of the benchmark, in the order of tasks and settings."""
     return tuple(
         Variant(task.name, setting)
         for task in all_tasks().values()
         for setting in settings_of(task)
-        if setting != EXPLICIT
+        if all_settings()[setting].implicit
     )
 
 
-def tellings(episode: Episode) -> Iterator[Telling]:
-    """Every setting, form and combination of options in which an episode can be told."""
+def expressible_options(episode: Episode) -> Iterator[InstructionOptions]:
+    """Yield every setting, form and combination of options that can express an episode."""
     for name in settings_of(get_task(episode.task)):
-        sayable = [
-            options
-            for options in all_settings()[name].variants
-            if can_express(episode, name, **options)
+        wanted = [
+            InstructionOptions(name)._replace(**changes)
+            for changes in all_settings()[name].variants
         ]
-        for form, options in itertools.product(FORMS, sayable):
-            yield Telling(name, form, options)
+        possible = [options for options in wanted if find_refusal(episode, options) is None]
+        for form, options in itertools.product(FORMS, possible):
+            yield options._replace(form=form)
 
 
 def instructions(
     episodes: Iterable[Episode],
     settings: Sequence[str],
     forms: Sequence[str],
-    **options: Any,  # noqa: ANN401 - those of `instruct`
+    options: InstructionOptions = InstructionOptions(),  # noqa: B008 - immutable
 ) -> Iterator[tuple[Episode, Instruction]]:
-    """Every episode in every wanted setting that can tell it, in every form.
+    """Yield the instructions of episodes in every wanted setting and form.
+
+    Leaves out a setting that the task lacks, or that cannot express the episode.
 
     Args:
-        episodes: what is told, in order.
-        settings: names; a task has its own among them.
+        episodes: in order.
+        settings: names.
         forms: ``implicit``, ``resolved`` or both.
-        options: of `instruct`.
+        options: all others.
     """
-    frame = options.get("frame", FRAMES[0])
     for episode in episodes:
-        sayable = expressible(episode, frame=frame)
-        for setting, form in itertools.product(settings, forms):
-            if setting in sayable:
-                yield episode, instruct(episode, setting, form, **options)
+        present = [name for name in settings if name in settings_of(get_task(episode.task))]
+        for setting, form in itertools.product(present, forms):
+            wanted = options._replace(setting=setting, form=form)
+            if find_refusal(episode, wanted) is None:
+                yield episode, instruct_with(episode, wanted)
 
 
 def split_episodes(task: str, split: Split) -> Iterator[Episode]:
-    """All episodes of a split of a task."""
+    """Yield all episodes of a split of a task."""
     for index in range(SIZES[split]):
         yield get_episode(task, split, index)

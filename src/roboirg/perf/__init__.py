@@ -1,1 +1,1 @@
-"""How fast this machine plays episodes, against the floor and against the stock path."""
+"""Performance of this machine, compared with the floor and the stock path."""

@@ -1,4 +1,4 @@
-"""Alternating rounds, medians, a table and JSON."""
+"""Runs measures in alternating rounds; reports medians as a table and JSON."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from pathlib import Path
 
 from rich.table import Table
 
-import roboirg
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.version import __version__
 from roboirg.perf.measures import Measure
 
 _SCALES = {"ms": 1e3}
-"""Seconds are told in these units; other figures are told as they are."""
+"""Factors from stored to displayed units; other units have factor 1."""
 
 
 @dataclass(frozen=True)
-class Figure:
-    """What came of a measure.
+class MeasureResult:
+    """The result of a measure.
 
     Attributes:
-        name: of the measure.
-        unit: of the figures; times are in seconds here, whatever the unit.
-        ours: of each round.
-        baseline: of each round; empty for figures that stand alone.
-        against: what the baseline is.
-        value: median of ours.
-        ratio: of the medians, greater is better; None for figures that stand alone.
-        goal: wanted ratio; for figures that stand alone the most wanted.
-        reached: whether the goal is.
+        name: name of the measure.
+        unit: unit in tables; stored times are in seconds.
+        ours: result of each round.
+        baseline: baseline of each round; empty for measures without one.
+        against: name of the baseline.
+        value: median of `ours`.
+        ratio: ratio of the medians, greater is better; None without a baseline.
+        goal: smallest ratio; without a baseline, the largest value.
+        reached: whether the goal is reached.
     """
 
     name: str
@@ -47,36 +47,36 @@ class Figure:
     reached: bool
 
 
-def run(
-    measures: Sequence[Measure], rounds: int, tell: Callable[[str], None]
-) -> tuple[Figure, ...]:
-    """Every measure in every round, ours after its baseline, which is timed once a round.
+def run_measures(
+    measures: Sequence[Measure], rounds: int, report: Callable[[str], None]
+) -> tuple[MeasureResult, ...]:
+    """Run every measure in every round, after its baseline, which is timed once per round.
 
     Args:
-        measures: what is measured.
-        rounds: how often.
-        tell: is told what is being measured.
+        measures: measures to run.
+        rounds: number of rounds.
+        report: called with a progress message before each measure.
 
     Raises:
-        InvalidValueError: no rounds.
+        InvalidValueError: `rounds` is less than 1.
     """
     if rounds < 1:
         raise InvalidValueError(f"rounds is {rounds}; it must be at least 1.")
     ours: list[list[float]] = [[] for _ in measures]
     baselines: list[list[float]] = [[] for _ in measures]
     for number in range(1, rounds + 1):
-        known: dict[Callable[[], float], float] = {}
+        timed: dict[Callable[[], float], float] = {}
         for measure, own, base in zip(measures, ours, baselines, strict=True):
-            tell(f"round {number} of {rounds}: {measure.name}")
+            report(f"round {number} of {rounds}: {measure.name}")
             if measure.baseline is not None:
-                if measure.baseline not in known:
-                    known[measure.baseline] = measure.baseline()
-                base.append(known[measure.baseline])
+                if measure.baseline not in timed:
+                    timed[measure.baseline] = measure.baseline()
+                base.append(timed[measure.baseline])
             own.append(measure.ours())
-    return tuple(map(_figure, measures, ours, baselines))
+    return tuple(map(_summarize, measures, ours, baselines))
 
 
-def _figure(measure: Measure, ours: Sequence[float], baseline: Sequence[float]) -> Figure:
+def _summarize(measure: Measure, ours: Sequence[float], baseline: Sequence[float]) -> MeasureResult:
     value, ratio = statistics.median(ours), None
     reached = value <= measure.goal
     if baseline:
@@ -84,7 +84,7 @@ def _figure(measure: Measure, ours: Sequence[float], baseline: Sequence[float]) 
         if measure.inverse:
             ratio = 1.0 / ratio
         reached = ratio >= measure.goal
-    return Figure(
+    return MeasureResult(
         name=measure.name,
         unit=measure.unit,
         ours=tuple(ours),
@@ -97,44 +97,44 @@ def _figure(measure: Measure, ours: Sequence[float], baseline: Sequence[float]) 
     )
 
 
-def table(figures: Sequence[Figure]) -> Table:
-    """Medians, ratios and goals."""
-    shown = Table(title=f"{roboirg.__version__} on {os.cpu_count()} cores", title_justify="left")
-    shown.add_column("measure")
+def results_table(results: Sequence[MeasureResult]) -> Table:
+    """Return a table of medians, ratios and goals."""
+    table = Table(title=f"{__version__} on {os.cpu_count()} cores", title_justify="left")
+    table.add_column("measure")
     for name in ("ours", "baseline", "against", "ratio", "goal", ""):
-        shown.add_column(name, justify="left" if name == "against" else "right")
-    for figure in figures:
-        base = statistics.median(figure.baseline) if figure.baseline else None
-        shown.add_row(
-            figure.name,
-            _told(figure.value, figure.unit),
-            "" if base is None else _told(base, figure.unit),
-            figure.against,
-            "" if figure.ratio is None else f"{figure.ratio:.2f} x",
-            f"{'<=' if figure.ratio is None else '>='} {figure.goal:g}",
-            "yes" if figure.reached else "no",
+        table.add_column(name, justify="left" if name == "against" else "right")
+    for result in results:
+        base = statistics.median(result.baseline) if result.baseline else None
+        table.add_row(
+            result.name,
+            _format_value(result.value, result.unit),
+            "" if base is None else _format_value(base, result.unit),
+            result.against,
+            "" if result.ratio is None else f"{result.ratio:.2f} x",
+            f"{'<=' if result.ratio is None else '>='} {result.goal:g}",
+            "yes" if result.reached else "no",
         )
-    return shown
+    return table
 
 
-def write(figures: Sequence[Figure], path: Path) -> None:
-    """All rounds of all figures, and the machine, as JSON.
+def write_results(results: Sequence[MeasureResult], path: Path) -> None:
+    """Write all rounds of all results, and the machine, as JSON.
 
     Raises:
         InvalidValueError: the file cannot be written.
     """
-    told = {
-        "roboirg": roboirg.__version__,
+    content = {
+        "roboirg": __version__,
         "python": platform.python_version(),
         "machine": platform.platform(),
         "cores": os.cpu_count(),
-        "figures": [asdict(figure) for figure in figures],
+        "figures": [asdict(result) for result in results],
     }
     try:
-        path.write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+        path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
     except OSError as error:
         raise InvalidValueError(f"{str(path)!r} cannot be written: {error}") from error
 
 
-def _told(value: float, unit: str) -> str:
+def _format_value(value: float, unit: str) -> str:
     return f"{value * _SCALES.get(unit, 1.0):.3g} {unit}"

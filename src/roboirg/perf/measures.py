@@ -1,4 +1,4 @@
-"""What is measured, against what, and how much is wanted."""
+"""The measures of the benchmark: timings, baselines and goals."""
 
 from __future__ import annotations
 
@@ -6,25 +6,25 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from roboirg.perf import engine, remote_rates, resetting, starting, stepping
+from roboirg.perf import engine_costs, process_costs, remote_rates, reset_times, step_times
 from roboirg.perf.workloads import Workload, as_in_demonstrations, over_the_table
-from roboirg.simulation.rendering.render_mode import LIGHT
+from roboirg.simulation.rendering.render_settings import LIGHT
 
 Timing = Callable[[], float]
 
 
 @dataclass(frozen=True)
 class Measure:
-    """One figure.
+    """One measure.
 
     Attributes:
         name: what is measured.
-        ours: gives seconds, or what `unit` says.
-        baseline: gives the same for what it is compared with; None for figures that stand alone.
-        against: what the baseline is.
-        goal: the wanted ratio of baseline to ours; of figures that stand alone the most wanted.
-        unit: of the figures.
-        inverse: more is better, so the ratio is ours to the baseline.
+        ours: returns seconds, or a figure in `unit`.
+        baseline: returns the same for the baseline; None for measures without one.
+        against: name of the baseline.
+        goal: smallest ratio of baseline to ours; without a baseline, the largest value.
+        unit: unit in tables.
+        inverse: whether more is better, so that the ratio is ours to the baseline.
     """
 
     name: str
@@ -37,39 +37,68 @@ class Measure:
 
 
 def measures() -> tuple[Measure, ...]:
-    """Everything, in the order of the table; a baseline that several have is one function."""
-    table, shown = over_the_table(), as_in_demonstrations()
-    video = resetting.shown_episode()
-
-    def stock_table() -> float:
-        return stepping.stock(table)
-
-    def stock_video() -> float:
-        return stepping.stock(shown)
-
-    def stock_reset() -> float:
-        return resetting.stock(video)
-
-    stepped = (
-        ("eager step, over the table", lambda: stepping.eager(table), stock_table, 7),
-        ("eager step, as in videos", lambda: stepping.eager(shown), stock_video, 5),
-        ("... light meshes, over the table", lambda: stepping.eager(table, LIGHT), stock_table, 12),
-        ("... light meshes, as in videos", lambda: stepping.eager(shown, LIGHT), stock_video, 10),
-        ("lazy step, 16 to a picture pair", lambda: stepping.lazy(table), stock_table, 70),
+    """Return all measures in the order of the table; a shared baseline is one object."""
+    table = over_the_table()
+    return (
+        *_step_measures(table, as_in_demonstrations()),
+        *_floor_measures(table),
+        *_reset_measures(),
+        *_process_measures(),
     )
-    reset = (
-        ("video reset, cold, all frames", lambda: resetting.cold(video, frames=True), 4.5),
-        ("video reset, cold, frames on demand", lambda: resetting.cold(video, frames=False), 30),
-        ("video reset, warm, all frames", lambda: resetting.warm(video, frames=True), 60),
+
+
+def _step_measures(table: Workload, video: Workload) -> tuple[Measure, ...]:
+    stock_table = partial(step_times.stock_step, table)
+    stock_video = partial(step_times.stock_step, video)
+    eager, lazy = step_times.eager_step, step_times.lazy_step
+    rows: tuple[tuple[str, Timing, Timing, float], ...] = (
+        ("eager step, over the table", partial(eager, table), stock_table, 7),
+        ("eager step, as in videos", partial(eager, video), stock_video, 5),
+        ("... light meshes, over the table", partial(eager, table, LIGHT), stock_table, 12),
+        ("... light meshes, as in videos", partial(eager, video, LIGHT), stock_video, 10),
+        ("lazy step, 16 to a picture pair", partial(lazy, table), stock_table, 70),
     )
+    return tuple(Measure(name, ours, base, "stock", goal) for name, ours, base, goal in rows)
+
+
+def _floor_measures(table: Workload) -> tuple[Measure, ...]:
+    """Return measures of the cost beyond physics and drawing."""
+    return (
+        Measure(
+            "eager step against its floor",
+            partial(step_times.eager_step, table),
+            partial(step_times.floor_step, table),
+            "floor",
+            0.8,
+        ),
+        Measure(
+            "step without pictures",
+            partial(step_times.undrawn_step, table),
+            partial(step_times.physics_step, table),
+            "physics",
+            0.5,
+        ),
+    )
+
+
+def _reset_measures() -> tuple[Measure, ...]:
+    episode = reset_times.video_episode()
+    stock = partial(reset_times.stock_reset, episode)
+    cold, warm = reset_times.cold_reset, reset_times.warm_reset
+    rows: tuple[tuple[str, Timing, float], ...] = (
+        ("video reset, cold, all frames", partial(cold, episode, frames=True), 4.5),
+        ("video reset, cold, frames on demand", partial(cold, episode, frames=False), 30),
+        ("video reset, warm, all frames", partial(warm, episode, frames=True), 60),
+    )
+    return tuple(Measure(name, ours, stock, "stock", goal, "s") for name, ours, goal in rows)
+
+
+def _process_measures() -> tuple[Measure, ...]:
     started = (
-        ("next episode in the same process", starting.next_episode, 15),
-        ("process start to first observation", starting.process_start, 5),
+        ("next episode in the same process", process_costs.next_episode, 15),
+        ("process start to first observation", process_costs.process_start, 5),
     )
     return (
-        *(Measure(name, ours, base, "stock", goal) for name, ours, base, goal in stepped),
-        *_floors(table),
-        *(Measure(name, ours, stock_reset, "stock", goal, "s") for name, ours, goal in reset),
         *(
             Measure(name, partial(timing, "ours"), partial(timing, "stock"), "stock", goal, "s")
             for name, timing, goal in started
@@ -83,36 +112,22 @@ def measures() -> tuple[Measure, ...]:
             unit="1/s",
             inverse=True,
         ),
-        Measure("run engine, of an episode", engine.engine, engine.episode, "episode", 50),
-        Measure("resuming with 100,000 records", engine.resume, None, "", 3, "s"),
-        Measure("memory of a process", starting.memory, None, "", 0.5, "GiB"),
+        Measure(
+            "run engine, of an episode",
+            engine_costs.engine_time,
+            engine_costs.episode_time,
+            "episode",
+            50,
+        ),
+        Measure("resuming with 100,000 records", engine_costs.resume_time, None, "", 3, "s"),
+        Measure("memory of a process", process_costs.process_memory, None, "", 0.5, "GiB"),
         Measure(
             "steps a second of 2 processes",
-            partial(starting.throughput, 2),
-            partial(starting.throughput, 1),
+            partial(process_costs.throughput, 2),
+            partial(process_costs.throughput, 1),
             "1 process",
             1.6,
             unit="1/s",
             inverse=True,
-        ),
-    )
-
-
-def _floors(table: Workload) -> tuple[Measure, ...]:
-    """What our own logic costs beyond physics and drawing."""
-    return (
-        Measure(
-            "eager step against its floor",
-            lambda: stepping.eager(table),
-            lambda: stepping.floor(table),
-            "floor",
-            0.8,
-        ),
-        Measure(
-            "step without pictures",
-            lambda: stepping.without_pictures(table),
-            lambda: stepping.physics(table),
-            "physics",
-            0.5,
         ),
     )

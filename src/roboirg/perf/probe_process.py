@@ -1,4 +1,4 @@
-"""What a process does of which the start or the memory is measured; it imports nothing else."""
+"""The process whose startup or memory is measured; imports nothing that is not needed."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ import sys
 import time
 from typing import Literal
 
-import roboirg
+from roboirg.envs.factory import make
 
 Path = Literal["ours", "stock"]
 TASK = "PickXtimes"
 
 
 def observe(path: Path, index: int) -> None:
-    """Play an episode without a video up to its first observation."""
+    """Play an episode without a video until its first observation."""
     if path == "ours":
-        roboirg.make(TASK, episode=index).reset()
+        make(TASK, episode=index).reset()
         return
     from roboirg.core.observations import CAMERAS
     from roboirg.episodes.splits import get_episode
     from roboirg.simulation.episode_session import EpisodeSession
-    from roboirg.simulation.rendering.render_mode import STOCK
+    from roboirg.simulation.rendering.render_settings import STOCK
 
     session = EpisodeSession(get_episode(TASK, "test", index), visible=True, rendering=STOCK)
     session.play_demonstration()
@@ -31,10 +31,10 @@ def observe(path: Path, index: int) -> None:
         session.world.cameras.segmentation(camera)
 
 
-def _most_resident() -> float:
-    """The most memory that this process has held, GiB.
+def _peak_memory() -> float:
+    """Return the peak resident memory of this process, GiB.
 
-    From Linux's status file: what `resource` tells may be the parent's before the fork.
+    Reads Linux's status file, because `resource` may report the parent's from before the fork.
     """
     status = pathlib.Path("/proc/self/status").read_text(encoding="ascii")
     line = next(line for line in status.splitlines() if line.startswith("VmHWM"))
@@ -42,21 +42,21 @@ def _most_resident() -> float:
 
 
 def _main(path: Path, what: str) -> None:
-    told: dict[str, float] = {}
+    results: dict[str, float] = {}
     start = time.perf_counter()
     observe(path, 0)
     if what == "next":
         if path == "ours":
             start = time.perf_counter()
             observe(path, 1)
-        told["seconds"] = time.perf_counter() - start
+        results["seconds"] = time.perf_counter() - start
     elif what == "memory":
-        from roboirg.perf import stepping
+        from roboirg.perf import step_times
         from roboirg.perf.workloads import over_the_table
 
-        stepping.eager(over_the_table())
-        told["gibibytes"] = _most_resident()
-    sys.stdout.write(json.dumps(told))
+        step_times.eager_step(over_the_table())
+        results["gibibytes"] = _peak_memory()
+    sys.stdout.write(json.dumps(results))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""How many steps a second a policy plays that answers at once, in process and over loopback."""
+"""Steps per second of a policy that answers at once, in process and over loopback."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-import roboirg
 from roboirg.core.observations import CAMERAS, Demonstration, Observation
+from roboirg.envs.factory import make
 from roboirg.policies import Policy, make_policy, play
 from roboirg.policies.requirements import wanted_cameras
 
@@ -25,8 +25,8 @@ SWING = 0.2
 """Radians."""
 
 
-class Waving:
-    """Swings the arm to and fro, so that every picture has to be drawn; decides nothing."""
+class WavingPolicy:
+    """Swings the arm back and forth, so that every picture must be drawn."""
 
     cameras: ClassVar[tuple[str, ...]] = CAMERAS
     version = "1"
@@ -36,12 +36,12 @@ class Waving:
         self._step = 0
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Begin to swing from wherever the arm is."""
+        """Restart the swing from the arm's current position."""
         del instruction, demonstration
         self._start, self._step = None, 0
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
-        """The next sixteen actions."""
+        """Return the next sixteen actions."""
         if self._start is None:
             self._start = np.array(observation["joint_positions"], np.float64)
         steps = np.arange(self._step + 1, self._step + CHUNK + 1)
@@ -52,24 +52,24 @@ class Waving:
 
 
 def in_process() -> float:
-    """Steps a second without a server."""
-    return _rate(make_policy(f"{__name__}:Waving", 0))
+    """Return steps per second without a server."""
+    return _rate(make_policy(f"{__name__}:WavingPolicy", 0))
 
 
 def over_loopback() -> float:
-    """Steps a second with the same policy behind openpi's protocol, in a process of its own."""
+    """Return steps per second with the same policy in a server process, over openpi's protocol."""
     return _rate(make_policy(_server(), 0))
 
 
 def _rate(policy: Policy) -> float:
-    """The median over some episodes, which a hiccup does not move."""
-    env = roboirg.make(
+    """Return the median rate over some episodes, which is robust against hiccups."""
+    env = make(
         "PickXtimes",
         cameras=wanted_cameras(policy),
         demonstration_frames="none",
         max_steps=CHUNK * CHUNKS,
     )
-    env.reset()  # what only the first episode costs
+    env.reset()  # costs only the first episode has
     rates = []
     for _ in range(EPISODES):
         start = time.perf_counter()
@@ -80,16 +80,16 @@ def _rate(policy: Policy) -> float:
 
 @functools.cache
 def _server() -> str:
-    """The address of a server that lives as long as this process."""
+    """Start a server that lives as long as this process; returns its address."""
     command = (
         "from roboirg.policies.serving.policy_server import open_server; "
-        f"server = open_server('{__name__}:Waving', 'openpi'); "
+        f"server = open_server('{__name__}:WavingPolicy', 'openpi'); "
         "print(server.url, flush=True); server.listening.serve_forever()"
     )
-    child = subprocess.Popen(  # noqa: S603 - this very package
+    child = subprocess.Popen(  # noqa: S603 - our own module
         [sys.executable, "-c", command], stdout=subprocess.PIPE, text=True
     )
     atexit.register(child.kill)
     if child.stdout is None:
-        raise AssertionError("it was asked for above")
+        raise AssertionError("stdout is a pipe")
     return f"{child.stdout.readline().strip()}?execute={CHUNK}"

@@ -1,4 +1,4 @@
-"""Policies: the contract, the built-in ones, and how a name becomes one."""
+"""Policies: the contract, the built-in ones, and how to make one from its name."""
 
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.policies.base import Policy, PrivilegedPolicy

@@ -1,4 +1,4 @@
-"""The policy contract: what the benchmark calls and what it gets back."""
+"""The policy contract: the methods that the benchmark calls."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ if TYPE_CHECKING:
 class Policy(Protocol):
     """Anything that turns observations into actions.
 
-    Set the class attribute ``cameras`` to the pictures that are wanted, for example ``()``;
-    by default every observation holds both. Set ``actions`` to the action space that `act`
-    speaks, ``"joint_angle"`` by default, ``"ee_pose"`` or ``"waypoint"``.
+    The class attribute ``cameras`` selects the pictures of observations, for example ``()``; by
+    default there are both. ``actions`` names the action space of `act`: ``"joint_angle"`` (the
+    default), ``"ee_pose"`` or ``"waypoint"``.
 
-    Pictures of the demonstration are drawn when they are read. ``demonstration_frames = 4`` has
-    only every fourth of them, ``"none"`` none. A policy that acts in chunks and wants to see what
-    happened meanwhile sets ``observe_every = n``: then every observation holds ``history``,
-    with the pictures of all its cameras, or only of ``history_cameras``.
+    Pictures of the demonstration are rendered when they are read. ``demonstration_frames = 4``
+    keeps every fourth, ``"none"`` none. With ``observe_every = n`` each observation has a
+    ``history``: the observations after every n-th step of the last chunk, with the pictures of all
+    cameras, or only of ``history_cameras``.
 
     All of these are optional, and so are the following. ``version`` (text) and ``metadata``
-    (JSON values by name; read after `reset`) go into the records. ``usage()`` is called when the
-    episode has ended and gives what it cost: ``calls``, ``input_tokens``, ``output_tokens``,
-    ``cost_usd``. ``close()`` is called after that. ``deterministic = False`` says that equal
-    episodes with equal seeds may differ; `roboirg check-policy` then does not complain of it.
-    ``grounded = True`` has the environment name the pixels of subgoals, for privileged policies
-    that pass them on.
+    (JSON values by name; read after `reset`) go into the records. ``usage()`` is called at the end
+    of an episode and returns its cost: ``calls``, ``input_tokens``, ``output_tokens``,
+    ``cost_usd``. ``close()`` is called after that. ``deterministic = False`` declares that equal
+    episodes with equal seeds may differ, which `roboirg check-policy` then accepts. With
+    ``grounded = True`` the environment gives the pixels of subgoals, for privileged policies that
+    pass them on.
     """
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """A new episode begins."""
+        """Begin an episode."""
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
-        """The next actions, n >= 1; all are executed before the next call.
+        """Return the next n >= 1 actions; all are executed before the next call.
 
         Returns:
             Shape (n, 8), or (n, 7) in the action spaces ee_pose and waypoint.
@@ -48,18 +48,25 @@ class Policy(Protocol):
 
 @runtime_checkable
 class SubgoalFollower(Policy, Protocol):
-    """A policy that a planner can tell what to do next."""
+    """A policy that takes subgoals from a planner."""
 
     def follow(self, subgoal: str) -> None:
-        """What to do next, in words, perhaps with ``at <y, x>`` (pixels of the front picture).
+        """Set the subgoal, in words, perhaps with ``at <y, x>`` (pixels of the front picture).
 
-        Called before `act`, whenever a planner stands in front; it holds until the next call.
+        Called by a planner before `act`; the subgoal holds until the next call.
         """
 
 
 @runtime_checkable
 class PrivilegedPolicy(Policy, Protocol):
-    """A policy that looks behind the scenes; it says so by having ``attach``."""
+    """A policy that reads the simulator's state; having ``attach`` declares it."""
 
     def attach(self, env: RoboIRGEnv) -> None:
-        """The environment of the episode that is about to begin, called before ``reset``."""
+        """Receive the environment of the next episode; called before ``reset``."""
+
+
+def close_policy(policy: object) -> None:
+    """Call the ``close`` of a policy or planner, if it has one."""
+    close = getattr(policy, "close", None)
+    if callable(close):
+        close()

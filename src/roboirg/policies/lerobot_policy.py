@@ -1,9 +1,9 @@
 """lerobot://path-or-hub-id: policies trained with LeRobot, in this process.
 
-A checkpoint says itself what it wants to see. Fed are the names that LeRobot's data sets of this
-robot use: ``observation.images.front``, ``observation.images.wrist``, ``observation.state`` (seven
-joints and the first finger) and the text ``task``; its actions are absolute joint targets and the
-gripper, +1 open to -1 closed.
+A checkpoint declares its inputs. Its names are those of LeRobot's data sets of this robot:
+``observation.images.front``, ``observation.images.wrist``, ``observation.state`` (seven joints and
+the first finger) and the text ``task``. Its actions are absolute joint targets and the gripper, +1
+open to -1 closed.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from roboirg.policies.policy_urls import UrlOptions, read_options, split_url
 
 PICTURE = "observation.images.{}"
 STATE = "observation.state"
-_BRIGHTEST = 255.0
+_MAX_BRIGHTNESS = 255.0
 
 
 class LeRobotPolicyOptions(UrlOptions):
@@ -30,7 +30,7 @@ class LeRobotPolicyOptions(UrlOptions):
 
     Attributes:
         device: of PyTorch.
-        execute: how many actions of a chunk are executed; all if it is None.
+        execute: actions of a chunk that are executed; None for all.
         version: of the checkpoint, for the records.
     """
 
@@ -39,13 +39,13 @@ class LeRobotPolicyOptions(UrlOptions):
     version: str | None = Field(None, min_length=1)
 
 
-class Loaded(NamedTuple):
+class LoadedCheckpoint(NamedTuple):
     """A checkpoint in memory.
 
     Attributes:
         model: LeRobot's policy.
-        before: turns a batch into what the model was trained on.
-        after: turns what the model gives into actions.
+        before: turns a batch into the model's inputs.
+        after: turns the model's outputs into actions.
     """
 
     model: Any
@@ -54,14 +54,14 @@ class Loaded(NamedTuple):
 
 
 class LeRobotPolicy:
-    """A checkpoint of LeRobot; it is loaded at the first reset, once in a process.
+    """A checkpoint of LeRobot, loaded at the first reset, once per process.
 
     Args:
         url: path or hub id, and options.
         seed: of PyTorch's generator, from each reset on.
 
     Raises:
-        UnknownNameError: the URL gives an option that there is not.
+        UnknownNameError: the URL has an unknown option.
         InvalidValueError: an option has a wrong value.
     """
 
@@ -76,15 +76,15 @@ class LeRobotPolicy:
 
     @property
     def version(self) -> str:
-        """What the URL says."""
+        """The URL's option ``version``, else ``unknown``."""
         return self.options.version or "unknown"
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:  # noqa: ARG002
-        """Begin an episode.
+        """Load the checkpoint and begin an episode.
 
         Raises:
             MissingDependencyError: LeRobot or PyTorch is not installed.
-            InvalidValueError: the checkpoint wants to see what is not there.
+            InvalidValueError: the checkpoint needs an input that does not exist.
         """
         import torch
 
@@ -94,7 +94,7 @@ class LeRobotPolicy:
         torch.manual_seed(self._seed)
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
-        """The checkpoint's next actions, (n, 8)."""
+        """Return the checkpoint's next actions, (n, 8)."""
         import torch
 
         with torch.inference_mode():
@@ -110,7 +110,7 @@ class LeRobotPolicy:
         return actions[: self.options.execute]
 
     def _batch(self, observation: Observation) -> dict[str, Any]:
-        """An observation as LeRobot has it: pictures (1, 3, H, W) in [0, 1]."""
+        """Return an observation in LeRobot's form: pictures (1, 3, H, W) in [0, 1]."""
         import torch
 
         state = np.append(observation["joint_positions"], observation["gripper"][0])
@@ -120,20 +120,20 @@ class LeRobotPolicy:
         }
         for camera in CAMERAS:
             picture = torch.from_numpy(np.array(observation[f"{camera}_rgb"]))  # type: ignore[literal-required]
-            batch[PICTURE.format(camera)] = picture.permute(2, 0, 1)[None].float() / _BRIGHTEST
+            batch[PICTURE.format(camera)] = picture.permute(2, 0, 1)[None].float() / _MAX_BRIGHTNESS
         return {
-            key: held if key == "task" else held.to(self.options.device)
-            for key, held in batch.items()
+            key: value if key == "task" else value.to(self.options.device)
+            for key, value in batch.items()
         }
 
 
 @functools.cache
-def load(place: str, device: str) -> Loaded:
-    """A checkpoint, once in a process.
+def load(place: str, device: str) -> LoadedCheckpoint:
+    """Load a checkpoint, once per process.
 
     Raises:
         MissingDependencyError: LeRobot or PyTorch is not installed.
-        InvalidValueError: the checkpoint wants to see what is not there.
+        InvalidValueError: the checkpoint needs an input that does not exist.
     """
     try:
         from lerobot.configs.policies import PreTrainedConfig
@@ -151,14 +151,14 @@ def load(place: str, device: str) -> Loaded:
         pretrained_path=place,
         preprocessor_overrides={"device_processor": {"device": device}},
     )
-    return Loaded(model.to(device).eval(), before, after)
+    return LoadedCheckpoint(model.to(device).eval(), before, after)
 
 
 def _check_features(place: str, features: dict[str, Any]) -> None:
-    """Complain of inputs that nobody has."""
+    """Raise if the checkpoint needs an input that does not exist."""
     known = [STATE, *(PICTURE.format(camera) for camera in CAMERAS)]
     for name in features:
         if name.startswith("observation.") and name not in known:
             raise InvalidValueError(
-                f"The checkpoint {place!r} wants to see {name!r}; there are {', '.join(known)}."
+                f"The checkpoint {place!r} needs {name!r}; there are {', '.join(known)}."
             )

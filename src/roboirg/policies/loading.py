@@ -1,8 +1,7 @@
-"""How a name on the command line becomes a policy."""
+"""Make policies from their names on the command line."""
 
 from __future__ import annotations
 
-import hashlib
 import inspect
 from pathlib import Path
 from typing import Any, cast
@@ -12,45 +11,45 @@ from roboirg.policies.base import Policy
 from roboirg.policies.planning import policy_specs
 from roboirg.policies.policy_classes import BUILTIN, find_class, make_from_class
 from roboirg.policies.policy_urls import is_url
-
-FINGERPRINT_LENGTH = 12
-"""Hexadecimal digits."""
+from roboirg.util.short_hash import short_hash
 
 
 def load_policy_class(spec: str) -> type[Any]:
-    """The class that a spec names: a built-in name, ``package.module:Class``, or a URL.
+    """Return the class of a built-in name, ``package.module:Class``, or a URL.
 
-    Of ``system:NAME`` and ``vlm-listener:PROVIDER`` (`roboirg.policies.planning.policy_specs`)
-    something that makes policies and has a class's attributes.
+    For ``system:NAME`` and ``vlm-listener:PROVIDER`` (`roboirg.policies.planning.policy_specs`)
+    it is a factory with the attributes of such a class.
 
     Raises:
-        UnknownNameError: it is none of them, or the URL gives an option that there is not.
-        InvalidValueError: the module or the class cannot be imported, or is not a policy; or
-            the URL is malformed.
+        UnknownNameError: the spec is none of them, or the URL has an unknown option.
+        InvalidValueError: the module or class cannot be imported or is not a policy, or the URL
+            is malformed.
+        MissingDependencyError: a library that the URL's scheme needs is not installed.
     """
     factory = policy_specs.find_policy_factory(spec) if ":" in spec else None
-    # A factory has all that is asked of a class here.
+    # A factory has every attribute of a class that is read here.
     return find_class(spec) if factory is None else cast("type[Any]", factory)
 
 
 def make_policy(spec: str, seed: int) -> Policy:
-    """A policy from its spec.
+    """Make a policy from its spec.
 
     Args:
         spec: ``oracle``, ``listener``, ``forgetful``, ``random``; ``package.module:Class``,
-            which is called with ``seed=`` if it takes it, else without arguments; or a URL.
+            called with ``seed=`` if it takes it, else without arguments; or a URL.
         seed: of the policy's own random choices.
 
     Raises:
         UnknownNameError: there is no such built-in policy, scheme or option.
-        InvalidValueError: the module or the class cannot be imported, or is not a policy; or
-            the URL is malformed.
+        InvalidValueError: the module or class cannot be imported or is not a policy, or the URL
+            is malformed.
+        MissingDependencyError: a library that the URL's scheme needs is not installed.
     """
     return make_from_class(spec, load_policy_class(spec), seed)
 
 
 def is_privileged(spec: str) -> bool:
-    """Whether a spec names a policy that looks behind the scenes."""
+    """Return whether a spec names a policy that reads the simulator's state."""
     try:
         policy_class = load_policy_class(spec)
         return hasattr(policy_class(spec) if is_url(spec) else policy_class, "attach")
@@ -59,11 +58,11 @@ def is_privileged(spec: str) -> bool:
 
 
 def policy_version(spec: str) -> str:
-    """What tells a policy from an earlier one of the same name.
+    """Return what distinguishes a policy from an earlier one of the same name.
 
-    Its class attribute ``version`` if it has one (a checkpoint's name, say), else a fingerprint of
-    the file that defines it; ``built-in``, or ``unknown`` if nothing can be found out. Of a URL
-    what its option ``version`` says: nothing is connected to find out more.
+    This is the class attribute ``version`` (say, the name of a checkpoint), else a fingerprint of
+    the file that defines the class; ``built-in``; or ``unknown`` if neither is found. For a URL it
+    is the option ``version``: no server is asked.
     """
     if spec in BUILTIN:
         return "built-in"
@@ -77,4 +76,4 @@ def policy_version(spec: str) -> str:
         source = Path(inspect.getfile(policy_class)).read_bytes()
     except (InvalidValueError, OSError, TypeError):
         return "unknown"
-    return hashlib.sha256(source).hexdigest()[:FINGERPRINT_LENGTH]
+    return short_hash(source)

@@ -1,4 +1,4 @@
-"""Playing one episode by hand, without a run around it."""
+"""Play a single episode in Python, outside of a run."""
 
 from __future__ import annotations
 
@@ -7,27 +7,22 @@ from typing import TYPE_CHECKING, Any, cast
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Observation
 from roboirg.policies.base import Policy, PrivilegedPolicy
-from roboirg.policies.requirements import (
-    wanted_actions,
-    wanted_demonstration_frames,
-    wanted_history,
-    wanted_history_cameras,
-)
+from roboirg.policies.requirements import REQUIREMENTS, wanted_actions
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
 
 def play(env: RoboIRGEnv, policy: Policy) -> dict[str, Any]:
-    """Let a policy play an environment's episode from its beginning to its end.
+    """Play the environment's episode from beginning to end with a policy.
 
     Returns:
         The last step's info; its ``status`` is success, failure or timeout.
 
     Raises:
-        InvalidActionError: the policy gave an action of a wrong shape or not finite.
-        InvalidValueError: the environment has another action space than the policy, or shows
-            something else than it asks for.
+        InvalidActionError: the policy gave actions that have a wrong shape or are not finite.
+        InvalidValueError: the action space or the observations of the environment are not those
+            that the policy needs.
     """
     _check(env, policy)
     observation, info = env.reset()
@@ -41,22 +36,17 @@ def play(env: RoboIRGEnv, policy: Policy) -> dict[str, Any]:
 
 
 def _check(env: RoboIRGEnv, policy: Policy) -> None:
-    """Complain if the environment is not what the policy asks for."""
+    """Raise if the environment does not meet the policy's requirements."""
     wanted = wanted_actions(policy).name
     if wanted != env.actions:
         raise InvalidValueError(
             f"{type(policy).__name__} acts in {wanted!r}, but the environment takes "
             f"{env.actions!r}; make it with actions={wanted!r}."
         )
-    wishes: dict[str, object] = {
-        "demonstration_frames": wanted_demonstration_frames(policy),
-        "observe_every": wanted_history(policy),
-        "history_cameras": wanted_history_cameras(policy),
-    }
-    for attribute, wish in wishes.items():
-        given = getattr(env, attribute)
-        if hasattr(policy, attribute) and wish != given:
+    for attribute in ("demonstration_frames", "observe_every", "history_cameras"):
+        value, given = REQUIREMENTS[attribute](policy), getattr(env, attribute)
+        if hasattr(policy, attribute) and value != given:
             raise InvalidValueError(
-                f"{type(policy).__name__} wants {attribute}={wish!r}, but the environment has "
-                f"{given!r}; make it with {attribute}={wish!r}."
+                f"{type(policy).__name__} needs {attribute}={value!r}, but the environment has "
+                f"{given!r}; make it with {attribute}={value!r}."
             )

@@ -1,4 +1,4 @@
-"""Does a policy keep the contract? Made-up episodes tell, without a simulator."""
+"""Check that a policy keeps the contract, on synthetic episodes and without a simulator."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from roboirg.core.actions import ActionSpace, check_chunk
 from roboirg.core.errors import MissingDependencyError, RoboIRGError
-from roboirg.policies.base import Policy
+from roboirg.policies.base import Policy, close_policy
 from roboirg.policies.loading import make_policy
 from roboirg.policies.requirements import (
     wanted_actions,
@@ -21,6 +21,7 @@ from roboirg.policies.requirements import (
     wanted_history,
 )
 from roboirg.policies.synthetic_episodes import SyntheticEpisode, SyntheticEpisodes
+from roboirg.util.plurals import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -32,31 +33,31 @@ NOTE: Verdict = "note"
 
 VIDEO_STEPS = 40
 CALLS = 3
-"""Calls of `act` in a made-up episode."""
+"""Calls of `act` in a synthetic episode."""
 _FIRST, _SECOND = "Put the red cube on the target.", "Press the second button from the left."
-_LONGEST_WORDS = 300
+_MAX_ERROR_LENGTH = 300
 
 
 class CheckResult(NamedTuple):
-    """One thing that was looked at.
+    """The result of one check.
 
     Attributes:
-        what: in a few words.
-        verdict: pass, fail, or note for what is allowed and good to know.
-        sentence: what was found.
+        check: its name.
+        verdict: pass, fail, or note for what is allowed but worth knowing.
+        message: one sentence.
     """
 
-    what: str
+    check: str
     verdict: Verdict
-    sentence: str
+    message: str
 
 
-class _Broken(Exception):  # noqa: N818 - never leaves this file
-    """The check cannot go on; the argument says why."""
+class _CheckAbortedError(Exception):
+    """The checks cannot go on; the arguments are those of the last `CheckResult`."""
 
 
-class _Course(NamedTuple):
-    """What a policy did in a made-up episode."""
+class _SyntheticRollout(NamedTuple):
+    """The policy's actions in a synthetic episode, and the time of each call."""
 
     chunks: list[NDArray[np.float64]]
     seconds: list[float]
@@ -64,256 +65,268 @@ class _Course(NamedTuple):
 
 
 def check_policy(policy: str | Policy, *, seed: int = 0) -> list[CheckResult]:
-    """Try a policy on made-up episodes.
+    """Check a policy on synthetic episodes.
 
     Args:
-        policy: a spec as for `roboirg.policies.make_policy`, or an object, which is then reset
-            where a spec gives a fresh one.
-        seed: of the policy and of what is made up.
+        policy: a spec as for `roboirg.policies.make_policy`, or an object, which is reset wherever
+            a spec would give a fresh object.
+        seed: of the policy and of the synthetic episodes.
 
     Returns:
-        What was found, in the order in which it was looked at; later checks need earlier ones.
+        The results in the order of the checks, which end at the first that makes others
+        impossible.
 
     Raises:
-        MissingDependencyError: something has to be installed first.
+        MissingDependencyError: a library that the policy needs is not installed.
     """
-    findings: list[CheckResult] = []
+    results: list[CheckResult] = []
     try:
-        _Check(policy, seed, findings).run()
-    except _Broken as broken:
-        findings.append(CheckResult(*broken.args))
-    return findings
+        _PolicyChecker(policy, seed, results).run()
+    except _CheckAbortedError as error:
+        results.append(CheckResult(*error.args))
+    return results
 
 
-def print_check_results(findings: list[CheckResult], console: Console) -> None:
-    """A table of what was found, and how many failed."""
+def print_check_results(results: list[CheckResult], console: Console) -> None:
+    """Print a table of results, and how many checks failed."""
     from rich.table import Table
 
     styles = {PASS: "green", FAIL: "bold red", NOTE: "yellow"}
     table = Table(box=None, pad_edge=False)
-    for heading in ("check", "", "finding"):
+    for heading in ("check", "", "result"):
         table.add_column(heading)
-    for finding in findings:
+    for result in results:
         table.add_row(
-            finding.what, f"[{styles[finding.verdict]}]{finding.verdict}[/]", finding.sentence
+            result.check, f"[{styles[result.verdict]}]{result.verdict}[/]", result.message
         )
     console.print(table, highlight=False)
-    failed = sum(finding.verdict == FAIL for finding in findings)
-    console.print(f"{failed} of {len(findings)} checks failed." if failed else "All is well.")
+    failed = sum(result.verdict == FAIL for result in results)
+    checks = counted(len(results), "check")
+    console.print(f"{failed} of {checks} failed." if failed else f"{checks}, none failed.")
 
 
-class _Check:
-    """One run of all checks."""
+class _PolicyChecker:
+    """Runs all checks of one policy and appends their results."""
 
-    def __init__(self, policy: str | Policy, seed: int, findings: list[CheckResult]) -> None:
-        self._given, self._seed, self._findings = policy, seed, findings
-        self._open: Policy | None = None
+    def __init__(self, policy: str | Policy, seed: int, results: list[CheckResult]) -> None:
+        self._source, self._seed, self._results = policy, seed, results
+        self._policy: Policy | None = None
 
     def run(self) -> None:
-        """Look at one thing after the other."""
+        """Run the checks in order."""
         try:
             policy = self._load()
-            self._look(policy)
-            plain = self._episode(_FIRST, 0)
-            course = self._chunks("without a video", plain)
-            self._time(course)
-            shown = self._episode(_SECOND, VIDEO_STEPS)
-            again = self._chunks("with a video", shown)
-            self._inputs(shown)
-            self._same(policy, shown, again)
-            self._forgets(policy, plain, shown, again)
-            self._garbage(plain)
+            self._check_requirements(policy)
+            without_video = self._new_episode(_FIRST, 0)
+            rollout = self._check_actions("without a video", without_video)
+            self._report_times(rollout)
+            with_video = self._new_episode(_SECOND, VIDEO_STEPS)
+            expected = self._check_actions("with a video", with_video)
+            self._check_inputs(with_video)
+            self._check_determinism(policy, with_video, expected)
+            self._check_reset(policy, without_video, with_video, expected)
+            self._check_broken_sensors(without_video)
         finally:
             self._close()
 
-    def _note(self, what: str, verdict: Verdict, sentence: str) -> None:
-        self._findings.append(CheckResult(what, verdict, sentence))
+    def _add(self, check: str, verdict: Verdict, message: str) -> None:
+        self._results.append(CheckResult(check, verdict, message))
 
     def _load(self) -> Policy:
         try:
-            policy = self._fresh()
-            lacking = [name for name in ("reset", "act") if not callable(getattr(policy, name, 0))]
+            policy = self._make_fresh()
+            missing = [name for name in ("reset", "act") if not callable(getattr(policy, name, 0))]
         except MissingDependencyError:
             raise
         except Exception as error:  # the policy's own code runs here
-            raise _Broken("loads", FAIL, _words(error)) from error
-        if lacking:
-            raise _Broken("loads", FAIL, f"It has no {lacking[0]}().")
+            raise _CheckAbortedError("loads", FAIL, _describe_error(error)) from error
+        if missing:
+            raise _CheckAbortedError("loads", FAIL, f"It has no {missing[0]}().")
         if hasattr(policy, "attach"):
-            raise _Broken(
-                "loads", NOTE, "It looks behind the scenes of a world; there is none here."
+            raise _CheckAbortedError(
+                "loads", NOTE, "It is privileged: it needs a simulator, and there is none here."
             )
-        self._note("loads", PASS, f"{type(policy).__name__} was made with seed {self._seed}.")
+        self._add("loads", PASS, f"{type(policy).__name__} was made with seed {self._seed}.")
         return policy
 
-    def _look(self, policy: Policy) -> None:
+    def _check_requirements(self, policy: Policy) -> None:
         try:
             self._space: ActionSpace = wanted_actions(policy)
             cameras, frames = wanted_cameras(policy), wanted_demonstration_frames(policy)
             every = wanted_history(policy)
         except RoboIRGError as error:
-            raise _Broken("asks for", FAIL, str(error)) from error
-        self._studio: Callable[[], SyntheticEpisodes] = lambda: SyntheticEpisodes(
+            raise _CheckAbortedError("requirements", FAIL, str(error)) from error
+        self._make_episodes: Callable[[], SyntheticEpisodes] = lambda: SyntheticEpisodes(
             cameras, frames, every, self._seed
         )
-        self._note(
-            "asks for",
+        self._add(
+            "requirements",
             PASS,
             f"Actions {self._space.name}, cameras {', '.join(cameras) or 'none'}, demonstration "
             f"frames {frames}, observations every {every or 'chunk'}.",
         )
 
-    def _chunks(self, when: str, episode: SyntheticEpisode) -> _Course:
-        course = self._play(f"acts {when}", episode)
-        sizes = [len(chunk) for chunk in course.chunks]
+    def _check_actions(self, when: str, episode: SyntheticEpisode) -> _SyntheticRollout:
+        rollout = self._play(f"acts {when}", episode)
+        sizes = [len(chunk) for chunk in rollout.chunks]
         outside = sum(
             int(((chunk < self._space.low) | (chunk > self._space.high)).any(axis=1).sum())
-            for chunk in course.chunks
+            for chunk in rollout.chunks
         )
-        told = f"{', '.join(map(str, sizes))} actions of {self._space.size} numbers, {course.dtype}"
-        self._note(f"acts {when}", PASS, f"Chunks of {told}, all finite.")
+        self._add(
+            f"acts {when}",
+            PASS,
+            f"Chunks of {', '.join(map(str, sizes))} actions of {self._space.size} numbers, "
+            f"{rollout.dtype}, all finite.",
+        )
         if outside:
-            self._note(
+            self._add(
                 f"range {when}",
                 NOTE,
-                f"{outside} of {sum(sizes)} actions have a number outside the usual range of "
-                f"{self._space.name}; they are executed as far as the robot can.",
+                f"{outside} of {counted(sum(sizes), 'action')} have a number outside the usual "
+                f"range of {self._space.name}; the robot executes them as well as it can.",
             )
-        return course
+        return rollout
 
-    def _time(self, course: _Course) -> None:
-        steps = sum(map(len, course.chunks))
-        first, *others = course.seconds
-        self._note(
+    def _report_times(self, rollout: _SyntheticRollout) -> None:
+        steps = sum(map(len, rollout.chunks))
+        first, *others = rollout.seconds
+        self._add(
             "time",
             NOTE,
             f"The first call took {1000 * first:.1f} ms, later ones {1000 * np.mean(others):.1f} "
-            f"ms; {1000 * sum(course.seconds) / steps:.2f} ms per action.",
+            f"ms; {1000 * sum(rollout.seconds) / steps:.2f} ms per action.",
         )
 
-    def _inputs(self, episode: SyntheticEpisode) -> None:
+    def _check_inputs(self, episode: SyntheticEpisode) -> None:
         given = copy.deepcopy(episode)
-        self._play_as_it_is("leaves its inputs alone", given)
-        changed = _difference(
+        self._play_in_place("inputs unchanged", given)
+        changed = _first_difference(
             (episode.demonstration, episode.first), (given.demonstration, given.first)
         )
         if changed:
-            self._note("leaves its inputs alone", FAIL, f"It changed {changed} in place.")
+            self._add("inputs unchanged", FAIL, f"It changed {changed} in place.")
         else:
-            self._note("leaves its inputs alone", PASS, "What it was given is as before.")
+            self._add("inputs unchanged", PASS, "Demonstration and observations are as before.")
 
-    def _same(self, policy: Policy, episode: SyntheticEpisode, before: _Course) -> None:
-        what = "is the same with the same seed"
-        again = self._play(what, episode)
-        if _equal(before, again):
-            self._note(what, PASS, "Two equal episodes have the same actions, bit for bit.")
-        elif getattr(policy, "deterministic", True):
-            self._note(
-                what,
-                FAIL,
-                f"Two equal episodes differ by up to {_apart(before, again)}; a policy "
-                "that cannot help it says deterministic = False.",
-            )
-        else:
-            self._note(what, NOTE, "Equal episodes differ, as it says of itself.")
-
-    def _forgets(
-        self, policy: Policy, other: SyntheticEpisode, episode: SyntheticEpisode, before: _Course
+    def _check_determinism(
+        self, policy: Policy, episode: SyntheticEpisode, expected: _SyntheticRollout
     ) -> None:
-        what = "reset forgets"
-        if not getattr(policy, "deterministic", True):
-            self._note(what, NOTE, "It says that it is not deterministic, so nothing can be told.")
-            return
-        self._play(what, other)
-        after = self._play(what, episode, fresh=False)
-        if _equal(before, after):
-            self._note(what, PASS, "An episode is not changed by the one before it.")
-        else:
-            self._note(
-                what,
+        again = self._play("deterministic", episode)
+        if _equal(expected, again):
+            self._add(
+                "deterministic", PASS, "Two equal episodes have the same actions, bit for bit."
+            )
+        elif getattr(policy, "deterministic", True):
+            self._add(
+                "deterministic",
                 FAIL,
-                "An episode after another one, with the same object, differs by up to "
-                f"{_apart(before, after)} from a first one.",
+                f"Two equal episodes differ by up to {_largest_difference(expected, again)}; if "
+                "that is intended, set deterministic = False.",
+            )
+        else:
+            self._add("deterministic", NOTE, "Equal episodes differ, as the policy declares.")
+
+    def _check_reset(
+        self,
+        policy: Policy,
+        other: SyntheticEpisode,
+        episode: SyntheticEpisode,
+        expected: _SyntheticRollout,
+    ) -> None:
+        if not getattr(policy, "deterministic", True):
+            self._add("reset forgets", NOTE, "Not checked: the policy is not deterministic.")
+            return
+        self._play("reset forgets", other)
+        after = self._play("reset forgets", episode, fresh=False)
+        if _equal(expected, after):
+            self._add("reset forgets", PASS, "An episode does not depend on the one before it.")
+        else:
+            self._add(
+                "reset forgets",
+                FAIL,
+                "A second episode with the same object differs by up to "
+                f"{_largest_difference(expected, after)} from the same episode played first.",
             )
 
-    def _garbage(self, episode: SyntheticEpisode) -> None:
-        what, studio = "broken sensors", self._studio()
-        policy = self._begin(what, episode)
+    def _check_broken_sensors(self, episode: SyntheticEpisode) -> None:
+        policy = self._reset("broken sensors", episode)
         try:
-            answer = check_chunk(policy.act(studio.garbage(episode)), self._space)
-            sentence = f"NaN and noise: it gives {len(answer)} finite actions."
-        except Exception as error:  # noqa: BLE001 - to complain is one of the right answers
-            sentence = f"NaN and noise: it complains ({_words(error)})"
+            actions = check_chunk(policy.act(self._make_episodes().broken(episode)), self._space)
+            reaction = f"it gives {counted(len(actions), 'finite action')}"
+        except Exception as error:  # noqa: BLE001 - to raise is one of the right reactions
+            reaction = f"it raises ({_describe_error(error).rstrip('.')})"
         self._close()
-        self._play(what, episode)
-        self._note(what, PASS, f"{sentence.rstrip('.')}; the next episode works.")
+        self._play("broken sensors", episode)
+        self._add("broken sensors", PASS, f"NaN and noise: {reaction}; the next episode works.")
 
-    def _episode(self, instruction: str, size: int) -> SyntheticEpisode:
-        return self._studio().episode(instruction, size)
+    def _new_episode(self, instruction: str, size: int) -> SyntheticEpisode:
+        return self._make_episodes().episode(instruction, size)
 
-    def _play(self, what: str, episode: SyntheticEpisode, *, fresh: bool = True) -> _Course:
-        """An episode of a few calls, on a copy that a policy may spoil."""
-        return self._play_as_it_is(what, copy.deepcopy(episode), fresh=fresh)
+    def _play(
+        self, check: str, episode: SyntheticEpisode, *, fresh: bool = True
+    ) -> _SyntheticRollout:
+        """Play a copy of an episode, which the policy may change."""
+        return self._play_in_place(check, copy.deepcopy(episode), fresh=fresh)
 
-    def _play_as_it_is(
-        self, what: str, episode: SyntheticEpisode, *, fresh: bool = True
-    ) -> _Course:
-        """An episode of a few calls; what is seen in them depends on the seed alone."""
-        policy = self._begin(what, episode, fresh=fresh)
-        studio, observation = self._studio(), episode.first
-        course = _Course([], [], "")
+    def _play_in_place(
+        self, check: str, episode: SyntheticEpisode, *, fresh: bool = True
+    ) -> _SyntheticRollout:
+        """Play some calls of an episode; the observations depend on the seed alone."""
+        policy = self._reset(check, episode, fresh=fresh)
+        episodes, observation = self._make_episodes(), episode.first
+        rollout = _SyntheticRollout([], [], "")
         for _ in range(CALLS):
             start = time.perf_counter()
             try:
-                answer = policy.act(observation)
+                actions = policy.act(observation)
                 seconds = time.perf_counter() - start
-                chunk = check_chunk(answer, self._space)
+                chunk = check_chunk(actions, self._space)
             except Exception as error:
-                raise _Broken(what, FAIL, f"act(): {_words(error)}") from error
-            # A copy: a policy may use its array again.
-            course.chunks.append(chunk.copy())
-            course.seconds.append(seconds)
-            course = course._replace(dtype=str(np.asarray(answer).dtype))
-            observation = studio.after(episode, len(chunk))
-        return course
+                raise _CheckAbortedError(check, FAIL, f"act(): {_describe_error(error)}") from error
+            # A copy: a policy may reuse its array.
+            rollout.chunks.append(chunk.copy())
+            rollout.seconds.append(seconds)
+            rollout = rollout._replace(dtype=str(np.asarray(actions).dtype))
+            observation = episodes.after(episode, len(chunk))
+        return rollout
 
-    def _begin(self, what: str, episode: SyntheticEpisode, *, fresh: bool = True) -> Policy:
+    def _reset(self, check: str, episode: SyntheticEpisode, *, fresh: bool = True) -> Policy:
         try:
-            policy = self._fresh() if fresh or self._open is None else self._open
-            self._open = policy
+            policy = self._make_fresh() if fresh or self._policy is None else self._policy
+            self._policy = policy
             policy.reset(episode.instruction, episode.demonstration)
         except Exception as error:
-            raise _Broken(what, FAIL, f"reset(): {_words(error)}") from error
+            raise _CheckAbortedError(check, FAIL, f"reset(): {_describe_error(error)}") from error
         return policy
 
-    def _fresh(self) -> Policy:
+    def _make_fresh(self) -> Policy:
         self._close()
-        return make_policy(self._given, self._seed) if isinstance(self._given, str) else self._given
+        source = self._source
+        return make_policy(source, self._seed) if isinstance(source, str) else source
 
     def _close(self) -> None:
-        policy, self._open = self._open, None
-        close = getattr(policy, "close", None)
-        if callable(close):
-            close()
+        policy, self._policy = self._policy, None
+        close_policy(policy)
 
 
-def _equal(one: _Course, other: _Course) -> bool:
+def _equal(one: _SyntheticRollout, other: _SyntheticRollout) -> bool:
     return len(one.chunks) == len(other.chunks) and all(
         np.array_equal(first, second)
         for first, second in zip(one.chunks, other.chunks, strict=True)
     )
 
 
-def _apart(one: _Course, other: _Course) -> str:
-    """The largest difference of two courses, in words."""
+def _largest_difference(one: _SyntheticRollout, other: _SyntheticRollout) -> str:
+    """Return the largest difference of two rollouts, in words."""
     pairs = list(zip(one.chunks, other.chunks, strict=True))
     if any(first.shape != second.shape for first, second in pairs):
         return "the number of actions"
     return f"{max(float(np.abs(first - second).max()) for first, second in pairs):.3g}"
 
 
-def _difference(before: Any, after: Any, name: str = "") -> str:  # noqa: ANN401 - any nest
-    """The name of something that differs between two nests of containers and arrays."""
+def _first_difference(before: Any, after: Any, name: str = "") -> str:  # noqa: ANN401 - any nest
+    """Return the name of an entry in which two nests of containers and arrays differ, or ``""``."""
     if isinstance(before, np.ndarray):
         same = isinstance(after, np.ndarray) and np.array_equal(before, after)
         return "" if same else name
@@ -325,12 +338,12 @@ def _difference(before: Any, after: Any, name: str = "") -> str:  # noqa: ANN401
         pairs = [(name, one, other) for one, other in zip(before, after, strict=True)]
     else:
         return "" if before == after else name
-    found = (_difference(one, other, key) for key, one, other in pairs)
+    found = (_first_difference(one, other, key) for key, one, other in pairs)
     return next((word for word in found if word), "")
 
 
-def _words(error: Exception) -> str:
+def _describe_error(error: Exception) -> str:
     words = " ".join(str(error).split())
     if not isinstance(error, RoboIRGError):
         words = f"{type(error).__name__}: {words}"
-    return words[:_LONGEST_WORDS].rstrip(": .") + "."
+    return words[:_MAX_ERROR_LENGTH].rstrip(": .") + "."

@@ -1,9 +1,10 @@
-"""Policies that a single class makes: built in, by import path, or by address."""
+"""Find the class of a policy: built in, by import path, or by URL scheme."""
 
 from __future__ import annotations
 
 import importlib
 import inspect
+import pkgutil
 from collections.abc import Mapping
 from types import ModuleType
 from typing import Any
@@ -11,7 +12,8 @@ from typing import Any
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.policies.base import Policy
 from roboirg.policies.policy_urls import is_url
-from roboirg.policies.requirements import WISHES
+from roboirg.policies.protocols import protocols_by_scheme
+from roboirg.policies.requirements import REQUIREMENTS
 
 BUILTIN: Mapping[str, str] = {
     "oracle": "roboirg.policies.builtin.oracle_policy:OraclePolicy",
@@ -20,27 +22,27 @@ BUILTIN: Mapping[str, str] = {
     "random": "roboirg.policies.builtin.random_policy:RandomPolicy",
 }
 
-SCHEMES: Mapping[str, str] = {
-    "openpi": "roboirg.policies.remote.openpi_client:OpenpiPolicy",
-    "mme-vla": "roboirg.policies.remote.mme_vla_client:MmeVlaPolicy",
-    "challenge": "roboirg.policies.remote.challenge_client:ChallengePolicy",
-    "challenge+http": "roboirg.policies.remote.challenge_client:ChallengeHttpPolicy",
-    "lerobot": "roboirg.policies.lerobot_policy:LeRobotPolicy",
-}
-"""Policies named by a URL, by its scheme: classes made with ``(url, seed=)``, without a network."""
+CHECKPOINTS: Mapping[str, str] = {"lerobot": "roboirg.policies.lerobot_policy:LeRobotPolicy"}
+"""Policies of this process that a URL names, by its scheme; called with ``(url, seed=)``."""
+
+
+def url_schemes() -> tuple[str, ...]:
+    """Return the schemes of all URLs that name policies."""
+    return (*protocols_by_scheme(), *CHECKPOINTS)
 
 
 def find_class(spec: str) -> type[Any]:
-    """The class that a spec names: a built-in name, ``package.module:Class``, or a URL.
+    """Return the class of a built-in name, ``package.module:Class``, or a URL.
 
     Raises:
-        UnknownNameError: it is none of them, or the URL gives an option that there is not.
-        InvalidValueError: the module or the class cannot be imported, or is not a policy; or
-            the URL is malformed.
+        UnknownNameError: the spec is none of them, or the URL has an unknown option.
+        InvalidValueError: the module or class cannot be imported or is not a policy, or the URL
+            is malformed.
+        MissingDependencyError: a library that the URL's scheme needs is not installed.
     """
     if is_url(spec):
         policy_class = _url_class(spec)
-        _check_wishes(spec, policy_class(spec))
+        _check_requirements(spec, policy_class(spec))
         return policy_class
     if spec not in BUILTIN and ":" not in spec:
         raise UnknownNameError("policy", spec, [*BUILTIN, "package.module:Class", *_examples()])
@@ -51,42 +53,44 @@ def find_class(spec: str) -> type[Any]:
     found = getattr(module, name)
     if not inspect.isclass(found):
         raise InvalidValueError(
-            f"Policy {spec!r}: {name!r} in module {module_name} is no class but of type "
-            f"{type(found).__name__}."
+            f"Policy {spec!r}: {name!r} in module {module_name} is of type "
+            f"{type(found).__name__}, not a class."
         )
     _check_class(spec, found)
     return found
 
 
 def make_from_class(spec: str, policy_class: type[Any], seed: int) -> Policy:
-    """A policy of a class that was found by a spec.
+    """Make a policy of the class that `find_class` returned.
 
     Args:
-        spec: an address is given to the constructor.
-        policy_class: is called with ``seed=`` if it takes it, else without.
+        spec: passed to the constructor if it is a URL.
+        policy_class: called with ``seed=`` if it takes it, else without arguments.
         seed: of the policy's own random choices.
     """
     if is_url(spec):
         remote: Policy = policy_class(spec, seed=seed)
         return remote
-    policy: Policy = policy_class(seed=seed) if "seed" in _takes(policy_class) else policy_class()
+    policy: Policy = (
+        policy_class(seed=seed) if "seed" in _parameters(policy_class) else policy_class()
+    )
     return policy
 
 
 def _check_class(spec: str, policy_class: type[Any]) -> None:
-    """Complain of what would otherwise end every episode."""
+    """Raise for a class with which every episode would end in an error."""
     name = policy_class.__name__
     for method in ("reset", "act"):
         if not hasattr(policy_class, method):
             raise InvalidValueError(f"Policy {spec!r}: class {name} has no method {method}().")
         if not callable(getattr(policy_class, method)):
-            raise InvalidValueError(f"Policy {spec!r}: {method} of class {name} is no method.")
+            raise InvalidValueError(f"Policy {spec!r}: {method} of class {name} is not a method.")
     if inspect.isabstract(policy_class):
-        lacking = sorted(policy_class.__abstractmethods__)
+        missing = sorted(policy_class.__abstractmethods__)
         raise InvalidValueError(
-            f"Policy {spec!r}: class {name} is abstract; it lacks {', '.join(lacking)}."
+            f"Policy {spec!r}: class {name} is abstract; it lacks {', '.join(missing)}."
         )
-    for parameter in _takes(policy_class).values():
+    for parameter in _parameters(policy_class).values():
         optional = parameter.default is not parameter.empty or parameter.kind in (
             parameter.VAR_POSITIONAL,
             parameter.VAR_KEYWORD,
@@ -96,40 +100,42 @@ def _check_class(spec: str, policy_class: type[Any]) -> None:
                 f"Policy {spec!r}: {name}() is called with seed= at most, but needs "
                 f"{parameter.name!r}; give it a default."
             )
-    _check_wishes(spec, policy_class)
+    _check_requirements(spec, policy_class)
 
 
-def _check_wishes(spec: str, policy: object) -> None:
-    """Complain of what a class, or a policy, asks for."""
-    for attribute, wanted in WISHES.items():
-        # What a property of a class says is known when there is an object.
+def _check_requirements(spec: str, policy: object) -> None:
+    """Raise if the requirements of a class, or of a policy, are invalid."""
+    for attribute, read in REQUIREMENTS.items():
+        # The value of a property is known only for an object.
         if not inspect.isclass(policy) or not hasattr(
             inspect.getattr_static(policy, attribute, ()), "__get__"
         ):
             try:
-                wanted(policy)
+                read(policy)
             except InvalidValueError as error:
                 raise InvalidValueError(f"Policy {spec!r}: {error}") from error
 
 
 def _url_class(spec: str) -> type[Any]:
-    """The class of a URL's scheme."""
+    """Return the class of a URL's scheme."""
     scheme = spec.partition("://")[0]
-    if scheme not in SCHEMES:
-        raise UnknownNameError("policy scheme", scheme, SCHEMES)
-    module_name, _, name = SCHEMES[scheme].partition(":")
-    found: type[Any] = getattr(_module(spec, module_name), name)
-    return found
+    if scheme in CHECKPOINTS:
+        found: type[Any] = pkgutil.resolve_name(CHECKPOINTS[scheme])
+        return found
+    protocols = protocols_by_scheme()
+    if scheme not in protocols:
+        raise UnknownNameError("policy scheme", scheme, url_schemes())
+    return protocols[scheme].clients[scheme]
 
 
 def _examples() -> list[str]:
-    return [*(f"{scheme}://…" for scheme in SCHEMES), "system:NAME", "vlm-listener:PROVIDER"]
+    return [*(f"{scheme}://…" for scheme in url_schemes()), "system:NAME", "vlm-listener:PROVIDER"]
 
 
-def _takes(policy_class: type[Any]) -> Mapping[str, inspect.Parameter]:
+def _parameters(policy_class: type[Any]) -> Mapping[str, inspect.Parameter]:
     try:
         return inspect.signature(policy_class).parameters
-    except (TypeError, ValueError):  # a class written in C need not tell
+    except (TypeError, ValueError):  # a class written in C may have no signature
         return {}
 
 

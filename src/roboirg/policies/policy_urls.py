@@ -1,4 +1,4 @@
-"""Policies named by a URL: the scheme says what kind, the query holds options."""
+"""URLs that name policies: the scheme says which kind, the query holds options."""
 
 from __future__ import annotations
 
@@ -7,21 +7,22 @@ from collections.abc import Mapping
 from typing import NamedTuple, TypeVar
 from urllib.parse import parse_qsl, unquote
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.policies.option_checking import check_options
 
-_MARK = "://"
+_SEPARATOR = "://"
 _URL = re.compile(r"[\w+.-]*://")
 
 
 class PolicyUrl(NamedTuple):
-    """A URL taken apart.
+    """The parts of a URL.
 
     Attributes:
-        text: all of it.
+        text: the whole URL.
         scheme: before ``://``.
-        place: after it, up to the query.
+        place: from there to the query.
         options: of the query.
     """
 
@@ -32,7 +33,7 @@ class PolicyUrl(NamedTuple):
 
 
 class UrlOptions(BaseModel):
-    """Options of a scheme: a field each, with its type, limits and default."""
+    """Options of a scheme: one field each, with type, limits and default."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -41,51 +42,50 @@ Options = TypeVar("Options", bound=UrlOptions)
 
 
 def is_url(spec: str) -> bool:
-    """Whether a policy's spec is a URL; one that holds a URL among its options is none."""
+    """Return whether a policy's spec is a URL; a URL among its options does not count."""
     return _URL.match(spec) is not None
 
 
 def split_url(spec: str) -> PolicyUrl:
-    """Take a URL apart.
+    """Split a URL into its parts.
 
     Raises:
-        InvalidValueError: it names nothing after the scheme, or its query is malformed.
+        InvalidValueError: there is nothing after the scheme, or the query is malformed.
     """
-    scheme, _, rest = spec.partition(_MARK)
+    scheme, _, rest = spec.partition(_SEPARATOR)
     place, _, query = rest.partition("?")
     if not place.strip("/"):
-        raise InvalidValueError(f"Policy {spec!r} names nothing after {scheme}{_MARK}.")
+        raise InvalidValueError(f"Policy {spec!r} names nothing after {scheme}{_SEPARATOR}.")
+    return PolicyUrl(spec, scheme, unquote(place), parse_query(spec, query))
+
+
+def parse_query(spec: str, query: str) -> dict[str, str]:
+    """Return the options in the query of a policy's spec.
+
+    Raises:
+        InvalidValueError: the query is malformed, or gives an option twice.
+    """
     try:
         pairs = parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query))
     except ValueError as error:
         raise InvalidValueError(
             f"Policy {spec!r}: options are written ?name=value&name=value, not {query!r}."
         ) from error
-    options = dict(pairs)
-    if len(options) < len(pairs):
-        names = [name for name, _ in pairs]
-        twice = next(name for name in names if names.count(name) > 1)
-        raise InvalidValueError(f"Policy {spec!r} gives the option {twice!r} twice.")
-    return PolicyUrl(spec, scheme, unquote(place), options)
+    names = [name for name, _ in pairs]
+    for name in names:
+        if names.count(name) > 1:
+            raise InvalidValueError(f"Policy {spec!r} gives the option {name!r} twice.")
+    return dict(pairs)
 
 
 def read_options(url: PolicyUrl, kind: type[Options]) -> Options:
-    """The options of a URL, checked.
+    """Return the options of a URL, checked.
 
     Raises:
-        UnknownNameError: the scheme has no such option; names the nearest.
-        InvalidValueError: an option has a value that it cannot have.
+        UnknownNameError: the scheme has no such option; the message names the nearest.
+        InvalidValueError: an option has an invalid value.
     """
     for name in url.options:
         if name not in kind.model_fields:
-            raise UnknownNameError(f"option of {url.scheme}{_MARK}", name, kind.model_fields)
-    try:
-        return kind.model_validate(dict(url.options))
-    except ValidationError as error:
-        first = error.errors()[0]
-        name = str(first["loc"][0])
-        message = first["msg"].removeprefix("Value error, ")
-        end = "" if message.endswith((".", "?")) else "."
-        raise InvalidValueError(
-            f"Policy {url.text!r}: option {name} is {url.options[name]!r}: {message}{end}"
-        ) from error
+            raise UnknownNameError(f"option of {url.scheme}{_SEPARATOR}", name, kind.model_fields)
+    return check_options(kind, url.options, f"Policy {url.text!r}")

@@ -1,4 +1,4 @@
-"""What a policy, or a class of policies, asks of its environment."""
+"""What a policy, or a class of policies, requires of its environment."""
 
 from __future__ import annotations
 
@@ -15,58 +15,59 @@ from roboirg.core.observations import (
 
 
 def wanted_cameras(policy: object) -> tuple[str, ...]:
-    """The pictures that a policy, or a class of policies, asks for.
+    """Return the cameras whose pictures a policy, or a class of policies, wants.
 
     Raises:
-        InvalidValueError: its ``cameras`` are not different names of cameras in a tuple or list.
+        InvalidValueError: ``cameras`` is not a tuple or list of distinct camera names.
     """
     return check_cameras(getattr(policy, "cameras", CAMERAS))
 
 
 def wanted_actions(policy: object) -> ActionSpace:
-    """The action space in which a policy, or a class of policies, gives its actions.
+    """Return the action space of a policy, or of a class of policies.
 
     Raises:
-        UnknownNameError: its ``actions`` name none.
+        UnknownNameError: ``actions`` names none.
     """
     return find_action_space(getattr(policy, "actions", JOINT_ANGLE.name))
 
 
 def wanted_demonstration_frames(policy: object) -> DemonstrationFrames:
-    """The pictures of the video that a policy, or a class of policies, asks for.
+    """Return the frames of the video that a policy, or a class of policies, wants.
 
     Raises:
-        InvalidValueError: its ``demonstration_frames`` are neither all, none nor every n-th.
+        InvalidValueError: ``demonstration_frames`` is neither all, none nor every n-th.
     """
     return check_demonstration_frames(getattr(policy, "demonstration_frames", "all"))
 
 
 def wanted_history(policy: object) -> int | None:
-    """After how many control steps a policy, or a class of policies, wants to look.
+    """Return the control steps between the observations of the history; None for no history.
 
     Raises:
-        InvalidValueError: its ``observe_every`` is neither None nor a number of control steps.
+        InvalidValueError: ``observe_every`` is neither None nor a number of control steps.
     """
     return check_observe_every(getattr(policy, "observe_every", None))
 
 
 def wanted_history_cameras(policy: object) -> tuple[str, ...] | None:
-    """The pictures that a policy, or a class of policies, wants in the history.
+    """Return the cameras whose pictures a policy, or a class of policies, wants in the history.
 
     Returns:
-        None for all that it wants of the present.
+        None for those of ``cameras``.
 
     Raises:
-        InvalidValueError: its ``history_cameras`` are not different names of cameras.
+        InvalidValueError: ``history_cameras`` is not a tuple or list of distinct camera names.
     """
     chosen = getattr(policy, "history_cameras", None)
     return None if chosen is None else check_cameras(chosen)
 
 
-WISHES: Mapping[str, Callable[[object], object]] = {
+REQUIREMENTS: Mapping[str, Callable[[object], object]] = {
     "cameras": wanted_cameras,
     "actions": wanted_actions,
     "demonstration_frames": wanted_demonstration_frames,
     "observe_every": wanted_history,
     "history_cameras": wanted_history_cameras,
 }
+"""The function that reads each attribute of a policy and checks it."""

@@ -1,4 +1,4 @@
-"""Made-up episodes, to try a policy without a simulator."""
+"""Synthetic episodes, to check a policy without a simulator."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _FINGER_RANGE = 0.04
 
 
 class SyntheticEpisode(NamedTuple):
-    """What a policy is given in an episode, twice asked.
+    """The inputs of a policy at the beginning of an episode.
 
     Attributes:
-        instruction: what is said.
+        instruction: the text.
         demonstration: the video, T steps.
         first: the first observation.
         size: control steps in the video.
@@ -31,13 +31,13 @@ class SyntheticEpisode(NamedTuple):
 
 
 class SyntheticEpisodes:
-    """Makes up what a policy that asks for this is shown.
+    """Makes the inputs that a policy with these requirements receives.
 
     Args:
         cameras: whose pictures.
-        demonstration_frames: which pictures of the video.
-        observe_every: after how many control steps there is an observation in ``history``.
-        seed: of everything that is made up.
+        demonstration_frames: frames of the video.
+        observe_every: control steps between the observations in ``history``.
+        seed: of all random values.
     """
 
     def __init__(
@@ -53,41 +53,41 @@ class SyntheticEpisodes:
         self._rng = np.random.default_rng(seed)
 
     def episode(self, instruction: str, size: int) -> SyntheticEpisode:
-        """An episode with a video of so many control steps, 0 for none."""
-        moments = [self._moment(instruction) for _ in range(max(size, 1))]
+        """Return an episode with a video of `size` control steps; 0 for none."""
+        observations = [self._observation(instruction) for _ in range(max(size, 1))]
         video: dict[str, Any] = {}
-        for field in moments[0]:
-            pictured = field.endswith("_rgb")
-            if field != "instruction" and not (pictured and self._frames == "none"):
-                every = self._frames if pictured and isinstance(self._frames, int) else 1
-                video[field] = np.stack([moment[field] for moment in moments])[:size:every]
-        first = self._moment(instruction)
+        for field in observations[0]:
+            is_picture = field.endswith("_rgb")
+            if field != "instruction" and not (is_picture and self._frames == "none"):
+                every = self._frames if is_picture and isinstance(self._frames, int) else 1
+                video[field] = np.stack([one[field] for one in observations])[:size:every]
+        first = self._observation(instruction)
         if self._every is not None:
             first["history"] = ()
         return SyntheticEpisode(instruction, video, cast("Observation", first), size)
 
     def after(self, episode: SyntheticEpisode, steps: int) -> Observation:
-        """An observation that many control steps later."""
-        last = self._moment(episode.instruction)
+        """Return an observation `steps` control steps later."""
+        last = self._observation(episode.instruction)
         if self._every is not None:
             count = steps // self._every
-            last["history"] = tuple(self._moment(episode.instruction) for _ in range(count))
+            last["history"] = tuple(self._observation(episode.instruction) for _ in range(count))
             if count and steps % self._every == 0:
-                now = {field: held for field, held in last.items() if field != "history"}
+                now = {field: value for field, value in last.items() if field != "history"}
                 last["history"] = (*last["history"][:-1], now)
         return cast("Observation", last)
 
-    def garbage(self, episode: SyntheticEpisode) -> Observation:
-        """An observation as from broken sensors: NaN everywhere, pictures of noise."""
-        broken = self._moment(episode.instruction)
-        for field, held in broken.items():
-            if isinstance(held, np.ndarray) and held.dtype.kind == "f":
-                broken[field] = np.full_like(held, np.nan)
+    def broken(self, episode: SyntheticEpisode) -> Observation:
+        """Return an observation of broken sensors: NaN everywhere, pictures of noise."""
+        broken = self._observation(episode.instruction)
+        for field, value in broken.items():
+            if isinstance(value, np.ndarray) and value.dtype.kind == "f":
+                broken[field] = np.full_like(value, np.nan)
         if self._every is not None:
             broken["history"] = ()
         return cast("Observation", broken)
 
-    def _moment(self, instruction: str) -> dict[str, Any]:
+    def _observation(self, instruction: str) -> dict[str, Any]:
         rng = self._rng
         pictures = {
             f"{camera}_rgb": rng.integers(0, 256, PICTURE, dtype=np.uint8)

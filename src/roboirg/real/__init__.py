@@ -1,1 +1,1 @@
-"""The real-robot kit: plans, the operator's page, the control loop and the twin."""
+"""Studies with a real robot: plans, the operator's page, the control loop and the twin."""

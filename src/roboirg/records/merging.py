@@ -1,4 +1,4 @@
-"""Several runs made into one."""
+"""Merge several runs into one folder."""
 
 from __future__ import annotations
 
@@ -11,67 +11,67 @@ from typing import NamedTuple
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.records.record import Record
-from roboirg.records.record_codec import Key, StoreError, identity_key
+from roboirg.records.record_codec import RecordKey, StoreError, identity_key
 from roboirg.records.store import RecordStore, read_records
 
 
-class Merged(NamedTuple):
-    """What came of merging.
+class MergeSummary(NamedTuple):
+    """Result of a merge.
 
     Attributes:
-        added: records that are new in the folder.
-        doubled: episodes that were there already, or in several runs.
-        disputed: of those, the ones whose verdicts differ; the first one's stays.
+        added: number of records added to the folder.
+        duplicates: number of records whose episode was already there.
+        conflicts: duplicates with another verdict than the one kept.
     """
 
     added: int
-    doubled: int
-    disputed: tuple[Record, ...]
+    duplicates: int
+    conflicts: tuple[Record, ...]
 
 
-def merge_runs(folders: Sequence[Path], out: Path) -> Merged:
-    """Put the records of several runs, and their films, into one folder.
+def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
+    """Copy the records and videos of several runs into one folder.
 
-    An episode that several of them have keeps the first verdict; an error gives way to a verdict.
+    If several runs have the same episode, the first verdict is kept; a verdict replaces an error.
 
     Args:
-        folders: of the runs; they stay as they are.
-        out: gets the records; may be one that has some.
+        folders: output folders of the runs; they are not changed.
+        out: destination; may already hold records.
 
     Raises:
         InvalidValueError: `out` is one of the runs.
-        StoreError: something cannot be read or written, or versions differ.
+        StoreError: a file cannot be read or written, or versions differ.
     """
     if out.resolve() in {folder.resolve() for folder in folders}:
         raise InvalidValueError(f"{out} is one of the runs to be merged; choose another --out.")
     runs = [(folder, read_records(folder)) for folder in folders]
     _check_versions(runs)
-    added, doubled, disputed = 0, 0, []
+    added, duplicates, conflicts = 0, 0, []
     with RecordStore(out) as store:
-        kept: dict[Key, Record] = {}
+        kept: dict[RecordKey, Record] = {}
         if store.stored:
-            runs_so_far = read_records(out)
-            _check_versions([(out, runs_so_far), *runs])
-            kept = {identity_key(record): record for record in runs_so_far}
+            stored = read_records(out)
+            _check_versions([(out, stored), *runs])
+            kept = {identity_key(record): record for record in stored}
         for folder, records in runs:
             for record in records:
                 before = kept.get(identity_key(record))
                 if before is not None:
-                    doubled += 1
+                    duplicates += 1
                     if before.outcome != "error":
                         if record.outcome not in ("error", before.outcome):
-                            disputed.append(record)
+                            conflicts.append(record)
                         continue
                     if record.outcome == "error":
                         continue
-                store.append(_with_film(record, folder, out))
+                store.append(_copy_video(record, folder, out))
                 kept[identity_key(record)] = record
                 added += before is None
-    return Merged(added, doubled, tuple(disputed))
+    return MergeSummary(added, duplicates, tuple(conflicts))
 
 
 def _check_versions(runs: Sequence[tuple[Path, Sequence[Record]]]) -> None:
-    """Refuse what no run would have mixed either."""
+    """Refuse records of different versions, as a run does."""
     first: dict[object, tuple[Path, object]] = {}
     for folder, records in runs:
         for record in records:
@@ -84,29 +84,30 @@ def _check_versions(runs: Sequence[tuple[Path, Sequence[Record]]]) -> None:
                 there, expected = first.setdefault(what, (folder, value))
                 if value != expected:
                     raise StoreError(
-                        f"{folder} and {there} do not go together: the "
-                        f"{' '.join(map(str, what))} is {value!r} here and {expected!r} there."
+                        f"{folder} and {there} cannot be merged: the "
+                        f"{' '.join(map(str, what))} is {value!r} in the first and "
+                        f"{expected!r} in the second."
                     )
 
 
-def _with_film(record: Record, source: Path, target: Path) -> Record:
-    """The record, after its film has come along; without a film if that is gone."""
+def _copy_video(record: Record, source: Path, target: Path) -> Record:
+    """Copy the record's video and return the record, without a video if the file is missing."""
     if record.video is None:
         return record
-    film, place = source / record.video, target / record.video
-    if not film.is_file():
+    video, copy = source / record.video, target / record.video
+    if not video.is_file():
         return record.model_copy(update={"video": None})
-    if place.exists():
+    if copy.exists():
         return record
-    place.parent.mkdir(parents=True, exist_ok=True)
-    for path, copy in ((film, place), (film.with_suffix(".jpg"), place.with_suffix(".jpg"))):
-        with contextlib.suppress(FileNotFoundError):
-            _copy(path, copy)
+    copy.parent.mkdir(parents=True, exist_ok=True)
+    _copy_file(video, copy)
+    with contextlib.suppress(FileNotFoundError):
+        _copy_file(video.with_suffix(".jpg"), copy.with_suffix(".jpg"))
     return record
 
 
-def _copy(path: Path, copy: Path) -> None:
+def _copy_file(path: Path, copy: Path) -> None:
     try:
-        os.link(path, copy)  # costs nothing on the same disk
+        os.link(path, copy)  # takes no space on the same disk
     except OSError:
         shutil.copyfile(path, copy)

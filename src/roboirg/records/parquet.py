@@ -1,4 +1,4 @@
-"""Records as a table for pandas, Polars or DuckDB: one row for each episode."""
+"""Export records as a Parquet table for pandas, Polars or DuckDB, one row per episode."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.core.errors import MissingDependencyError
 from roboirg.records.record import Record
+from roboirg.util.atomic_write import replacing
 
 if TYPE_CHECKING:
     from pyarrow import Schema
 
-_TEXTS = [
+_TEXT_COLUMNS = [
     "policy",
     "task",
     "split",
@@ -37,12 +38,12 @@ _TEXTS = [
     "plan",
     "command",
     "video",
-    "film_lost",
+    "video_error",
     "details",
     "render_device",
     "started_at",
 ]
-_NUMBERS = [
+_NUMBER_COLUMNS = [
     "episode",
     "distractors",
     "policy_seed",
@@ -55,16 +56,16 @@ _NUMBERS = [
     "attempt",
     "schema_version",
 ]
-_AS_JSON = ("goal", "metadata", "policy_metadata", "usage", "timings")
-"""Every task and policy has keys of its own here."""
-_ROWS_AT_ONCE = 5_000
+_JSON_COLUMNS = ("goal", "metadata", "policy_metadata", "usage", "timings")
+"""Fields whose keys depend on the task or policy."""
+_BATCH_ROWS = 5_000
 
 
 def check_parquet_support() -> None:
-    """See before the work starts that Parquet can be written.
+    """Check that Parquet can be written.
 
     Raises:
-        MissingDependencyError: it cannot.
+        MissingDependencyError: pyarrow is not installed.
     """
     try:
         import pyarrow.parquet  # noqa: F401
@@ -75,14 +76,14 @@ def check_parquet_support() -> None:
 
 
 def write_parquet(records: Iterable[Record], path: Path) -> int:
-    """Write records into a Parquet file, which appears whole or not at all.
+    """Write records to a Parquet file, which appears complete or not at all.
 
-    Columns are the fields of a record. ``instruction``, ``mentions``, ``events`` and
+    The columns are the fields of a record. ``instruction``, ``mentions``, ``events`` and
     ``attribution`` are nested; ``goal``, ``metadata``, ``policy_metadata``, ``usage`` and
     ``timings`` are JSON texts.
 
     Returns:
-        The number of rows.
+        Number of rows.
 
     Raises:
         MissingDependencyError: pyarrow is not installed.
@@ -93,23 +94,20 @@ def write_parquet(records: Iterable[Record], path: Path) -> int:
     from pyarrow import parquet
 
     schema, count = _schema(), 0
-    partial = path.with_name(f".{path.name}.part")
     rows = map(_row, records)
-    try:
-        with parquet.ParquetWriter(partial, schema, compression="zstd") as writer:
-            while batch := list(itertools.islice(rows, _ROWS_AT_ONCE)):
-                writer.write_table(pa.Table.from_pylist(batch, schema=schema))
-                count += len(batch)
-        partial.replace(path)
-    except OSError as error:
-        partial.unlink(missing_ok=True)
-        raise InvalidValueError(f"Cannot write {path}: {error.strerror or error}.") from error
+    with (
+        replacing(path) as partial,
+        parquet.ParquetWriter(partial, schema, compression="zstd") as writer,
+    ):
+        while batch := list(itertools.islice(rows, _BATCH_ROWS)):
+            writer.write_table(pa.Table.from_pylist(batch, schema=schema))
+            count += len(batch)
     return count
 
 
 def _row(record: Record) -> dict[str, Any]:
     data = record.model_dump(mode="json")
-    for name in _AS_JSON:
+    for name in _JSON_COLUMNS:
         data[name] = json.dumps(data[name], ensure_ascii=False)
     frames = data["demonstration_frames"]
     data["demonstration_frames"] = None if frames is None else str(frames)
@@ -123,8 +121,8 @@ def _schema() -> Schema:
 
     text, number, truth = pa.string(), pa.int64(), pa.bool_()
     known = {
-        **dict.fromkeys((*_TEXTS, *_AS_JSON), text),
-        **dict.fromkeys(_NUMBERS, number),
+        **dict.fromkeys((*_TEXT_COLUMNS, *_JSON_COLUMNS), text),
+        **dict.fromkeys(_NUMBER_COLUMNS, number),
         "privileged": truth,
         "duration_s": pa.float64(),
         "stages": pa.list_(number),

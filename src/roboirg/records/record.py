@@ -1,8 +1,8 @@
-"""What was to be played (`Job`), what came of it (`Result`), and all that is kept (`Record`).
+"""Data of one episode: what to play (`Job`), the verdict (`Result`), and everything (`Record`).
 
-A record is one JSON object. It says everything that the report and the statistics need, so that
-they never open the simulator. It depends on its job alone: not on the worker, the order, or what
-ran before; `NON_DETERMINISTIC_FIELDS` names the fields that are exempt.
+A record is one JSON object with everything that reports and statistics need, so they never start
+the simulator. It depends only on its job, not on the worker, the order, or what ran before, except
+for the fields in `NON_DETERMINISTIC_FIELDS`.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from roboirg.core.instruction_options import (
 )
 from roboirg.core.observations import DemonstrationFrames
 
-SCHEMA_VERSION: Literal[2] = 2
+SCHEMA_VERSION: Literal[3] = 3
 
 Outcome = Literal["success", "failure", "error"]
 
 ErrorKind = Literal[
     "policy", "invalid_action", "timeout", "connection", "environment", "infrastructure"
 ]
-"""Whose fault an error is: the policy raised; its action cannot be executed; it took longer than it
-may; its server is not to be reached; the world raised; a process, machine or disk gave way."""
+"""What an error is due to: the policy raised; its action cannot be executed; a time limit was
+exceeded; a server could not be reached; the environment raised; a process or machine was lost."""
 
 ERROR_KINDS: tuple[ErrorKind, ...] = get_args(ErrorKind)
 
@@ -45,17 +45,16 @@ NON_DETERMINISTIC_FIELDS = frozenset(
         "code",
         "details",
         "duration_s",
-        "film_lost",
         "plan",
         "spec",
         "started_at",
         "timings",
         "usage",
         "video",
+        "video_error",
     }
 )
-"""Times, costs, paths, lost films, tries, code and plan: all that may differ where the same command
-is run twice."""
+"""Fields that may differ when the same command runs twice: times, costs, paths, attempts, …"""
 
 
 class _RecordModel(BaseModel):
@@ -63,27 +62,28 @@ class _RecordModel(BaseModel):
 
 
 class Job(_RecordModel):
-    """One episode to play. All fields but `spec` are the identity of its record.
+    """One episode to play. All fields but `spec` identify its record.
 
     Attributes:
-        policy: its name, which is often its spec.
+        policy: name of the policy, often its spec.
         task: name of the task.
         split: train, val or test.
         episode: 0-based position in the split.
-        setting: explicit, direct, reasoning, contextual or spatial.
+        setting: name of the setting.
         form: implicit or resolved. The explicit setting is its own resolved form and is always
             played as ``implicit``.
-        stages: which stages of the discourse are spoken (contextual setting; else all).
-        distractor: kind of distractor (contextual setting; else the default).
-        distractors: how many of them are spoken (contextual setting; else the default).
-        frame: frame of reference (spatial setting; else the default).
-        policy_seed: chosen for the run; the policy gets a seed made of it and the episode's.
+        stages: stages of the discourse; the default if the setting does not read them.
+        distractor: kind of distractor; the default if the setting does not read it.
+        distractors: number of distractors; the default if the setting does not read it.
+        frame: frame of reference; the default if the setting does not read it.
+        policy_seed: seed chosen for the run; the policy's seed is derived from it and the episode.
         max_steps: the policy's limit, control steps.
-        actions: the action space that is prescribed, or None for the policy's own.
-        demonstration_frames: which pictures of the video are prescribed; None as the policy says.
-        observe_every: after how many control steps there is a picture; None as the policy says.
+        actions: required action space; None for the policy's own.
+        demonstration_frames: which frames of the video the policy gets; None for its own choice.
+        observe_every: control steps between observations; None for the policy's own choice.
         meshes: faithful or light.
-        spec: what makes the policy, where that is not its name: an address may change.
+        spec: spec of the policy if that is not its name; not part of the identity, because an
+            address may change.
     """
 
     policy: str
@@ -106,28 +106,28 @@ class Job(_RecordModel):
 
     @property
     def options(self) -> InstructionOptions:
-        """How the episode is told."""
+        """The options of its instruction."""
         return InstructionOptions(
             self.setting, self.form, self.stages, self.distractor, self.distractors, self.frame
         )
 
     @property
     def policy_spec(self) -> str:
-        """What makes the policy: a built-in name, ``package.module:Class``, or an address."""
+        """Spec of the policy: a built-in name, ``package.module:Class``, or an address."""
         return self.spec or self.policy
 
     @property
     def slug(self) -> str:
-        """A short name, unique for the job and good as a file name."""
+        """Short unique name that is safe in file names."""
         words = (self.policy, self.task, self.split, str(self.episode), self.setting, self.form)
         readable = re.sub(r"[^A-Za-z0-9]+", "-", "-".join(words)).strip("-")[:100]
-        # Of the fields alone, so that a record (which is a job) has its job's slug.
+        # Only from the identity, so that a record (which is a job) has its job's slug.
         identity = repr([(name, getattr(self, name)) for name in IDENTITY])
         return f"{readable}-{hashlib.sha256(identity.encode()).hexdigest()[:8]}"
 
 
 IDENTITY = tuple(name for name in Job.model_fields if name != "spec")
-"""The fields that tell one job from another."""
+"""The fields that identify a job."""
 
 
 class UtteranceRecord(_RecordModel):
@@ -138,16 +138,16 @@ class UtteranceRecord(_RecordModel):
 
 
 class MentionSpan(_RecordModel):
-    """A span of an utterance that introduces a slot value or points back at one.
+    """A span of an utterance that introduces a slot value or refers back to one.
 
     Attributes:
         utterance: index of the utterance.
         start: first character of the span.
         end: one past the last.
         role: ``antecedent`` or ``anaphor``.
-        expression: class of an anaphor, else None.
+        expression: class of an anaphor; None for an antecedent.
         slot: name of the goal slot.
-        value: what it stands for.
+        value: value of the slot.
     """
 
     utterance: int
@@ -160,14 +160,14 @@ class MentionSpan(_RecordModel):
 
 
 class EventRecord(_RecordModel):
-    """A fact that became true, or ceased to be, in the world.
+    """A fact that became true or false during the episode.
 
     Attributes:
         step: control steps since the policy's turn began; at most 0 in the demonstration.
         kind: as in `roboirg.core.episode.Fact`.
         subject: name of the object.
         place: name of the place, if the kind has one.
-        holds: whether it became true.
+        holds: whether it became true; otherwise it became false.
     """
 
     step: int
@@ -181,12 +181,12 @@ class Attribution(_RecordModel):
     """Why an episode failed, concluded from its events.
 
     Attributes:
-        kind: ``grounding`` (the wrong thing was done) or ``execution`` (the right thing was not
-            brought off).
-        failure: which of the kind, as in `roboirg.judging.attribution`.
-        subject: name of the object that it is about, if there is one.
-        step: control step of the policy's turn at which it showed, if there is one.
-        sentence: the same in words.
+        kind: ``grounding`` (the policy did the wrong thing) or ``execution`` (it tried the right
+            thing and did not succeed).
+        failure: subtype, as in `roboirg.judging.failure_attribution`.
+        subject: name of the object concerned, if there is one.
+        step: control step of the policy's turn at which the failure showed, if there is one.
+        sentence: explanation in words.
     """
 
     kind: FailureKind
@@ -197,27 +197,27 @@ class Attribution(_RecordModel):
 
 
 class Result(Job):
-    """What came of a job, without what was said and done: all that rates are made of.
+    """Verdict on a job, without instruction and events: everything that rates are computed from.
 
     Attributes:
-        seed: of the episode's scene.
+        seed: seed of the episode's scene.
         difficulty: easy, medium or hard.
-        outcome: success, failure (the policy's doing) or error (nobody knows what the policy
-            would have done; never counted as a failure).
-        error: whose fault an error is; None if it is none.
+        outcome: success, failure (due to the policy) or error (the episode could not be judged;
+            never counted as a failure).
+        error: kind of error; None if the outcome is not an error.
         cause: why it failed or ended in an error, in words.
-        attribution: of a failure; None if nobody can tell.
+        attribution: of a failure; None if the reason is unclear.
         steps: control steps that the policy played.
-        demonstration_steps: frames, one per control step, of the video that was shown before;
-            0 without one.
-        privileged: whether the policy looks behind the scenes (it has ``attach``).
-        policy_version: tells a policy from an earlier one of the same name.
+        demonstration_steps: frames of the video before the policy's turn, one per control step;
+            0 without a video.
+        privileged: whether the policy has access to the simulator's state (it has ``attach``).
+        policy_version: distinguishes versions of a policy of the same name.
         language_version: version of the instruction generator.
         environment_version: version of scenes, rules and physics.
         package_version: version of roboirg.
         code: fingerprint of the package's files.
-        plan: fingerprint of the plan in whose course it was played.
-        attempt: 1 for the first try.
+        plan: fingerprint of the plan.
+        attempt: number of the attempt, from 1.
     """
 
     seed: int
@@ -239,36 +239,36 @@ class Result(Job):
 
     @property
     def identity(self) -> Job:
-        """The job this is the result of, whatever made the policy."""
+        """The job of this result, without the policy's spec."""
         return Job(**{name: getattr(self, name) for name in IDENTITY})
 
 
 class Record(Result):
-    """All that is kept of an episode.
+    """Everything that is stored of an episode.
 
     Attributes:
-        schema_version: of this table of fields.
+        schema_version: version of this list of fields.
         instruction: the utterances that the policy was given.
         mentions: the referring expressions in them.
-        command: the same task in plain words (the explicit setting).
+        command: the same task in the explicit setting.
         goal: what the instruction conveys, a value for each slot.
         metadata: of the instruction: reasoning pattern, relation, stages, landmarks, template
-            ids and the like.
-        policy_metadata: what the policy says of itself: checkpoint, server, model, …
-        events: what happened, in order.
-        usage: what the episode cost: ``calls``, ``input_tokens``, ``output_tokens``, ``cost_usd``
-            of models that the policy asked.
+            ids, ….
+        policy_metadata: what the policy reports about itself: checkpoint, server, model, ….
+        events: facts that became true or false, in order.
+        usage: what models queried by the policy cost: ``calls``, ``input_tokens``,
+            ``output_tokens``, ``cost_usd``.
         timings: wall-clock seconds by phase: ``policy_load``, ``policy_reset``, ``policy_act``,
             ``env_reset``, ``env_step``, ….
-        video: path relative to the records file, or None.
-        film_lost: why the film that was asked for could not be written, or None.
-        details: the traceback of an error, or None.
-        render_device: the driver's name of the device that drew the pictures, or None.
+        video: path of the video relative to the records file, or None.
+        video_error: why the requested video could not be written, or None.
+        details: traceback of an error, or None.
+        render_device: the driver's name of the render device; None if nothing was rendered.
         started_at: ISO 8601, UTC.
         duration_s: wall-clock seconds.
     """
 
-    schema_version: Literal[2] = SCHEMA_VERSION
+    schema_version: Literal[3] = SCHEMA_VERSION
     instruction: tuple[UtteranceRecord, ...]
     mentions: tuple[MentionSpan, ...] = ()
     command: str
@@ -279,12 +279,8 @@ class Record(Result):
     usage: dict[str, float] = {}
     timings: dict[str, float] = {}
     video: str | None = None
-    film_lost: str | None = None
+    video_error: str | None = None
     details: str | None = None
     render_device: str | None = None
     started_at: str
     duration_s: float
-
-    def comparable(self) -> dict[str, object]:
-        """All fields that depend on the job alone: everything but `NON_DETERMINISTIC_FIELDS`."""
-        return self.model_dump(mode="json", exclude=set(NON_DETERMINISTIC_FIELDS))

@@ -1,11 +1,10 @@
-"""One line of a records file: what of it is needed, and older schemas."""
+"""Read one line of a records file: as a record, a result, or an index entry."""
 
 from __future__ import annotations
 
-import json
 import operator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import msgspec
 from pydantic import ValidationError
@@ -22,29 +21,25 @@ from roboirg.records.record import (
     DEFAULT_MESHES,
     IDENTITY,
     SCHEMA_VERSION,
-    ErrorKind,
     Job,
     Result,
 )
 
-OLDEST_SCHEMA = 1
-
-Kind = TypeVar("Kind", bound=Result)
+ResultType = TypeVar("ResultType", bound=Result)
 
 
 class StoreError(RoboIRGError):
-    """The records cannot be read or written; the sentence says which and why."""
+    """The records cannot be read or written; the message names the file and the reason."""
 
 
 class DamagedLineError(StoreError):
-    """A line is not JSON: cut short, or overwritten."""
+    """A line is not valid JSON: cut short or overwritten."""
 
 
 class RecordIndexEntry(msgspec.Struct, frozen=True, gc=False):
-    """The identity of a record, how it ended, and what it must not be mixed with.
+    """Identity, outcome and versions of a record.
 
-    The first fields are those of a `Job`. Read instead of whole records where there are very many
-    of them: in a tenth of the time and memory.
+    Read instead of whole records to save time and memory: it takes a tenth of both.
     """
 
     policy: str
@@ -78,22 +73,22 @@ class _Version(msgspec.Struct):
     schema_version: int
 
 
-Key = tuple[object, ...]
-"""A job's identity: the values of its fields."""
+RecordKey = tuple[object, ...]
+"""Identity of a job: the values of its fields in `IDENTITY`."""
 
 _identity = operator.attrgetter(*IDENTITY)
 _decoder = msgspec.json.Decoder(RecordIndexEntry)
 _version_decoder = msgspec.json.Decoder(_Version)
 
 
-def identity_key(one: Job | RecordIndexEntry) -> Key:
-    """The identity of a job, a record, or what is read of one."""
-    key: Key = _identity(one)
+def identity_key(one: Job | RecordIndexEntry) -> RecordKey:
+    """Return the identity of a job, a record or an index entry."""
+    key: RecordKey = _identity(one)
     return key
 
 
 def read_index_entry(line: bytes, path: Path, number: int) -> RecordIndexEntry:
-    """What the runner has to know of a line.
+    """Read a line as an index entry.
 
     Args:
         line: without its newline.
@@ -101,13 +96,13 @@ def read_index_entry(line: bytes, path: Path, number: int) -> RecordIndexEntry:
         number: of the line, from 1.
 
     Raises:
-        DamagedLineError: it is not JSON.
-        StoreError: it is not a record of a version that can be read.
+        DamagedLineError: the line is not JSON.
+        StoreError: the line is not a record of this schema version.
     """
     try:
         stored = _decoder.decode(line)
     except msgspec.ValidationError:
-        read_line(line, path, number, Result)  # knows what is wrong with it
+        read_line(line, path, number, Result)  # raises with the exact reason
         raise StoreError(f"{path} line {number} is not a record.") from None
     except msgspec.DecodeError as error:
         raise _damaged(path, number, error) from error
@@ -115,12 +110,12 @@ def read_index_entry(line: bytes, path: Path, number: int) -> RecordIndexEntry:
     return stored
 
 
-def read_line(line: bytes, path: Path, number: int, kind: type[Kind]) -> Kind:
-    """A line as a whole record, or as its result alone.
+def read_line(line: bytes, path: Path, number: int, kind: type[ResultType]) -> ResultType:
+    """Read a line as a `Record` or a `Result`.
 
     Raises:
-        DamagedLineError: it is not JSON.
-        StoreError: it is not a record of a version that can be read.
+        DamagedLineError: the line is not JSON.
+        StoreError: the line is not a record of this schema version.
     """
     try:
         version = _version_decoder.decode(line).schema_version
@@ -129,8 +124,6 @@ def read_line(line: bytes, path: Path, number: int, kind: type[Kind]) -> Kind:
     except msgspec.DecodeError as error:
         raise _damaged(path, number, error) from error
     _check_schema(version, path, number)
-    if version != SCHEMA_VERSION:
-        line = json.dumps(_upgraded(json.loads(line))).encode()
     try:
         return kind.model_validate_json(line, extra="ignore" if kind is Result else "forbid")
     except ValidationError as error:
@@ -146,28 +139,8 @@ def _damaged(path: Path, number: int, error: Exception) -> DamagedLineError:
 
 
 def _check_schema(version: object, path: Path, number: int) -> None:
-    if type(version) is not int or not OLDEST_SCHEMA <= version <= SCHEMA_VERSION:
+    if version != SCHEMA_VERSION:
         raise StoreError(
-            f"{path} line {number} has schema version {version!r}, but this roboirg reads versions "
-            f"{OLDEST_SCHEMA} to {SCHEMA_VERSION}; use the roboirg that wrote it, or another "
-            "folder."
+            f"{path} line {number} has schema version {version!r}, but this roboirg reads only "
+            f"version {SCHEMA_VERSION}; use the roboirg that wrote it, or another folder."
         )
-
-
-def _upgraded(data: dict[str, Any]) -> dict[str, Any]:
-    """What was written in an older schema, in today's."""
-    if data["schema_version"] == 1:
-        data = {**data, "schema_version": 2, "error": _error_kind(data)}
-    return data
-
-
-def _error_kind(data: dict[str, Any]) -> ErrorKind | None:
-    """Schema 1 named whose fault an error was in its cause alone."""
-    if data.get("outcome") != "error":
-        return None
-    blamed = str(data.get("cause")).partition(":")[0]
-    if blamed == "policy":
-        return "policy"
-    if blamed == "invalid action":
-        return "invalid_action"
-    return "infrastructure" if "worker died" in str(data.get("cause")) else "environment"

@@ -1,17 +1,17 @@
-"""The file of records: append-only JSON lines that survive being killed.
+"""Crash-safe storage of records as append-only JSON lines.
 
-Guaranteed, on a local POSIX file system:
+Guaranteed on a local POSIX file system:
 
-- A record that `append` returned from is on the disk (one write, then fsync), whole, on one line.
-- Killing the process at any moment loses at most the record whose `append` had not returned. A
+- When `append` returns, the record is on disk (one write, then fsync), complete, on one line.
+- Killing the process at any moment loses at most the record whose `append` has not returned. A
   torn last line is never read as a record; the next writer moves it to ``records.torn`` (copied
-  and synced there before it is cut off here) and says so.
-- A line in the middle that is no JSON costs that line alone: it is passed over and told of.
-- One writer at a time: the lock is the kernel's (`flock`), so it ends with its owner, however
-  that dies, and never goes stale.
+  and synced there before it is removed here) and reports it.
+- A damaged line in the middle is skipped and reported; all other lines are read.
+- There is one writer at a time: the lock is the kernel's (`flock`), so it is released when its
+  owner dies and never goes stale.
 
-Not guaranteed: anything on network file systems whose `flock` or fsync do not do what they say;
-that lines are in the order of the plan (they are in the order in which episodes ended).
+Not guaranteed: anything on network file systems whose `flock` or fsync do not work as specified;
+that lines are in the order of the plan (they are in the order in which episodes finished).
 """
 
 from __future__ import annotations
@@ -28,13 +28,14 @@ from typing import NamedTuple, Self, TypeVar
 from roboirg.records.record import Record, Result
 from roboirg.records.record_codec import (
     DamagedLineError,
-    Key,
     RecordIndexEntry,
+    RecordKey,
     StoreError,
     identity_key,
     read_index_entry,
     read_line,
 )
+from roboirg.util.atomic_write import sync_to_disk
 
 __all__ = [
     "RecordStore",
@@ -50,19 +51,19 @@ TORN_FILE = "records.torn"
 LOCK_FILE = ".lock"
 
 _BUFFER = 1 << 20
-"""Bytes that are read at once."""
+"""Bytes to read at a time."""
 
-Kind = TypeVar("Kind", bound=Result)
+ResultType = TypeVar("ResultType", bound=Result)
 Parsed = TypeVar("Parsed")
 
 
 class StoreContents(NamedTuple):
-    """What a file of records holds.
+    """Contents of a records file.
 
     Attributes:
-        records: all of them, in the order of the file.
+        records: all records, in the order of the file.
         torn: bytes of an unfinished last line, usually empty.
-        damaged: numbers of the lines that are no JSON, usually none.
+        damaged: numbers of the lines that are not JSON, usually none.
     """
 
     records: tuple[Record, ...]
@@ -71,21 +72,21 @@ class StoreContents(NamedTuple):
 
 
 class RecordStore:
-    """The records of one output folder, open for appending by this process alone.
+    """The records of one output folder, open for appending by this process only.
 
-    Use as a context manager. It keeps a `RecordIndexEntry` of each record
-    in memory, not the record itself.
+    Use as a context manager. It keeps a `RecordIndexEntry` of each record in memory, not the record
+    itself.
 
     Args:
-        folder: made if it does not exist.
+        folder: created if it does not exist.
 
     Attributes:
-        stored: what is in the file, the newest of each identity.
-        torn: the bytes that were moved aside when it was opened.
-        damaged: numbers of the lines that are no JSON; their episodes count as not played.
+        stored: index entries by identity, the newest of each.
+        torn: bytes of an unfinished line that were moved aside when the file was opened.
+        damaged: numbers of the lines that are not JSON; their episodes count as not played.
 
     Raises:
-        StoreError: another process writes there, or the file is not one of ours.
+        StoreError: another process writes to the folder, or a line is not a record.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -97,24 +98,24 @@ class RecordStore:
                 self._lock = os.open(folder / LOCK_FILE, os.O_RDWR | os.O_CREAT, 0o644)
                 undo.callback(os.close, self._lock)
                 self._take_lock()
-                lines = _Lines(self.path)
-                self.stored: dict[Key, RecordIndexEntry] = {
-                    identity_key(one): one for one in lines.parsed(read_index_entry)
+                lines = _RecordsFile(self.path)
+                self.stored: dict[RecordKey, RecordIndexEntry] = {
+                    identity_key(one): one for one in lines.parse(read_index_entry)
                 }
                 self.torn, self.damaged = lines.torn, tuple(lines.damaged)
                 self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
                 undo.callback(os.close, self._file)
-                self._mend()
-                _sync_folder(folder)
+                self._repair_tail()
+                sync_to_disk(folder)
             except OSError as error:
                 raise StoreError(f"Cannot write to {folder}: {error.strerror}.") from error
             undo.pop_all()
 
     def append(self, record: Record) -> None:
-        """Write one record; when this returns, it is on the disk.
+        """Write one record; when this returns, it is on disk.
 
         Raises:
-            StoreError: it cannot be written; the file is as it was before.
+            StoreError: the record cannot be written; the file is unchanged.
         """
         size = os.fstat(self._file).st_size
         try:
@@ -127,7 +128,7 @@ class RecordStore:
         self.stored[identity_key(record)] = read_index_entry(line, self.path, 0)
 
     def close(self) -> None:
-        """Let the next writer in."""
+        """Close the file and release the lock."""
         os.close(self._file)
         os.close(self._lock)
 
@@ -149,8 +150,8 @@ class RecordStore:
         os.ftruncate(self._lock, 0)
         os.pwrite(self._lock, f"{os.getpid()}\n".encode(), 0)
 
-    def _mend(self) -> None:
-        """Leave the file empty or ending in a newline, losing nothing."""
+    def _repair_tail(self) -> None:
+        """Move a torn line aside, so that the file is empty or ends in a newline."""
         size = os.fstat(self._file).st_size
         if self.torn:
             aside = os.open(self.folder / TORN_FILE, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
@@ -161,75 +162,58 @@ class RecordStore:
                 os.close(aside)
             os.ftruncate(self._file, size - len(self.torn))
         elif size and os.pread(self._file, 1, size - 1) != b"\n":
-            # Killed between the last byte of a record and its newline: the record is whole.
+            # Killed between the last byte of a record and its newline: the record is complete.
             _write_all(self._file, b"\n")
         os.fsync(self._file)
 
 
 def read_contents(path: Path) -> StoreContents:
-    """Everything in a file of records; takes no lock, so a run may be under way.
+    """Read a whole records file; takes no lock, so a run may be writing to it.
 
     Raises:
-        StoreError: a line is a record of a version that cannot be read, or no record.
+        StoreError: a line is not a record of this schema version.
     """
-    lines = _Lines(path)
-    records = tuple(lines.parsed(partial(read_line, kind=Record)))
+    lines = _RecordsFile(path)
+    records = tuple(lines.parse(partial(read_line, kind=Record)))
     return StoreContents(records, lines.torn, tuple(lines.damaged))
 
 
 def read_records(folder: Path) -> tuple[Record, ...]:
-    """The records of a run's folder, the newest of each identity, in the order of the file.
+    """Read the records of a run's folder: the newest of each identity, in the order of the file.
 
     Raises:
-        StoreError: there are none, or a line is no record of a version that can be read.
+        StoreError: there are none, or a line is not a record of this schema version.
     """
-    return _newest(folder, Record)
+    return _read_newest(folder, Record)
 
 
 def read_results(folder: Path) -> tuple[Result, ...]:
-    """As `read_records`, without what was said and done: for very many of them.
+    """Read the results of a run's folder: like `read_records`, but faster and smaller.
 
     Raises:
-        StoreError: there are none, or a line is no record of a version that can be read.
+        StoreError: there are none, or a line is not a record of this schema version.
     """
-    return _newest(folder, Result)
+    return _read_newest(folder, Result)
 
 
-def read_index(folder: Path) -> dict[Key, RecordIndexEntry]:
-    """What is stored in a run's folder, the newest of each identity; empty if there is no run.
+def read_index(folder: Path) -> dict[RecordKey, RecordIndexEntry]:
+    """Read the index entries of a run's folder, the newest of each; empty if there is no run.
 
     Raises:
-        StoreError: the file cannot be read, or a line is no record of a version that can be read.
+        StoreError: the file cannot be read, or a line is not a record of this schema version.
     """
     return {
-        identity_key(one): one for one in _Lines(folder / RECORDS_FILE).parsed(read_index_entry)
+        identity_key(one): one
+        for one in _RecordsFile(folder / RECORDS_FILE).parse(read_index_entry)
     }
 
 
-def write_atomically(path: Path, text: str) -> None:
-    """Replace a file whole: readers see the old or the new text, never a part.
-
-    Raises:
-        StoreError: the folder cannot be written to.
-    """
-    partial = path.with_name(f".{path.name}.part")
-    try:
-        with partial.open("w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        partial.replace(path)
-        _sync_folder(path.parent)
-    except OSError as error:
-        raise StoreError(f"Cannot write {path}: {error.strerror}.") from error
-
-
-class _Lines:
-    """A file of records, line by line.
+class _RecordsFile:
+    """Reads a records file line by line.
 
     Attributes:
-        torn: bytes of an unfinished last line, known after `parsed`.
-        damaged: numbers of lines that are no JSON, known after `parsed`.
+        torn: bytes of an unfinished last line, set by `parse`.
+        damaged: numbers of lines that are not JSON, set by `parse`.
     """
 
     def __init__(self, path: Path) -> None:
@@ -237,11 +221,11 @@ class _Lines:
         self.torn = b""
         self.damaged: list[int] = []
 
-    def parsed(self, parse: Callable[[bytes, Path, int], Parsed]) -> Iterator[Parsed]:
-        """What `parse` makes of each line, path and number; nothing if there is no file.
+    def parse(self, parse_line: Callable[[bytes, Path, int], Parsed]) -> Iterator[Parsed]:
+        """Yield `parse_line` of each line, path and line number; nothing if there is no file.
 
         Raises:
-            StoreError: the file cannot be read, or whatever `parse` raises.
+            StoreError: the file cannot be read, or `parse_line` raises it.
         """
         try:
             file = self._path.open("rb", buffering=_BUFFER)
@@ -251,13 +235,13 @@ class _Lines:
             raise StoreError(f"Cannot read {self._path}: {error.strerror}.") from error
         with file:
             for number, line in enumerate(file, start=1):
-                # A JSON object has no proper prefix that is one: if the last line lacks nothing
-                # but its newline, the record is whole.
+                # No proper prefix of a JSON object is valid JSON: if the last line lacks only its
+                # newline, the record is complete.
                 if not line.endswith(b"\n") and not _is_json(line):
                     self.torn = line
                     return
                 try:
-                    yield parse(line.removesuffix(b"\n"), self._path, number)
+                    yield parse_line(line.removesuffix(b"\n"), self._path, number)
                 except DamagedLineError:
                     self.damaged.append(number)
 
@@ -270,10 +254,10 @@ def _is_json(line: bytes) -> bool:
     return True
 
 
-def _newest(folder: Path, kind: type[Kind]) -> tuple[Kind, ...]:
-    lines = _Lines(folder / RECORDS_FILE)
-    newest: dict[Key, Kind] = {}
-    for one in lines.parsed(partial(read_line, kind=kind)):
+def _read_newest(folder: Path, kind: type[ResultType]) -> tuple[ResultType, ...]:
+    lines = _RecordsFile(folder / RECORDS_FILE)
+    newest: dict[RecordKey, ResultType] = {}
+    for one in lines.parse(partial(read_line, kind=kind)):
         newest[identity_key(one)] = one
     if not newest:
         raise StoreError(
@@ -283,14 +267,6 @@ def _newest(folder: Path, kind: type[Kind]) -> tuple[Kind, ...]:
 
 
 def _write_all(descriptor: int, data: bytes) -> None:
-    # One system call unless the disk is full or a signal comes in between.
+    # One system call, unless the disk is full or a signal interrupts it.
     while data:
         data = data[os.write(descriptor, data) :]
-
-
-def _sync_folder(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

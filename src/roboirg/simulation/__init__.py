@@ -1,1 +1,1 @@
-"""The world that plays any scene, built on SAPIEN; no file here knows a task's name."""
+"""Simulation of any scene, built on SAPIEN and independent of tasks."""

@@ -1,13 +1,15 @@
-"""Objects of a scene as SAPIEN bodies: shapes, masses and colors as RoboMME builds them.
+"""Objects of a scene as SAPIEN bodies: shapes, masses and colors as in RoboMME.
 
-Boxes and rolls of tape are our own.
+Boxes and rolls of tape are our own. Another package adds a kind of object with
+`register_body_builder`, in the module of the task that uses it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 import sapien
@@ -17,7 +19,8 @@ from sapien.wrapper.actor_builder import ActorBuilder
 from sapien.wrapper.articulation_builder import ArticulationBuilder
 
 from roboirg.core import object_sizes
-from roboirg.core.episode import SceneObject
+from roboirg.core.episode import ObjectKind, SceneObject
+from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.motions import Point
 from roboirg.simulation.rendering.tube_mesh import Rgba, tube
 
@@ -57,9 +60,9 @@ class Body:
 
     Attributes:
         item: the data it was built from.
-        entity: what moves (of a button: its base).
-        physics: the component that touches things.
-        joint: of a button: the articulation whose only joint is the cap's.
+        entity: the entity that moves (of a button: its base).
+        physics: the component that collides.
+        button: of a button: the articulation whose only joint is the cap's.
     """
 
     item: SceneObject
@@ -69,7 +72,7 @@ class Body:
 
     @property
     def position(self) -> Point:
-        """Of the object's origin, world frame, m."""
+        """Position of the object's origin, world frame, m."""
         return Point(*(float(value) for value in self.entity.pose.p))
 
     def put(self, position: Point) -> None:
@@ -85,13 +88,41 @@ class Body:
 
     @property
     def pressed_depth(self) -> float:
-        """How far a button's cap is down, m; 0 for other objects."""
+        """Distance by which a button's cap is down, m; 0 for other objects."""
         return -float(self.button.get_qpos()[0]) if self.button is not None else 0.0
 
 
+BodyBuilder = Callable[[sapien.Scene, SceneObject, bool], Body]
+"""Adds an object to a scene, with visual shapes if the flag is True."""
+
+
 def build(scene: sapien.Scene, item: SceneObject, *, visible: bool) -> Body:
-    """Add an object to a scene, with or without what is only drawn."""
-    return _BUILDERS[item.kind](scene, item, visible)
+    """Add an object to a scene, with or without its visual shapes.
+
+    Raises:
+        UnknownNameError: its kind has no builder.
+    """
+    builder = BODY_BUILDERS.get(item.kind)
+    if builder is None:
+        raise UnknownNameError("kind of object", item.kind, BODY_BUILDERS)
+    return builder(scene, item, visible)
+
+
+def register_body_builder(kind: ObjectKind, builder: BodyBuilder) -> None:
+    """Add a kind of object. Adding the same one again changes nothing.
+
+    Args:
+        kind: the new kind.
+        builder: adds an object of the kind to a scene, given whether it has visual shapes, for
+            example with `finish_body`.
+
+    Raises:
+        InvalidValueError: the kind exists with another builder.
+    """
+    if _BUILDERS.setdefault(kind, builder) is not builder:
+        raise InvalidValueError(
+            f"There is already a kind of object {kind!r} with another builder; choose another name."
+        )
 
 
 def _pose(item: SceneObject, position: Point) -> sapien.Pose:
@@ -108,9 +139,19 @@ def _rgba(item: SceneObject, usual: Rgba) -> Rgba:
     return usual if item.rgb is None else (*item.rgb, 1.0)
 
 
-def _finish(builder: ActorBuilder, scene: sapien.Scene, item: SceneObject, kind: str) -> Body:
+def finish_body(
+    builder: ActorBuilder, scene: sapien.Scene, item: SceneObject, body_type: str
+) -> Body:
+    """Build an actor at its object's place in the scene.
+
+    Args:
+        builder: of the actor, with all its shapes.
+        scene: of the simulator.
+        item: the object.
+        body_type: ``"dynamic"`` or ``"kinematic"``.
+    """
     builder.set_scene(scene)
-    builder.set_physx_body_type(kind)
+    builder.set_physx_body_type(body_type)
     builder.set_initial_pose(_pose(item, item.position))
     entity = builder.build(name=item.name)
     physics = entity.find_component_by_type(sapien.physx.PhysxRigidBaseComponent)
@@ -124,11 +165,11 @@ def _build_cube(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
     if visible:
         material = _material(COLOR_RGBA[str(item.color)])
         builder.add_box_visual(half_size=[half] * 3, material=material)
-    return _finish(builder, scene, item, "dynamic")
+    return finish_body(builder, scene, item, "dynamic")
 
 
 def _build_container(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
-    """Six boxes, built opening up and turned over; the knob is what the gripper grasps."""
+    """Build six boxes, upside down; the gripper grasps the knob."""
     wall, side = object_sizes.CONTAINER_WALL / 2, object_sizes.CONTAINER_HALF
     roof, height = object_sizes.CONTAINER_ROOF / 2, object_sizes.CONTAINER_WALL_HEIGHT / 2
     # Upside down, z is measured from the origin (the roof's top) towards the opening.
@@ -146,11 +187,11 @@ def _build_container(scene: sapien.Scene, item: SceneObject, visible: bool) -> B
         builder.add_box_collision(sapien.Pose(center), half_size=half)
         if visible:
             builder.add_box_visual(sapien.Pose(center), half_size=half, material=_material(WHITE))
-    return _finish(builder, scene, item, "dynamic")
+    return finish_body(builder, scene, item, "dynamic")
 
 
 def _build_target(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
-    """A ringed disc, purple or as the scene wants it."""
+    """Build a ringed disc, purple unless the scene gives a color."""
     half = (item.thickness or object_sizes.TARGET_THICKNESS) / 2
     return _ringed_disc(
         scene, item, PURPLE if item.rgb is None else (*item.rgb, 1.0), half, visible
@@ -158,14 +199,14 @@ def _build_target(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body
 
 
 def _build_marker(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
-    """A ringed disc, red and thick enough to cover a target."""
+    """Build a red ringed disc, thick enough to cover a target."""
     return _ringed_disc(scene, item, RED, object_sizes.MARKER_HALF_THICKNESS, visible)
 
 
 def _ringed_disc(
     scene: sapien.Scene, item: SceneObject, rgba: Rgba, half: float, visible: bool
 ) -> Body:
-    """Five concentric discs, colored and white in turn; nothing collides with them."""
+    """Build five concentric discs, colored and white in turn, without collision shapes."""
     radius = float(item.radius or 0.0)
     builder = ActorBuilder()
     for index, share in enumerate(RING_SHARES if visible else ()):
@@ -175,26 +216,26 @@ def _ringed_disc(
             half_length=half + index * 1e-5,
             material=_material(WHITE if index % 2 else rgba),
         )
-    return _finish(builder, scene, item, "kinematic")
+    return finish_body(builder, scene, item, "kinematic")
 
 
 def _build_site(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
-    """A place that is neither seen nor felt."""
+    """Build an invisible place without collision shapes."""
     del visible
-    return _finish(ActorBuilder(), scene, item, "kinematic")
+    return finish_body(ActorBuilder(), scene, item, "kinematic")
 
 
 def _build_shuttle(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
-    """A cube that is only seen."""
+    """Build a cube without collision shapes."""
     builder = ActorBuilder()
     if visible:
         material = _material(_rgba(item, WHITE))
         builder.add_box_visual(half_size=[object_sizes.CUBE_HALF] * 3, material=material)
-    return _finish(builder, scene, item, "kinematic")
+    return finish_body(builder, scene, item, "kinematic")
 
 
 def _build_bin(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
-    """Four walls; the black floor is only seen, things fall to the table."""
+    """Build four walls and a black floor without collision: objects fall to the table."""
     height = object_sizes.BIN_HEIGHT / 2
     builder = ActorBuilder()
     walls = _walls(object_sizes.BIN_HALF, object_sizes.BIN_WALL / 2, height)
@@ -206,11 +247,11 @@ def _build_bin(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
             half_size=(object_sizes.BIN_HOLE_HALF, object_sizes.BIN_HOLE_HALF, floor),
             material=_material(BLACK),
         )
-    return _finish(builder, scene, item, "kinematic")
+    return finish_body(builder, scene, item, "kinematic")
 
 
 def _build_box(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
-    """Four walls and a floor, which stand fast."""
+    """Build four walls and a floor, fixed to the table."""
     rgba = COLOR_RGBA[str(item.color)]
     red, green, blue, _ = rgba
     dark = (FLOOR_SHADE * red, FLOOR_SHADE * green, FLOOR_SHADE * blue, 1.0)
@@ -224,11 +265,11 @@ def _build_box(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
     builder = ActorBuilder()
     _add_boxes(builder, _walls(object_sizes.BOX_HALF, wall, height), rgba if visible else None)
     _add_boxes(builder, [bottom], dark if visible else None)
-    return _finish(builder, scene, item, "kinematic")
+    return finish_body(builder, scene, item, "kinematic")
 
 
 def _walls(half: float, wall: float, height: float) -> list[Cuboid]:
-    """Four walls around a square; half of the outer side, and half thickness and height."""
+    """Return four walls around a square, given half its outer side, thickness and height."""
     side, hole = half - wall, half - 2 * wall
     return [
         cuboid
@@ -241,7 +282,7 @@ def _walls(half: float, wall: float, height: float) -> list[Cuboid]:
 
 
 def _add_boxes(builder: ActorBuilder, cuboids: Sequence[Cuboid], rgba: Rgba | None) -> None:
-    """Boxes to be touched and, if they have a color, seen."""
+    """Add boxes with collision and, if they have a color, visual shapes."""
     for center, half in cuboids:
         builder.add_box_collision(sapien.Pose(center), half_size=half)
         if rgba is not None:
@@ -250,7 +291,7 @@ def _add_boxes(builder: ActorBuilder, cuboids: Sequence[Cuboid], rgba: Rgba | No
 
 
 def _build_tape(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
-    """A ring of boxes, which fingers can take from outside or by its wall; round to the eye."""
+    """Build a ring of boxes, to be grasped from outside or by its wall; it looks round."""
     outer, inner = object_sizes.TAPE_RADIUS, object_sizes.TAPE_HOLE_RADIUS
     wall = (outer - inner) / 2
     half = (wall, outer * math.tan(math.pi / object_sizes.TAPE_SIDES), object_sizes.TAPE_HALF)
@@ -260,7 +301,7 @@ def _build_tape(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
         center = (math.cos(angle) * (inner + wall), math.sin(angle) * (inner + wall), 0.0)
         turned = [math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2)]
         builder.add_box_collision(sapien.Pose(center, turned), half_size=half)
-    body = _finish(builder, scene, item, "dynamic")
+    body = finish_body(builder, scene, item, "dynamic")
     if visible:
         component = sapien.render.RenderBodyComponent()
         component.attach(tube(outer, inner, object_sizes.TAPE_HALF, COLOR_RGBA[str(item.color)]))
@@ -269,7 +310,7 @@ def _build_tape(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
 
 
 def _build_button(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
-    """A base and a cap on a sprung vertical joint; negative joint positions are pressed."""
+    """Build a base and a cap on a sprung vertical joint; negative positions are pressed."""
     builder = ArticulationBuilder()
     builder.set_scene(scene)
     builder.set_initial_pose(_pose(item, item.position))
@@ -306,7 +347,7 @@ def _build_button(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body
     return Body(item, articulation.links[0].entity, cap_link, articulation)
 
 
-_BUILDERS: dict[str, Callable[[sapien.Scene, SceneObject, bool], Body]] = {
+_BUILDERS: dict[ObjectKind, BodyBuilder] = {
     "cube": _build_cube,
     "hidden_cube": _build_cube,
     "container": _build_container,
@@ -319,3 +360,6 @@ _BUILDERS: dict[str, Callable[[sapien.Scene, SceneObject, bool], Body]] = {
     "box": _build_box,
     "tape": _build_tape,
 }
+
+BODY_BUILDERS: Mapping[ObjectKind, BodyBuilder] = MappingProxyType(_BUILDERS)
+"""Every kind of object, those of other packages included."""

@@ -1,7 +1,7 @@
-"""From a policy's actions to what the joints do: one controller for each action space.
+"""Controllers: convert actions of each action space to joint actions.
 
-A controller gives joint actions piece by piece, as the oracle's hands do: the world has executed
-one piece before the next is planned. Rules and step counts: RoboMME.
+Like the scripted expert, a controller yields one joint trajectory at a time; the world executes it
+before the next is planned. Rules and step counts follow RoboMME.
 """
 
 from __future__ import annotations
@@ -14,97 +14,98 @@ from numpy.typing import NDArray
 
 from roboirg.core.actions import EE_POSE, JOINT_ANGLE, POSE_SIZE, WAYPOINT, ActionSpace
 from roboirg.core.errors import MotionPlanningError
-from roboirg.simulation.panda import Panda
+from roboirg.simulation.panda import JointTrajectory, Panda
 from roboirg.simulation.physics_settings import CLOSED, GRIPPER_STEPS, OPEN
 
 if TYPE_CHECKING:
     from roboirg.simulation.expert.motion_planning import MotionPlanner, ToolPose
 
-Piece = NDArray[np.float64]
-"""Joint actions (n, 8), n >= 1: joint targets and the gripper."""
-
 
 class Controller(Protocol):
-    """Turns checked actions of one space into joint actions."""
+    """Converts validated actions of one action space to joint actions."""
 
-    def pieces(self, action: NDArray[np.float64]) -> Iterator[Piece]:
-        """The pieces of one action; take the next one when the last has been executed.
+    def trajectories(self, action: NDArray[np.float64]) -> Iterator[JointTrajectory]:
+        """Yield the trajectories of one action; take the next after executing the last.
 
         Raises:
-            MotionPlanningError: the pose cannot be reached; the message is a cause of failure.
+            MotionPlanningError: the pose cannot be reached; the message is the cause of failure.
         """
 
 
 def make_controller(space: ActionSpace, robot: Panda) -> Controller:
-    """A controller for one episode.
+    """Create a controller for one episode.
 
     Args:
-        space: what the actions are.
-        robot: whose joints are to move; its gripper counts as open.
+        space: the action space.
+        robot: the robot to move; its gripper is assumed to be open.
     """
     return _CONTROLLERS[space.name](robot)
 
 
-class JointAngles:
-    """Joint targets, as they are."""
+class JointAngleController:
+    """Passes joint targets through unchanged."""
 
     def __init__(self, _robot: Panda) -> None:
         pass
 
-    def pieces(self, action: NDArray[np.float64]) -> Iterator[Piece]:
-        """One control step."""
+    def trajectories(self, action: NDArray[np.float64]) -> Iterator[JointTrajectory]:
+        """Yield one control step."""
         yield action[None]
 
 
-class ToolPoses:
-    """Poses of the tool, each by the nearest joint positions that have it."""
+class ToolPoseController:
+    """Reaches tool poses in one control step by inverse kinematics."""
 
     def __init__(self, robot: Panda) -> None:
         self._robot = robot
         self._planner = _make_planner(robot)
 
-    def pieces(self, action: NDArray[np.float64]) -> Iterator[Piece]:
-        """One control step.
+    def trajectories(self, action: NDArray[np.float64]) -> Iterator[JointTrajectory]:
+        """Yield one control step.
 
         Raises:
-            MotionPlanningError: no joint positions have that pose.
+            MotionPlanningError: no joint positions reach the pose.
         """
         try:
-            arm = self._planner.inverse(self._robot.arm_positions, tool_pose(action))
+            arm = self._planner.inverse_kinematics(self._robot.arm_positions, tool_pose(action))
         except MotionPlanningError as error:
-            raise MotionPlanningError(f"no joint positions reach {in_words(action)}") from error
+            raise MotionPlanningError(
+                f"no joint positions reach {describe_pose(action)}"
+            ) from error
         yield np.append(arm, action[POSE_SIZE])[None]
 
 
-class Waypoints:
-    """Poses to which the tool moves in a straight line, with what the gripper does there."""
+class WaypointController:
+    """Moves the tool to poses in a straight line, then opens or closes the gripper."""
 
     def __init__(self, robot: Panda) -> None:
         self._robot = robot
         self._planner = _make_planner(robot)
         self._gripper = OPEN
 
-    def pieces(self, action: NDArray[np.float64]) -> Iterator[Piece]:
-        """The move with the gripper as it was, then six steps if it is to close or open.
+    def trajectories(self, action: NDArray[np.float64]) -> Iterator[JointTrajectory]:
+        """Yield the move with the gripper unchanged, then six steps if it opens or closes.
 
         Raises:
             MotionPlanningError: the pose cannot be reached.
         """
         try:
-            path = self._planner.travel(self._robot.arm_positions, tool_pose(action))
+            path = self._planner.plan_move(self._robot.arm_positions, tool_pose(action))
         except MotionPlanningError as error:
-            raise MotionPlanningError(f"no straight move reaches {in_words(action)}") from error
+            raise MotionPlanningError(
+                f"no straight move reaches {describe_pose(action)}"
+            ) from error
         yield self._with_gripper(path)
         if action[POSE_SIZE] in (OPEN, CLOSED):
             self._gripper = float(action[POSE_SIZE])
             yield self._with_gripper(np.tile(self._robot.arm_positions, (GRIPPER_STEPS, 1)))
 
-    def _with_gripper(self, joints: NDArray[np.float64]) -> Piece:
+    def _with_gripper(self, joints: NDArray[np.float64]) -> JointTrajectory:
         return np.column_stack([joints, np.full(len(joints), self._gripper)])
 
 
 def tool_pose(action: NDArray[np.float64]) -> ToolPose:
-    """The pose in an action that begins with x, y, z, roll, pitch, yaw (extrinsic x-y-z)."""
+    """Return the pose of an action that starts with x, y, z, roll, pitch, yaw (extrinsic x-y-z)."""
     from scipy.spatial.transform import Rotation
 
     from roboirg.simulation.expert.motion_planning import ToolPose
@@ -112,25 +113,25 @@ def tool_pose(action: NDArray[np.float64]) -> ToolPose:
     return ToolPose(action[:3], Rotation.from_euler("xyz", action[3:POSE_SIZE]))
 
 
-def in_words(action: NDArray[np.float64]) -> str:
-    """The same pose for people to read."""
-    x, y, z, roll, pitch, yaw = (_short(number) for number in action[:POSE_SIZE])
+def describe_pose(action: NDArray[np.float64]) -> str:
+    """Return the pose of an action in words."""
+    x, y, z, roll, pitch, yaw = (_format_number(number) for number in action[:POSE_SIZE])
     return f"({x}, {y}, {z}) with roll {roll}, pitch {pitch}, yaw {yaw}"
 
 
 def _make_planner(robot: Panda) -> MotionPlanner:
-    # It takes a third of a second to import, and who commands joints does not need it.
+    # Importing it takes a third of a second, and joint actions do not need it.
     from roboirg.simulation.expert.motion_planning import MotionPlanner
 
     return MotionPlanner(robot)
 
 
-def _short(number: float) -> str:
+def _format_number(number: float) -> str:
     return f"{number:.3f}" if abs(number) < 1e6 else f"{number:.3e}"  # noqa: PLR2004
 
 
 _CONTROLLERS: Mapping[str, Callable[[Panda], Controller]] = {
-    JOINT_ANGLE.name: JointAngles,
-    EE_POSE.name: ToolPoses,
-    WAYPOINT.name: Waypoints,
+    JOINT_ANGLE.name: JointAngleController,
+    EE_POSE.name: ToolPoseController,
+    WAYPOINT.name: WaypointController,
 }

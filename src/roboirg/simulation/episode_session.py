@@ -1,4 +1,4 @@
-"""One episode being played: the world, the judge, and the log of events."""
+"""One episode in progress: the world, the judge, and the log of events."""
 
 from __future__ import annotations
 
@@ -14,33 +14,35 @@ from roboirg.core.episode import Episode, Stage
 from roboirg.core.errors import MotionPlanningError
 from roboirg.judging import Event, Judge, Status, changes
 from roboirg.simulation.bodies import Body
-from roboirg.simulation.demonstration.recording import Move, Recording
+from roboirg.simulation.demonstration.recording import RecordedStep, Recording
 from roboirg.simulation.physics_settings import HOME_ACTION
-from roboirg.simulation.rendering.render_mode import FAITHFUL, Rendering
+from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
 from roboirg.simulation.world import World
 
 StepHook = Callable[[Stage], object]
 
 
-def _look_away(stage: Stage) -> None:
+def _do_nothing(stage: Stage) -> None:
     del stage
 
 
 class EpisodeSession:
-    """Plays one episode from its first moment.
+    """One episode, from its start.
 
     Args:
-        episode: what to play.
-        visible: whether pictures are wanted at all.
-        rendering: how they are made.
+        episode: the episode to play.
+        visible: whether pictures can be drawn.
+        rendering: how pictures are drawn.
 
     Attributes:
         world: the simulator.
         judge: follows all stages, those of the demonstration first.
-        events: everything that happened since the beginning.
+        events: all events since the start.
     """
 
-    def __init__(self, episode: Episode, *, visible: bool, rendering: Rendering = FAITHFUL) -> None:
+    def __init__(
+        self, episode: Episode, *, visible: bool, rendering: RenderSettings = FAITHFUL
+    ) -> None:
         self.episode = episode
         self.world = World(episode.scene, visible=visible, rendering=rendering)
         self.judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
@@ -49,38 +51,37 @@ class EpisodeSession:
 
     @property
     def status(self) -> Status:
-        """How the episode stands."""
+        """Status of the episode."""
         return self.judge.status
 
     def step(self, action: NDArray[np.floating[Any]]) -> None:
-        """Execute one action (8) and judge what came of it."""
+        """Execute one action (8) and judge the result."""
         before = self.world.facts
         now = self.world.step(action)
         self.events += changes(self.world.elapsed, before, now)
         self._judge()
 
     def play_demonstration(
-        self, after_step: StepHook = _look_away, recording: Recording | None = None
+        self, after_step: StepHook = _do_nothing, recording: Recording | None = None
     ) -> Recording:
-        """Do the demonstration's stages, then one step at home.
+        """Execute the demonstration's stages, then one step at home.
 
         Args:
-            after_step: called with the stage that the hands are doing after each control step of
-                the demonstration that is in the video;
-                not after the step at home, whose result is the policy's first observation.
-            recording: what to replay; None lets the oracle's hands plan.
+            after_step: called with the current stage after each control step that the video
+                contains; not after the step at home, which gives the policy's first observation.
+            recording: the demonstration to replay; None plans it with the scripted expert.
 
         Returns:
-            What was done; its end is the recording's own if the replay was true.
+            The recording of what was executed; an exact replay has the same `end` as `recording`.
 
         Raises:
             MotionPlanningError: a stage was not completed; the scene cannot be used.
         """
-        done: list[Move] = []
-        for move in self._planned() if recording is None else recording.moves():
-            stage = self.episode.demonstration[move.stage]
-            self.step(move.action)
-            done.append(move)
+        executed: list[RecordedStep] = []
+        for step in self._plan_demonstration() if recording is None else recording.steps():
+            stage = self.episode.demonstration[step.stage]
+            self.step(step.action)
+            executed.append(step)
             if stage.recorded:
                 after_step(stage)
         if self.judge.index < len(self.episode.demonstration):
@@ -89,41 +90,41 @@ class EpisodeSession:
                 f" of {len(self.episode.demonstration)} was complete."
             )
         self.step(HOME_ACTION)
-        return Recording.of(done, self.state_hash())
+        return Recording.from_steps(executed, self.state_hash())
 
     def state_hash(self) -> str:
-        """SHA-256, in hexadecimal, of everything that can be known of the present state."""
+        """Return the SHA-256, in hexadecimal, of all readable state."""
         robot = self.world.robot.articulation
         numbers = [robot.get_qpos(), robot.get_qvel()]
         for body in self.world.bodies.values():
-            numbers += _state(body)
+            numbers += _body_state(body)
         digest = hashlib.sha256()
         for array in numbers:
             digest.update(np.ascontiguousarray(array).tobytes())
-        told = (self.world.elapsed, self.judge.index, str(self.judge.status), self.events)
-        digest.update(repr(told).encode())
+        progress = (self.world.elapsed, self.judge.index, str(self.judge.status), self.events)
+        digest.update(repr(progress).encode())
         return digest.hexdigest()
 
-    def _planned(self) -> Iterator[Move]:
-        """What the oracle's hands do; each piece is planned when the one before has been done."""
+    def _plan_demonstration(self) -> Iterator[RecordedStep]:
+        """Yield the scripted expert's steps; each trajectory is planned after the last is done."""
         if not self.episode.demonstration:
             return
-        # What plans takes a third of a second to import; who only replays does not need it.
+        # Importing the planner takes a third of a second, and replays do not need it.
         from roboirg.simulation.expert.primitives import MotionPrimitives
 
-        hands = MotionPrimitives(self.world)
+        expert = MotionPrimitives(self.world)
         for index, stage in enumerate(self.episode.demonstration):
-            for piece in hands.perform(stage.primitive):
-                for action in piece:
-                    yield Move(index, action)
+            for trajectory in expert.execute(stage.primitive):
+                for action in trajectory:
+                    yield RecordedStep(index, action)
 
     def _judge(self) -> None:
         self.judge.update(self.world.elapsed, self.world.facts)
         self.world.note_stage(self.judge.index)
 
 
-def _state(body: Body) -> list[NDArray[Any]]:
-    """Pose, velocities and joints of an object."""
+def _body_state(body: Body) -> list[NDArray[Any]]:
+    """Return the pose, velocities and joints of an object."""
     pose = body.entity.pose
     numbers = [pose.p, pose.q]
     if isinstance(body.physics, sapien.physx.PhysxRigidDynamicComponent):

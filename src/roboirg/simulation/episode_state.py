@@ -1,4 +1,4 @@
-"""What an environment has in hand while an episode is played."""
+"""State of an environment that lasts from one reset to the next."""
 
 from __future__ import annotations
 
@@ -16,42 +16,42 @@ from roboirg.simulation.rendering.pixel_grounding import PixelGrounding
 
 @dataclass
 class EpisodeState:
-    """What lasts from one reset to the next.
+    """State of one episode in an environment.
 
     Attributes:
         session: the episode.
-        senses: what observations are read from.
-        controller: turns actions into joint actions.
-        grounding: names pixels, if that is asked for.
-        felt: what was felt at each step of the video.
-        labels: what was being done in each step of the video.
-        history: what was seen since the last observation, as far as it is wanted.
+        observation_builder: reads observations.
+        controller: converts actions to joint actions.
+        pixel_grounding: finds the pixels of subgoals; None if not requested.
+        video_proprioception: proprioception at each step of the video.
+        video_subgoals: the subgoal in words at each step of the video.
+        history: observations for ``history`` since the last observation.
         steps: control steps of the policy.
-        reported: how many events have been told.
+        reported_events: number of events that `take_new_events` has returned.
     """
 
     session: EpisodeSession
-    senses: ObservationBuilder
+    observation_builder: ObservationBuilder
     controller: Controller
-    grounding: PixelGrounding | None
-    felt: list[dict[str, Any]] = field(default_factory=list)
-    labels: list[str] = field(default_factory=list)
+    pixel_grounding: PixelGrounding | None
+    video_proprioception: list[dict[str, Any]] = field(default_factory=list)
+    video_subgoals: list[str] = field(default_factory=list)
     history: list[dict[str, Any]] = field(default_factory=list)
     steps: int = 0
-    reported: int = 0
+    reported_events: int = 0
 
-    def follow(self, stage: Stage | None) -> None:
-        """To be called after each control step, with the stage whose label is current."""
-        self.senses.proprioception.follow()
-        if self.grounding is not None:
-            self.grounding.update(stage)
+    def after_step(self, stage: Stage | None) -> None:
+        """Update after a control step; call after each one with the published stage."""
+        self.observation_builder.proprioception.update()
+        if self.pixel_grounding is not None:
+            self.pixel_grounding.update(stage)
 
-    def label(self, stage: Stage) -> str:
-        """A stage of the video in words, grounded if that is asked for."""
-        return self.grounding.text if self.grounding else plain_subgoal(stage)
+    def describe_stage(self, stage: Stage) -> str:
+        """Return the subgoal of a video's stage, grounded if requested."""
+        return self.pixel_grounding.text if self.pixel_grounding else plain_subgoal(stage)
 
-    def fresh_events(self) -> Sequence[Event]:
-        """The events that have not been told yet."""
-        fresh = self.session.events[self.reported :]
-        self.reported += len(fresh)
+    def take_new_events(self) -> Sequence[Event]:
+        """Return the events since the last call."""
+        fresh = self.session.events[self.reported_events :]
+        self.reported_events += len(fresh)
         return fresh

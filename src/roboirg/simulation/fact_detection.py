@@ -1,15 +1,17 @@
-"""Which facts hold: thresholds on positions and contacts, as RoboMME evaluates them."""
+"""Detect facts: thresholds on positions and contacts, as RoboMME evaluates them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
+from typing import NamedTuple
 
 import numpy as np
 import sapien.physx
 
 from roboirg.core.conditions import Fact
+from roboirg.core.fact_traits import FACT_TRAITS
 from roboirg.core.motions import Point
 from roboirg.simulation.bodies import Body
 from roboirg.simulation.panda import Panda
@@ -20,7 +22,7 @@ RELEASED_HEIGHT = 0.035
 ON_TARGET_DISTANCE = 0.05
 OVER_DISTANCE, OVER_HEIGHT = 0.03, 0.12
 BEYOND_DISTANCE, BEYOND_HEIGHT = 0.04, 0.3
-"""How far a cube over a target has to go until it is not over it any more."""
+"""A cube that is over a target stays so until it is beyond one of these."""
 BINNED_FINGERS, BINNED_TOOL_DISTANCE = 0.02, 0.02
 LIFTED_HEIGHT = 0.15
 PUT_DOWN_HEIGHT = 0.07
@@ -31,18 +33,36 @@ NEAR_DISTANCE = 0.06
 HOME_TOLERANCE = 0.01
 REACHED_DISTANCE = 0.03
 REACH = 0.12
-"""What is farther from the tool center point than this cannot be between the fingers, m."""
+"""Objects farther from the tool center than this cannot be between the fingers, m."""
 
 Contacts = list[sapien.physx.PhysxContact]
 
 
-class FactDetector:
-    """Finds the facts of one world.
+class DetectionContext(NamedTuple):
+    """The world at one evaluation, for detectors of other packages' kinds of fact.
 
-    It remembers the last ones: some facts begin and cease at different thresholds, or stay.
+    Attributes:
+        bodies: every object that is in the world, by name.
+        robot: the robot.
+        tool: position of the tool center, world frame, m.
+        contacts: of the last physics step.
+        before: the facts of the evaluation before.
+    """
+
+    bodies: Mapping[str, Body]
+    robot: Panda
+    tool: Point
+    contacts: Contacts
+    before: frozenset[Fact]
+
+
+class FactDetector:
+    """Detects the facts of one world.
+
+    It keeps the last ones: some facts start and cease at different thresholds, or last.
 
     Args:
-        bodies: every object of the scene by name.
+        bodies: every object of the scene, by name.
         robot: the robot.
     """
 
@@ -54,6 +74,7 @@ class FactDetector:
         self._bins = (*self._of_kind("bin"), *self._of_kind("box"))
         self._before: frozenset[Fact] = frozenset()
         self._contacts: Contacts = []
+        self._stopped: AbstractSet[str] = frozenset()
         self._tool = self._tool_now()
 
     def detect(
@@ -62,30 +83,46 @@ class FactDetector:
         absent: AbstractSet[str] = frozenset(),
         stopped: AbstractSet[str] = frozenset(),
     ) -> frozenset[Fact]:
-        """All facts that hold now.
+        """Return all facts that hold now.
 
         Args:
             contacts: of the last physics step.
-            absent: names of objects that are out of the world: nothing is concluded from where
-                they are kept meanwhile.
+            absent: names of objects that are out of the world; the positions at which they are
+                kept meanwhile mean nothing.
             stopped: names of objects that have been stopped for good.
         """
-        self._contacts, self._tool = contacts, self._tool_now()
-        facts = {fact for fact in self._before if fact.kind == "binned"}
-        for body in self._bodies:
-            if body.item.name in absent:
-                continue
-            if body.item.kind in ("cube", "tape"):
-                facts.update(self._cube_facts(body))
-            elif body.item.kind == "container":
-                facts.update(self._container_facts(body))
-            elif body.item.kind == "button":
-                facts.update(self._button_facts(body))
-            elif body.item.kind == "shuttle":
-                facts.update(self._shuttle_facts(body, stopped=body.item.name in stopped))
+        self._contacts, self._tool, self._stopped = contacts, self._tool_now(), stopped
+        present = [body for body in self._bodies if body.item.name not in absent]
+        facts = {fact for fact in self._before if fact.traits.lasts}
+        for body in present:
+            facts.update(self._facts_about(body))
         facts.update(self._robot_facts())
+        facts.update(self._registered_facts(present))
         self._before = frozenset(facts)
         return self._before
+
+    def _facts_about(self, body: Body) -> Iterator[Fact]:
+        match body.item.kind:
+            case "cube" | "tape":
+                return self._cube_facts(body)
+            case "container":
+                return self._container_facts(body)
+            case "button":
+                return self._button_facts(body)
+            case "shuttle":
+                return self._shuttle_facts(body)
+        return iter(())
+
+    def _registered_facts(self, present: Sequence[Body]) -> Iterator[Fact]:
+        """Yield the facts of the kinds that other packages have registered."""
+        detectors = [one.detect for one in FACT_TRAITS.values() if one.detect is not None]
+        if detectors:
+            bodies = {body.item.name: body for body in present}
+            context = DetectionContext(
+                bodies, self._robot, self._tool, self._contacts, self._before
+            )
+            for detect in detectors:
+                yield from (Fact(*found) for found in detect(context))
 
     def _cube_facts(self, cube: Body) -> Iterator[Fact]:
         name, position = cube.item.name, cube.position
@@ -130,11 +167,11 @@ class FactDetector:
         if self._tool.z < HOVER_HEIGHT and _apart(self._tool, button.position) <= HOVER_DISTANCE:
             yield Fact("hovering", "robot", button.item.name)
 
-    def _shuttle_facts(self, shuttle: Body, *, stopped: bool) -> Iterator[Fact]:
+    def _shuttle_facts(self, shuttle: Body) -> Iterator[Fact]:
         for target in self._targets:
             if _apart(shuttle.position, target.position) <= NEAR_DISTANCE:
                 yield Fact("near", shuttle.item.name, target.item.name)
-                if stopped:
+                if shuttle.item.name in self._stopped:
                     yield Fact("stopped", shuttle.item.name, target.item.name)
 
     def _robot_facts(self) -> Iterator[Fact]:
@@ -146,7 +183,7 @@ class FactDetector:
             yield Fact("home", "robot")
 
     def _hand_facts(self, body: Body, position: Point) -> Generator[Fact, None, bool]:
-        """Where the hand is at something movable; gives back whether it is held."""
+        """Yield the facts about the hand at a movable object; return whether the hand holds it."""
         distance = math.dist(position, self._tool)
         if distance > REACH:
             return False
@@ -165,5 +202,5 @@ class FactDetector:
 
 
 def _apart(first: Point, second: Point) -> float:
-    """Distance in the plane, m."""
+    """Return the distance in the plane, m."""
     return math.hypot(first.x - second.x, first.y - second.y)

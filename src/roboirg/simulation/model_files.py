@@ -1,7 +1,7 @@
-"""Model files of the Panda and the table, read from where ManiSkill is installed.
+"""Model files of the Panda and the table, read from the installed ManiSkill.
 
-ManiSkill is found without importing it, and the files are checked by hash: other files would
-give other pictures and other dynamics.
+ManiSkill is located without importing it, and a hash verifies the files: other files would change
+pictures and dynamics.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ _SHA256 = "9f361fea8bcea5593b0632f053d5798e5412a7532de7987230f0a72b15cca236"
 
 @dataclass(frozen=True, slots=True)
 class ModelFiles:
-    """Where the model files are.
+    """Paths of the model files.
 
     Attributes:
         robot: URDF of the Panda with a wrist camera.
-        wrist_camera: the camera's mesh, binary STL.
-        table: the table's mesh.
-        ground_texture: the grid on the floor.
+        wrist_camera: mesh of the wrist camera, binary STL.
+        table: mesh of the table.
+        ground_texture: grid texture of the floor.
     """
 
     robot: Path
@@ -50,7 +50,7 @@ class ModelFiles:
 
 @functools.cache
 def find_model_files() -> ModelFiles:
-    """The model files of ManiSkill 3.0.1, found and checked once per process.
+    """Return the model files of ManiSkill 3.0.1, located and verified once per process.
 
     Raises:
         MissingDependencyError: ManiSkill is not installed, or its files are not those of 3.0.1.
@@ -59,7 +59,7 @@ def find_model_files() -> ModelFiles:
 
 
 def look_for_model_files() -> ModelFiles:
-    """As `find_model_files`, looking anew.
+    """Locate and verify the model files without caching.
 
     Raises:
         MissingDependencyError: ManiSkill is not installed, or its files are not those of 3.0.1.

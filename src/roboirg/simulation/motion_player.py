@@ -1,4 +1,4 @@
-"""Plays the scripted motions of a scene: objects that hide, change places, run, glow or vanish."""
+"""Scripted motions of a scene: objects hide, swap, move back and forth, glow or vanish."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from roboirg.simulation.bodies import Body
 Bodies = Mapping[str, Body]
 
 _SPACING = 0.5
-"""Meters between the spots of objects that are away, so that they do not touch."""
+"""Meters between the parking spots of absent objects, so that they do not touch."""
 
 
 class MotionContext(NamedTuple):
-    """What a motion may depend on, before the physics of a control step.
+    """Inputs of a motion before the physics of a control step.
 
     Attributes:
         step: control steps since reset.
-        facts: all that held at the last evaluation.
-        stages: for each stage that has become due: at which step.
+        facts: all facts that held after the last step.
+        stages: step at which each stage became due, by stage index.
     """
 
     step: int
@@ -39,44 +39,45 @@ class MotionPlayer:
     """Plays all motions of a scene.
 
     Args:
-        motions: what is to be played.
+        motions: the motions to play.
         bodies: the scene's objects by name.
     """
 
     def __init__(self, motions: Sequence[Motion], bodies: Bodies) -> None:
         spots = (Point(10.0 + _SPACING * index, 10.0, 10.0) for index in range(len(motions)))
         players = [
-            _player(motion, bodies, spot) for motion, spot in zip(motions, spots, strict=True)
+            _scripted_motion(motion, bodies, spot)
+            for motion, spot in zip(motions, spots, strict=True)
         ]
-        # What comes back to another object's place has to find it there.
-        self._players = sorted(players, key=lambda player: not isinstance(player, _SwapPlayer))
+        # Swaps come first: an object that returns under another needs that one's new position.
+        self._players = sorted(players, key=lambda player: not isinstance(player, _SwapMotion))
 
-    def before_step(self, moment: MotionContext) -> None:
-        """Put the objects where they have to be for the coming control step."""
+    def before_step(self, context: MotionContext) -> None:
+        """Move the objects for the next control step."""
         for player in self._players:
-            player.before_step(moment)
+            player.before_step(context)
 
     def after_step(self, facts: AbstractSet[Fact]) -> None:
-        """Take away what the new facts make vanish."""
+        """Remove the objects that the new facts make vanish."""
         for player in self._players:
             player.after_step(facts)
 
     def absent(self) -> frozenset[str]:
-        """Names of the objects that were out of the world in the last control step."""
+        """Return the names of objects that were out of the world in the last control step."""
         return frozenset(player.subject for player in self._players if player.absent)
 
     def stopped(self) -> frozenset[str]:
-        """Names of the objects that have been stopped for good."""
+        """Return the names of objects that have stopped permanently."""
         return frozenset(player.subject for player in self._players if player.stopped)
 
 
-class _Player(ABC):
-    """Plays one motion.
+class _ScriptedMotion(ABC):
+    """Plays one motion of one object.
 
     Attributes:
         subject: name of the object.
-        absent: whether it was out of the world in the last control step.
-        stopped: whether something has stopped it for good.
+        absent: whether the object was out of the world in the last control step.
+        stopped: whether the object has stopped permanently.
     """
 
     def __init__(self, subject: str) -> None:
@@ -85,13 +86,13 @@ class _Player(ABC):
         self.stopped = False
 
     @abstractmethod
-    def before_step(self, moment: MotionContext) -> None: ...
+    def before_step(self, context: MotionContext) -> None: ...
 
     def after_step(self, facts: AbstractSet[Fact]) -> None:
         del facts
 
 
-class _AwayPlayer(_Player):
+class _AwayMotion(_ScriptedMotion):
     def __init__(self, motion: Away, bodies: Bodies, spot: Point) -> None:
         super().__init__(motion.subject)
         self._motion, self._spot = motion, spot
@@ -99,11 +100,11 @@ class _AwayPlayer(_Player):
         self._under = None if motion.under is None else bodies[motion.under]
         self.absent = motion.start == 0
 
-    def before_step(self, moment: MotionContext) -> None:
-        self.absent = self._motion.start <= moment.step < self._motion.end
+    def before_step(self, context: MotionContext) -> None:
+        self.absent = self._motion.start <= context.step < self._motion.end
         if self.absent:
             self._body.put(self._spot)
-        elif moment.step == self._motion.end:
+        elif context.step == self._motion.end:
             place = self._body.item.position
             if self._under is not None:
                 x, y, _ = self._under.position
@@ -111,7 +112,7 @@ class _AwayPlayer(_Player):
             self._body.put(place)
 
 
-class _SwapPlayer(_Player):
+class _SwapMotion(_ScriptedMotion):
     def __init__(self, motion: Swap, bodies: Bodies) -> None:
         super().__init__(motion.first)
         self._motion = motion
@@ -119,17 +120,17 @@ class _SwapPlayer(_Player):
         self._bodies = [bodies[name] for name in names]
         self._poses: list[sapien.Pose] = []
 
-    def before_step(self, moment: MotionContext) -> None:
-        begin = 0 if self._motion.stage is None else moment.stages.get(self._motion.stage)
+    def before_step(self, context: MotionContext) -> None:
+        begin = 0 if self._motion.stage is None else context.stages.get(self._motion.stage)
         if begin is None:
             return
-        gone = moment.step - begin - self._motion.start
-        if not 0 <= gone <= self._motion.steps:
+        elapsed = context.step - begin - self._motion.start
+        if not 0 <= elapsed <= self._motion.steps:
             return
-        if gone == 0:
+        if elapsed == 0:
             self._poses = [body.entity.pose for body in self._bodies]
         first, second = self._poses[:2]
-        share = gone / self._motion.steps
+        share = elapsed / self._motion.steps
         poses = (
             _on_lane(first, second, share, self._motion.lane),
             _on_lane(second, first, share, self._motion.lane),
@@ -139,39 +140,39 @@ class _SwapPlayer(_Player):
             body.set_pose(pose)
 
 
-class _ShuttlePlayer(_Player):
+class _ShuttleMotion(_ScriptedMotion):
     def __init__(self, motion: Shuttle, bodies: Bodies) -> None:
         super().__init__(motion.subject)
         self._motion, self._body = motion, bodies[motion.subject]
 
-    def before_step(self, moment: MotionContext) -> None:
+    def before_step(self, context: MotionContext) -> None:
         if self.stopped:
             return
-        self._body.put(shuttle_position(self._motion, moment.step))
-        self.stopped = self._motion.stopped_by in moment.facts
+        self._body.put(shuttle_position(self._motion, context.step))
+        self.stopped = self._motion.stopped_by in context.facts
 
 
-class _GlowPlayer(_Player):
+class _GlowMotion(_ScriptedMotion):
     def __init__(self, motion: Glow, bodies: Bodies, spot: Point) -> None:
         super().__init__(motion.subject)
         self._motion, self._body, self._spot = motion, bodies[motion.subject], spot
         self._last: int | None = None
         self.absent = True
 
-    def before_step(self, moment: MotionContext) -> None:
-        if self._motion.during in moment.facts:
-            self._last = moment.step
-        self.absent = self._last is None or moment.step - self._last > self._motion.linger
+    def before_step(self, context: MotionContext) -> None:
+        if self._motion.during in context.facts:
+            self._last = context.step
+        self.absent = self._last is None or context.step - self._last > self._motion.linger
         self._body.put(self._spot if self.absent else self._body.item.position)
 
 
-class _VanishPlayer(_Player):
+class _VanishMotion(_ScriptedMotion):
     def __init__(self, motion: Vanish, bodies: Bodies, spot: Point) -> None:
         super().__init__(motion.subject)
         self._motion, self._body, self._spot = motion, bodies[motion.subject], spot
 
-    def before_step(self, moment: MotionContext) -> None:
-        del moment
+    def before_step(self, context: MotionContext) -> None:
+        del context
         if self.absent:
             self._body.put(self._spot)
 
@@ -181,24 +182,24 @@ class _VanishPlayer(_Player):
             self._body.put(self._spot)
 
 
-def _player(motion: Motion, bodies: Bodies, spot: Point) -> _Player:
+def _scripted_motion(motion: Motion, bodies: Bodies, spot: Point) -> _ScriptedMotion:
     match motion:
         case Away():
-            return _AwayPlayer(motion, bodies, spot)
+            return _AwayMotion(motion, bodies, spot)
         case Swap():
-            return _SwapPlayer(motion, bodies)
+            return _SwapMotion(motion, bodies)
         case Shuttle():
-            return _ShuttlePlayer(motion, bodies)
+            return _ShuttleMotion(motion, bodies)
         case Glow():
-            return _GlowPlayer(motion, bodies, spot)
+            return _GlowMotion(motion, bodies, spot)
         case Vanish():
-            return _VanishPlayer(motion, bodies, spot)
+            return _VanishMotion(motion, bodies, spot)
         case _:
             assert_never(motion)
 
 
 def shuttle_position(motion: Shuttle, step: int) -> Point:
-    """Where a shuttle that nothing stops is at a control step."""
+    """Return the position of an unstopped shuttle at a control step."""
     done = min(step / motion.interval, float(motion.passes))
     number = min(int(done), motion.passes - 1)
     share = _smooth(done - number)
@@ -207,7 +208,7 @@ def shuttle_position(motion: Shuttle, step: int) -> Point:
 
 
 def _on_lane(start: sapien.Pose, goal: sapien.Pose, share: float, lane: float) -> sapien.Pose:
-    """The pose on the way from one place to another, to the left of the straight line."""
+    """Return the pose on a curve from one place to another, left of the straight line."""
     if share >= 1.0:
         x, y, _ = goal.p
         return sapien.Pose([x, y, start.p[2]], goal.q)
@@ -215,7 +216,7 @@ def _on_lane(start: sapien.Pose, goal: sapien.Pose, share: float, lane: float) -
     x, y, _ = _between(start.p, goal.p, smooth)
     dx, dy = float(goal.p[0] - start.p[0]), float(goal.p[1] - start.p[1])
     swing = lane * math.sin(math.pi * smooth) / math.hypot(dx, dy)
-    # Quaternions q and -q are the same rotation; the nearer one makes the shorter turn.
+    # Quaternions q and -q are the same rotation; the nearer one gives the shorter turn.
     sign = 1.0 if float(np.dot(start.q, goal.q)) >= 0.0 else -1.0
     turned = np.asarray(start.q) + smooth * (sign * np.asarray(goal.q) - np.asarray(start.q))
     turned /= np.linalg.norm(turned)
@@ -227,5 +228,5 @@ def _between(begin: Iterable[float], end: Iterable[float], share: float) -> tupl
 
 
 def _smooth(share: float) -> float:
-    """From 0 to 1 with rest at both ends."""
+    """Ease in and out: map 0..1 to 0..1 with zero speed at both ends."""
     return share * share * (3.0 - 2.0 * share)

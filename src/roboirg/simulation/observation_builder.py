@@ -1,4 +1,4 @@
-"""What an observation holds: pictures as asked for, their depth and calibration, proprioception."""
+"""Observations: pictures, depth, calibration and proprioception."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from roboirg.core.observations import (
     check_observe_every,
 )
 from roboirg.simulation.proprioception import Proprioception
-from roboirg.simulation.rendering.render_mode import FAITHFUL, Rendering
+from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
 from roboirg.simulation.rendering.viewpoint import SIZE
 from roboirg.simulation.world import World
 
 _SLACK = 0.1
-"""Radians by which joints may pass their limits while they are pushed."""
+"""Radians by which joints may exceed their limits under load."""
 
 
 class ObservationSpec(NamedTuple):
-    """Which fields observations have besides proprioception, and the video.
+    """Fields of observations and of the video besides proprioception.
 
     Attributes:
-        cameras: whose pictures.
-        depth: whether with depth.
-        calibration: whether with extrinsic and intrinsic matrices.
-        demonstration_frames: which pictures the video has: all, none, or every n-th.
-        observe_every: after how many control steps there is an observation in ``history``.
-        history_cameras: whose pictures these have; None for those of `cameras`.
-        rendering: how pictures are made.
+        cameras: cameras whose pictures are included.
+        depth: whether depth is included.
+        calibration: whether extrinsic and intrinsic matrices are included.
+        demonstration_frames: pictures in the video: all, none, or every n-th.
+        observe_every: control steps from one observation in ``history`` to the next.
+        history_cameras: cameras in the history; None for `cameras`.
+        rendering: how pictures are drawn.
     """
 
     cameras: Sequence[str]
@@ -45,110 +45,111 @@ class ObservationSpec(NamedTuple):
     demonstration_frames: DemonstrationFrames = "all"
     observe_every: int | None = None
     history_cameras: Sequence[str] | None = None
-    rendering: Rendering = FAITHFUL
+    rendering: RenderSettings = FAITHFUL
 
     @property
-    def of_history(self) -> ObservationSpec:
-        """What the observations in ``history`` hold."""
+    def for_history(self) -> ObservationSpec:
+        """The spec of the observations in ``history``."""
         cameras = self.cameras if self.history_cameras is None else self.history_cameras
         return self._replace(cameras=cameras)
 
-    def checked(self) -> ObservationSpec:
-        """These wishes, if they can be fulfilled.
+    def validated(self) -> ObservationSpec:
+        """Return this spec, with the cameras as a tuple, if it is valid.
 
         Raises:
-            UnknownNameError: there is no such camera.
-            InvalidValueError: depth or calibration is wanted of no camera, or a number is none.
+            UnknownNameError: a camera does not exist.
+            InvalidValueError: a value is invalid, or depth or calibration has no camera.
         """
         check_demonstration_frames(self.demonstration_frames)
         check_observe_every(self.observe_every)
         cameras = check_cameras(self.cameras)
-        for camera in check_cameras(self.of_history.cameras):
+        for camera in check_cameras(self.for_history.cameras):
             if camera not in cameras:
                 raise InvalidValueError(
-                    f"history_cameras has {camera!r}, but cameras is {cameras}; name it there too."
+                    f"history_cameras has {camera!r}, but cameras is {cameras}; add it there."
                 )
         for name, wanted in (("depth", self.depth), ("calibration", self.calibration)):
             if not isinstance(wanted, bool):
-                raise InvalidValueError(f"{name} is {wanted!r}; it has to be True or False.")
+                raise InvalidValueError(f"{name} is {wanted!r}; it must be True or False.")
             if wanted and not cameras:
                 raise InvalidValueError(
-                    f"{name}=True is for the cameras asked for, and cameras is (); "
-                    "name one, for example cameras=('front',)."
+                    f"{name}=True needs a camera, but cameras is (); "
+                    "add one, for example cameras=('front',)."
                 )
         return self._replace(cameras=cameras)
 
 
 class ObservationBuilder:
-    """Reads one world.
+    """Reads observations of one world.
 
     Args:
-        world: to be followed from now on.
-        wishes: what is read.
+        world: the world to read.
+        spec: fields to read.
 
     Attributes:
-        proprioception: what the robot feels.
+        proprioception: the robot's proprioception.
     """
 
-    def __init__(self, world: World, wishes: ObservationSpec) -> None:
+    def __init__(self, world: World, spec: ObservationSpec) -> None:
         self._world = world
-        self._wishes = wishes
-        self._drawn = tuple(picture_space(wishes))
-        self._drawn_before = tuple(picture_space(wishes.of_history))
+        self._spec = spec
+        self._picture_fields = tuple(picture_space(spec))
+        self._history_picture_fields = tuple(picture_space(spec.for_history))
         self.proprioception = Proprioception(world.robot)
 
     def read(self) -> dict[str, Any]:
-        """The observation without the instruction."""
-        return self._read(self._wishes.cameras, self._drawn)
+        """Return the current observation without the instruction."""
+        return self._read(self._spec.cameras, self._picture_fields)
 
-    def recall(self) -> dict[str, Any]:
-        """The same as ``history`` will hold it."""
-        return self._read(self._wishes.of_history.cameras, self._drawn_before)
+    def read_history_entry(self) -> dict[str, Any]:
+        """Return the current observation for ``history``, without the instruction."""
+        return self._read(self._spec.for_history.cameras, self._history_picture_fields)
 
-    def _read(self, cameras: Sequence[str], drawn: Sequence[str]) -> dict[str, Any]:
-        if drawn:
-            # All cameras begin before the first picture is waited for.
+    def _read(self, cameras: Sequence[str], picture_fields: Sequence[str]) -> dict[str, Any]:
+        if picture_fields:
+            # All cameras start drawing before the first picture is fetched.
             self._world.cameras.draw(cameras)
-        return {**{field: draw(self._world, field) for field in drawn}, **self.feel()}
+        pictures = {field: read_picture(self._world, field) for field in picture_fields}
+        return {**pictures, **self.read_proprioception()}
 
-    def feel(self) -> dict[str, Any]:
-        """The part of the observation for which nothing is drawn."""
+    def read_proprioception(self) -> dict[str, Any]:
+        """Return the observation fields that need no drawing: proprioception and calibration."""
         fields: dict[str, Any] = {}
-        for camera in self._wishes.cameras if self._wishes.calibration else ():
+        for camera in self._spec.cameras if self._spec.calibration else ():
             fields[f"{camera}_extrinsic"] = self._world.cameras.extrinsic(camera)
             fields[f"{camera}_intrinsic"] = self._world.cameras.intrinsic(camera)
         return {**fields, **self.proprioception.read()}
 
 
-def draw(world: World, field: str) -> NDArray[Any]:
-    """A field such as ``"front_rgb"`` of the world as it is now."""
+def read_picture(world: World, field: str) -> NDArray[Any]:
+    """Return a picture field of the current world, for example ``"front_rgb"``."""
     camera, _, kind = field.rpartition("_")
-    return _DRAWN[kind](world, camera)
+    return _PICTURE_READERS[kind](world, camera)
 
 
-_DRAWN: Mapping[str, Callable[[World, str], NDArray[Any]]] = {
+_PICTURE_READERS: Mapping[str, Callable[[World, str], NDArray[Any]]] = {
     "rgb": lambda world, camera: world.picture(camera),
     "depth": lambda world, camera: world.cameras.depth(camera),
 }
 
 
-def picture_space(wishes: ObservationSpec) -> dict[str, spaces.Space[Any]]:
-    """The space of each field that has to be drawn."""
+def picture_space(spec: ObservationSpec) -> dict[str, spaces.Space[Any]]:
+    """Return the space of each field that is drawn."""
     fields: dict[str, spaces.Space[Any]] = {
-        f"{camera}_rgb": spaces.Box(0, 255, (SIZE, SIZE, 3), np.uint8) for camera in wishes.cameras
+        f"{camera}_rgb": spaces.Box(0, 255, (SIZE, SIZE, 3), np.uint8) for camera in spec.cameras
     }
     millimeters = np.iinfo(np.int16)
-    for camera in wishes.cameras if wishes.depth else ():
+    for camera in spec.cameras if spec.depth else ():
         fields[f"{camera}_depth"] = spaces.Box(
             int(millimeters.min), int(millimeters.max), (SIZE, SIZE, 1), np.int16
         )
     return fields
 
 
-def proprioception_space(wishes: ObservationSpec) -> dict[str, spaces.Space[Any]]:
-    """The space of each field that `ObservationBuilder.feel` gives."""
+def proprioception_space(spec: ObservationSpec) -> dict[str, spaces.Space[Any]]:
+    """Return the space of each field of `ObservationBuilder.read_proprioception`."""
     fields: dict[str, spaces.Space[Any]] = {}
-    for camera in wishes.cameras if wishes.calibration else ():
+    for camera in spec.cameras if spec.calibration else ():
         fields[f"{camera}_extrinsic"] = spaces.Box(-np.inf, np.inf, (3, 4), np.float32)
         fields[f"{camera}_intrinsic"] = spaces.Box(-np.inf, np.inf, (3, 3), np.float32)
     low, high = (JOINT_LOW - _SLACK).astype(np.float32), (JOINT_HIGH + _SLACK).astype(np.float32)
@@ -160,23 +161,23 @@ def proprioception_space(wishes: ObservationSpec) -> dict[str, spaces.Space[Any]
     }
 
 
-def observation_space(wishes: ObservationSpec) -> dict[str, spaces.Space[Any]]:
-    """The space of each field that `ObservationBuilder.read` gives."""
-    return {**picture_space(wishes), **proprioception_space(wishes)}
+def observation_space(spec: ObservationSpec) -> dict[str, spaces.Space[Any]]:
+    """Return the space of each field of `ObservationBuilder.read`."""
+    return {**picture_space(spec), **proprioception_space(spec)}
 
 
-def history_space(wishes: ObservationSpec) -> dict[str, spaces.Space[Any]]:
-    """The space of each field that `ObservationBuilder.recall` gives."""
-    return {**picture_space(wishes.of_history), **proprioception_space(wishes)}
+def history_space(spec: ObservationSpec) -> dict[str, spaces.Space[Any]]:
+    """Return the space of each field of `ObservationBuilder.read_history_entry`."""
+    return {**picture_space(spec.for_history), **proprioception_space(spec)}
 
 
 def stack_proprioception(
-    moments: Sequence[dict[str, Any]], wishes: ObservationSpec
+    readings: Sequence[dict[str, Any]], spec: ObservationSpec
 ) -> dict[str, NDArray[Any]]:
-    """What `ObservationBuilder.feel` gave, as arrays with a leading axis T, which may be 0."""
+    """Stack readings of `read_proprioception` to arrays with a leading axis T >= 0."""
     return {
-        key: np.stack([moment[key] for moment in moments]) if moments else _empty(space)
-        for key, space in proprioception_space(wishes).items()
+        key: np.stack([reading[key] for reading in readings]) if readings else _empty(space)
+        for key, space in proprioception_space(spec).items()
     }
 
 

@@ -1,4 +1,4 @@
-"""The Franka Panda with a wrist camera: loading, control, and what it feels."""
+"""The Franka Panda with a wrist camera: loading, control, and sensing."""
 
 from __future__ import annotations
 
@@ -21,11 +21,14 @@ from roboirg.core.observations import CAMERAS, FRONT
 from roboirg.simulation import physics_settings
 from roboirg.simulation.model_files import find_model_files
 from roboirg.simulation.rendering.culling import CullableBody
-from roboirg.simulation.rendering.render_mode import FAITHFUL, Rendering
-from roboirg.simulation.rendering.robot_meshes import finish, link_hull, link_shapes
+from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
+from roboirg.simulation.rendering.robot_meshes import apply_shading, link_hull, link_shapes
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
+
+JointTrajectory = NDArray[np.float64]
+"""Actions (n, 8), n >= 1: joint targets (rad) and the gripper."""
 
 FINGERS = ("panda_leftfinger", "panda_rightfinger")
 TOOL_LINK = "panda_hand_tcp"
@@ -44,16 +47,16 @@ class Panda:
     """A Panda in a scene, fixed at its base, at home with an open gripper.
 
     Args:
-        scene: where to build it; it has to be the first thing that is built.
-        visible: whether to load its pictures' meshes too.
-        rendering: which meshes.
+        scene: the scene; the robot must be built first.
+        visible: whether to load meshes for drawing.
+        rendering: how pictures are drawn.
 
     Attributes:
-        drawables: what is known of its bodies that cameras draw.
+        cullable_bodies: culling data of the bodies that cameras draw.
     """
 
     def __init__(
-        self, scene: sapien.Scene, *, visible: bool, rendering: Rendering = FAITHFUL
+        self, scene: sapien.Scene, *, visible: bool, rendering: RenderSettings = FAITHFUL
     ) -> None:
         loader = _loader(visible, rendering.meshes == "stock")
         builder = loader.builder
@@ -71,17 +74,17 @@ class Panda:
             )
             joint.set_friction(0.0)
         self.links = {link.name: link for link in self.articulation.links}
-        self.drawables: dict[sapien.render.RenderBodyComponent, CullableBody] = {}
+        self.cullable_bodies: dict[sapien.render.RenderBodyComponent, CullableBody] = {}
         self._add_meshes(loader.visuals, rendering)
         self.tool = self.links[TOOL_LINK]
         self._joints = list(self.articulation.active_joints)
         self._fingers = [self.links[name] for name in FINGERS]
         self.reset()
 
-    def _add_meshes(self, visuals: Mapping[str, Sequence[Any]], rendering: Rendering) -> None:
+    def _add_meshes(self, visuals: Mapping[str, Sequence[Any]], rendering: RenderSettings) -> None:
         for name, records in visuals.items():
             if name == BASE_LINK and rendering.culling:
-                # It never moves, and the front camera draws only what it can see of it.
+                # The base never moves; the front camera draws only the part it can see.
                 others = [camera for camera in CAMERAS if camera != FRONT]
                 self._add_body(name, records, rendering, (FRONT,), sapien.Pose(ROBOT_BASE))
                 self._add_body(name, records, rendering, others)
@@ -92,19 +95,19 @@ class Panda:
         self,
         link: str,
         records: Sequence[Any],
-        rendering: Rendering,
+        rendering: RenderSettings,
         cameras: Sequence[str],
         fixed_at: sapien.Pose | None = None,
     ) -> None:
-        """Give a link what some cameras draw of it.
+        """Add a render body to a link.
 
         Args:
-            link: its name.
-            records: SAPIEN's, of its meshes.
-            rendering: which meshes.
-            cameras: that draw it.
-            fixed_at: where the link is for ever, world frame, if only what the front camera can
-                see of it there is wanted.
+            link: name of the link.
+            records: SAPIEN's visual records of the link's meshes.
+            rendering: how pictures are drawn.
+            cameras: cameras that draw the body.
+            fixed_at: fixed pose of the link in the world frame; keeps only the part that the front
+                camera sees there.
         """
         component, hulls = sapien.render.RenderBodyComponent(), []
         for record in records:
@@ -116,8 +119,8 @@ class Panda:
             matrix = pose.to_transformation_matrix()
             hulls.append(link_hull(path, rendering) @ matrix[:3, :3].T + matrix[:3, 3])
         self.links[link].entity.add_component(component)
-        finish(component, rendering)
-        self.drawables[component] = CullableBody(np.concatenate(hulls), cameras)
+        apply_shading(component, rendering)
+        self.cullable_bodies[component] = CullableBody(np.concatenate(hulls), cameras)
 
     def reset(self) -> None:
         """Put the robot at home, at rest."""
@@ -129,7 +132,7 @@ class Panda:
             joint.set_drive_target(float(target))
 
     def set_targets(self, action: NDArray[np.floating[Any]]) -> None:
-        """Drive towards an action (8): seven joint targets (rad) and the gripper in [-1, 1]."""
+        """Set the drive targets of an action (8): seven joints (rad) and the gripper in [-1, 1]."""
         for joint, target in zip(self._joints, action[:ARM_JOINTS], strict=False):
             joint.set_drive_target(float(target))
         share = (min(max(float(action[ARM_JOINTS]), -1.0), 1.0) + 1.0) / 2.0
@@ -139,7 +142,7 @@ class Panda:
 
     @property
     def arm_positions(self) -> NDArray[np.float64]:
-        """Joint angles of the arm (7), rad."""
+        """Joint positions of the arm (7), rad."""
         return np.asarray(self.articulation.get_qpos()[:ARM_JOINTS], dtype=np.float64)
 
     @property
@@ -153,18 +156,18 @@ class Panda:
         return self.tool.entity_pose
 
     def is_still(self) -> bool:
-        """Whether no arm joint moves faster than 0.2 rad/s."""
+        """Return whether no arm joint moves faster than 0.2 rad/s."""
         speeds = np.abs(self.articulation.get_qvel()[:ARM_JOINTS])
         return bool(speeds.max() <= STILL_SPEED)
 
     def grasps(
         self, body: sapien.physx.PhysxBaseComponent, contacts: list[sapien.physx.PhysxContact]
     ) -> bool:
-        """Whether both fingers push the body with enough force against their opening direction.
+        """Return whether both fingers push the body hard enough against their opening direction.
 
         Args:
-            body: the object's physical component.
-            contacts: of the last physics step.
+            body: the object's physics component.
+            contacts: contacts of the last physics step.
         """
         for finger, sign in zip(self._fingers, (1.0, -1.0), strict=True):
             force = _force_on(finger, body, contacts)
@@ -179,8 +182,8 @@ class Panda:
 
 
 def rotation_of(pose: sapien.Pose) -> Rotation:
-    """The rotation of a pose; SAPIEN's quaternions have the scalar first, SciPy's last."""
-    # SciPy takes a quarter of a second to import, and only planning needs it.
+    """Return the rotation of a pose; SAPIEN's quaternions put the scalar first, SciPy's last."""
+    # Importing SciPy takes a quarter of a second, and only planning needs it.
     from scipy.spatial.transform import Rotation
 
     w, x, y, z = np.asarray(pose.q, dtype=np.float64)
@@ -192,7 +195,7 @@ def _force_on(
     body: sapien.physx.PhysxBaseComponent,
     contacts: list[sapien.physx.PhysxContact],
 ) -> NDArray[np.float64]:
-    """Mean force of `body` on `finger` in the last physics step, N, world frame."""
+    """Return the mean force of `body` on `finger` in the last physics step, N, world frame."""
     impulse = np.zeros(3)
     for contact in contacts:
         first, second = contact.bodies
@@ -207,16 +210,16 @@ def _force_on(
     return impulse * physics_settings.PHYSICS_RATE
 
 
-class _Loader(URDFLoader):  # type: ignore[misc]  # SAPIEN's wrappers have no types
-    """Reads the robot's description.
+class _PandaLoader(URDFLoader):  # type: ignore[misc]  # SAPIEN's wrappers have no types
+    """Parses the robot's description.
 
     Args:
-        visible: whether the robot is to be seen at all.
-        stock: whether it is built with its meshes as they are installed.
+        visible: whether the robot is drawn.
+        stock: whether to build it with the installed meshes.
 
     Attributes:
         builder: builds the robot, any number of times.
-        visuals: how the description wants the meshes shown that the builder leaves out, by link.
+        visuals: visual records of the meshes that the builder leaves out, by link.
     """
 
     def __init__(self, *, visible: bool, stock: bool) -> None:
@@ -225,7 +228,7 @@ class _Loader(URDFLoader):  # type: ignore[misc]  # SAPIEN's wrappers have no ty
         self._stock = stock
         self.visuals: dict[str, list[Any]] = {}
         self.fix_root_link = True
-        # The loader wants a scene even to parse; the one to build in is set later.
+        # Parsing needs a scene too; the scene to build in is set later.
         self.set_scene(sapien.Scene([sapien.physx.PhysxCpuSystem()]))
         for finger in FINGERS:
             self.set_link_material(finger, 2.0, 2.0, 0.0)
@@ -245,6 +248,6 @@ class _Loader(URDFLoader):  # type: ignore[misc]  # SAPIEN's wrappers have no ty
 
 
 @functools.cache
-def _loader(visible: bool, stock: bool) -> _Loader:
-    """The parsed robot description; parsing takes longer than building."""
-    return _Loader(visible=visible, stock=stock)
+def _loader(visible: bool, stock: bool) -> _PandaLoader:
+    """Return the parsed description, cached because parsing takes longer than building."""
+    return _PandaLoader(visible=visible, stock=stock)

@@ -1,4 +1,4 @@
-"""Physics, lights and control as ManiSkill 3.0.1 sets them, so that dynamics and pictures match."""
+"""Physics, light and control settings of ManiSkill 3.0.1, so that dynamics and pictures match."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ CONTROL_PERIOD = 1.0 / CONTROL_RATE
 """Seconds in a control step."""
 
 HOME = np.array([0.0, 0.0, 0.0, -math.pi / 2, 0.0, math.pi / 2, math.pi / 4])
-"""The arm's home joint positions (7), rad: the hand at the top of the front picture, (RoboMME)."""
+"""Home joint positions (7), rad, with the hand at the top of the front picture (RoboMME)."""
 HOME_ACTION = np.append(HOME, 1.0)
-"""The action (8) that keeps the robot at home with an open gripper."""
+"""Action (8) that keeps the robot at home with an open gripper."""
 
 OPEN, CLOSED = 1.0, -1.0
 """Gripper actions."""
 GRIPPER_STEPS = 6
-"""Control steps in which the gripper opens or closes (RoboMME)."""
+"""Control steps for opening or closing the gripper (RoboMME)."""
 FINGER_OPEN = 0.04
 FINGER_SQUEEZE = -0.01
-"""Finger targets, m, of gripper actions +1 and -1; the joint limit keeps fingers at or above 0."""
+"""Finger targets, m, of gripper actions +1 and -1; the joint limit keeps the fingers >= 0."""
 
 STIFFNESS = 1000.0
 DAMPING = 100.0
@@ -42,7 +42,7 @@ LIGHT_DIRECTIONS = ((1.0, 1.0, -1.0), (0.0, 0.0, -1.0))
 
 @functools.cache
 def apply_physics_settings() -> None:
-    """Set SAPIEN's global physics defaults; has to come before anything is built."""
+    """Set SAPIEN's global physics defaults; call before building anything."""
     physx = sapien.physx
     physx.set_scene_config(
         gravity=np.array([0, 0, -9.81]),
@@ -63,7 +63,7 @@ def apply_physics_settings() -> None:
 
 @functools.cache
 def apply_render_settings() -> None:
-    """Choose the usual shader of cameras and the formats of their pictures."""
+    """Set the default camera shader and the picture formats."""
     sapien.render.set_camera_shader_dir("minimal")
     sapien.render.set_picture_format("Color", "r8g8b8a8unorm")
     sapien.render.set_picture_format("ColorRaw", "r8g8b8a8unorm")
@@ -71,7 +71,7 @@ def apply_render_settings() -> None:
 
 
 def add_lights(scene: sapien.Scene) -> None:
-    """Two white directional lights without shadows, and ambient light."""
+    """Add two white directional lights without shadows, and ambient light."""
     scene.set_ambient_light(AMBIENT_LIGHT)
     for direction in LIGHT_DIRECTIONS:
         light = sapien.render.RenderDirectionalLightComponent()

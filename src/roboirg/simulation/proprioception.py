@@ -1,4 +1,4 @@
-"""What the robot feels: joints, fingers, and the tool's pose as continuous numbers."""
+"""Proprioception: joints, fingers, and the tool's pose with continuous angles."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from roboirg.simulation.panda import Panda
 
 LOCKED = 1e-7
-"""Radians from straight up or down at which roll and yaw turn about one axis; yaw is 0 there."""
+"""Radians from gimbal lock within which yaw is set to 0."""
 
 
 class ProprioceptiveState(TypedDict):
@@ -24,23 +24,23 @@ class ProprioceptiveState(TypedDict):
 
 
 class Proprioception:
-    """Reads a robot; follows the tool's angles, so that they never jump by a full turn.
+    """Reads a robot's proprioception; unwraps the tool's angles so that they never jump.
 
     Args:
-        robot: to be followed from now on.
+        robot: the robot to read.
     """
 
     def __init__(self, robot: Panda) -> None:
         self._robot = robot
         self._angles = self._principal_angles()
 
-    def follow(self) -> None:
-        """To be called after every control step, whether or not anybody reads."""
+    def update(self) -> None:
+        """Update the unwrapped angles; call after every control step."""
         pairs = zip(self._angles.tolist(), self._principal_angles().tolist(), strict=True)
-        self._angles = np.array([unwrapped(before, now) for before, now in pairs])
+        self._angles = np.array([unwrap_angle(before, now) for before, now in pairs])
 
     def read(self) -> ProprioceptiveState:
-        """The robot's state at the last step that was followed."""
+        """Return the robot's state at the last update."""
         position = np.asarray(self._robot.tool_pose.p, dtype=np.float64)
         return {
             "joint_positions": self._robot.arm_positions.astype(np.float32),
@@ -49,12 +49,12 @@ class Proprioception:
         }
 
     def _principal_angles(self) -> NDArray[np.float64]:
-        """Roll, pitch and yaw of the tool, extrinsic x-y-z, rad."""
+        """Return roll, pitch and yaw of the tool, extrinsic x-y-z, rad."""
         return euler_angles(self._robot.tool_pose)
 
 
-def unwrapped(before: float, now: float) -> float:
-    """An angle without whole turns since before, rad: `numpy.unwrap`, for two numbers quicker."""
+def unwrap_angle(before: float, now: float) -> float:
+    """Unwrap an angle (rad) relative to the previous one, like `numpy.unwrap` but faster."""
     change = now - before
     if abs(change) < math.pi:
         return now + 0.0
@@ -65,17 +65,17 @@ def unwrapped(before: float, now: float) -> float:
 
 
 def euler_angles(pose: sapien.Pose) -> NDArray[np.float64]:
-    """Roll, pitch and yaw of a pose (extrinsic x-y-z), rad, each from -pi to pi.
+    """Return roll, pitch and yaw of a pose (extrinsic x-y-z), rad, each from -pi to pi.
 
-    By the formulas of Bernardes and Viollet (2022), which SciPy uses too and with the same bits;
-    importing SciPy would be a fifth of a process's start.
+    Uses the formulas of Bernardes and Viollet (2022), as SciPy does, and gives the same bits;
+    importing SciPy would take a fifth of a process's startup time.
     """
     w, x, y, z = (float(number) for number in pose.q)
-    # The order of the sum decides the last bit.
+    # The order of the sum determines the last bit.
     norm = math.sqrt(x * x + y * y + z * z + w * w)
     w, x, y, z = w / norm, x / norm, y / norm, z / norm
     half_sum, half_difference = math.atan2(x + z, w - y), math.atan2(z - x, w + y)
-    # NumPy's hypot is the C library's, which Python's is not.
+    # NumPy's hypot is the C library's; Python's is not.
     tilt = 2.0 * math.atan2(np.hypot(w + y, z - x), np.hypot(w - y, x + z))
     roll, yaw = half_sum - half_difference, half_sum + half_difference
     if tilt <= LOCKED:
@@ -86,7 +86,7 @@ def euler_angles(pose: sapien.Pose) -> NDArray[np.float64]:
 
 
 def _principal(angle: float) -> float:
-    """The same angle from -pi to pi."""
+    """Wrap an angle to -pi to pi."""
     if abs(angle) <= math.pi:
         return angle
     return angle - math.copysign(2.0 * math.pi, angle)

@@ -12,7 +12,7 @@ import sapien.render
 from sapien.wrapper.actor_builder import ActorBuilder
 
 from roboirg.simulation.model_files import find_model_files
-from roboirg.simulation.rendering.render_mode import FAITHFUL, Rendering
+from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
 from roboirg.simulation.rendering.table_mesh import table_shape
 
 Range = tuple[int, int]
@@ -27,8 +27,7 @@ FLOOR_WIDTH = 100.0
 FLOOR_CELLS = 100
 """Squares per side; with fewer, single wrist pixels would differ by one level."""
 FAR_FLOOR_STEP = 20
-"""So many squares are one in length and width far from the table, where no pixel differs, and where
-pictures may differ a little."""
+"""Squares merged per side far from the table, where no pixel changes, and in light meshes."""
 NEAR_FLOOR = ((40, 60), (40, 60))
 FLOOR_PIECES = (
     NEAR_FLOOR,
@@ -37,22 +36,24 @@ FLOOR_PIECES = (
     ((0, 40), (0, 100)),
     ((60, 100), (0, 100)),
 )
-"""The floor's squares, from and to along x and y, in pieces that a camera draws or leaves out:
-most see only the first, which has the table in its middle."""
+"""Ranges of the floor's squares along x and y, in pieces that are culled separately: most
+views show only the first, which has the table at its center."""
 WHOLE_FLOOR = (((0, 100), (0, 100)),)
 FLOOR_TEXTURE_REPEATS = 25.0
 """Repeats of the grid texture over the floor's width."""
 PLANE_UP = (0.7071068, 0.0, -0.7071068, 0.0)
 
 
-def add_scenery(scene: sapien.Scene, *, visible: bool, rendering: Rendering = FAITHFUL) -> None:
+def add_scenery(
+    scene: sapien.Scene, *, visible: bool, rendering: RenderSettings = FAITHFUL
+) -> None:
     """Add the table, whose top is at z = 0, and the floor under it."""
     _add_table(scene, visible=visible, rendering=rendering)
     pieces = WHOLE_FLOOR if rendering.meshes == "stock" else FLOOR_PIECES
     _add_floor(scene, pieces if visible else (), rendering)
 
 
-def _add_table(scene: sapien.Scene, *, visible: bool, rendering: Rendering) -> None:
+def _add_table(scene: sapien.Scene, *, visible: bool, rendering: RenderSettings) -> None:
     builder = ActorBuilder()
     builder.set_scene(scene)
     builder.add_box_collision(sapien.Pose([0.0, 0.0, TABLE_HEIGHT / 2]), half_size=TABLE_HALF)
@@ -72,7 +73,7 @@ def _add_table(scene: sapien.Scene, *, visible: bool, rendering: Rendering) -> N
 
 
 def _add_floor(
-    scene: sapien.Scene, pieces: Sequence[tuple[Range, Range]], rendering: Rendering
+    scene: sapien.Scene, pieces: Sequence[tuple[Range, Range]], rendering: RenderSettings
 ) -> None:
     builder = ActorBuilder()
     builder.set_scene(scene)
@@ -91,7 +92,7 @@ def _add_floor(
 def _floor_piece(
     along_x: Range, along_y: Range, step: int
 ) -> sapien.render.RenderShapeTriangleMesh:
-    """Squares of the floor, from and to along x and y, as triangles with the grid texture."""
+    """Return a range of the floor's squares along x and y as a textured mesh."""
     ticks = np.linspace(-FLOOR_WIDTH / 2, FLOOR_WIDTH / 2, FLOOR_CELLS + 1)
     columns, rows = ((along[1] - along[0]) // step for along in (along_x, along_y))
     x, y = (

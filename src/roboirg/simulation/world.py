@@ -1,4 +1,4 @@
-"""The world: a scene, a robot, and time. It plays any episode and knows no task."""
+"""The simulated world: a scene, a robot, and time. It is independent of tasks."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ from roboirg.simulation.motion_player import MotionContext, MotionPlayer
 from roboirg.simulation.panda import Panda
 from roboirg.simulation.rendering.cameras import Cameras
 from roboirg.simulation.rendering.render_device import render_system
-from roboirg.simulation.rendering.render_mode import FAITHFUL, Rendering
+from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
 from roboirg.simulation.scenery import add_scenery
 
 
 class World:
-    """One scene in the simulator, from its first moment on.
+    """One scene in the simulator, from its start.
 
     Args:
         scene: the objects and their scripted movements.
-        visible: False leaves out all that is only drawn; pictures are then not to be had, and
+        visible: False leaves out everything that is only drawn; there are then no pictures, and
             no Vulkan device is needed.
-        rendering: how pictures are made.
+        rendering: how pictures are drawn.
 
     Attributes:
-        elapsed: control steps since the beginning.
-        facts: all that held at the last evaluation.
+        elapsed: control steps since the start.
+        facts: all facts that hold now.
     """
 
     def __init__(
-        self, scene: Scene, *, visible: bool = True, rendering: Rendering = FAITHFUL
+        self, scene: Scene, *, visible: bool = True, rendering: RenderSettings = FAITHFUL
     ) -> None:
         physics_settings.apply_physics_settings()
         systems: list[Any] = [sapien.physx.PhysxCpuSystem()]
@@ -82,20 +82,20 @@ class World:
         return self.facts
 
     def advance(self, action: NDArray[np.floating[Any]]) -> None:
-        """The physics of one control step and nothing else: no motions, no facts, no time."""
+        """Run only the physics of one control step: no motions, no facts, no time."""
         self.robot.set_targets(action)
         for _ in range(physics_settings.PHYSICS_STEPS):
             self._physics.step()
 
     def note_stage(self, index: int) -> None:
-        """Take note that a stage is due, for the motions that wait for it."""
+        """Record the step at which a stage became due, for the motions that wait for it."""
         self._stages.setdefault(index, self.elapsed)
 
     def picture(self, camera: str) -> NDArray[np.uint8]:
-        """What a camera sees now, RGB, shape (256, 256, 3).
+        """Return the current picture of a camera, RGB, shape (256, 256, 3).
 
         Raises:
-            UnknownNameError: there is no such camera.
+            UnknownNameError: the camera does not exist.
             InvalidValueError: the world was built without pictures.
         """
         if camera not in CAMERAS:
@@ -104,7 +104,7 @@ class World:
 
     @property
     def cameras(self) -> Cameras:
-        """The cameras.
+        """The cameras of this world.
 
         Raises:
             InvalidValueError: the world was built without pictures.

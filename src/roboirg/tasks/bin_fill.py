@@ -1,9 +1,8 @@
-"""BinFill: put so many cubes of each named color into the bin, then press the button.
+"""BinFill: put a number of cubes of each named color into the bin, then press the button.
 
-Counting suite. A cube that falls into the bin is gone, so what has been put in cannot be seen; in
-half of the episodes only one cube of each color is there at first. Only the numbers are judged,
-not the order. Facts: RoboMME, where the oracle shuffles the colors; here it takes them in the
-order of the goal.
+Counting suite. Cubes vanish in the bin, so its content cannot be seen; in half of the episodes only
+one cube of each color is there at first. The numbers are judged, not the order. Facts: RoboMME,
+where the oracle shuffles the colors; here it takes them in the order of the goal.
 """
 
 from __future__ import annotations
@@ -38,6 +37,7 @@ from roboirg.tasks.shared.fixtures import (
 )
 from roboirg.tasks.shared.placement import Footprint, Region
 from roboirg.tasks.task import Commands, Task, Wording
+from roboirg.util.plurals import counted
 
 COLORS_PRESENT: dict[Difficulty, int] = {"easy": 1, "medium": 2, "hard": 3}
 CUBES: dict[Difficulty, tuple[int, int]] = {"easy": (4, 6), "medium": (8, 10), "hard": (10, 12)}
@@ -46,7 +46,7 @@ GOAL_COLORS: dict[Difficulty, tuple[int, int]] = {
     "medium": (1, 2),
     "hard": (2, 3),
 }
-"""Colors among which the wanted cubes are dealt out; one may get none."""
+"""Number of colors among which the goal's cubes are drawn; one may get none."""
 GOAL_CUBES: dict[Difficulty, tuple[int, int]] = {"easy": (1, 3), "medium": (2, 4), "hard": (3, 5)}
 MAX_GOAL_CUBES = 5
 GOAL_ORDER: tuple[Color, ...] = ("red", "blue", "green")
@@ -56,11 +56,11 @@ BIN_REGION = Region(0.05, 0.0, 0.1, 0.2)
 CUBE_REGION = Region(-0.1, 0.0, 0.2, 0.25)
 CUBE_GAP = 0.02
 APPEAR_STEPS = 50
-"""Late cubes of a color appear one after the other, so many control steps apart."""
+"""Control steps between the late cubes of a color."""
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
-    """Button, bin and cubes of one to three colors, of some of which a few are wanted."""
+    """Draw button, bin and cubes of one to three colors, and a count for one or more of them."""
     late = bool(rng.integers(2))
     button = draw_button(rng, BUTTON_REGION)
     # RoboMME places the bin without looking at the button; here its walls stay off the base.
@@ -78,7 +78,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
 def _draw_wanted(
     rng: np.random.Generator, difficulty: Difficulty, present: list[Color]
 ) -> dict[Color, int]:
-    """How many cubes of each color that is present are to go into the bin."""
+    """Draw the goal's number of cubes for each color that is present."""
     candidates = draw_number(rng, GOAL_COLORS[difficulty])
     total = draw_number(rng, GOAL_CUBES[difficulty])
     wanted = dict.fromkeys(present, 0)
@@ -93,7 +93,7 @@ def _draw_spawned(
     present: list[Color],
     wanted: dict[Color, int],
 ) -> list[Color]:
-    """A color for each cube, shuffled: enough of what is wanted, one at least of each present."""
+    """Draw a color for each cube: enough for the goal, and at least one of each present."""
     spawned = [color for color in present for _ in range(max(wanted[color], 1))]
     left = draw_number(rng, CUBES[difficulty]) - len(spawned)
     spawned += [present[index] for index in rng.integers(len(present), size=left)]
@@ -103,7 +103,7 @@ def _draw_spawned(
 def _draw_cubes(
     rng: np.random.Generator, spawned: list[Color], obstacles: list[Footprint]
 ) -> list[SceneObject]:
-    """Cubes of the given colors, numbered within their color: ``cube_red_0`` and so on."""
+    """Draw cubes of the given colors, numbered within their color: ``cube_red_0`` and so on."""
     taken = list(obstacles)
     cubes: list[SceneObject] = []
     numbers = {color: itertools.count() for color in COLORS}
@@ -116,9 +116,9 @@ def _draw_cubes(
 
 
 def _motions(cubes: list[SceneObject], *, late: bool) -> tuple[Motion, ...]:
-    """Binned cubes vanish; late ones appear, the first of each color being there from the start.
+    """Return the motions: binned cubes vanish, and late ones appear after the first of their color.
 
-    As in RoboMME nobody makes sure that the place of a late cube is still free.
+    As in RoboMME, the place of a late cube may be occupied.
     """
     ranks = {
         cube.name: number
@@ -135,7 +135,7 @@ def _motions(cubes: list[SceneObject], *, late: bool) -> tuple[Motion, ...]:
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
-    """Up to five cubes in all, of each color as many as there are at most."""
+    """Return all goals of up to five cubes in all, at most the present ones of each color."""
     colors = [color for color in GOAL_ORDER if _of_color(scene, color)]
     choices = [range(len(_of_color(scene, color)) + 1) for color in colors]
     found: list[Goal] = []
@@ -151,9 +151,9 @@ def goals(scene: Scene) -> tuple[Goal, ...]:
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Pick and put in, once for each wanted cube, then press: 2 N + 1 stages.
+    """Return 2 N + 1 stages: pick and put in once for each of N cubes, then press.
 
-    Any cube completes a stage; whether the colors are right is judged when all are in.
+    Any cube completes a stage; the colors are judged when N are in.
     """
     cubes = [cube.name for cube in scene.of_kind("cube")]
     picked, binned = tuple(Fact("picked", cube) for cube in cubes), _binned(cubes)
@@ -186,7 +186,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 
 def _wanted(scene: Scene, goal: Goal) -> Iterator[tuple[str, str, str]]:
-    """Color, ordinal and name of the cubes that the oracle takes, in the order of appearance."""
+    """Yield color, ordinal and name of the cubes that the oracle takes, in order of appearance."""
     for color, count in zip(goal.texts("colors"), goal.numbers("counts"), strict=True):
         cubes = _of_color(scene, color)[:count]
         for ordinal, cube in zip(ORDINALS, cubes, strict=False):
@@ -194,23 +194,24 @@ def _wanted(scene: Scene, goal: Goal) -> Iterator[tuple[str, str, str]]:
 
 
 def _wrong_counts(scene: Scene, goal: Goal) -> Iterator[Rule]:
-    """For each color that is present: more in the bin than wanted, or fewer."""
+    """Yield rules against more cubes in the bin than the goal's, and fewer, for each color."""
     wanted = dict(zip(goal.texts("colors"), goal.numbers("counts"), strict=True))
     for color in GOAL_ORDER:
         binned, count = _binned(_of_color(scene, color)), wanted.get(color, 0)
         if not binned:
             continue
-        things = f"{count} {color} cube{'' if count == 1 else 's'} in the bin"
         if count == 0:
-            yield Rule(FactCount(binned), f"a {color} cube in the bin", "wrong_object")
-        else:
-            yield Rule(FactCount(binned, least=count + 1), f"more than {things}", "wrong_count")
-            fewer = FactCount(binned, least=0, most=count - 1)
-            yield Rule(fewer, f"fewer than {things}", "wrong_count")
+            yield Rule(FactCount(binned), f"put a {color} cube into the bin", "wrong_object")
+            continue
+        cubes = f"{counted(count, f'{color} cube')} into the bin"
+        more, fewer = FactCount(binned, least=count + 1), FactCount(binned, 0, count - 1)
+        few = f"fewer than {cubes}" if count > 1 else f"no {color} cube into the bin"
+        yield Rule(more, f"put more than {cubes}", "wrong_count")
+        yield Rule(fewer, f"put {few}", "wrong_count")
 
 
 def _of_color(scene: Scene, color: str) -> list[str]:
-    """Names of all cubes of a color, as numbered."""
+    """Return the names of all cubes of a color, as numbered."""
     return [cube.name for cube in scene.of_kind("cube") if cube.color == color]
 
 

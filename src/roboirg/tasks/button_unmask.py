@@ -1,7 +1,7 @@
-"""ButtonUnmask: see containers appear over cubes, press the button, lift the right containers.
+"""ButtonUnmask: watch containers appear over cubes, press the button, lift the right containers.
 
-Permanence suite. As VideoUnmask, but without a video: the cubes lie open during the policy's
-first steps, whatever it does. In hard episodes one container is put down and a second is lifted.
+Permanence suite. As VideoUnmask, but without a video: the cubes lie open during the policy's first
+steps, independent of its actions. In hard episodes one container is put down and a second lifted.
 Facts: RoboMME.
 """
 
@@ -21,7 +21,7 @@ BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.05)
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
-    """A button, then containers as in VideoUnmask; the first placed are the ones to lift."""
+    """Draw a button, then containers as in VideoUnmask; the first ones are to be lifted."""
     button = draw_button(rng, BUTTON_REGION)
     obstacles = [button_keep_out(button)]
     containers = unmask.draw_containers(rng, CONTAINERS[difficulty], REGION, GAP, obstacles)
@@ -32,7 +32,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Press the button, then lift the containers."""
+    """Return the stages: press the button, then lift the containers."""
     press = unmask.press_stage(Fact("pressed", "button"), "button")
     return (press, *unmask.pick_stages(scene, goal))
 

@@ -1,7 +1,7 @@
 """ButtonUnmaskSwap: press both buttons while containers change places, then lift the right ones.
 
-Permanence suite. As VideoUnmaskSwap, but without a video: all happens during the policy's first
-steps, whatever it does. Facts: RoboMME.
+Permanence suite. As VideoUnmaskSwap, but without a video: the containers move during the policy's
+first steps, independent of its actions. Facts: RoboMME.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ FOUR: tuple[PlanePoint, ...] = ((0.0, -0.1), (0.0, 0.1), (0.1, 0.1), (0.1, -0.1)
 TRIANGLE: tuple[PlanePoint, ...] = ((-0.05, -0.15), (-0.05, 0.15), (0.05, 0.0))
 LINE: tuple[PlanePoint, ...] = ((-0.05, -0.15), (-0.05, 0.15), (-0.05, 0.0))
 MAX_SHIFT = 0.1
-"""Points are moved by up to so much: two rows of four sideways, each of three away, m."""
+"""Largest shift of the points, m: of four, both rows sideways; of three, each away."""
 
 
 def shifted_points(rng: np.random.Generator, count: int) -> tuple[PlanePoint, ...]:
-    """Three or four points about which the containers stand; they are not turned."""
+    """Draw three or four points near which the containers stand; the pattern is not turned."""
     if count == len(FOUR):
         near, far = (MAX_SHIFT * rng.random(2)).tolist()
         shifts = (near, near, far, far)
@@ -41,7 +41,7 @@ def shifted_points(rng: np.random.Generator, count: int) -> tuple[PlanePoint, ..
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
-    """Two buttons, and containers near the points of a layout, three of them over a cube."""
+    """Draw two buttons, and containers near the points of a layout, three of them over a cube."""
     right = draw_button(rng, RIGHT_REGION, RIGHT)
     left = draw_button(rng, LEFT_REGION, LEFT)
     points = shifted_points(rng, unmask_swap.CONTAINERS[difficulty])
@@ -51,7 +51,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Press both buttons, in any order, then lift the containers."""
+    """Return the stages: press both buttons, in any order, then lift the containers."""
     right, left = Fact("pressed", RIGHT), Fact("pressed", LEFT)
     both = All((OccurrenceCount((left,)), OccurrenceCount((right,))))
     return (

@@ -1,8 +1,7 @@
 """PickByCount: pick the yellow or the gray tape and place it on the target, once or twice.
 
-Suite of the real robot, this is its twin. Nothing marks the end: an operator waits whether the
-robot goes on, and so does the judge. Facts: the paper's study with a real robot. Difficulties do
-not differ.
+Simulated twin of a real-robot task. Nothing marks the end: like an operator, the judge waits
+whether the robot continues. Facts: the paper's study with a real robot. Difficulties do not differ.
 """
 
 from __future__ import annotations
@@ -24,12 +23,12 @@ TARGET_RADIUS = 0.05
 LEFT_TAPE_REGION = Region(-0.09, 0.14, 0.11, 0.09)
 TAPE_GAP = 0.03
 WAIT_STEPS = 140
-"""How long all tapes have to be left alone in the end, control steps: whoever goes on has picked
-one up by then. The longest pick of RoboMME's data takes 137."""
+"""Control steps without a pick that end the task: a policy that continues has picked a tape by
+then. The longest pick in RoboMME's data takes 137."""
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
-    """The target, a tape on either side; sides, target tape and number are uniform."""
+    """Draw the target and a tape on either side; sides, goal tape and number are uniform."""
     del difficulty
     target = draw_target(rng, "target", TARGET_RADIUS, TARGET_REGION, 0.0, ())
     obstacles: list[Footprint] = [Circle(target.position.x, target.position.y, TARGET_RADIUS)]
@@ -52,7 +51,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
-    """Every tape of the scene, once or twice."""
+    """Return a goal for every tape of the scene, once or twice."""
     return tuple(
         Goal.of(color=str(tape.color), repeats=repeats)
         for tape in scene.of_kind("tape")
@@ -61,7 +60,7 @@ def goals(scene: Scene) -> tuple[Goal, ...]:
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Pick and place, as often as wanted, then leave all tapes alone for a while."""
+    """Return the stages: N times pick and place, then leave all tapes alone for a while."""
     color = goal.text("color")
     tape = f"tape_{color}"
     wrong = tuple(

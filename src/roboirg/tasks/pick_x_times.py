@@ -1,7 +1,7 @@
-"""PickXtimes: pick a cube and place it on the target so many times, then press the button.
+"""PickXtimes: pick a cube and place it on the target N times, then press the button.
 
-Counting suite. Everything is visible from the start; after the first placement all states look
-alike, so only the count of past cycles tells when to press. Facts: RoboMME.
+Counting suite. All objects are visible from the start. After the first placement all states look
+alike, so the policy must count its placements to know when to press. Facts: RoboMME.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ TARGET_GAP = 0.04
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
-    """Button, cubes of different colors, target disc; target cube and repeats are uniform."""
+    """Draw button, cubes of different colors, target disc; goal cube and repeats are uniform."""
     repeats = draw_number(rng, REPEATS[difficulty])
     button = draw_button(rng, BUTTON_REGION)
     obstacles: list[Footprint] = [button_keep_out(button)]
@@ -47,7 +47,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
-    """Every cube of the scene, one to five times."""
+    """Return a goal for every cube of the scene, one to five times."""
     return tuple(
         Goal.of(color=str(cube.color), repeats=repeats)
         for cube in scene.of_kind("cube")
@@ -56,7 +56,7 @@ def goals(scene: Scene) -> tuple[Goal, ...]:
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Pick and place, as often as wanted, then press: 2 N + 1 stages."""
+    """Return 2 N + 1 stages: N times pick and place, then press."""
     color = goal.text("color")
     cube = f"cube_{color}"
     cubes = tuple(item.name for item in scene.of_kind("cube"))

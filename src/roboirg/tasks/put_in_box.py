@@ -1,8 +1,8 @@
 """PutInBox: put the yellow tape into the green or the purple box.
 
-Suite of the real robot, this is its twin. What has to be understood is which box; the tape is the
-only one. Facts: the paper's study with a real robot; a tape that is put into the wrong box, an
-operator counts as a failure, and so does the judge. Difficulties do not differ.
+Simulated twin of a real-robot task. The instruction selects the box; there is only one tape. Facts:
+the paper's study with a real robot. Like an operator, the judge counts a tape in the wrong box as a
+failure. Difficulties do not differ.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ TAPE_GAP = 0.03
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
-    """A box on either side, the tape before them; sides and target box are uniform."""
+    """Draw a box on either side, the tape in front of them; sides and goal box are uniform."""
     del difficulty
     left, right = draw_sides(rng, BOXES)
     sides: dict[Color, Side] = {left: "left", right: "right"}
@@ -46,12 +46,12 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
-    """Every box of the scene."""
+    """Return a goal for every box of the scene."""
     return tuple(Goal.of(color=str(box.color)) for box in scene.of_kind("box"))
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Pick the tape and put it into the box, and into no other."""
+    """Return the stages: pick the tape, and put it into the right box only."""
     target = f"box_{goal.text('color')}"
     wrong = tuple(
         Rule(
@@ -82,7 +82,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 COMMANDS = Commands(
     thing="box",
     colored="box",
-    # Excluding the tape's color and that of a box leaves the other box.
+    # Excluding the colors of the tape and one box leaves the other box.
     colors=(*BOXES, TAPE),
     by_place="the box {place}",
     patterns=("color exclusion",),

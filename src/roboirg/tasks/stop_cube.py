@@ -1,8 +1,8 @@
-"""StopCube: press the button so that the running cube stops on the target on its n-th visit.
+"""StopCube: press the button so that the moving cube stops on the target on its n-th visit.
 
-Counting suite. A cube that nothing touches runs to and fro over a target; every pass is one visit.
-The difficulty changes nothing. Facts: RoboMME, whose path turns with the target's place; here its
-angle is drawn independently.
+Counting suite. A cube without collisions moves back and forth over a target; every pass is one
+visit. Difficulties do not differ. Facts: RoboMME, where the direction of the path depends on the
+target's place; here it is drawn independently.
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ TARGET_REGION = Region(0.0, 0.0, 0.1, 0.1)
 TARGET_RADIUS = 0.036
 TARGET_THICKNESS = 0.01
 HEIGHT = 0.01
-"""Of the centers of the target and of the cube, which is half sunk in the table, m."""
+"""Height of the centers of the target and the cube, which is half sunk in the table, m."""
 PATH_HALF = 0.3
 """Half the length of the cube's path, m; the target is in its middle."""
 PATH_ANGLE = math.radians(30.0)
-"""The path is turned away from the y axis by at most so much to either side."""
+"""Largest angle between the path and the y axis, to either side."""
 INTERVALS = (60, 80, 120)
 """Control steps of one pass."""
 PASSES = 5
 VISITS = range(2, PASSES + 1)
-"""Which visits can be wanted; never the first."""
+"""Visits that a goal can name; never the first."""
 LEAD = 30
-"""How many control steps before the cube is on the target the hand begins to press."""
+"""Control steps before the cube is on the target at which the oracle starts to press."""
 CHECKPOINT = 100
-"""Waiting is cut into stages that end at multiples of so many control steps."""
+"""Waiting is split into stages that end at multiples of this number of control steps."""
 
 
 def sample(rng: np.random.Generator, _difficulty: Difficulty) -> tuple[Scene, Goal]:
-    """Button, target, cube; speed, wanted visit and direction of the path are uniform."""
+    """Draw button, target and cube; speed, goal visit and direction of the path are uniform."""
     button = draw_button(rng, BUTTON_REGION)
     x, y = TARGET_REGION.draw(rng)
     target = SceneObject(
@@ -64,12 +64,12 @@ def sample(rng: np.random.Generator, _difficulty: Difficulty) -> tuple[Scene, Go
 
 
 def goals(_scene: Scene) -> tuple[Goal, ...]:
-    """The second to the fifth visit."""
+    """Return a goal for each of the second to the fifth visit."""
     return tuple(Goal.of(visit=visit) for visit in VISITS)
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Get ready above the button, wait, press."""
+    """Return the stages: move above the button, wait, press."""
     visit = goal.number("visit")
     interval = next(motion.interval for motion in scene.motions if isinstance(motion, Shuttle))
     stopped = Fact("stopped", "shuttle", "target")
@@ -106,11 +106,11 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 
 def checkpoints(interval: int, visit: int) -> tuple[int, ...]:
-    """Control steps since reset at which waiting stages end, the last when it is time to press.
+    """Return the control steps since reset at which waiting stages end, the last to press.
 
     Args:
         interval: control steps of one pass.
-        visit: the wanted one, from 1; its middle is half an interval before its pass ends.
+        visit: the goal's visit, from 1; its middle is half an interval before its pass ends.
     """
     press = interval * visit - interval // 2 - LEAD
     return (*range(CHECKPOINT, press, CHECKPOINT), press)
@@ -119,7 +119,7 @@ def checkpoints(interval: int, visit: int) -> tuple[int, ...]:
 def _wrong(
     interval: int, visit: int, off_target: Literal["wrong_time", "misplaced"] = "wrong_time"
 ) -> tuple[Rule, ...]:
-    """What fails the episode in every stage; off the target while it is time, it is bad aim."""
+    """Return the rules of every stage; in the last, a press off the target is bad aim."""
     off = All((Fact("pressed", "button"), absent(Fact("near", "shuttle", "target"))))
     return (
         Rule(off, "pressed the button while the cube was off the target", off_target),

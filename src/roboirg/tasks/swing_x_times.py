@@ -1,7 +1,7 @@
-"""SwingXtimes: carry a cube over the right and the left target so many times, put it down, press.
+"""SwingXtimes: carry a cube over the right and left target N times, put it down, press the button.
 
-Counting suite. A disc lights up while the cube is over it and a little longer; nothing shows how
-often that has been. Facts: RoboMME.
+Counting suite. A disc lights up while the cube is over it and a little longer; nothing shows the
+count. Facts: RoboMME.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ SIDES: dict[str, Region] = {
     "right": Region(-0.1, -0.2, 0.1, 0.1),
     "left": Region(-0.1, 0.2, 0.1, 0.1),
 }
-"""Where the two targets are, in the order of visiting; sides are the robot's."""
+"""Regions of the two targets, in the order of visits; sides are the robot's."""
 TARGET_RADIUS = 0.04
 TARGET_GAP = 0.02
 TARGET_RGB = (128 / 255, 128 / 255, 128 / 255)
@@ -44,7 +44,7 @@ LINGER = 20
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
-    """Button, cubes, a target on either side; target cube and repeats are uniform."""
+    """Draw button, cubes and a target on either side; goal cube and repeats are uniform."""
     repeats = draw_number(rng, REPEATS[difficulty])
     button = draw_button(rng, BUTTON_REGION)
     obstacles: list[Footprint] = [button_keep_out(button)]
@@ -69,7 +69,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
-    """Every cube of the scene, one to three times."""
+    """Return a goal for every cube of the scene, one to three times."""
     return tuple(
         Goal.of(color=str(cube.color), repeats=repeats)
         for cube in scene.of_kind("cube")
@@ -78,14 +78,14 @@ def goals(scene: Scene) -> tuple[Goal, ...]:
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Pick, over the right and the left target as often as wanted, put down, press: 2 N + 3."""
+    """Return 2 N + 3 stages: pick, N times over the right and left target, put down, press."""
     color, repeats = goal.text("color"), goal.number("repeats")
     cube = f"cube_{color}"
     pressed = Fact("pressed", "button")
     visits = tuple(Fact("over", cube, f"target_{side}") for side in SIDES)
-    # Visits in a wrong order complete nothing and still count, so they end here, too.
+    # Visits in a wrong order complete no stage but count, so they also violate this rule.
     too_often = Rule(
-        OccurrenceCount(visits, least=2 * repeats + 1), "passed over the targets once too often"
+        OccurrenceCount(visits, least=2 * repeats + 1), "moved the cube over a target too often"
     )
     wrong_cubes = [Fact("picked", item.name) for item in scene.of_kind("cube") if item.name != cube]
     wrong: tuple[Fact | Rule, ...] = (*wrong_cubes, pressed, too_often)

@@ -1,17 +1,14 @@
-"""What a task is: facts and pure functions that the other rooms read."""
+"""The type of a task: plain data and pure functions that other packages read."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from roboirg.core.episode import COLORS, Color, Difficulty, Goal, Scene, Stage, Suite
-
-Thing = Literal["cube", "container", "box", "tape"]
-"""What can be told by a place: its kind and its name in words."""
+from roboirg.core.episode import COLORS, Color, Difficulty, Goal, ObjectKind, Scene, Stage, Suite
 
 
 def _no_stages(_scene: Scene) -> tuple[Stage, ...]:
@@ -19,13 +16,13 @@ def _no_stages(_scene: Scene) -> tuple[Stage, ...]:
 
 
 class Wording(NamedTuple):
-    """One way to say the command.
+    """One wording of the command.
 
     Attributes:
         text: a sentence with a field for each part of the goal: ``{repeats}`` for a slot with one
             value, ``{colors.0}``, ``{colors.1}`` for a slot with several; ``{cubes}`` for all
             colors together with their counts.
-        parts: how many things are handled one after the other in this sentence.
+        parts: number of objects that the sentence names one after the other.
     """
 
     text: str
@@ -34,23 +31,24 @@ class Wording(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Commands:
-    """How a task is commanded; the settings of the language fill the fields.
+    """The commands of a task; the settings of the language fill the fields.
 
     Attributes:
         patterns: reasoning patterns, in the order in which the episodes cycle through them.
         wordings: at least two for each number of parts.
-        thing: what the goal chooses among, for example ``"cube"``; places are told among all
-            things of that kind.
-        colored: what has the color that tells the thing: itself, or the cube in a container.
-        colors: those that are spoken of; color exclusion takes exactly three.
-        by_color: the thing told by a color; ``{cube}`` is what has that color.
-        by_place: the thing told by a place, after its count if it has one: ``cube[|s] ...``.
+        thing: kind of object that the goal selects, and its name in words; a place distinguishes
+            one among all objects of that kind.
+        colored: kind of object that has the goal's color: the same, or the cube in a container.
+        colors: those that commands mention; color exclusion takes exactly three.
+        by_color: how to refer to the object by a color; ``{cube}`` is the colored object.
+        by_place: how to refer to the object by a place, after its count if it has one:
+            ``cube[|s] ...``.
     """
 
     patterns: tuple[str, ...]
     wordings: tuple[Wording, ...]
-    thing: Thing = "cube"
-    colored: Thing = "cube"
+    thing: ObjectKind = "cube"
+    colored: ObjectKind = "cube"
     colors: tuple[Color, ...] = COLORS
     by_color: str = "{cube}"
     by_place: str = "the cube {place}"
@@ -58,19 +56,19 @@ class Commands:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One task, of the benchmark or of the real robot.
+    """One task, of this package or another (docs/tasks.md, "Add a task").
 
     Attributes:
         name: as in RoboMME and the paper, for example ``"PickXtimes"``.
-        suite: the suite it belongs to.
-        code: number of the task in the rule that gives an episode its seed.
+        suite: its suite.
+        code: unique number from which the seeds of its episodes follow.
         spatial: whether the spatial setting is defined for it.
-        sample: scene and goal for a difficulty; raises SceneRejectedError when the seed
-            yields no valid scene.
-        goals: every goal that somebody could have in a scene, the listener's choices.
+        sample: draws scene and goal for a difficulty; raises SceneRejectedError if the seed yields
+            no valid scene.
+        goals: every possible goal in a scene, among which the listener chooses.
         stages: what must happen, in order, for a goal in a scene.
-        commands: how it is commanded in words.
-        demonstration: stages the oracle plays before the policy's turn.
+        commands: the wordings of its instruction.
+        demonstration: stages that the oracle plays before the policy's turn.
     """
 
     name: str

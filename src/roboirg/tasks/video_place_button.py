@@ -20,7 +20,7 @@ PRESSED = Fact("pressed", "button")
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
-    """The cube goes to ``target_0`` before the press and to ``target_1`` after it."""
+    """Draw a scene in which the cube goes to ``target_0``, then to ``target_1`` after the press."""
     objects = video_place.draw_table(
         rng, video_place.CUBES[difficulty], DISCS[difficulty], SITE_RADIUS
     )
@@ -35,7 +35,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
-    """Any cube, to the disc used before the press or to the one used after it."""
+    """Return a goal for every cube and the disc used before or after the press."""
     return tuple(
         Goal.of(color=color, relation=relation)
         for color in video_place.colors_of(scene)
@@ -44,7 +44,7 @@ def goals(scene: Scene) -> tuple[Goal, ...]:
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Pick the cube, and place it where one was placed right before or after the press."""
+    """Return the stages: pick the cube, and place it on the disc before or after the press."""
     step = -1 if goal.text("relation") == "before" else 1
     placing = scene.past[scene.past.index(PRESSED) + step]
     return video_place.place_stages(scene, goal.text("color"), str(placing.place))

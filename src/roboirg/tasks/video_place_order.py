@@ -23,7 +23,7 @@ PRESSED = Fact("pressed", "button")
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
-    """Visited discs, their number and order, the wanted one and the time of the press: uniform."""
+    """Draw the visited discs, their order, the goal's disc and the time of the press."""
     objects = video_place.draw_table(rng, video_place.CUBES[difficulty], DISCS, SITE_RADIUS)
     table = Scene(objects)
     cubes, discs = table.of_kind("cube"), table.of_kind("target")
@@ -39,7 +39,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
-    """Any cube, to any of the discs that were visited."""
+    """Return a goal for every cube and every disc that was visited."""
     return tuple(
         Goal.of(color=color, placement=placement)
         for color in video_place.colors_of(scene)
@@ -48,7 +48,7 @@ def goals(scene: Scene) -> tuple[Goal, ...]:
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Pick the cube, and place it on the disc of that number in the order of visits."""
+    """Return the stages: pick the cube, and place it on the n-th disc that was visited."""
     answer = video_place.visited(scene)[goal.number("placement") - 1]
     return video_place.place_stages(scene, goal.text("color"), answer)
 

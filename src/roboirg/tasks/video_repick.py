@@ -1,7 +1,7 @@
-"""VideoRepick: pick the cube up again that the video showed, so many times, then press the button.
+"""VideoRepick: pick up the cube from the video N times, then press the button.
 
 Reference suite. The video shows one of several cubes picked up and put down. In easy and medium
-episodes all cubes look alike and change places afterwards; in hard ones many stay where they are.
+episodes all cubes look alike and change places afterwards; in hard ones none of many cubes moves.
 Facts: RoboMME.
 """
 
@@ -33,30 +33,30 @@ BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.05)
 GAP = 0.02
 LAYOUT_CUBES = 3
 LAYOUT_HALF = 0.07
-"""Half side of the square around a point of the layout in which its cube lies."""
+"""Half side of the square around a layout point in which its cube lies, m."""
 CLUTTER_REGION = Region(-0.1, 0.0, 0.2, 0.25)
 CLUTTER_ROUNDS = 5
-"""How many cubes of each color a cluttered table has."""
+"""Cubes of each color on a cluttered table."""
 
 SWAP_LANE = 0.07
 SWAP_STAGE = 3
-"""Index of the demonstration's stage with which the exchanges begin: the first hold."""
+"""Index of the demonstration's stage with which the swaps start: the first hold."""
 
 SHOWN_RELEASE, OWN_RELEASE = 0.03, 0.01
-"""Tool heights at which the oracle lets the cube go in the video and afterwards, m."""
+"""Tool heights at which the oracle releases the cube in the video and afterwards, m."""
 
 EARLY_PRESS = (50, 500)
-"""A press before its time only fails within these steps of its timer."""
+"""A premature press fails only within these control steps of its timer."""
 PRESSED = Fact("pressed", "button")
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
-    """Button and cubes; which cube is shown and how often it is wanted are uniform."""
+    """Draw button and cubes; the cube of the video and the number of repeats are uniform."""
     repeats = draw_number(rng, REPEATS)
     swaps = draw_number(rng, SWAPS[difficulty])
     button = draw_button(rng, BUTTON_REGION)
     cubes = _draw_clutter(rng, button) if difficulty == "hard" else _draw_layout(rng, button)
-    # The cube that was shown begins the first exchange, the others follow in any order.
+    # The cube of the video starts the first swap, the others follow in any order.
     target, *others = (cubes[index].name for index in rng.permutation(len(cubes)))
     motions = plan_swaps(
         cubes, (target, *others)[:swaps], start=0, lane=SWAP_LANE, stage=SWAP_STAGE
@@ -66,7 +66,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
 
 
 def _draw_layout(rng: np.random.Generator, button: SceneObject) -> list[SceneObject]:
-    """Three cubes of one color, each near its point of a layout."""
+    """Draw three cubes of one color, each near its point of a layout."""
     color = COLORS[int(rng.integers(len(COLORS)))]
     obstacles: list[Footprint] = [button_keep_out(button)]
     cubes: list[SceneObject] = []
@@ -79,7 +79,7 @@ def _draw_layout(rng: np.random.Generator, button: SceneObject) -> list[SceneObj
 
 
 def _draw_clutter(rng: np.random.Generator, button: SceneObject) -> list[SceneObject]:
-    """Five cubes of each color, anywhere; in each round one of each, in any order."""
+    """Draw five cubes of each color; in each round one of each, in any order."""
     obstacles: list[Footprint] = [button_keep_out(button)]
     cubes: list[SceneObject] = []
     for number in range(CLUTTER_ROUNDS):
@@ -93,7 +93,7 @@ def _draw_clutter(rng: np.random.Generator, button: SceneObject) -> list[SceneOb
 
 
 def demonstration(scene: Scene) -> tuple[Stage, ...]:
-    """The cube is picked up and put down; the robot waits while cubes change places."""
+    """Return the video's stages: pick up the cube, put it down, wait while cubes change places."""
     target = scene.past[0].subject
     put_down = Stage(
         expects=Fact("lying", target),
@@ -108,13 +108,13 @@ def demonstration(scene: Scene) -> tuple[Stage, ...]:
 
 
 def goals(_scene: Scene) -> tuple[Goal, ...]:
-    """One to three times; the video tells which cube."""
+    """Return a goal for each of one to three repeats; the video shows the cube."""
     low, high = REPEATS
     return tuple(Goal.of(repeats=repeats) for repeats in range(low, high + 1))
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Pick up and put down, as often as wanted, then press: 2 N + 1 stages."""
+    """Return 2 N + 1 stages: N times pick up and put down, then press."""
     target = scene.past[0].subject
     cubes = tuple(item.name for item in scene.of_kind("cube"))
     wrong = tuple(Fact("picked", other) for other in cubes if other != target)
@@ -147,7 +147,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 
 def _early_press(timer: str) -> Rule:
-    """A press within the steps of its timer in which it counts as premature."""
+    """Return the rule against a premature press, given the name of its timer."""
     return Rule(All((PRESSED, Elapsed(*EARLY_PRESS, timer=timer))), "pressed the button too early")
 
 

@@ -1,7 +1,7 @@
-"""VideoUnmask: see in the video which container covers which cube, then lift the right ones.
+"""VideoUnmask: watch in the video which container covers which cube, then lift the right ones.
 
-Permanence suite. The video shows the open cubes, then identical containers stand over them; the
-policy sees only containers. In hard episodes one container is put down and a second is lifted.
+Permanence suite. The video shows the open cubes, then identical containers over them; the policy
+sees only containers. In hard episodes one container is put down and a second is lifted.
 Facts: RoboMME.
 """
 
@@ -15,7 +15,7 @@ from roboirg.tasks.shared.placement import Region
 from roboirg.tasks.task import Task, Wording
 
 CONTAINERS: dict[Difficulty, int] = {"easy": 3, "medium": 5, "hard": 15}
-"""Upper bounds: placement ends at the first container that fits nowhere."""
+"""Upper bounds: placement ends at the first container without a free place."""
 PICKS: dict[Difficulty, int] = {"easy": 1, "medium": 1, "hard": 2}
 
 REGION = Region(0.0, 0.0, 0.2, 0.2)
@@ -24,7 +24,7 @@ HOLD_STEPS = 64
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
-    """Containers at random, three of them over a cube; the first placed are the ones to lift."""
+    """Draw containers, three of them over a cube; the first ones are to be lifted."""
     containers = unmask.draw_containers(rng, CONTAINERS[difficulty], REGION, GAP)
     cubes = unmask.hide_cubes(rng, containers)
     colors = tuple(str(cube.color) for cube in cubes[: PICKS[difficulty]])
@@ -33,7 +33,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
 
 
 def demonstration(_scene: Scene) -> tuple[Stage, ...]:
-    """The robot watches for 64 steps."""
+    """Return the video's stage: hold still for 64 steps."""
     return (video_stages.hold_still(HOLD_STEPS),)
 
 

@@ -1,7 +1,7 @@
 """VideoUnmaskSwap: watch containers appear over cubes and change places, lift the right ones.
 
-Permanence suite. Two containers that change places also exchange their orientations, so only the
-movement in the video tells where a cube has gone. Facts: RoboMME.
+Permanence suite. Containers that change places also exchange their orientations, so only the
+movement in the video shows where a cube has gone. Facts: RoboMME.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from roboirg.tasks.task import Task, Wording
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
-    """Containers near the points of a turned layout, three of them over a cube."""
+    """Draw containers near the points of a turned layout, three of them over a cube."""
     points = layout_points(rng, unmask_swap.CONTAINERS[difficulty])
     return unmask_swap.sample(rng, difficulty, unmask_swap.draw_containers_about(rng, points))
 
 
 def demonstration(scene: Scene) -> tuple[Stage, ...]:
-    """The robot watches until the last exchange: 114, 164 or 214 steps."""
+    """Return the video's stage: hold still until the last swap, for 114, 164 or 214 steps."""
     return (video_stages.hold_still(last_step(scene.motions)),)
 
 

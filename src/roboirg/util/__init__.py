@@ -1,1 +1,1 @@
-"""Helpers that know nothing of robots: caching, parallel work, discovery, text in pictures."""
+"""Helpers without robot code: cache, parallel map, discovery, plurals, text in pictures."""

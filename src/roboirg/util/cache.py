@@ -1,11 +1,10 @@
-"""Files that save work: named by what determines them, bounded in size, safe against crashes.
+"""Disk cache: files under keys, limited in size and safe against crashes.
 
-An entry is written to another name, flushed to the disk and renamed, so that a kill leaves a whole
-entry or none; it carries a checksum, so that damage done later is noticed. Any number of processes
-may read and write. Nothing depends on a cache: where the disk refuses, there are no entries.
+An entry is written under a temporary name, flushed to the disk and renamed, so that a kill leaves
+a complete entry or none. A checksum detects later damage. Any number of processes may read and
+write. Errors of the disk never reach the caller: the cache then has no entries.
 
-``ROBOIRG_CACHE`` names the folder, or is ``off``; ``ROBOIRG_CACHE_GIB`` is the most that it may
-hold.
+``ROBOIRG_CACHE`` names the folder, or is ``off``; ``ROBOIRG_CACHE_GIB`` limits its size.
 """
 
 from __future__ import annotations
@@ -26,28 +25,28 @@ from roboirg.core.errors import InvalidValueError
 FOLDER_VARIABLE = "ROBOIRG_CACHE"
 SIZE_VARIABLE = "ROBOIRG_CACHE_GIB"
 OFF = "off"
-USUAL_GIB = 2.0
+DEFAULT_GIB = 2.0
 _GIB = 2**30
 
 Kind = Literal["actions", "frames", "meshes"]
 _SHARES: dict[Kind, float] = {"actions": 1 / 16, "frames": 14 / 16, "meshes": 1 / 16}
-"""Of the size. Frames are large and quick to draw again; they must not drive out the others."""
+"""Shares of the size. Frames are large and cheap to render again; they must not evict the rest."""
 
 _MAGIC = b"roboirg1"
 _HEAD_SIZE = len(_MAGIC) + hashlib.sha256().digest_size
 _PART = ".part"
 _ABANDONED = 600.0
-"""Seconds after which an unfinished entry belongs to a process that is no more."""
+"""Seconds after which an unfinished entry must belong to a dead process."""
 
 _log = logging.getLogger(__name__)
 
 
 class Cache:
-    """Entries of one kind in one folder.
+    """Cache of one kind of entries in one folder; evicts the least recently used ones.
 
     Args:
-        folder: made when something is kept; None keeps nothing.
-        limit: bytes that all entries together may have; what has not been used for longest goes.
+        folder: created with the first entry; None disables the cache.
+        limit: size limit of all entries together, bytes.
     """
 
     def __init__(self, folder: Path | None, limit: int) -> None:
@@ -55,12 +54,12 @@ class Cache:
         self._limit = limit
 
     @property
-    def keeps(self) -> bool:
-        """Whether anything is kept at all."""
+    def enabled(self) -> bool:
+        """Whether the cache stores anything."""
         return self._folder is not None
 
     def read(self, key: str) -> memoryview | None:
-        """What was kept under a key; None if it is not there (any more) or damaged."""
+        """Return the content of an entry; None if it is missing or damaged."""
         if self._folder is None:
             return None
         path = self._folder / key
@@ -68,19 +67,19 @@ class Cache:
             raw = path.read_bytes()
             content = memoryview(raw)[_HEAD_SIZE:]
             if raw[:_HEAD_SIZE] != _head(key, content):
-                _log.warning("The cache entry %s is damaged; it is made anew.", path)
+                _log.warning("The cache entry %s is damaged and will be rebuilt.", path)
                 path.unlink(missing_ok=True)
                 return None
             os.utime(path)
         except FileNotFoundError:
             return None
         except OSError as error:
-            _give_notice(error)
+            _warn_once(error)
             return None
         return content
 
     def write(self, key: str, content: bytes) -> None:
-        """Keep something; whether that works makes no difference to the caller."""
+        """Store an entry; a failure is logged, not raised."""
         size = _HEAD_SIZE + len(content)
         if self._folder is None or size > self._limit:
             return
@@ -99,20 +98,20 @@ class Cache:
                 part.unlink(missing_ok=True)
             _flush_folder(self._folder)
         except OSError as error:
-            _give_notice(error)
+            _warn_once(error)
 
     def _make_room(self, size: int) -> None:
-        """Remove what has not been used for longest until so many bytes more fit in."""
+        """Remove the least recently used entries until `size` bytes more fit in."""
         entries = sorted(self._entries())
-        total = size + sum(held for _, held, _ in entries)
-        for _, held, path in entries:
+        total = size + sum(entry_size for _, entry_size, _ in entries)
+        for _, entry_size, path in entries:
             if total <= self._limit:
                 return
             path.unlink(missing_ok=True)
-            total -= held
+            total -= entry_size
 
     def _entries(self) -> Iterator[tuple[int, int, Path]]:
-        """When each entry was last used (ns), its bytes and path; sweeps out what was abandoned."""
+        """Yield time of last use (ns), size and path of each entry; remove abandoned ones."""
         for path in Path(self._folder or "").iterdir():
             try:
                 state = path.stat()
@@ -121,14 +120,14 @@ class Cache:
                 elif time.time() - state.st_mtime > _ABANDONED:
                     path.unlink(missing_ok=True)
             except FileNotFoundError:
-                continue  # another process has made room
+                continue  # another process removed it
 
 
 def open_cache(kind: Kind) -> Cache:
-    """The cache of one kind of things, as the environment variables want it.
+    """Return the cache of one kind of entries, as the environment variables configure it.
 
     Raises:
-        InvalidValueError: ``ROBOIRG_CACHE_GIB`` is no positive number.
+        InvalidValueError: ``ROBOIRG_CACHE_GIB`` is not a positive number.
     """
     folder = cache_folder()
     if folder is None:
@@ -137,27 +136,27 @@ def open_cache(kind: Kind) -> Cache:
 
 
 def cache_folder() -> Path | None:
-    """The folder of all caches, as the environment variable wants it; None for none."""
-    named = os.environ.get(FOLDER_VARIABLE, "")
-    if named == OFF:
+    """Return the folder of all caches; None if the environment variable disables them."""
+    folder = os.environ.get(FOLDER_VARIABLE, "")
+    if folder == OFF:
         return None
-    return Path(named).expanduser() if named else platformdirs.user_cache_path("roboirgbench")
+    return Path(folder).expanduser() if folder else platformdirs.user_cache_path("roboirgbench")
 
 
 def _size() -> float:
-    """Bytes that all caches together may have."""
-    text = os.environ.get(SIZE_VARIABLE) or str(USUAL_GIB)
+    """Return the size limit of all caches together, bytes."""
+    text = os.environ.get(SIZE_VARIABLE) or str(DEFAULT_GIB)
     try:
         number = float(text)
     except ValueError:
         number = 0.0
     if not 0.0 < number < float("inf"):
-        raise InvalidValueError(f"{SIZE_VARIABLE} is {text!r}; it has to be a positive number.")
+        raise InvalidValueError(f"{SIZE_VARIABLE} is {text!r}; it must be a positive number.")
     return number * _GIB
 
 
 def _head(key: str, content: bytes | memoryview) -> bytes:
-    """What an entry begins with; it fits to no other key and no other content."""
+    """Return the head of an entry: a checksum of its key and content."""
     digest = hashlib.sha256(key.encode())
     digest.update(content)
     return _MAGIC + digest.digest()
@@ -171,11 +170,11 @@ def _flush_folder(folder: Path) -> None:
         os.close(number)
 
 
-_noticed: set[type[OSError]] = set()
+_warned: set[type[OSError]] = set()
 
 
-def _give_notice(error: OSError) -> None:
-    """Say what is wrong with the cache, once in a process for each kind of trouble."""
-    if type(error) not in _noticed:
-        _noticed.add(type(error))
-        _log.warning("The cache cannot be used (%s); what it lacks is made anew.", error)
+def _warn_once(error: OSError) -> None:
+    """Log an error of the cache, once in a process for each type of error."""
+    if type(error) not in _warned:
+        _warned.add(type(error))
+        _log.warning("The cache is unusable (%s); its entries will be rebuilt.", error)

@@ -1,4 +1,4 @@
-"""The same work on many things, in processes of their own."""
+"""Parallel map: call a function on many items in worker processes."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ Outcome = TypeVar("Outcome")
 def parallel_map(
     work: Callable[[Item], Outcome], items: Sequence[Item], workers: int
 ) -> Iterator[tuple[Item, Outcome]]:
-    """Every item with what the work on it gives, as they end.
+    """Yield every item with the result of its call, in the order in which the calls finish.
 
     Args:
         work: a function that can be pickled.
-        items: what it is called with.
-        workers: how many processes; 0 works in this one.
+        items: its arguments, one for each call.
+        workers: number of processes; 0 runs all calls in this process.
 
     Raises:
         InvalidValueError: a negative number of workers.
-        RoboIRGError: a process died.
+        RoboIRGError: a worker process died.
     """
     if workers < 0:
         raise InvalidValueError(f"workers is {workers}; it must be at least 0.")
@@ -37,10 +37,10 @@ def parallel_map(
         return
     pool = ProcessPoolExecutor(
         workers,
-        # Spawned, not forked: threads of the simulator do not survive a fork.
+        # Spawn, because threads of the simulator do not survive a fork.
         mp_context=multiprocessing.get_context("spawn"),
         initializer=signal.signal,
-        # Ctrl-C reaches the whole process group; the parent decides what it means.
+        # Ctrl-C reaches the whole process group; only the parent handles it.
         initargs=(signal.SIGINT, signal.SIG_IGN),
     )
     with contextlib.ExitStack() as stack:
@@ -50,4 +50,4 @@ def parallel_map(
             for future in as_completed(futures):
                 yield futures[future], future.result()
         except BrokenProcessPool as error:
-            raise RoboIRGError(f"A process at work died: {error}") from error
+            raise RoboIRGError(f"A worker process died: {error}") from error

@@ -1,4 +1,4 @@
-"""Text in pictures, with the fonts that OpenCV always has."""
+"""Draw text into pictures, with the built-in fonts of OpenCV."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ Frame = NDArray[np.uint8]
 Color = tuple[int, int, int]
 """RGB, 0 to 255."""
 
-_FONT = 0  # cv2.FONT_HERSHEY_SIMPLEX; importing OpenCV takes a while
+_FONT = 0  # cv2.FONT_HERSHEY_SIMPLEX; importing OpenCV is slow
 
 
 def draw_text(
     image: Frame, text: str, x: int, y: int, scale: float, color: Color, thickness: int = 1
 ) -> None:
-    """Put a line of text into a picture, with its base line at y; what is not ASCII becomes "?".
+    """Draw a line of text into a picture; characters outside ASCII become ``?``.
 
     Args:
         image: uint8 (height, width, 3), changed in place.
         text: one line.
-        x: of the left end, pixels.
-        y: of the base line, pixels.
-        scale: 1 is about 22 pixels high.
+        x: left end of the text, pixels.
+        y: base line of the text, pixels.
+        scale: size of the font; 1 is about 22 pixels high.
         color: RGB.
-        thickness: of the strokes, pixels.
+        thickness: width of the strokes, pixels.
     """
     import cv2
 
@@ -33,7 +33,7 @@ def draw_text(
 
 
 def wrap_text(text: str, width: int, scale: float) -> list[str]:
-    """The text in lines of at most so many pixels; a word that is longer has its own line."""
+    """Split a text into lines of at most `width` pixels; a longer word gets a line of its own."""
     import cv2
 
     lines: list[str] = []

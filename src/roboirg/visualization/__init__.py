@@ -1,1 +1,1 @@
-"""One episode to look at: its scene in words and a sheet of pictures of how the oracle plays it."""
+"""Inspection of one episode: its scene in words, and a contact sheet of the oracle's play."""

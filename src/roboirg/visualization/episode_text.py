@@ -1,4 +1,4 @@
-"""An episode in words and tables for the terminal."""
+"""Description of an episode in words and tables, for the terminal."""
 
 from __future__ import annotations
 
@@ -14,32 +14,32 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import Episode, Scene, SceneObject
 from roboirg.core.motions import Away, Glow, Motion, Point, Shuttle, Swap, Vanish
 from roboirg.judging import plain_subgoal
-from roboirg.language import expressible, instruct, settings_of
+from roboirg.language import find_refusals, instruct, settings_of
 from roboirg.tasks import get_task
 
 MINIMUM_WIDTH = 100
-"""Columns to use where the output is not a terminal."""
+"""Columns if the output is not a terminal."""
 
 _RELATIONS = {"placed": "placed on", "binned": "in", "stopped": "stopped on", "hovering": "over"}
 
 
 def print_episode(episode: Episode, console: Console) -> None:
-    """Everything but pictures: objects, motions, video, goal, and what is said in each setting."""
+    """Print objects, motions, video, goal, and the instruction in each setting."""
     if not console.is_terminal:
         console.width = max(console.width, MINIMUM_WIDTH)
     console.print(
         f"[bold]{episode.key}[/] {episode.difficulty}, seed {episode.seed}", highlight=False
     )
     console.print(objects_table(episode.scene))
-    _print_list("moves by itself", motion_lines(episode.scene), console)
-    _print_list("the video shows", video_lines(episode), console)
+    _print_list("moves by itself", describe_motions(episode.scene), console)
+    _print_list("the video shows", describe_video(episode), console)
     goal = ", ".join(f"{slot} {_value(value)}" for slot, value in episode.goal.slots)
     _print_list("goal", [goal], console)
     console.print(instructions_table(episode))
 
 
 def objects_table(scene: Scene) -> Table:
-    """All objects with their places at the start, meters and degrees."""
+    """Return a table of all objects with their initial positions (m) and yaw (degrees)."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for name in ("object", "kind", "color"):
         table.add_column(name)
@@ -52,8 +52,8 @@ def objects_table(scene: Scene) -> Table:
     return table
 
 
-def motion_lines(scene: Scene) -> list[str]:
-    """The scripted movements in words; those that say the same of several objects are one."""
+def describe_motions(scene: Scene) -> list[str]:
+    """Describe the scripted motions; objects with the same motion share a line."""
     subjects: dict[str, list[str]] = {}
     for motion in scene.motions:
         subject, words = _motion_words(motion)
@@ -61,8 +61,8 @@ def motion_lines(scene: Scene) -> list[str]:
     return [f"{', '.join(names)}: {words}" for words, names in subjects.items()]
 
 
-def video_lines(episode: Episode) -> list[str]:
-    """The stages of the demonstration, and what of it counts."""
+def describe_video(episode: Episode) -> list[str]:
+    """Describe the stages of the demonstration and the facts that instructions refer to."""
     shown = [plain_subgoal(stage) for stage in episode.demonstration if stage.recorded]
     lines = [f"{number}. {words}" for number, words in enumerate(shown, start=1)]
     if episode.scene.past:
@@ -71,21 +71,20 @@ def video_lines(episode: Episode) -> list[str]:
 
 
 def fact_words(fact: Fact) -> str:
-    """A fact in words, with the objects' names."""
-    words = _RELATIONS.get(fact.kind, fact.kind.replace("_", " "))
-    return " ".join(part for part in (fact.subject, words, fact.place) if part)
+    """Return a fact in words, with the objects' names."""
+    return " ".join(part for part in (fact.subject, fact.traits.state, fact.place) if part)
 
 
 def instructions_table(episode: Episode) -> Table:
-    """What is said in every setting, and its resolved form."""
+    """Return a table of the instruction in every setting, implicit and resolved."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_lines=False)
     table.add_column("setting", style="bold")
     table.add_column("form", style="dim")
     table.add_column("instruction", overflow="fold")
-    sayable = expressible(episode)
+    refusals = find_refusals(episode)
     for setting in settings_of(get_task(episode.task)):
-        if setting not in sayable:
-            table.add_row(setting, "", "cannot be expressed")
+        if setting in refusals:
+            table.add_row(setting, "", f"cannot express the episode: {escape(refusals[setting])}")
             continue
         for form in ("implicit",) if setting == "explicit" else ("implicit", "resolved"):
             text = instruct(episode, setting, form).text
@@ -94,7 +93,7 @@ def instructions_table(episode: Episode) -> Table:
 
 
 def _motion_words(motion: Motion) -> tuple[str, str]:
-    """Who moves, and how."""
+    """Return the object that moves, and its movement in words."""
     match motion:
         case Away(subject, start, end, under):
             begin = f"away from step {start}" if start else "away"

@@ -1,4 +1,4 @@
-"""The paper's figures, made of the records of one or several runs."""
+"""The paper's figures, drawn from the records of one or several runs."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ def write_figures(
 
     Args:
         content: of the runs.
-        folder: made if it is missing.
-        which: names out of `FIGURES`; what the runs have nothing for is left out.
-        published: put the paper's own values in, as ghosts.
+        folder: created if missing.
+        which: names out of `FIGURES`; figures without data are left out.
+        published: whether to add the paper's values, in gray.
 
     Returns:
         The files.
 
     Raises:
-        UnknownNameError: there is no such figure.
+        UnknownNameError: a figure does not exist.
         MissingDependencyError: matplotlib is not installed.
-        InvalidValueError: the folder cannot be written to, or there is nothing to draw.
+        InvalidValueError: the folder is not writable, or there is nothing to draw.
     """
     for name in which:
         if name not in FIGURES:
@@ -42,7 +42,7 @@ def write_figures(
     ]
     if not paths:
         raise InvalidValueError(
-            f"The runs hold nothing to draw for {', '.join(which)}; `roboirg tables` shows what "
+            f"The runs have nothing to draw for {', '.join(which)}; `roboirg tables` shows what "
             "they have."
         )
     return tuple(paths)

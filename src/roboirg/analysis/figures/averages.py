@@ -1,4 +1,4 @@
-"""Figure: the average over tasks in each setting, for each policy."""
+"""Figure: average over tasks in each setting, for each policy."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from roboirg.analysis.figures.figure_style import (
     rates_figure,
 )
 from roboirg.analysis.published import published_rows
-from roboirg.analysis.stats.run_summary import ALL
-from roboirg.analysis.stats.success_rates import SETTING_ORDER, SettingColumn
+from roboirg.analysis.stats.option_labels import default_settings
+from roboirg.analysis.stats.run_summary import ALL, ScopeKey
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.util.plurals import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,31 +24,29 @@ if TYPE_CHECKING:
 
 HEIGHT_INCHES = 2.5
 SPREAD = 0.62
-"""The width over which the points of one setting lie, in distances between settings."""
+"""Width of the points of one setting, relative to the distance between settings."""
 GHOST_PLACE = 0.42
 
 
 def draw_averages(content: FigureData, *, published: bool = False) -> Figure | None:
-    """Draw the unweighted means over tasks with their intervals; None without any."""
-    settings = [
-        setting
-        for setting in SETTING_ORDER
-        if any((who, ALL, SettingColumn(setting)) in content.summaries for who in content.names)
-    ]
+    """Draw the unweighted means over tasks with their intervals; return None without any."""
+    settings = default_settings(key.options for key in content.summaries)
     if not settings:
         return None
     ghosts = published_rows("main") if published else ()
     models = list(dict.fromkeys(row.model for row in ghosts))
     figure, axes = rates_figure(HEIGHT_INCHES, len(content.names) + len(models))
-    for number, who in enumerate(content.names):
+    for number, policy_run in enumerate(content.names):
+        label = content.name(policy_run)
         for place, setting in enumerate(settings):
-            one = content.summaries.get((who, ALL, SettingColumn(setting)))
+            key = ScopeKey(policy_run, ALL, InstructionOptions(setting))
+            one = content.summaries.get(key)
             if one is not None and one.rate is not None:
                 at = place + _offset(number, len(content.names))
-                draw_point(axes, at, float(one.rate), one.interval, number, content.name(who))
+                draw_point(axes, at, float(one.rate), one.interval, number, label)
     for row in ghosts:
-        if row.variant.setting in settings:
-            at = settings.index(row.variant.setting) + GHOST_PLACE
+        if row.options.setting in settings:
+            at = settings.index(row.options.setting) + GHOST_PLACE
             number = models.index(row.model)
             draw_ghost(axes, at, float(row.average), number, f"{row.model} (published)")
     _set_axes(axes, content, settings, room=GHOST_PLACE if ghosts else 0.0)
@@ -62,14 +62,14 @@ def _set_axes(axes: Axes, content: FigureData, settings: list[str], room: float)
 
 
 def _label(content: FigureData, setting: str) -> str:
-    """The setting and over how many tasks it is a mean."""
-    counts = {
+    """Return the setting and the number of tasks in its mean."""
+    counts = [
         len(one.tasks)
-        for (_, scope, told), one in content.summaries.items()
-        if scope == ALL and told == SettingColumn(setting) and one.rate is not None
-    }
-    words = "–".join(map(str, sorted({min(counts, default=0), max(counts, default=0)})))
-    return f"{setting}\n({words} task{'' if words == '1' else 's'})"
+        for key, one in content.summaries.items()
+        if key.scope == ALL and key.options == InstructionOptions(setting) and one.rate is not None
+    ]
+    low, high = min(counts, default=0), max(counts, default=0)
+    return f"{setting}\n({'' if low == high else f'{low}–'}{counted(high, 'task')})"
 
 
 def _offset(number: int, count: int) -> float:

@@ -1,10 +1,10 @@
-"""Figure: success by how much of the contextual discourse is spoken."""
+"""Figure: success by the stages of the contextual discourse that are spoken."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from roboirg.analysis.figures.figure_data import FigureData, by_key
+from roboirg.analysis.figures.figure_data import FigureData, summaries_by_key
 from roboirg.analysis.figures.figure_style import (
     COLORS,
     GHOST,
@@ -14,10 +14,10 @@ from roboirg.analysis.figures.figure_style import (
     rates_figure,
 )
 from roboirg.analysis.published import published_rows
-from roboirg.analysis.stats.run_summary import ALL
-from roboirg.analysis.stats.samples import PolicyRun, Samples
-from roboirg.analysis.stats.success_rates import SettingColumn
-from roboirg.language import STAGE_SETS
+from roboirg.analysis.stats.cells import CellKey, Cells, PolicyRun
+from roboirg.analysis.stats.option_labels import staged_options
+from roboirg.analysis.stats.run_summary import ALL, ScopeKey
+from roboirg.core.instruction_options import InstructionOptions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,72 +28,82 @@ SHIFT = 0.08
 
 
 def draw_context(content: FigureData, *, published: bool = False) -> Figure | None:
-    """Draw the means over the tasks that were played with every set; None with one set or none."""
-    sets = [
-        stages
-        for stages in STAGE_SETS
-        if any(_is(told, stages) for told in _courses(content.samples).values())
-    ]
-    samples, tasks = _shared(content.samples, sets)
+    """Draw the means over the tasks played with every set of stages.
+
+    Returns:
+        None if no policy was played with several sets, or no task with all of them.
+    """
+    played = _played(content.cells)
+    columns = [one for one in staged_options() if any(one in own for own in played.values())]
+    cells, tasks = _shared(content.cells, list(played), columns)
     if not tasks:
         return None
-    found = by_key(samples)
     ghosts = published_rows("context") if published else ()
     models = list(dict.fromkeys(row.model for row in ghosts))
-    names = [who for who in content.names if any(own == who for own, _, _ in found)]
-    figure, axes = rates_figure(HEIGHT_INCHES, len(names) + len(models))
-    for number, who in enumerate(names):
-        course = []
-        for place, stages in enumerate(sets):
-            one = found.get((who, ALL, SettingColumn("contextual", stages=stages)))
-            if one is not None and one.rate is not None:
-                at = place + SHIFT * (number - (len(names) - 1) / 2)
-                course.append((at, 100 * float(one.rate)))
-                draw_point(axes, at, float(one.rate), one.interval, number, content.name(who))
-        axes.plot(*zip(*course, strict=True), color=COLORS[number % len(COLORS)], linewidth=0.8)
-    for model in models:
-        rows = {row.variant.stages: float(row.average) for row in ghosts if row.model == model}
-        known = [(place, rows[stages]) for place, stages in enumerate(sets) if stages in rows]
-        for at, value in known:
-            draw_ghost(axes, at, value, models.index(model), f"{model} (published)")
-        axes.plot(*zip(*known, strict=True), color=GHOST, linewidth=0.6, linestyle=":", zorder=1)
-    _set_axes(axes, sets, tasks)
+    policy_runs = {key.policy_run for key in cells}
+    entries = len(policy_runs) + len(models)
+    figure, axes = rates_figure(HEIGHT_INCHES, entries)
+    _draw_policies(axes, content, cells, columns)
+    for number, model in enumerate(models):
+        rates = {row.options: float(row.average) for row in ghosts if row.model == model}
+        _draw_model(axes, model, [rates.get(options) for options in columns], number)
+    _set_axes(axes, columns, tasks)
     legend_below(figure, axes)
     return figure
 
 
-def _set_axes(axes: Axes, sets: list[tuple[int, ...]], tasks: list[str]) -> None:
-    axes.set_xticks(range(len(sets)), [",".join(map(str, stages)) for stages in sets])
-    axes.set_xlim(-0.4, len(sets) - 0.6)
+def _draw_policies(
+    axes: Axes, content: FigureData, cells: Cells, columns: list[InstructionOptions]
+) -> None:
+    found = summaries_by_key(cells)
+    policy_runs = [one for one in content.names if any(key.policy_run == one for key in found)]
+    for number, policy_run in enumerate(policy_runs):
+        shift = SHIFT * (number - (len(policy_runs) - 1) / 2)
+        line = []
+        for place, options in enumerate(columns):
+            one = found.get(ScopeKey(policy_run, ALL, options))
+            if one is not None and one.rate is not None:
+                rate, label = float(one.rate), content.name(policy_run)
+                line.append((place + shift, 100 * rate))
+                draw_point(axes, place + shift, rate, one.interval, number, label)
+        axes.plot(*zip(*line, strict=True), color=COLORS[number % len(COLORS)], linewidth=0.8)
+
+
+def _draw_model(axes: Axes, model: str, rates: list[float | None], number: int) -> None:
+    line = [(place, rate) for place, rate in enumerate(rates) if rate is not None]
+    for place, rate in line:
+        draw_ghost(axes, place, rate, number, f"{model} (published)")
+    axes.plot(*zip(*line, strict=True), color=GHOST, linewidth=0.6, linestyle=":", zorder=1)
+
+
+def _set_axes(axes: Axes, columns: list[InstructionOptions], tasks: list[str]) -> None:
+    axes.set_xticks(range(len(columns)), [",".join(map(str, one.stages)) for one in columns])
+    axes.set_xlim(-0.4, len(columns) - 0.6)
     axes.set_xlabel(f"stages that are spoken; mean over {', '.join(tasks)}", wrap=True)
 
 
-def _courses(samples: Samples) -> dict[PolicyRun, set[SettingColumn]]:
-    """The sets that each contestant was told, of those who were told several."""
-    usual = {SettingColumn("contextual", stages=stages) for stages in STAGE_SETS}
-    told: dict[PolicyRun, set[SettingColumn]] = {}
-    for (who, _, variant), sample in samples.items():
-        if variant in usual and sample.trials:
-            told.setdefault(who, set()).add(variant)
-    return {who: own for who, own in told.items() if len(own) > 1}
+def _played(cells: Cells) -> dict[PolicyRun, set[InstructionOptions]]:
+    """Return the sets of stages that each policy run played, for those that played several."""
+    staged = staged_options()
+    found: dict[PolicyRun, set[InstructionOptions]] = {}
+    for key, cell in cells.items():
+        if key.options in staged and cell.trials:
+            found.setdefault(key.policy_run, set()).add(key.options)
+    return {policy_run: own for policy_run, own in found.items() if len(own) > 1}
 
 
-def _is(told: set[SettingColumn], stages: tuple[int, ...]) -> bool:
-    return SettingColumn("contextual", stages=stages) in told
-
-
-def _shared(samples: Samples, sets: list[tuple[int, ...]]) -> tuple[Samples, list[str]]:
-    """Of those who were told several sets: the tasks that all of them played with every set."""
-    names = _courses(samples)
-    wanted = {SettingColumn("contextual", stages=stages) for stages in sets}
+def _shared(
+    cells: Cells, policy_runs: list[PolicyRun], columns: list[InstructionOptions]
+) -> tuple[Cells, list[str]]:
+    """Return the tasks that all policy runs played with every set of stages, and their cells."""
     kept = {
-        key: sample
-        for key, sample in samples.items()
-        if key[0] in names and key[2] in wanted and sample.trials
+        key: cell
+        for key, cell in cells.items()
+        if key.policy_run in policy_runs and key.options in columns and cell.trials
     }
     tasks = [
         task
-        for task in dict.fromkeys(task for _, task, _ in kept)
-        if all((who, task, told) in kept for who in names for told in wanted)
+        for task in dict.fromkeys(key.task for key in kept)
+        if all(CellKey(one, task, options) in kept for one in policy_runs for options in columns)
     ]
-    return {key: sample for key, sample in kept.items() if key[1] in tasks}, tasks
+    return {key: cell for key, cell in kept.items() if key.task in tasks}, tasks

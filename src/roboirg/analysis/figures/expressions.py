@@ -1,4 +1,4 @@
-"""Figure: in how many scenes each class of referring expression was said."""
+"""Figure: number of scenes with each class of referring expression."""
 
 from __future__ import annotations
 
@@ -10,32 +10,33 @@ from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.plan import instruct_job
 from roboirg.language.expression_figure import write_figure
 from roboirg.language.instruction import Instruction
+from roboirg.language.settings import EXPLICIT
 from roboirg.records.record import Job
 
-TITLE = "Referring expressions that were said"
+TITLE = "Referring expressions in the instructions"
 
 
 def write_expressions(content: FigureData, folder: Path, name: str) -> tuple[Path, ...]:
-    """Draw what the instructions of the runs consist of; nothing without implicit ones.
+    """Draw the referring expressions of the runs; return no files without implicit instructions.
 
-    Results do not hold the words. They are said again, which only the version of the language
-    that said them can.
+    Results do not hold the instructions, so they are generated again, if the language has the same
+    version.
 
     Raises:
         MissingDependencyError: matplotlib is not installed.
-        InvalidValueError: the folder cannot be written to.
+        InvalidValueError: the folder is not writable.
     """
-    told = [
+    jobs = [
         result.identity.model_copy(update={"policy": "", "policy_seed": 0})
         for _, result in content.results
-        if result.form == "implicit" and result.setting != "explicit"
+        if result.form == "implicit" and result.setting != EXPLICIT
         if result.language_version == language.LANGUAGE_VERSION
     ]
-    said = [one for job in dict.fromkeys(told) if (one := _say(job)) is not None]
-    return write_figure(said, folder, name, TITLE) if said else ()
+    found = [one for job in dict.fromkeys(jobs) if (one := _instruction(job)) is not None]
+    return write_figure(found, folder, name, TITLE) if found else ()
 
 
-def _say(job: Job) -> Instruction | None:
+def _instruction(job: Job) -> Instruction | None:
     try:
         return instruct_job(job)
     except RoboIRGError:

@@ -1,4 +1,4 @@
-"""Figure: why episodes failed, by policy and setting."""
+"""Figure: causes of failures, by policy and setting."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from roboirg.analysis.figures.figure_style import (
     clear_axes,
     new_figure,
 )
-from roboirg.analysis.stats.samples import PolicyRun
-from roboirg.analysis.stats.success_rates import SettingColumn
+from roboirg.analysis.stats.cells import PolicyRun
+from roboirg.analysis.stats.option_labels import options_label, options_sort_key
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 from roboirg.records.record import Result
 
@@ -37,61 +38,62 @@ COLORS: Mapping[str, str] = {
     UNKNOWN: "#bbbbbb",
 }
 """Shades of orange for grounding, of blue for execution."""
-MOST_PANELS = 2
+MAX_COLUMNS = 2
 LEGEND_COLUMNS = {1: 2, 2: 4}
-WIDE_ENOUGH = 6.0
-"""Percent from which on a part has room for its number."""
+MIN_LABELED_PERCENT = 6.0
+"""Smallest part with room for its number, percent."""
 _DARK = frozenset((*GROUNDING[:2], *EXECUTION[:3]))
 
-Counts = Mapping[tuple[PolicyRun, SettingColumn], Counter[str]]
+Counts = Mapping[tuple[PolicyRun, InstructionOptions], Counter[str]]
 
 
 def draw_failures(content: FigureData) -> Figure | None:
-    """Draw the shares of episodes that failed in each way; None if none did."""
+    """Draw the shares of episodes by cause of failure; return None without failures."""
     counts, played = _counts(content)
     if not any(counts.values()):
         return None
-    names = [who for who in content.names if any(own == who for own, _ in played)]
-    told = sorted({variant for _, variant in played}, key=SettingColumn.sort_key)
-    across = min(MOST_PANELS, len(names))
+    names = [one for one in content.names if any(own == one for own, _ in played)]
+    bars = sorted({options for _, options in played}, key=options_sort_key)
+    across = min(MAX_COLUMNS, len(names))
     down = -(-len(names) // across)
     kinds = [kind for kind in COLORS if any(own[kind] for own in counts.values())]
     columns = LEGEND_COLUMNS[across]
     figure = new_figure(
         PAGE_INCHES if across > 1 else COLUMN_INCHES,
-        down * (ROW_INCHES * len(told) + MARGIN_INCHES)
+        down * (ROW_INCHES * len(bars) + MARGIN_INCHES)
         + LEGEND_LINE_INCHES * (-(-len(kinds) // columns) + 1),
     )
     axes = figure.subplots(down, across, squeeze=False, sharey=True).ravel()
-    for panel, who in zip(axes, names, strict=False):
-        for place, variant in enumerate(told):
-            _draw_bar(panel, place, counts.get((who, variant)), played[who, variant])
-        panel.set_title(content.name(who), fontsize=8.5, loc="left", fontweight="bold")
+    for panel, policy_run in zip(axes, names, strict=False):
+        for place, options in enumerate(bars):
+            key = (policy_run, options)
+            _draw_bar(panel, place, counts.get(key), played[key])
+        panel.set_title(content.name(policy_run), fontsize=8.5, loc="left", fontweight="bold")
         panel.set_xlabel("share of the episodes with a verdict, %")
         panel.set_xlim(0, 100)
         panel.set_xticks(range(0, 101, 25))
         clear_axes(panel, grid="x")
     for panel in axes[len(names) :]:
         panel.set_visible(False)
-    axes[0].set_yticks(range(len(told)), [variant.label for variant in told])
-    axes[0].set_ylim(len(told) - 0.5, -0.5)
+    axes[0].set_yticks(range(len(bars)), [options_label(options) for options in bars])
+    axes[0].set_ylim(len(bars) - 0.5, -0.5)
     _add_legend(figure, kinds, columns)
     return figure
 
 
 def failure_name(result: Result) -> str:
-    """Which failure it was."""
+    """Return the name of a result's failure."""
     return UNKNOWN if result.attribution is None else result.attribution.failure
 
 
-def _counts(content: FigureData) -> tuple[Counts, Counter[tuple[PolicyRun, SettingColumn]]]:
-    counts: dict[tuple[PolicyRun, SettingColumn], Counter[str]] = defaultdict(Counter)
-    played: Counter[tuple[PolicyRun, SettingColumn]] = Counter()
-    for (who, _, variant), sample in content.samples.items():
-        played[who, variant] += sample.trials
-    for who, result in content.results:
+def _counts(content: FigureData) -> tuple[Counts, Counter[tuple[PolicyRun, InstructionOptions]]]:
+    counts: dict[tuple[PolicyRun, InstructionOptions], Counter[str]] = defaultdict(Counter)
+    played: Counter[tuple[PolicyRun, InstructionOptions]] = Counter()
+    for key, cell in content.cells.items():
+        played[key.policy_run, key.options] += cell.trials
+    for policy_run, result in content.results:
         if result.outcome == "failure":
-            counts[who, SettingColumn.of(result)][failure_name(result)] += 1
+            counts[policy_run, result.options][failure_name(result)] += 1
     return counts, played
 
 
@@ -110,7 +112,7 @@ def _draw_bar(axes: Axes, place: int, counts: Counter[str] | None, played: int) 
         axes.barh(
             place, width, left=left, height=0.78, color=color, edgecolor="white", linewidth=0.5
         )
-        if width >= WIDE_ENOUGH:
+        if width >= MIN_LABELED_PERCENT:
             axes.text(
                 left + width / 2, place, str(count), ha="center", va="center", fontsize=6.5,
                 color="white" if kind in _DARK else "black",

@@ -1,4 +1,4 @@
-"""What all figures share: sizes, colors, signs, and the files they become."""
+"""Style of all figures: sizes, colors, signs, and file formats."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from roboirg.analysis.stats.intervals import Interval
-from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.util.figure_files import save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -15,71 +15,32 @@ if TYPE_CHECKING:
 
 FORMATS = ("png", "svg", "pdf")
 COLUMN_INCHES, PAGE_INCHES = 3.4, 7.0
-"""Widths of a column and of a page; figures are drawn at their true size."""
+"""Widths of a column and of a page; figures are drawn at final size."""
 LEGEND_COLUMNS, LEGEND_LINE_INCHES = 2, 0.16
 """Of a figure of one column."""
 DOTS_PER_INCH = 300
+STYLE = {
+    "font.size": 7.5,
+    "axes.linewidth": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": 7,
+}
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
-"""Of Okabe and Ito, told apart by color-blind people too; signs differ as well."""
+"""Okabe and Ito's colors, safe for color-blind readers; signs differ as well."""
 SIGNS = ("o", "s", "^", "D", "v", "P")
 GHOST, GHOST_SIGNS = "#8a8a8a", ("d", "X", "p", "<", ">", "h", "8", "*")
 
 
-def check_figure_support() -> None:
-    """See before the work starts that pictures can be drawn.
-
-    Raises:
-        MissingDependencyError: matplotlib is not installed.
-    """
-    try:
-        import matplotlib as mpl  # noqa: F401
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"Figures need matplotlib, which is not installed ({error}); run: "
-            "pip install 'roboirgbench[report]'"
-        ) from error
-
-
 def save(draw: Callable[[], Figure | None], folder: Path, name: str) -> tuple[Path, ...]:
-    """Draw a figure and write it in all formats; nothing if there is nothing to draw.
-
-    The same content gives the same bytes.
-
-    Raises:
-        MissingDependencyError: matplotlib is not installed.
-        InvalidValueError: the folder cannot be written to.
-    """
-    check_figure_support()
-    import matplotlib as mpl
-
-    with mpl.rc_context(
-        {
-            "font.family": "DejaVu Sans",
-            "font.size": 7.5,
-            "axes.linewidth": 0.6,
-            "legend.frameon": False,
-            "legend.fontsize": 7,
-            "pdf.fonttype": 42,  # letters, not outlines, which some venues refuse
-            "svg.hashsalt": "roboirg",  # the ids in an SVG file are random without it
-        }
-    ):
-        figure = draw()
-        if figure is None:
-            return ()
-        paths = tuple(folder / f"{name}.{ending}" for ending in FORMATS)
-        dates = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": None}
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            for path, ending in zip(paths, FORMATS, strict=True):
-                figure.savefig(path, dpi=DOTS_PER_INCH, metadata=dates[ending])
-        except OSError as error:
-            raise InvalidValueError(f"Cannot write to {folder}: {error.strerror}.") from error
-    return paths
+    """Draw a figure in the common style and write it in all formats; see `save_figure`."""
+    return save_figure(
+        draw, folder, name, formats=FORMATS, dots_per_inch=DOTS_PER_INCH, style=STYLE
+    )
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure of so many inches."""
-    # Not by pyplot: that would keep every figure and look for a display.
+    """Return an empty figure of the given size in inches."""
+    # Without pyplot, which keeps every figure and looks for a display.
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
@@ -87,7 +48,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def clear_axes(axes: Axes, *, grid: str) -> None:
-    """Leave of the frame only what helps to read, with lines across along one axis."""
+    """Remove most of the frame and add grid lines for one axis."""
     axes.set_axisbelow(True)
     axes.grid(axis="x" if grid == "x" else "y", color="#dddddd", linewidth=0.5)
     axes.tick_params(axis="both", length=0)
@@ -98,11 +59,11 @@ def clear_axes(axes: Axes, *, grid: str) -> None:
 
 
 def rates_figure(height: float, entries: int) -> tuple[Figure, Axes]:
-    """An empty figure of one column with success in percent upwards and room for a legend below.
+    """Return an empty one-column figure for success in percent, with room for a legend below.
 
     Args:
-        height: inches without the legend.
-        entries: of the legend.
+        height: in inches, without the legend.
+        entries: number of entries of the legend.
     """
     lines = -(-entries // LEGEND_COLUMNS)
     figure = new_figure(COLUMN_INCHES, height + LEGEND_LINE_INCHES * lines)
@@ -117,7 +78,7 @@ def rates_figure(height: float, entries: int) -> tuple[Figure, Axes]:
 def draw_point(
     axes: Axes, place: float, rate: float, interval: Interval | None, number: int, label: str
 ) -> None:
-    """A rate with its interval, both from 0 to 1."""
+    """Draw a rate with its interval, both from 0 to 1."""
     color = COLORS[number % len(COLORS)]
     if interval is not None:
         axes.plot([place] * 2, [100 * end for end in interval], color=color, linewidth=1.1)
@@ -133,7 +94,7 @@ def draw_point(
 
 
 def draw_ghost(axes: Axes, place: float, percent: float, number: int, label: str) -> None:
-    """A published value."""
+    """Draw a published value."""
     axes.plot(
         [place],
         [percent],
@@ -149,7 +110,7 @@ def draw_ghost(axes: Axes, place: float, percent: float, number: int, label: str
 
 
 def legend_below(figure: Figure, axes: Axes) -> None:
-    """Every label once, below the axes."""
+    """Add a legend below the axes with every label once."""
     handles, names = axes.get_legend_handles_labels()
     found = dict(zip(names, handles, strict=True))
     figure.legend(

@@ -1,4 +1,4 @@
-"""Figure: each suite in implicit and in resolved form, with what both solve and what one alone."""
+"""Figure: overlap of the implicit and the resolved form, by suite and setting."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from roboirg.analysis.figures.figure_data import FigureData
 from roboirg.analysis.figures.figure_style import COLUMN_INCHES, PAGE_INCHES, clear_axes, new_figure
+from roboirg.analysis.stats.cells import PolicyRun
+from roboirg.analysis.stats.option_labels import default_settings
 from roboirg.analysis.stats.paired_tests import Gap
-from roboirg.analysis.stats.run_summary import ALL, Scope
-from roboirg.analysis.stats.samples import PolicyRun
-from roboirg.analysis.stats.success_rates import SETTING_ORDER, SettingColumn
-from roboirg.analysis.tables.run_tables import ALL_TASKS, points
+from roboirg.analysis.stats.rates import points
+from roboirg.analysis.stats.run_summary import ALL, ALL_TASKS, Scope, ScopeKey
+from roboirg.core.instruction_options import InstructionOptions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,15 +25,15 @@ PARTS = (
     ("only implicit", "#009E73", "...."),
     ("neither", "#dddddd", ""),
 )
-"""What an episode did in the two forms: words, color, pattern."""
-WORDS_AT, ROOM = 103, 160
-"""Where the difference is written and where the panel ends, in percent of the episodes."""
-MOST_PANELS = 2
-"""Side by side."""
+"""Outcomes of an episode in the two forms: label, color, pattern."""
+TEXT_AT, ROOM = 103, 160
+"""Positions of the difference and of the panel's end, in percent of the episodes."""
+MAX_COLUMNS = 2
+"""Panels side by side."""
 
 
 class FormRow(NamedTuple):
-    """A bar: where, and what came of the two forms there."""
+    """A bar: scope, setting and the gap between the two forms."""
 
     scope: str
     setting: str
@@ -40,11 +41,11 @@ class FormRow(NamedTuple):
 
 
 def draw_forms(content: FigureData) -> Figure | None:
-    """Draw the overlap of the two forms and their difference; None if not both were played."""
-    panels = {who: rows for who in content.names if (rows := _rows(content, who))}
+    """Draw overlap and difference of the two forms; return None unless both were played."""
+    panels = {one: rows for one in content.names if (rows := _rows(content, one))}
     if not panels:
         return None
-    across = min(MOST_PANELS, len(panels))
+    across = min(MAX_COLUMNS, len(panels))
     down = -(-len(panels) // across)
     height = max(len(rows) + len({row.scope for row in rows}) for rows in panels.values()) + 1
     figure = new_figure(
@@ -52,32 +53,33 @@ def draw_forms(content: FigureData) -> Figure | None:
         down * (ROW_INCHES * height) + MARGIN_INCHES,
     )
     axes = figure.subplots(down, across, squeeze=False).ravel()
-    for panel, (who, rows) in zip(axes, panels.items(), strict=False):
+    for panel, (policy_run, rows) in zip(axes, panels.items(), strict=False):
         _draw_panel(panel, rows)
-        panel.set_title(content.name(who), fontsize=8.5, loc="left", fontweight="bold")
+        panel.set_title(content.name(policy_run), fontsize=8.5, loc="left", fontweight="bold")
     for panel in axes[len(panels) :]:
         panel.set_visible(False)
     handles = _handles()
     figure.legend(
-        handles, [words for words, _, _ in PARTS], loc="outside lower center",
+        handles, [label for label, _, _ in PARTS], loc="outside lower center",
         ncols=len(PARTS) if across > 1 else 2, columnspacing=1.2, handletextpad=0.4,
     )  # fmt: skip
     return figure
 
 
-def _rows(content: FigureData, who: PolicyRun) -> list[FormRow]:
+def _rows(content: FigureData, policy_run: PolicyRun) -> list[FormRow]:
     suites = dict.fromkeys(
-        scope.suite for _, scope, _ in content.summaries if scope.suite is not None
+        key.scope.suite for key in content.summaries if key.scope.suite is not None
     )
-    scopes = [(str(suite), Scope(suite=suite)) for suite in suites]
+    settings = default_settings(key.options for key in content.summaries)
+    scopes = [(suite, Scope(suite=suite)) for suite in suites]
     if len(scopes) > 1:
         scopes.append((ALL_TASKS, ALL))
     return [
         FormRow(name, setting, one.form_gap)
         for name, scope in scopes
-        for setting in SETTING_ORDER
-        if (one := content.summaries.get((who, scope, SettingColumn(setting)))) is not None
-        if one.form_gap is not None
+        for setting in settings
+        if (key := ScopeKey(policy_run, scope, InstructionOptions(setting))) in content.summaries
+        if (one := content.summaries[key]).form_gap is not None
     ]
 
 
@@ -97,7 +99,7 @@ def _draw_panel(axes: Axes, rows: list[FormRow]) -> None:
     axes.set_xlabel("share of the episodes, %", x=50 / ROOM, fontsize=7.5)
     clear_axes(axes, grid="x")
     axes.spines["bottom"].set_bounds(0, 100)
-    axes.text(WORDS_AT, -0.72, "implicit − resolved", fontsize=6.5, va="center", color="#555555")
+    axes.text(TEXT_AT, -0.72, "implicit − resolved", fontsize=6.5, va="center", color="#555555")
 
 
 def _draw_bar(axes: Axes, place: float, gap: Gap) -> None:
@@ -111,10 +113,10 @@ def _draw_bar(axes: Axes, place: float, gap: Gap) -> None:
             linewidth=0.4,
         )  # fmt: skip
         left += width
-    words = points(gap.value)
+    text = points(gap.value)
     if gap.interval is not None:
-        words += f" [{points(gap.interval.low)}, {points(gap.interval.high)}]"
-    axes.text(WORDS_AT, place, words, va="center", fontsize=6.5)
+        text += f" [{points(gap.interval.low)}, {points(gap.interval.high)}]"
+    axes.text(TEXT_AT, place, text, va="center", fontsize=6.5)
 
 
 def _handles() -> list[Patch]:

@@ -1,1 +1,1 @@
-"""The page about a run: what is in it, and how it is served."""
+"""The HTML page of a run, and its server."""

@@ -1,8 +1,8 @@
-"""The episodes as the page carries them: columns of small numbers, and a line of details for each.
+"""The data of the page: columns of small numbers, and a line of details for each episode.
 
-Ten thousand episodes have to open and filter at once. So what is filtered by is kept as columns of
-indices, every text is kept once, and what only an opened episode shows is a line of JSON that
-nobody parses before.
+A page of ten thousand episodes must open and filter at once. So filters use columns of indices,
+every text is stored once, and the details of an episode are a line of JSON that is parsed when the
+episode is opened.
 """
 
 from __future__ import annotations
@@ -12,11 +12,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, get_args
 
-from roboirg.analysis.page.details import Strings, details_of, words_of
-from roboirg.analysis.page.entries import EpisodeEntries, EpisodeEntry, task_order
-from roboirg.analysis.page.films import EpisodeVideo, EpisodeVideos
-from roboirg.analysis.stats.success_rates import SettingColumn
+from roboirg.analysis.page.details import Strings, details_of, searched_texts
+from roboirg.analysis.page.entries import EpisodeEntries, EpisodeEntry
+from roboirg.analysis.page.episode_videos import EpisodeVideo, EpisodeVideos
+from roboirg.analysis.stats.cells import task_order
+from roboirg.analysis.stats.option_labels import options_label, options_sort_key
 from roboirg.core.episode import DIFFICULTIES
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 from roboirg.records.record import ERROR_KINDS, FailureKind, Outcome
 from roboirg.tasks import all_tasks
@@ -29,11 +31,11 @@ Row = dict[str, int | str]
 
 
 class FilterOption(NamedTuple):
-    """A filter: its name in the columns, what it is called, and what it offers.
+    """A filter: its name in the columns, its label, and its values.
 
     Attributes:
-        groups: for each value the heading above it; empty without headings. Values of all groups
-            differ.
+        groups: for each value the heading above it; empty without headings. No value occurs in
+            two groups.
     """
 
     name: str
@@ -44,15 +46,15 @@ class FilterOption(NamedTuple):
 
 @dataclass
 class Columns:
-    """What the page's script reads.
+    """The data that the page's script reads.
 
     Attributes:
         choices: the filters.
-        columns: by name, a number for each episode; of a filter the index of its value.
-        strings: every text once.
-        words: for each episode, the texts that a search looks into.
+        columns: by name, a number for each episode; for a filter the index of its value.
+        strings: every text, once.
+        words: for each episode, the texts that a search looks through.
         details: for each episode, a line of JSON.
-        films: that are part of the page, by the episode's key.
+        videos: embedded in the page, by the episode's key.
     """
 
     choices: tuple[FilterOption, ...]
@@ -60,34 +62,34 @@ class Columns:
     strings: Strings = field(default_factory=Strings)
     words: list[list[int]] = field(default_factory=list)
     details: list[str] = field(default_factory=list)
-    films: dict[str, EpisodeVideo] = field(default_factory=dict)
+    videos: dict[str, EpisodeVideo] = field(default_factory=dict)
 
 
-def make_columns(entries: EpisodeEntries, films: EpisodeVideos) -> Columns:
-    """Take the episodes apart."""
+def make_columns(entries: EpisodeEntries, videos: EpisodeVideos) -> Columns:
+    """Make the data of all episodes."""
     found = Columns(_choices(entries))
     index = {
         choice.name: {value: number for number, value in enumerate(choice.values)}
         for choice in found.choices
     }
-    same: dict[tuple[object, ...], int] = {}
+    numbers: dict[tuple[object, ...], int] = {}
     resolved = _resolved_texts(entries.all)
     for entry in entries.all:
-        row = _row(entry, entries, index, same)
+        row = _row(entry, entries, index, numbers)
         for name, value in row.items():
             found.columns.setdefault(name, []).append(value)
-        film = films.film(entry)
-        if film is not None and films.embeds:
-            found.films[entry.key] = film
-        found.words.append(words_of(entry.record, found.strings))
-        text = resolved.get(_scene_and_words(entry))
-        details = details_of(entry.record, found.strings, film, text, embeds=films.embeds)
+        video = videos.video(entry)
+        if video is not None and videos.embeds:
+            found.videos[entry.key] = video
+        found.words.append(searched_texts(entry.record, found.strings))
+        text = resolved.get(_instruction_key(entry))
+        details = details_of(entry.record, found.strings, video, text, embeds=videos.embeds)
         found.details.append(json.dumps(details, separators=(",", ":")))
     return found
 
 
 def failure_of(entry: EpisodeEntry) -> tuple[str, str] | None:
-    """Of what kind an episode's failure or error is, and which; None for a success."""
+    """Return kind and name of an episode's failure or error; None for a success."""
     record = entry.record
     if record.outcome == "success":
         return None
@@ -100,15 +102,15 @@ def failure_of(entry: EpisodeEntry) -> tuple[str, str] | None:
 
 def _choices(entries: EpisodeEntries) -> tuple[FilterOption, ...]:
     records = [entry.record for entry in entries.all]
-    told = sorted({entry.told for entry in entries.all}, key=SettingColumn.sort_key)
-    settings = tuple(dict.fromkeys(one._replace(form="implicit").label for one in told))
+    options = sorted({entry.options for entry in entries.all}, key=options_sort_key)
+    settings = tuple(dict.fromkeys(map(setting_label, options)))
     failures = _failures(entries.all)
     tasks = tuple(task_order({record.task for record in records}))
     return (
         FilterOption("policy", "policy", tuple(entries.names.values())),
         FilterOption("task", "task", tasks, tuple(map(_suite, tasks))),
         FilterOption("setting", "setting", settings),
-        FilterOption("form", "form", tuple(dict.fromkeys(one.form for one in told))),
+        FilterOption("form", "form", tuple(dict.fromkeys(one.form for one in options))),
         FilterOption(
             "difficulty", "difficulty", _present(DIFFICULTIES, (r.difficulty for r in records))
         ),
@@ -153,45 +155,50 @@ def _row(
     entry: EpisodeEntry,
     entries: EpisodeEntries,
     index: dict[str, dict[str, int]],
-    same: dict[tuple[object, ...], int],
+    numbers: dict[tuple[object, ...], int],
 ) -> Row:
     record = entry.record
     failure = failure_of(entry)
     scene = (record.task, record.split, record.episode)
     return {
         "key": entry.key,
-        "policy": index["policy"][entries.names[entry.who]],
+        "policy": index["policy"][entries.names[entry.policy_run]],
         "task": index["task"][record.task],
-        "setting": index["setting"][entry.told._replace(form="implicit").label],
-        "form": index["form"][entry.told.form],
+        "setting": index["setting"][setting_label(entry.options)],
+        "form": index["form"][entry.options.form],
         "difficulty": index["difficulty"][record.difficulty],
         "outcome": index["outcome"][record.outcome],
         "failure": NO_FAILURE if failure is None else index["failure"][failure[1]],
         "seed": index["seed"][str(record.policy_seed)],
         "episode": record.episode,
         "steps": record.steps,
-        # Episodes of the same scene, and among them those that can be held against each other.
-        "scene": same.setdefault(scene, len(same)),
-        "pair": same.setdefault((*scene, record.policy_seed, entry.told), len(same)),
+        # Episodes of the same scene, and among them those that can be compared.
+        "scene": numbers.setdefault(scene, len(numbers)),
+        "pair": numbers.setdefault((*scene, record.policy_seed, entry.options), len(numbers)),
     }
 
 
-def _scene_and_words(entry: EpisodeEntry) -> tuple[object, ...]:
+def setting_label(options: InstructionOptions) -> str:
+    """Return the label of options whatever the form, which is a filter of its own."""
+    return options_label(options._replace(form="implicit"))
+
+
+def _instruction_key(entry: EpisodeEntry) -> tuple[object, ...]:
     record = entry.record
     return (
         record.task,
         record.split,
         record.episode,
-        entry.told._replace(form=""),
+        entry.options._replace(form=""),
         record.language_version,
         record.environment_version,
     )
 
 
 def _resolved_texts(entries: Iterable[EpisodeEntry]) -> dict[tuple[object, ...], str]:
-    """What was said in the resolved form, where that was played."""
+    """Return the instructions of the resolved form, if it was played."""
     return {
-        _scene_and_words(entry): " ".join(turn.text for turn in entry.record.instruction)
+        _instruction_key(entry): " ".join(turn.text for turn in entry.record.instruction)
         for entry in entries
-        if entry.told.form == "resolved"
+        if entry.options.form == "resolved"
     }

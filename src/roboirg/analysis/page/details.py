@@ -1,4 +1,4 @@
-"""What an opened episode shows: words with their mentions, time line, cause, film."""
+"""The details of an opened episode: instruction with mentions, timeline, cause, video."""
 
 from __future__ import annotations
 
@@ -6,99 +6,108 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from roboirg.analysis.page.films import EpisodeVideo
+from roboirg.analysis.page.episode_videos import EpisodeVideo
 from roboirg.analysis.page.reconstruction import resolved_form, stages_of
+from roboirg.core.fact_traits import fact_traits
+from roboirg.language.settings import EXPLICIT
 from roboirg.records.record import EventRecord, Record
 
-SHORT_LIVED = frozenset({"home", "held", "lying", "still"})
-"""Kinds of event that say how the world is rather than what is done."""
-LASTING = frozenset({"lifted", "picked", "placed"})
-"""Kinds of event of which the end is told too."""
-INSIDE = "#"
-"""Stands for a film that is part of the page."""
+EMBEDDED = "#"
+"""Stands for a video that is part of the page."""
 
 Details = dict[str, Any]
 
 
 @dataclass
 class Strings:
-    """Every text once."""
+    """A list of distinct texts."""
 
     texts: list[str] = field(default_factory=list)
     _places: dict[str, int] = field(default_factory=dict)
 
     def index(self, text: str) -> int:
-        """Where a text is; it is added if it is new."""
+        """Return the index of a text, which is added if it is new."""
         place = self._places.setdefault(text, len(self.texts))
         if place == len(self.texts):
             self.texts.append(text)
         return place
 
+    def optional_index(self, text: str | None) -> int | None:
+        """Return the index of a text, or None."""
+        return None if text is None else self.index(text)
 
-def words_of(record: Record, strings: Strings) -> list[int]:
-    """The texts that a search looks into: the utterances first, then what went wrong."""
+
+def searched_texts(record: Record, strings: Strings) -> list[int]:
+    """Return the texts that a search looks through: utterances, cause, attribution."""
     texts = [turn.text for turn in record.instruction]
-    texts += [text for text in (record.cause, _sentence(record)) if text]
+    sentence = None if record.attribution is None else record.attribution.sentence
+    texts += [text for text in (record.cause, sentence) if text]
     return [strings.index(text) for text in texts]
 
 
 def details_of(
     record: Record,
     strings: Strings,
-    film: EpisodeVideo | None,
+    video: EpisodeVideo | None,
     resolved: str | None,
     *,
     embeds: bool,
 ) -> Details:
-    """An episode, with texts as indices; what is empty is left out.
+    """Return the details of an episode, with texts as indices; empty ones are left out.
 
     Args:
         record: of the episode.
-        strings: where the texts go.
-        film: of it.
+        strings: to which the texts are added.
+        video: of the episode.
         resolved: its resolved form, if that was played too.
-        embeds: whether the film is part of the page.
+        embeds: whether the video is part of the page.
     """
-    at = strings.index
+    index, optional_index = strings.index, strings.optional_index
     if resolved is None or record.form == "resolved":
         resolved = resolved_form(record)
     found: Details = {
-        "turns": [[at(turn.stage), at(turn.text)] for turn in record.instruction],
-        "mentions": [
-            [one.utterance, one.start, one.end, int(one.role == "anaphor"),
-             at(one.expression or ""), at(one.slot), at(str(one.value))]
-            for one in record.mentions
-        ],
-        "command": None if record.setting == "explicit" else at(record.command),
-        "resolved": None if resolved is None else at(resolved),
-        "goal": [[at(slot), at(_value(value))] for slot, value in record.goal.items()],
-        "cause": None if record.cause is None else at(record.cause),
+        "turns": [[index(turn.stage), index(turn.text)] for turn in record.instruction],
+        "mentions": _mentions(record, strings),
+        "command": None if record.setting == EXPLICIT else index(record.command),
+        "resolved": optional_index(resolved),
+        "goal": [[index(slot), index(_value(value))] for slot, value in record.goal.items()],
+        "cause": optional_index(record.cause),
         "attribution": _attribution(record, strings),
         "shown": record.demonstration_steps or None,
-        "events": [[one.step, at(event_text(one)), int(one.holds)] for one in _told(record)],
-        "stages": [[at(mark.subgoal), mark.step] for mark in stages_of(record)],
-        "traceback": None if record.details is None else at(record.details),
-        "lost": None if record.film_lost is None else at(record.film_lost),
-        "rules": at(_rules(record)),
-    }  # fmt: skip
-    if film is not None:
-        found["film"] = INSIDE if embeds else film.source
-        found["poster"] = INSIDE if embeds else film.poster
+        "events": [
+            [one.step, index(event_text(one)), int(one.holds)] for one in _shown_events(record)
+        ],
+        "stages": [[index(mark.subgoal), mark.step] for mark in stages_of(record)],
+        "traceback": optional_index(record.details),
+        "lost": optional_index(record.video_error),
+        "conditions": index(_conditions(record)),
+    }
+    if video is not None:
+        found["film"] = EMBEDDED if embeds else video.source
+        found["poster"] = EMBEDDED if embeds else video.poster
     return {name: value for name, value in found.items() if value is not None and value != []}
 
 
 def event_text(event: EventRecord) -> str:
-    """An event in words."""
-    words = event.kind.replace("_", " ")
-    text = f"{event.subject.replace('_', ' ')} {words}"
-    if event.place:
-        text += f" {'' if event.kind == 'over' else 'on '}{event.place.replace('_', ' ')}"
+    """Return an event in words."""
+    names = (event.subject, fact_traits(event.kind).state, event.place)
+    text = " ".join(name.replace("_", " ") for name in names if name)
     return text if event.holds else f"{text}: no longer"
 
 
-def _told(record: Record) -> Iterator[EventRecord]:
+def _mentions(record: Record, strings: Strings) -> list[list[int]]:
+    index = strings.index
+    return [
+        [one.utterance, one.start, one.end, int(one.role == "anaphor"),
+         index(one.expression or ""), index(one.slot), index(str(one.value))]
+        for one in record.mentions
+    ]  # fmt: skip
+
+
+def _shown_events(record: Record) -> Iterator[EventRecord]:
     for event in record.events:
-        if event.kind not in SHORT_LIVED and (event.holds or event.kind in LASTING):
+        shown = fact_traits(event.kind).timeline
+        if shown == "both" or (shown == "start" and event.holds):
             yield event
 
 
@@ -110,17 +119,13 @@ def _attribution(record: Record, strings: Strings) -> list[Any] | None:
             strings.index(found.sentence)]  # fmt: skip
 
 
-def _sentence(record: Record) -> str | None:
-    return None if record.attribution is None else record.attribution.sentence
-
-
 def _value(value: object) -> str:
     return ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)
 
 
-def _rules(record: Record) -> str:
-    words = [f"{record.split} split", f"at most {record.max_steps} steps"]
-    words += [
+def _conditions(record: Record) -> str:
+    parts = [f"{record.split} split", f"at most {record.max_steps} steps"]
+    parts += [
         f"{name.replace('_', ' ')} {getattr(record, name)}"
         for name in ("actions", "demonstration_frames", "observe_every")
         if getattr(record, name) is not None
@@ -129,4 +134,4 @@ def _rules(record: Record) -> str:
         f"policy {record.policy_version}, language {record.language_version}, environment "
         f"{record.environment_version}, roboirg {record.package_version}"
     )
-    return f"{', '.join(words)}; {versions}"
+    return f"{', '.join(parts)}; {versions}"

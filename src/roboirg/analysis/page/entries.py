@@ -1,35 +1,37 @@
-"""The episodes of a page in their order, each with who played it."""
+"""The episodes of a page in order, each with its policy run."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from roboirg.analysis.stats.samples import (
+from roboirg.analysis.stats.cells import (
+    CellKey,
     CellResults,
-    EvalConditions,
+    Cells,
     PolicyRun,
-    Samples,
-    Versions,
     gather,
     labels,
+    policy_order,
+    sort_cells,
+    task_order,
 )
-from roboirg.analysis.stats.success_rates import SettingColumn
+from roboirg.analysis.stats.option_labels import options_sort_key
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.records.record import Job, Record
-from roboirg.tasks import all_tasks
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What a page is about, or is compared with.
+    """A run that a page shows.
 
     Attributes:
         name: of the run.
         records: one for each identity.
-        folder: where its films are; None leaves them out.
-        planned: jobs that should be there.
-        link: what the page writes before the path of a film that is not in it.
+        folder: of its videos; None leaves them out.
+        planned: jobs that should have a record.
+        link: prefix of the paths of videos that are not in the page.
     """
 
     name: str
@@ -45,105 +47,77 @@ class EpisodeEntry:
 
     Attributes:
         key: short, unique on the page, the same in every page about the run.
-        record: what is known.
-        who: played it.
-        told: in which way.
-        run: to which it belongs.
+        record: of the episode.
+        policy_run: that played it.
+        run: that it belongs to.
     """
 
     key: str
     record: Record
-    who: PolicyRun
-    told: SettingColumn
+    policy_run: PolicyRun
     run: Run
+
+    @property
+    def options(self) -> InstructionOptions:
+        """The instruction options."""
+        return self.record.options
 
 
 @dataclass(frozen=True, slots=True)
 class EpisodeEntries:
-    """All episodes, and the samples they make.
+    """All episodes and their cells.
 
     Attributes:
-        all: by policy, task and episode, then as they are told.
-        samples: with what is missing.
-        names: of the contestants, in the order of the page.
+        all: by policy run, task, episode, options and policy seed.
+        cells: the same results gathered, with those that are missing.
+        names: labels of the policy runs, in the order of the page.
     """
 
     all: tuple[EpisodeEntry, ...]
-    samples: Samples
+    cells: Cells
     names: Mapping[PolicyRun, str]
 
 
 def make_entries(runs: Sequence[Run]) -> EpisodeEntries:
-    """Sort the episodes of one run, or of two that are to be compared."""
-    apart = len(runs) > 1
-    samples: dict[tuple[PolicyRun, str, SettingColumn], CellResults] = {}
+    """Sort the episodes of one run, or of two runs to compare."""
+    found: dict[CellKey, CellResults] = {}
     entries: list[EpisodeEntry] = []
     for number, run in enumerate(runs):
-        name = run.name if apart else ""
-        for (who, task, told), sample in gather([(name, run.records)], run.planned).items():
-            samples[who._replace(run=name), task, told] = sample
+        name = run.name if len(runs) > 1 else ""
+        found |= gather_run(name, run.records, run.planned)
         for record in run.records:
-            who = PolicyRun(record.policy, EvalConditions.of(record), Versions.of(record), name)
             key = record.slug.rpartition("-")[2] + ("" if number == 0 else f"-{number + 1}")
-            entries.append(EpisodeEntry(key, record, who, SettingColumn.of(record), run))
-    return _sorted(entries, samples, runs)
+            entries.append(EpisodeEntry(key, record, PolicyRun.of(record, name), run))
+    jobs: list[Job] = [job for run in runs for job in (*run.planned, *run.records)]
+    policies = list(dict.fromkeys(job.policy for job in jobs))
+    cells = sort_cells(found, policy_order(found, policies, [run.name for run in runs]))
+    privileged = {entry.record.policy for entry in entries if entry.record.privileged}
+    names = labels(cells, privileged)
+    return EpisodeEntries(_sorted(entries, list(names)), cells, names)
+
+
+def gather_run(name: str, records: Sequence[Record], planned: Sequence[Job] = ()) -> Cells:
+    """Gather the records of one run; its policy runs bear the given name."""
+    return {
+        key._replace(policy_run=key.policy_run._replace(run=name)): cell
+        for key, cell in gather([(name, records)], planned).items()
+    }
 
 
 def _sorted(
-    entries: Sequence[EpisodeEntry], samples: Samples, runs: Sequence[Run]
-) -> EpisodeEntries:
-    policies, privileged = _planned_order(runs), _privileged(entries)
-    order = [run.name for run in runs]
-
-    def place(who: PolicyRun) -> tuple[object, ...]:
-        run = order.index(who.run) if who.run else 0
-        return (run, policies.index(who.policy), repr(who.rules), repr(who.versions))
-
-    names = labels(samples)
-    marked = {
-        who: f"{names[who]} (privileged)" if who.policy in privileged else names[who]
-        for who in sorted(names, key=place)
-    }
-    ranks = {who: rank for rank, who in enumerate(marked)}
-    tasks = task_order({task for _, task, _ in samples})
-    ordered = sorted(
-        entries,
-        key=lambda one: (
-            ranks[one.who],
-            tasks.index(one.record.task),
-            one.record.episode,
-            one.told.sort_key(),
-            one.record.policy_seed,
-        ),
+    entries: Sequence[EpisodeEntry], policy_runs: Sequence[PolicyRun]
+) -> tuple[EpisodeEntry, ...]:
+    ranks = {policy_run: rank for rank, policy_run in enumerate(policy_runs)}
+    tasks = task_order({entry.record.task for entry in entries})
+    return tuple(
+        sorted(
+            entries,
+            key=lambda one: (
+                ranks[one.policy_run],
+                tasks.index(one.record.task),
+                one.record.episode,
+                options_sort_key(one.options),
+                one.record.policy_seed,
+            ),
+        )
     )
-    return EpisodeEntries(tuple(ordered), in_order(samples, list(marked)), marked)
-
-
-def in_order(samples: Samples, contestants: Sequence[PolicyRun]) -> Samples:
-    """The same samples, by contestant, task and telling.
-
-    The bootstrap takes them one after the other, and episodes end in any order.
-    """
-    tasks = task_order({task for _, task, _ in samples})
-    keys = sorted(
-        samples,
-        key=lambda key: (contestants.index(key[0]), tasks.index(key[1]), key[2].sort_key()),
-    )
-    return {key: samples[key] for key in keys}
-
-
-def task_order(names: Iterable[str]) -> list[str]:
-    """Tasks as in the benchmark, unknown ones at the end."""
-    known = list(all_tasks())
-    return sorted(
-        names, key=lambda name: (known.index(name) if name in known else len(known), name)
-    )
-
-
-def _planned_order(runs: Sequence[Run]) -> list[str]:
-    jobs: list[Job] = [job for run in runs for job in (*run.planned, *run.records)]
-    return list(dict.fromkeys(job.policy for job in jobs))
-
-
-def _privileged(entries: Iterable[EpisodeEntry]) -> set[str]:
-    return {one.record.policy for one in entries if one.record.privileged}

@@ -1,7 +1,7 @@
-"""What a record leaves out because it follows from the rest: the resolved form, the stages.
+"""Parts of an episode that a record leaves out because they follow from it: resolved form, stages.
 
-Both come from the installed package, so only for records of its own versions; for others the page
-does without.
+Both are derived by the installed package, so only for records of the same versions; the page omits
+them for others.
 """
 
 from __future__ import annotations
@@ -16,24 +16,25 @@ from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.plan import instruct_job
 from roboirg.judging import Event
 from roboirg.judging.episode_replay import rejudge
+from roboirg.language.settings import EXPLICIT
 from roboirg.records.record import Record
 
 
 class StageMark(NamedTuple):
-    """A stage of the task: what it asks for, and the control step that completed it, if any."""
+    """A stage of the task: its subgoal, and the control step that completed it, if any."""
 
     subgoal: str
     step: int | None
 
 
 def resolved_form(record: Record) -> str | None:
-    """The same instruction with every reference spelled out.
+    """Return the same instruction with every reference resolved.
 
-    None where the record is that already, or was told by another version of the language.
+    None if the record has this form already, or another language or environment version.
     """
-    if record.setting == "explicit" or record.form == "resolved":
+    if record.setting == EXPLICIT or record.form == "resolved":
         return None
-    if record.language_version != language.LANGUAGE_VERSION or not _is_of_this_world(record):
+    if record.language_version != language.LANGUAGE_VERSION or not _has_this_environment(record):
         return None
     try:
         return instruct_job(record.identity.model_copy(update={"form": "resolved"})).text
@@ -42,12 +43,12 @@ def resolved_form(record: Record) -> str | None:
 
 
 def stages_of(record: Record) -> tuple[StageMark, ...]:
-    """The stages of the policy's turn; none where another version of the worlds was played."""
-    if not record.events or not _is_of_this_world(record):
+    """Return the stages of the policy's turn; none for another environment version."""
+    if not record.events or not _has_this_environment(record):
         return ()
     turn = max(0, -min(event.step for event in record.events))
     events = [
-        Event(one.step + turn, Fact(one.kind, one.subject, one.place), one.holds)  # type: ignore[arg-type]
+        Event(one.step + turn, Fact(one.kind, one.subject, one.place), one.holds)
         for one in record.events
     ]
     last = max(record.steps, *(event.step for event in record.events))
@@ -55,10 +56,10 @@ def stages_of(record: Record) -> tuple[StageMark, ...]:
         episode = get_episode(record.task, record.split, record.episode)
         trace = rejudge(episode, events, turn, turn + last)
     except (RoboIRGError, KeyError):
-        return ()  # a task that is no longer installed, or events that are not all there
+        return ()  # a task that is no longer installed, or incomplete events
     done = {
-        trace.dues[step]: step - turn
-        for step in range(len(trace.dues))
+        stage: step - turn
+        for step, stage in enumerate(trace.expected_stages)
         if trace.completed(step) is not None
     }
     return tuple(
@@ -67,5 +68,5 @@ def stages_of(record: Record) -> tuple[StageMark, ...]:
     )
 
 
-def _is_of_this_world(record: Record) -> bool:
+def _has_this_environment(record: Record) -> bool:
     return record.environment_version == ENVIRONMENT_VERSION

@@ -1,4 +1,4 @@
-"""One self-contained HTML page that shows every episode: what was said, done and judged."""
+"""One self-contained HTML page with every episode: instruction, events, verdict."""
 
 from __future__ import annotations
 
@@ -10,20 +10,22 @@ from typing import TYPE_CHECKING, Any
 
 from roboirg.analysis.page.columns import Columns, make_columns
 from roboirg.analysis.page.entries import EpisodeEntries, Run, make_entries
-from roboirg.analysis.page.films import EpisodeVideos
+from roboirg.analysis.page.episode_videos import EpisodeVideos
 from roboirg.analysis.page.matrix import make_matrix
 from roboirg.analysis.page.run_warnings import comparisons, facts_of, run_warnings
 from roboirg.core.errors import MissingDependencyError
 from roboirg.evaluation.video_writer import LAST_FRAME_REPEATS, VideoOptions
+from roboirg.language.settings import EXPLICIT, all_settings
 from roboirg.records.record import Job, Record
-from roboirg.records.store import read_records, write_atomically
+from roboirg.records.store import read_records
+from roboirg.util.atomic_write import write_atomically
 
 if TYPE_CHECKING:
     import jinja2
 
 REPORT_FILE = "report.html"
 FILMING = VideoOptions()
-"""As `roboirg run` films, so that the page finds the moment of an event in a film."""
+"""As in `roboirg run`, so that the page finds the moment of an event in a video."""
 TEMPLATE = "report.html.j2"
 STYLES = ("base", "overview", "filters", "episodes", "pairs")
 SCRIPTS = (
@@ -40,7 +42,7 @@ SCRIPTS = (
     "pairs",
     "main",
 )
-"""Parts of the style sheet and of the script, in their order."""
+"""Parts of the style sheet and of the script, in order."""
 
 
 def write_report(
@@ -51,20 +53,20 @@ def write_report(
     against: Path | None = None,
     planned_against: Sequence[Job] = (),
 ) -> Path:
-    """Write ``report.html`` into a run's folder, whole or not at all.
+    """Write ``report.html`` into a run's folder atomically.
 
     Args:
         folder: of the run.
-        planned: jobs that should be there; the page says which cells lack some.
-        videos: put the films into the page.
-        against: folder of a run to compare with, episode by episode.
-        planned_against: jobs that should be there.
+        planned: jobs that should have a record; the page marks cells that lack some.
+        videos: whether to embed the videos.
+        against: folder of another run, to compare with episode by episode.
+        planned_against: planned jobs of the other run.
 
     Returns:
         The path of the page.
 
     Raises:
-        StoreError: there are no records, or they cannot be read.
+        StoreError: there are no readable records.
         MissingDependencyError: Jinja is not installed.
     """
     check_report_support()
@@ -78,14 +80,14 @@ def write_report(
 
 
 def make_view(folder: Path, planned: Sequence[Job] = ()) -> str:
-    """The page about a run as it is served: its films stay beside it.
+    """Return the page of a run as it is served, with links to its videos.
 
     Args:
         folder: of the run.
-        planned: jobs that should be there.
+        planned: jobs that should have a record.
 
     Raises:
-        StoreError: there are no records, or they cannot be read.
+        StoreError: there are no readable records.
         MissingDependencyError: Jinja is not installed.
     """
     check_report_support()
@@ -99,14 +101,14 @@ def render(
     *,
     name: str = "",
 ) -> str:
-    """The page about one run as text.
+    """Return the page of one run.
 
     Args:
         records: one for each identity.
-        folder: where the films are; None leaves them out. More than
-            `roboirg.analysis.page.films.MOST_FILM_BYTES` of them are linked to, by their paths in
-            it, rather than embedded.
-        planned: jobs that should be there.
+        folder: of the videos; None leaves them out. Videos of more than
+            `roboirg.analysis.page.episode_videos.MAX_EMBEDDED_BYTES` are linked to by their paths
+            in the folder.
+        planned: jobs that should have a record.
         name: of the run.
 
     Raises:
@@ -116,35 +118,35 @@ def render(
 
 
 def render_runs(runs: Sequence[Run], *, embed: bool = True) -> str:
-    """The page about one run, or two of them held against each other.
+    """Return the page of one run, or of two runs to compare.
 
     Args:
         runs: one or two.
-        embed: put films into the page, if they are not too much together.
+        embed: whether to embed the videos unless they are too large.
 
     Raises:
         MissingDependencyError: Jinja is not installed.
     """
     template = _environment().get_template(TEMPLATE)
     entries = make_entries(runs)
-    films = EpisodeVideos.of(entries.all, embed=embed)
-    columns = make_columns(entries, films)
+    videos = EpisodeVideos.of(entries.all, embed=embed)
+    columns = make_columns(entries, videos)
     return template.render(
         styles=STYLES,
         scripts=SCRIPTS,
         name=" against ".join(run.name for run in runs),
         count=len(entries.all),
         facts=facts_of(runs),
-        notices=run_warnings(entries),
-        films_are_beside=films.count > 0 and not films.embeds,
-        films=columns.films,
+        warnings=run_warnings(entries),
+        videos_are_linked=videos.count > 0 and not videos.embeds,
+        videos=columns.videos,
         data=_json(_data(entries, columns)),
         details="\n".join(map(_safe, columns.details)),
     )
 
 
 def check_report_support() -> None:
-    """Complain now if the page cannot be made.
+    """Check that the page can be made.
 
     Raises:
         MissingDependencyError: Jinja is not installed.
@@ -167,14 +169,16 @@ def _data(entries: EpisodeEntries, columns: Columns) -> dict[str, Any]:
         "matrix": make_matrix(entries),
         "comparisons": comparisons(entries),
         "sides": _sides(entries),
+        "reference": EXPLICIT,
+        "framed": [name for name, one in all_settings().items() if "frame" in one.reads],
         "film": {"every": FILMING.every, "rate": FILMING.rate, "repeats": LAST_FRAME_REPEATS},
     }
 
 
 def _sides(entries: EpisodeEntries) -> list[int]:
-    """Whom to hold against each other first: a policy and itself in the other run, or the next."""
+    """Return the policies to compare first: a policy and itself in the other run, or the next."""
     names = list(entries.names)
-    twins = [place for place, who in enumerate(names) if place and who.policy == names[0].policy]
+    twins = [place for place, one in enumerate(names) if place and one.policy == names[0].policy]
     return [0, twins[0] if twins else min(1, len(names) - 1)]
 
 
@@ -183,7 +187,7 @@ def _json(value: object) -> str:
 
 
 def _safe(text: str) -> str:
-    """JSON that can stand in a script element: no text in it ends the element."""
+    """Escape JSON for a script element: no text in it ends the element."""
     return text.replace("<", "\\u003c")
 
 
@@ -206,7 +210,7 @@ def _run(folder: Path, planned: Sequence[Job], *, videos: bool, link: str = "") 
 
 
 def _distinct(runs: Sequence[Run], *folders: Path | None) -> list[Run]:
-    """The runs under different names."""
+    """Return the runs with distinct names."""
     if len({run.name for run in runs}) == len(runs):
         return list(runs)
     return [

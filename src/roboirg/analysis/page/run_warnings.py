@@ -1,4 +1,4 @@
-"""What a reader has to know before any figure: what is amiss, mixed, or alone."""
+"""Warnings above the results: incomplete or mixed runs, and missing references."""
 
 from __future__ import annotations
 
@@ -10,48 +10,50 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from roboirg.analysis.page.entries import EpisodeEntries, Run
-from roboirg.analysis.page.matrix import SEED
+from roboirg.analysis.stats.cells import PolicyRun, Versions
 from roboirg.analysis.stats.comparison import compare
 from roboirg.analysis.stats.comparison_text import sentences
-from roboirg.analysis.stats.samples import PolicyRun, Versions
+from roboirg.analysis.stats.intervals import SEED
 from roboirg.core.errors import InvalidValueError
+from roboirg.language.settings import EXPLICIT
+from roboirg.util.plurals import counted
 
-MOST_PAIRS = 6
-"""Of policies that are compared in words."""
+MAX_COMPARISONS = 6
+"""Pairs of policies that are compared in words."""
 
 
 class RunWarning(NamedTuple):
-    """A sentence above the figures; `kind` is warning or note."""
+    """A sentence above the results; `kind` is ``warning`` or ``note``."""
 
     kind: str
     text: str
 
 
 def run_warnings(entries: EpisodeEntries) -> list[RunWarning]:
-    """What is incomplete, failed, mixed, or cannot be compared."""
+    """Return what is incomplete, failed, mixed, or cannot be compared."""
     return [
-        *(RunWarning("warning", text) for text in _amiss(entries)),
+        *(RunWarning("warning", text) for text in _incomplete(entries)),
         *(RunWarning("warning", text) for text in _mixed(entries)),
-        *(RunWarning("note", text) for text in _alone(entries)),
+        *(RunWarning("note", text) for text in _without_reference(entries)),
     ]
 
 
 def facts_of(runs: Sequence[Run]) -> list[tuple[str, str]]:
-    """What the head of the page says about the runs."""
+    """Return the facts in the head of the page, each with its label."""
     records = [record for run in runs for record in run.records]
     times = sorted(record.started_at[:16].replace("T", " ") for record in records)
     facts = [
         ("run", " against ".join(run.name for run in runs)),
-        ("played", _span(times[0], times[-1]) if times else ""),
+        ("played", _period(times[0], times[-1]) if times else ""),
         *(
-            (label, ", ".join(sorted({_said(getattr(one, name)) for one in records})))
+            (label, ", ".join(sorted({_text(getattr(one, name)) for one in records})))
             for label, name in (
                 ("split", "split"),
                 ("step limit", "max_steps"),
                 ("roboirg", "package_version"),
                 ("language", "language_version"),
                 ("environment", "environment_version"),
-                ("drawn by", "render_device"),
+                ("rendered on", "render_device"),
             )
         ),
     ]
@@ -59,19 +61,23 @@ def facts_of(runs: Sequence[Run]) -> list[tuple[str, str]]:
 
 
 def comparisons(entries: EpisodeEntries) -> list[dict[str, Any]]:
-    """What can be said of each two policies, in words; the first few of them."""
-    found = []
+    """Return the comparison of the first pairs of policies in words."""
     names = list(entries.names)
-    for first, second in list(combinations(range(len(names)), 2))[:MOST_PAIRS]:
-        said = _compared(entries, names[first], names[second])
-        found.append({"left": first, "right": second, "said": said})
-    return found
+    pairs = list(combinations(range(len(names)), 2))[:MAX_COMPARISONS]
+    return [
+        {
+            "left": first,
+            "right": second,
+            "sentences": _compared(entries, names[first], names[second]),
+        }
+        for first, second in pairs
+    ]
 
 
 def _compared(entries: EpisodeEntries, first: PolicyRun, second: PolicyRun) -> list[str]:
     ours, theirs = (
-        {key: sample for key, sample in entries.samples.items() if key[0] == who}
-        for who in (first, second)
+        {key: cell for key, cell in entries.cells.items() if key.policy_run == policy_run}
+        for policy_run in (first, second)
     )
     try:
         comparison = compare(ours, theirs, np.random.default_rng(SEED))
@@ -80,13 +86,14 @@ def _compared(entries: EpisodeEntries, first: PolicyRun, second: PolicyRun) -> l
     return list(sentences(comparison, entries.names[first], entries.names[second]))
 
 
-def _amiss(entries: EpisodeEntries) -> Iterable[str]:
-    missing = sum(sample.missing for sample in entries.samples.values())
+def _incomplete(entries: EpisodeEntries) -> Iterable[str]:
+    missing = sum(cell.missing for cell in entries.cells.values())
+    total = len(entries.all)
     if missing:
-        planned = missing + len(entries.all)
+        verb = "has" if missing == 1 else "have"
         yield (
-            f"Incomplete: {missing} of {planned} planned episodes have not been played. Cells and "
-            "averages that lack some are marked “…”."
+            f"Incomplete: {missing} of {counted(missing + total, 'planned episode')} {verb} not "
+            "been played. Cells and averages that lack some are marked “…”."
         )
     errors = Counter(
         entry.record.error or "unknown" for entry in entries.all if entry.record.outcome == "error"
@@ -94,8 +101,8 @@ def _amiss(entries: EpisodeEntries) -> Iterable[str]:
     if errors:
         kinds = ", ".join(f"{count} {kind}" for kind, count in errors.most_common())
         yield (
-            f"{errors.total()} of {len(entries.all)} episodes ended in an error ({kinds}). They "
-            "are in no rate; cells and averages that lack them are marked “!”."
+            f"{errors.total()} of {counted(total, 'episode')} ended in an error ({kinds}). "
+            "Errors are in no rate; cells and averages that lack them are marked “!”."
         )
 
 
@@ -105,41 +112,47 @@ def _mixed(entries: EpisodeEntries) -> Iterable[str]:
         if len(found) > 1:
             yield (
                 f"Mixed versions of the {name}: {', '.join(sorted(map(str, found)))}. "
-                "They stand apart and are never averaged."
+                "They have separate heat maps and are never averaged."
             )
-    for policy in dict.fromkeys(who.policy for who in entries.names):
-        own = [who for who in entries.names if who.policy == policy]
-        versions = {who.versions.policy for who in own if who.versions is not None}
-        if len(versions) > 1:
-            yield (
-                f"{policy} played in several versions: {', '.join(sorted(versions))}. "
-                "They stand apart and are never averaged."
-            )
-        for run in dict.fromkeys(who.run for who in own):
-            rules = {who.rules for who in own if who.run == run}
-            if len(rules) > 1:
-                yield f"{policy} played under {len(rules)} sets of rules, which stand apart."
+    for policy in dict.fromkeys(one.policy for one in entries.names):
+        yield from _mixed_policy(policy, [one for one in entries.names if one.policy == policy])
     codes = {entry.record.code for entry in entries.all}
     if len(codes) > 1:
         yield f"Played with {len(codes)} different states of the package’s code."
 
 
-def _alone(entries: EpisodeEntries) -> Iterable[str]:
+def _mixed_policy(policy: str, policy_runs: Sequence[PolicyRun]) -> Iterable[str]:
+    versions = {one.versions.policy for one in policy_runs if one.versions is not None}
+    if len(versions) > 1:
+        yield (
+            f"{policy} played in several versions: {', '.join(sorted(versions))}. "
+            "They have separate heat maps and are never averaged."
+        )
+    for run in dict.fromkeys(one.run for one in policy_runs):
+        conditions = {one.conditions for one in policy_runs if one.run == run}
+        if len(conditions) > 1:
+            yield (
+                f"{policy} played under {len(conditions)} sets of conditions, which have "
+                "separate heat maps."
+            )
+
+
+def _without_reference(entries: EpisodeEntries) -> Iterable[str]:
     if len(entries.names) == 1:
         yield (
-            "One policy alone: without the forgetful listener’s figures beside it, a rate does not "
-            "say how much of it is chance (roboirg tables RUN --chance adds them)."
+            "Only one policy: without the forgetful listener’s results beside it, a rate does not "
+            "show how much of it is chance (roboirg tables RUN --chance adds the chance level)."
         )
-    if all(told.setting != "explicit" for _, _, told in entries.samples):
+    if all(key.options.setting != EXPLICIT for key in entries.cells):
         yield "Explicit was not played, so there is no gap to it."
 
 
-def _said(value: object) -> str:
+def _text(value: object) -> str:
     return "" if value is None else str(value)
 
 
-def _span(first: str, last: str) -> str:
-    """From one time to another, such as 2026-01-02 03:04; the day only once."""
+def _period(first: str, last: str) -> str:
+    """Return a period such as ``2026-01-02 03:04 to 03:09 UTC``; names the day once if equal."""
     if first == last:
         return f"{first} UTC"
     day, _, minute = last.partition(" ")

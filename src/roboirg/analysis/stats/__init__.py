@@ -1,1 +1,1 @@
-"""Statistics of records: rates, intervals, paired tests, power."""
+"""Statistics of records: cells, rates, intervals, paired tests, power."""

@@ -1,8 +1,8 @@
-"""The chance level: what somebody reaches who hears only the final command.
+"""The chance level: the expected success of a policy that hears only the final command.
 
-The forgetful listener chooses uniformly among the goals that fit the command, or among all goals
-where none does. So its expected success is known without playing: one by the number of goals it
-chooses from, given hands that never slip. Nothing here is estimated.
+The forgetful listener chooses uniformly among the goals that fit the command, or among all goals if
+none fits. Its expected success follows without playing, assuming flawless execution: the share of
+these goals that have the stages of the right one. Nothing is estimated.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import functools
 from collections.abc import Iterable
 from fractions import Fraction
 
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.plan import instruct_job
 from roboirg.language import interpret
@@ -19,52 +20,33 @@ from roboirg.tasks import get_task
 
 
 def chance_of(job: Job) -> Fraction:
-    """The share of the forgetful listener's choices that do what the episode asks for.
+    """Return the probability that the forgetful listener chooses right.
 
     Args:
-        job: an episode and how it is told; who plays it, and how often, does not matter.
+        job: an episode with its instruction options; the policy and its seed do not matter.
 
     Raises:
-        UnknownNameError: there is no such task.
-        InvalidValueError: there is no such episode, or it cannot be told so.
+        UnknownNameError: the task does not exist.
+        InvalidValueError: the episode does not exist, or has no such instruction.
     """
-    # Whatever is not about words keeps the default, so that the same words are looked up once.
-    return _chance(
-        Job(
-            policy="",
-            **{name: getattr(job, name) for name in _WORDS},
-        )
-    )
+    return _chance(job.task, job.split, job.episode, job.options)
 
 
 def chance_level(jobs: Iterable[Job]) -> Fraction | None:
-    """The mean chance over the different tellings among some jobs; None for none."""
-    tellings = {tuple(getattr(job, name) for name in _WORDS): job for job in jobs}
-    chances = [chance_of(job) for job in tellings.values()]
+    """Return the mean chance over the distinct instructions of some jobs; None without jobs."""
+    instructions = dict.fromkeys((job.task, job.split, job.episode, job.options) for job in jobs)
+    chances = [_chance(*each) for each in instructions]
     return sum(chances, Fraction(0)) / len(chances) if chances else None
 
 
-_WORDS = (
-    "task",
-    "split",
-    "episode",
-    "setting",
-    "form",
-    "stages",
-    "distractor",
-    "distractors",
-    "frame",
-)
-"""The fields of a job on which the words depend."""
-
-
 @functools.lru_cache(maxsize=16_384)
-def _chance(job: Job) -> Fraction:
-    episode, task = get_episode(job.task, job.split, job.episode), get_task(job.task)
+def _chance(task_name: str, split: str, number: int, options: InstructionOptions) -> Fraction:
+    job = Job(policy="", task=task_name, split=split, episode=number, **options._asdict())
+    episode, task = get_episode(task_name, split, number), get_task(task_name)
     scene = episode.scene
-    fitting = interpret(instruct_job(job).command, scene, job.task).goals
+    fitting = interpret(instruct_job(job).command, scene, task_name).goals
     choices = fitting or task.goals(scene)
-    # Goals that come down to the same stages are one to the judge.
+    # Goals with the same stages are the same to the judge.
     wanted = task.stages(scene, episode.goal)
     right = sum(task.stages(scene, goal) == wanted for goal in choices)
     return Fraction(right, len(choices))

@@ -1,4 +1,4 @@
-"""Two policies on the same episodes, told in the same ways: which is better where."""
+"""Comparison of two policies on the same episodes with the same instruction options."""
 
 from __future__ import annotations
 
@@ -8,38 +8,39 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from roboirg.analysis.stats.cells import CellResults, Cells, PolicyRun
 from roboirg.analysis.stats.intervals import ALPHA
 from roboirg.analysis.stats.multiple_testing import holm
+from roboirg.analysis.stats.option_labels import options_sort_key
 from roboirg.analysis.stats.paired_tests import Gap, Pairs, measure_gap
 from roboirg.analysis.stats.power import episodes_needed, smallest_gap
-from roboirg.analysis.stats.samples import CellResults, PolicyRun, Samples
-from roboirg.analysis.stats.success_rates import SettingColumn
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import InstructionOptions
 
 Verdict = Literal["first", "second", "open"]
 
 
-class Where(NamedTuple):
-    """A telling, of one task or (None) of all that both played."""
+class ComparisonKey(NamedTuple):
+    """What is compared: one task or, as None, all tasks that both policies played."""
 
     task: str | None
-    variant: SettingColumn
+    options: InstructionOptions
 
 
 @dataclass(frozen=True, slots=True)
 class ComparisonResult:
-    """What can be said about one telling.
+    """The comparison for one task or all tasks with one set of options.
 
     Attributes:
-        where: task and telling.
+        key: task and options.
         tasks: that were paired.
-        gap: of the first to the second.
-        p_holm: its p-value after Holm's correction over all averages, or over all single tasks.
-        unpaired: trials with a verdict of one of them that the other did not play.
-        unjudged: trials of either that ended in an error or are still to be played.
+        gap: first less second.
+        p_holm: its p-value after Holm's correction over all averages, or over all single cells.
+        unpaired: trials with a verdict of one policy that the other did not play.
+        unjudged: trials of either policy that ended in an error or are still to be played.
     """
 
-    where: Where
+    key: ComparisonKey
     tasks: tuple[str, ...]
     gap: Gap
     p_holm: float
@@ -48,7 +49,7 @@ class ComparisonResult:
 
     @property
     def verdict(self) -> Verdict:
-        """Who is better; open where the corrected test does not tell."""
+        """The better policy; open if the corrected test does not decide."""
         if self.p_holm > ALPHA or self.gap.value == 0:
             return "open"
         return "first" if self.gap.value > 0 else "second"
@@ -60,24 +61,24 @@ class ComparisonResult:
 
     @property
     def detectable(self) -> float | None:
-        """The smallest gap that these episodes would show in 4 of 5 cases; None for none."""
+        """The smallest gap that these episodes show with a power of 80 %; None if there is none."""
         return smallest_gap(self.gap.episodes, self.discordance)
 
     @property
     def needed(self) -> int | None:
-        """How many episodes would show a gap as large as this in 4 of 5 cases; None for none."""
+        """Episodes that show a gap of this size with a power of 80 %; None if there are none."""
         return episodes_needed(self.gap.value, self.discordance)
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Two policies, averages first.
+    """The comparison of two policies.
 
     Attributes:
-        first: who.
-        second: against whom.
-        averages: for each telling, the unweighted mean over the tasks that both played.
-        cells: for each telling and task.
+        first: one policy run.
+        second: the other.
+        averages: for each set of options, the unweighted mean over the tasks that both played.
+        cells: for each task and set of options.
     """
 
     first: PolicyRun
@@ -86,89 +87,90 @@ class Comparison:
     cells: tuple[ComparisonResult, ...]
 
 
-def compare(first: Samples, second: Samples, rng: np.random.Generator) -> Comparison:
+def compare(first: Cells, second: Cells, rng: np.random.Generator) -> Comparison:
     """Compare two policies on the episodes that both played.
 
     Args:
-        first: the samples of one policy, under one set of rules.
-        second: of the other.
+        first: the cells of one policy run.
+        second: the cells of the other.
         rng: of the bootstrap.
 
     Raises:
-        InvalidValueError: one of them is several policies or versions, the words or worlds of the
-            two are of different versions, or they share no episode.
+        InvalidValueError: one side has several policies or versions, the two have different
+            language or environment versions, or they share no episode.
     """
-    ours, theirs = _only(first), _only(second)
+    ours, theirs = _only_policy_run(first), _only_policy_run(second)
     _check_fair(ours, theirs)
-    here = {(task, told): sample for (_, task, told), sample in first.items()}
-    there = {(task, told): sample for (_, task, told), sample in second.items()}
+    here = {ComparisonKey(task, options): cell for (_, task, options), cell in first.items()}
+    there = {ComparisonKey(task, options): cell for (_, task, options), cell in second.items()}
+    shared = [key for key in here if key in there]
     cells, averages = [], []
-    for variant in sorted(
-        {told for _, told in here.keys() & there.keys()}, key=SettingColumn.sort_key
-    ):
-        tasks = [task for task, told in here if told == variant and (task, told) in there]
-        cells += [_finding(Where(task, variant), [task], here, there, rng) for task in tasks]
-        averages.append(_finding(Where(None, variant), tasks, here, there, rng))
+    for options in sorted({key.options for key in shared}, key=options_sort_key):
+        keys = [key for key in shared if key.options == options]
+        cells += [_compared(key, [key], here, there, rng) for key in keys]
+        averages.append(_compared(ComparisonKey(None, options), keys, here, there, rng))
     found = _corrected(averages)
     if not found:
         raise InvalidValueError(
-            f"{ours.policy} and {theirs.policy} have no episode in common that both were told in "
-            "the same way; play both on the same tasks, settings and episodes."
+            f"{ours.policy} and {theirs.policy} have no episode in common with the same "
+            "instruction; play both on the same tasks, settings and episodes."
         )
     return Comparison(ours, theirs, found, _corrected(cells))
 
 
-def _finding(
-    where: Where,
-    tasks: Sequence[str],
-    here: Mapping[tuple[str, SettingColumn], CellResults],
-    there: Mapping[tuple[str, SettingColumn], CellResults],
+def _compared(
+    key: ComparisonKey,
+    cells: Sequence[ComparisonKey],
+    here: Mapping[ComparisonKey, CellResults],
+    there: Mapping[ComparisonKey, CellResults],
     rng: np.random.Generator,
 ) -> ComparisonResult | None:
-    both = [(here[task, where.variant], there[task, where.variant]) for task in tasks]
+    both = [(here[cell], there[cell]) for cell in cells]
     pairs = [Pairs.of(ours, theirs) for ours, theirs in both]
     gap = measure_gap(pairs, rng)
     if gap is None:
         return None
-    tried = sum(int(each.rows[:, 1::2].sum()) for each in pairs)
+    paired = sum(int(each.rows[:, 1::2].sum()) for each in pairs)
     return ComparisonResult(
-        where=where,
-        tasks=tuple(task for task, each in zip(tasks, pairs, strict=True) if len(each.rows)),
+        key=key,
+        tasks=tuple(
+            str(cell.task) for cell, each in zip(cells, pairs, strict=True) if len(each.rows)
+        ),
         gap=gap,
         p_holm=gap.p_value,
-        unpaired=sum(ours.trials + theirs.trials for ours, theirs in both) - tried,
+        unpaired=sum(ours.trials + theirs.trials for ours, theirs in both) - paired,
         unjudged=sum(one.errors + one.missing for pair in both for one in pair),
     )
 
 
-def _corrected(findings: Sequence[ComparisonResult | None]) -> tuple[ComparisonResult, ...]:
-    found = [finding for finding in findings if finding is not None]
-    adjusted = holm([finding.gap.p_value for finding in found])
+def _corrected(results: Sequence[ComparisonResult | None]) -> tuple[ComparisonResult, ...]:
+    found = [result for result in results if result is not None]
+    adjusted = holm([result.gap.p_value for result in found])
     return tuple(
-        replace(finding, p_holm=p_value) for finding, p_value in zip(found, adjusted, strict=True)
+        replace(result, p_holm=p_value) for result, p_value in zip(found, adjusted, strict=True)
     )
 
 
-def _only(samples: Samples) -> PolicyRun:
-    contestants = list(dict.fromkeys(who for who, _, _ in samples))
-    names = list(dict.fromkeys(who.policy for who in contestants))
+def _only_policy_run(cells: Cells) -> PolicyRun:
+    policy_runs = list(dict.fromkeys(key.policy_run for key in cells))
+    names = list(dict.fromkeys(one.policy for one in policy_runs))
     if not names:
         raise InvalidValueError("There are no results to compare; play something first.")
     if len(names) > 1:
         raise InvalidValueError(
             f"The run has several policies ({', '.join(names)}); name one as RUN:{names[0]}."
         )
-    if len(contestants) > 1:
+    if len(policy_runs) > 1:
         raise InvalidValueError(
-            f"{names[0]} played under several rules or in several versions, which cannot be taken "
-            "together; give runs with one of each."
+            f"{names[0]} played under several conditions or in several versions, whose results "
+            "cannot be pooled; give runs with one of each."
         )
-    return contestants[0]
+    return policy_runs[0]
 
 
 def _check_fair(first: PolicyRun, second: PolicyRun) -> None:
     if first.versions is None or second.versions is None:
-        raise InvalidValueError("One of the two has played nothing yet.")
+        raise InvalidValueError("One of the two policies has no results yet.")
     for name in ("language", "environment"):
         one, other = getattr(first.versions, name), getattr(second.versions, name)
         if one != other:
@@ -177,9 +179,9 @@ def _check_fair(first: PolicyRun, second: PolicyRun) -> None:
                 "only results of the same version can be compared."
             )
     for name in ("split", "max_steps", "meshes"):
-        one, other = getattr(first.rules, name), getattr(second.rules, name)
+        one, other = getattr(first.conditions, name), getattr(second.conditions, name)
         if one != other:
             raise InvalidValueError(
                 f"{first.policy} played with {name} {one} and {second.policy} with {other}; "
-                "only results under the same rules can be compared."
+                "only results under the same conditions can be compared."
             )

@@ -1,86 +1,87 @@
-"""A comparison in words."""
+"""A comparison as sentences."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 from roboirg.analysis.stats.comparison import Comparison, ComparisonResult
-from roboirg.analysis.stats.power import MOST_EPISODES, POWER
-
-_SMALLEST_P = 0.001
+from roboirg.analysis.stats.option_labels import options_label
+from roboirg.analysis.stats.power import MAX_EPISODES, POWER
+from roboirg.analysis.stats.rates import p_text, points
+from roboirg.util.plurals import counted
 
 
 def sentences(comparison: Comparison, first: str, second: str) -> Iterator[str]:
-    """What was found, a sentence each; paragraphs are separated by empty ones.
+    """Yield the results, a sentence each; empty ones separate paragraphs.
 
     Args:
         comparison: of two policies.
-        first: what to call the first.
-        second: what to call the second.
+        first: label of the first.
+        second: label of the second.
     """
     names = (first, second)
     yield f"{first} against {second}, on the same episodes."
     yield ""
-    for finding in comparison.averages:
-        yield _sentence(finding, names)
-    told = [finding for finding in comparison.cells if finding.verdict != "open"]
-    if any(len(finding.tasks) > 1 for finding in comparison.averages):
+    for result in comparison.averages:
+        yield _sentence(result, names)
+    decided = [result for result in comparison.cells if result.verdict != "open"]
+    if any(len(result.tasks) > 1 for result in comparison.averages):
         yield ""
+        cells = f"{counted(len(comparison.cells), 'single cell')} (one task in one setting)"
         yield (
-            f"Of {_count(len(comparison.cells), 'single cell')} (a task told in one way), "
-            f"{len(told)} can be told apart:"
-            if told
-            else f"None of {_count(len(comparison.cells), 'single cell')} (a task told in one way) "
-            "can be told apart by itself."
+            f"{len(decided)} of {cells} {'shows' if len(decided) == 1 else 'show'} a difference:"
+            if decided
+            else f"None of {cells} shows a difference by itself."
         )
-        for finding in sorted(told, key=lambda finding: -abs(finding.gap.value)):
-            yield f"  {_where(finding)}: {_better(finding, names)}, {_figures(finding)}."
+        for result in sorted(decided, key=lambda result: -abs(result.gap.value)):
+            yield f"  {_subject(result)}: {_better(result, names)}, {_figures(result)}."
     yield ""
     yield from _caveats(comparison)
 
 
-def _sentence(finding: ComparisonResult, names: tuple[str, str]) -> str:
-    if finding.verdict == "open":
-        return f"{_where(finding)}: cannot tell, {_figures(finding)}.{_more(finding)}"
-    return f"{_where(finding)}: {_better(finding, names)}, {_figures(finding)}."
+def _sentence(result: ComparisonResult, names: tuple[str, str]) -> str:
+    if result.verdict == "open":
+        return f"{_subject(result)}: no clear difference, {_figures(result)}.{_outlook(result)}"
+    return f"{_subject(result)}: {_better(result, names)}, {_figures(result)}."
 
 
-def _where(finding: ComparisonResult) -> str:
-    task, variant = finding.where
-    if task is not None:
-        return f"{task}, {variant.label}"
-    return variant.label
+def _subject(result: ComparisonResult) -> str:
+    task, options = result.key
+    label = options_label(options)
+    return label if task is None else f"{task}, {label}"
 
 
-def _better(finding: ComparisonResult, names: tuple[str, str]) -> str:
-    return f"{names[finding.verdict == 'second']} is better"
+def _better(result: ComparisonResult, names: tuple[str, str]) -> str:
+    return f"{names[result.verdict == 'second']} is better"
 
 
-def _figures(finding: ComparisonResult) -> str:
-    gap = finding.gap
-    words = f"{_points(gap.value)} points"
+def _figures(result: ComparisonResult) -> str:
+    gap = result.gap
+    words = f"{points(gap.value, 1)} points"
     if gap.interval is not None:
-        words += f" (95 % interval {_points(gap.interval.low)} to {_points(gap.interval.high)})"
-    tasks = "" if len(finding.tasks) == 1 else f" of {len(finding.tasks)} tasks"
-    return f"{words}, {_p(finding.p_holm)}, {_count(gap.episodes, 'episode')}{tasks}"
+        low, high = (points(end, 1) for end in gap.interval)
+        words += f" (95 % interval {low} to {high})"
+    tasks = "" if len(result.tasks) == 1 else f" of {len(result.tasks)} tasks"
+    return f"{words}, {p_text(result.p_holm)}, {counted(gap.episodes, 'episode')}{tasks}"
 
 
-def _more(finding: ComparisonResult) -> str:
-    """What it would take to tell."""
-    least = finding.detectable
-    can = "no gap" if least is None else f"gaps from {100 * least:.1f} points on"
-    words = f" So many episodes show {can} in {POWER:.0%} of cases".replace("%", " %")
-    if finding.gap.value == 0:
+def _outlook(result: ComparisonResult) -> str:
+    """Say which gaps these episodes show, and how many episodes would show this gap."""
+    least = result.detectable
+    detectable = "no gap" if least is None else f"gaps of {100 * least:.1f} points or more"
+    this_many = "This episode shows" if result.gap.episodes == 1 else "This many episodes show"
+    words = f" {this_many} {detectable} in {POWER:.0%} of cases".replace("%", " %")
+    if result.gap.value == 0:
         return f"{words}; the two did equally well."
-    needed = finding.needed
-    number = f"more than {MOST_EPISODES}" if needed is None else f"about {needed}"
-    return f"{words}; to show one of this size, {number} would be needed."
+    needed = result.needed
+    number = f"more than {MAX_EPISODES:,}" if needed is None else f"about {needed:,}"
+    return f"{words}; showing a gap of this size needs {number}."
 
 
 def _caveats(comparison: Comparison) -> Iterator[str]:
-    unpaired = sum(finding.unpaired for finding in comparison.averages)
-    unjudged = sum(finding.unjudged for finding in comparison.averages)
-    several = any(len(finding.tasks) > 1 for finding in comparison.averages)
+    unpaired = sum(result.unpaired for result in comparison.averages)
+    unjudged = sum(result.unjudged for result in comparison.averages)
+    several = any(len(result.tasks) > 1 for result in comparison.averages)
     yield "p-values are of the exact paired test, after Holm's correction" + (
         ": over the averages, and over the single cells. An average is the unweighted mean over "
         "tasks."
@@ -88,22 +89,11 @@ def _caveats(comparison: Comparison) -> Iterator[str]:
         else " over the settings."
     )
     if unpaired:
-        yield f"{_count(unpaired, 'trial')} of one without counterpart of the other are left out."
+        verb = "is" if unpaired == 1 else "are"
+        yield f"{counted(unpaired, 'trial')} without a counterpart {verb} left out."
     if unjudged:
+        verb = "is" if unjudged == 1 else "are"
         yield (
-            f"Incomplete: {_count(unjudged, 'trial')} ended in an error or are still to be played, "
-            "and are left out."
+            f"Incomplete: {counted(unjudged, 'trial')} without a verdict (an error, or still to be "
+            f"played) {verb} left out."
         )
-
-
-def _p(value: float) -> str:
-    return f"p < {_SMALLEST_P}" if value < _SMALLEST_P else f"p = {value:.3f}"
-
-
-def _points(gap: float) -> str:
-    text = f"{100 * gap:+.1f}".replace("-", "−")
-    return "±0.0" if text in {"+0.0", "−0.0"} else text
-
-
-def _count(number: int, name: str) -> str:
-    return f"{number} {name}{'' if number == 1 else 's'}"

@@ -1,4 +1,4 @@
-"""Many tests at once: Holm's step-down correction."""
+"""Holm's step-down correction for multiple tests."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 
 def holm(p_values: Sequence[float]) -> tuple[float, ...]:
-    """Adjusted p-values, in the order given: reject what is at most 0.05.
+    """Return adjusted p-values in the given order.
 
-    The chance of any false alarm among all of them is then at most 0.05, however the tests depend
-    on each other. None for none.
+    Rejecting those of at most 0.05 keeps the probability of any false alarm at 0.05 or below,
+    whatever the dependence between the tests.
     """
     if not p_values:
         return ()

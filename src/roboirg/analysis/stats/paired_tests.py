@@ -1,4 +1,4 @@
-"""Two samples on the same episodes: gap, tests, retention, overlap."""
+"""Paired comparison of two cells on the same episodes: gap, test, retention, overlap."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from roboirg.analysis.stats.cells import CellResults
 from roboirg.analysis.stats.intervals import (
     DRAWS,
     Interval,
@@ -17,17 +18,16 @@ from roboirg.analysis.stats.intervals import (
     resampled_rates,
     without_spread,
 )
-from roboirg.analysis.stats.samples import CellResults
 
 
 class Overlap(NamedTuple):
-    """What two samples did in the same trials (episode and policy seed).
+    """Outcomes of two cells in the trials (episode and policy seed) that they share.
 
     Attributes:
-        both: trials solved in both.
-        only_first: in the first alone.
-        only_second: in the second alone.
-        neither: in neither.
+        both: trials that succeed in both cells.
+        only_first: trials that succeed in the first cell alone.
+        only_second: trials that succeed in the second cell alone.
+        neither: trials that succeed in neither cell.
     """
 
     both: int
@@ -37,24 +37,24 @@ class Overlap(NamedTuple):
 
     @property
     def trials(self) -> int:
-        """All of them."""
+        """Number of shared trials."""
         return sum(self)
 
     @property
     def discordance(self) -> float | None:
-        """Share of the trials that exactly one solves; None without trials."""
+        """Share of the trials that succeed in exactly one cell; None without trials."""
         return (self.only_first + self.only_second) / self.trials if self.trials else None
 
 
 @dataclass(frozen=True, slots=True)
 class Pairs:
-    """Two samples of one task, episode by episode.
+    """Two cells of one task, paired by episode.
 
     Attributes:
-        rows: for each episode that has verdicts in both: successes and trials of the first, then
-            of the second; shape (episodes, 4). Of the policy seeds those that both have, or all
-            where they share none.
-        overlap: over the trials that both have.
+        rows: for each episode with verdicts in both cells, successes and trials of the first,
+            then of the second; shape (episodes, 4). Counts the policy seeds that both cells have,
+            or all seeds if they share none.
+        overlap: of the trials that both cells have.
     """
 
     rows: Rows
@@ -62,7 +62,7 @@ class Pairs:
 
     @classmethod
     def of(cls, first: CellResults, second: CellResults) -> Pairs:
-        """Pair two samples of the same task."""
+        """Pair two cells of the same task."""
         ours, theirs = first.by_episode(), second.by_episode()
         rows = []
         for episode in sorted(ours.keys() & theirs.keys()):
@@ -88,27 +88,28 @@ class Pairs:
 
     @property
     def differences(self) -> NDArray[np.int64]:
-        """By how much the first succeeded more often in each episode, in whole numbers.
+        """First less second in each episode, in whole numbers.
 
-        In trials where both have as many of them, else in shares times both numbers of trials.
+        In trials if both cells have equally many in every episode, else in success rates times
+        both numbers of trials.
         """
-        won, tried, lost, sought = self.rows.T
-        if np.array_equal(tried, sought):
-            return np.asarray(won - lost)
-        return np.asarray(won * sought - lost * tried)
+        first, first_trials, second, second_trials = self.rows.T
+        if np.array_equal(first_trials, second_trials):
+            return np.asarray(first - second)
+        return np.asarray(first * second_trials - second * first_trials)
 
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """How much better the first of two is, over one task or the unweighted mean of several.
+    """Difference between two cells of a task, or the unweighted mean over several tasks.
 
     Attributes:
-        value: difference of the success rates on the same episodes, -1 to 1.
-        interval: of it, from the paired bootstrap over episodes.
-        p_value: of the hypothesis that it makes no difference; not corrected.
-        retention: success rate of the first by that of the second; None where that is 0.
-        retention_interval: of it; ends that the data do not bound are infinite.
-        episodes: that were paired.
+        value: success rate of the first less that of the second on the same episodes, -1 to 1.
+        interval: of the value, from the paired bootstrap over episodes.
+        p_value: of the null hypothesis of no difference; not corrected.
+        retention: success rate of the first by that of the second; None if the latter is 0.
+        retention_interval: of the retention; ends that the data do not bound are infinite.
+        episodes: number of paired episodes.
         overlap: of their trials.
     """
 
@@ -122,7 +123,7 @@ class Gap:
 
 
 def measure_gap(tasks: Sequence[Pairs], rng: np.random.Generator, draws: int = DRAWS) -> Gap | None:
-    """The gap between the first and the second; None if no task has a pair."""
+    """Measure the gap over the tasks that have pairs; None if no task has any."""
     paired = [pairs for pairs in tasks if len(pairs.rows)]
     if not paired:
         return None
@@ -138,24 +139,22 @@ def measure_gap(tasks: Sequence[Pairs], rng: np.random.Generator, draws: int = D
         retention=float(first / second) if second else None,
         retention_interval=_retention_interval(drawn, sizes) if second else None,
         episodes=sum(sizes),
-        overlap=Overlap._make(np.sum([pairs.overlap for pairs in paired], axis=0).tolist()),
+        overlap=pooled_overlap(paired),
     )
 
 
-def mcnemar_test(only_first: int, only_second: int) -> float:
-    """McNemar's exact test: two-sided p-value of the trials that exactly one of two solves."""
-    from scipy import stats
-
-    unlike = only_first + only_second
-    return float(stats.binomtest(only_first, unlike).pvalue) if unlike else 1.0
+def pooled_overlap(tasks: Sequence[Pairs]) -> Overlap:
+    """Add the overlaps of several tasks."""
+    counts = zip(*(pairs.overlap for pairs in tasks), strict=True)
+    return Overlap._make(map(sum, counts)) if tasks else Overlap(0, 0, 0, 0)
 
 
 def sign_flip_test(differences: NDArray[np.int64]) -> float:
-    """The exact test that the two of each pair could be swapped: a two-sided p-value.
+    """Return the two-sided p-value of the exact sign-flip test.
 
-    The sum of the differences is compared with what all ways to swap the two within episodes
-    give. With one policy seed the differences are -1, 0 and 1, and this is McNemar's exact test;
-    with several it stays right although the seeds of an episode are alike.
+    Compares the sum of the differences with the sums of all ways to swap the two cells within
+    episodes. With one policy seed the differences are -1, 0 and 1, and this is McNemar's exact
+    test; with several seeds it stays valid although the seeds of an episode are correlated.
 
     Args:
         differences: one for each episode, whole numbers.
@@ -165,7 +164,7 @@ def sign_flip_test(differences: NDArray[np.int64]) -> float:
         return 1.0
     sizes //= np.gcd.reduce(sizes)
     total = int(sizes.sum())
-    # Probability of every sum of those that fall to the first.
+    # Probability of each sum of the sizes that get a positive sign.
     chances = np.zeros(total + 1)
     chances[0] = 1.0
     for size in sizes.tolist():

@@ -1,7 +1,7 @@
-"""How many episodes a paired comparison needs, and what a run can find out at all.
+"""Power of a paired comparison: the episodes it needs and the gaps it can detect.
 
-All of it is exact for McNemar's exact test with one policy seed. More seeds on the same episodes
-help less than as many more episodes would; so what is said here errs on the safe side for them.
+Exact for McNemar's exact test with one policy seed. More seeds on the same episodes add power, but
+less than the same number of new episodes, so these figures are conservative for them.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from roboirg.analysis.stats.intervals import ALPHA
 from roboirg.core.errors import InvalidValueError
 
 POWER = 0.8
-"""How likely a gap shall be found: the usual choice."""
-MOST_EPISODES = 100_000
-"""Beyond that a number of episodes is no help."""
-_REACH = 10.0
-"""Standard deviations beyond which nothing happens."""
+"""The usual choice of a wanted power."""
+MAX_EPISODES = 100_000
+"""Larger numbers of episodes are not reported."""
+_MAX_DEVIATIONS = 10.0
+"""Standard deviations beyond which probabilities are negligible."""
 _TOLERANCE = 1e-4
-"""To which a smallest gap is found: a hundredth of a point."""
+"""Precision of a smallest gap: a hundredth of a point."""
 
 
 def mcnemar_power(episodes: int, gap: float, discordance: float, alpha: float = ALPHA) -> float:
-    """How likely the exact test finds a difference.
+    """Return the probability that the exact test finds a difference.
 
     Args:
         episodes: played by both.
@@ -35,7 +35,7 @@ def mcnemar_power(episodes: int, gap: float, discordance: float, alpha: float = 
         alpha: level of the test.
 
     Raises:
-        InvalidValueError: no such gap and discordance can be.
+        InvalidValueError: the gap is larger than the discordance, or a value is out of range.
     """
     _check(gap, discordance)
     if episodes < 1:
@@ -54,22 +54,22 @@ def mcnemar_power(episodes: int, gap: float, discordance: float, alpha: float = 
 def episodes_needed(
     gap: float, discordance: float, power: float = POWER, alpha: float = ALPHA
 ) -> int | None:
-    """Episodes with which a gap is found with the wanted power; None beyond `MOST_EPISODES`.
+    """Return the episodes that detect a gap with the wanted power; None above `MAX_EPISODES`.
 
-    The power of an exact test rises in saw-teeth; this is a number that has it, and at most a
-    tooth above the least.
+    The power of an exact test rises in a sawtooth; the number has the wanted power and is at most
+    one tooth above the smallest such number.
 
     Raises:
-        InvalidValueError: no such gap and discordance can be.
+        InvalidValueError: the gap is larger than the discordance, or a value is out of range.
     """
     _check(gap, discordance)
     if gap == 0:
         return None
     low, high = 1, 2
     while mcnemar_power(high, gap, discordance, alpha) < power:
-        if high >= MOST_EPISODES:
+        if high >= MAX_EPISODES:
             return None
-        low, high = high, min(2 * high, MOST_EPISODES)
+        low, high = high, min(2 * high, MAX_EPISODES)
     while high - low > 1:
         middle = (low + high) // 2
         enough = mcnemar_power(middle, gap, discordance, alpha) >= power
@@ -80,7 +80,7 @@ def episodes_needed(
 def smallest_gap(
     episodes: int, discordance: float, power: float = POWER, alpha: float = ALPHA
 ) -> float | None:
-    """The smallest gap that so many episodes find with the wanted power, 0 to 1.
+    """Return the smallest gap that episodes detect with the wanted power, 0 to 1.
 
     Args:
         episodes: played by both.
@@ -89,7 +89,7 @@ def smallest_gap(
         alpha: level of the test.
 
     Returns:
-        None if not even that is found where every such episode goes to the same side.
+        None if even the largest gap, with all discordant episodes on one side, is not detected.
     """
     if mcnemar_power(episodes, discordance, discordance, alpha) < power:
         return None
@@ -105,16 +105,16 @@ def smallest_gap(
 def _rejections(
     episodes: int, discordance: float, alpha: float
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """How many episodes may go to one side alone, and when the test then still rejects.
+    """Return numbers of discordant episodes and, for each, when the test rejects.
 
     Returns:
-        Numbers of such episodes, all but those with a chance of less than 1e-20; and for each the
-        most wins of the rarer side with which the test rejects, -1 where none are few enough.
+        The numbers of discordant episodes, but for those with a probability below 1e-20; and for
+        each the most wins of the rarer side with which the test rejects, -1 if it never does.
     """
     from scipy import stats
 
     center = episodes * discordance
-    reach = _REACH * math.sqrt(center * (1 - discordance)) + _REACH
+    reach = _MAX_DEVIATIONS * math.sqrt(center * (1 - discordance)) + _MAX_DEVIATIONS
     least, most = max(0, math.floor(center - reach)), min(episodes, math.ceil(center + reach))
     unlike = np.arange(least, most + 1)
     fewest = stats.binom.ppf(alpha / 2, unlike, 0.5)
@@ -125,6 +125,6 @@ def _rejections(
 def _check(gap: float, discordance: float) -> None:
     if not 0 <= abs(gap) <= discordance <= 1:
         raise InvalidValueError(
-            f"A gap of {gap} with a discordance of {discordance} cannot be; the discordance must "
-            "be from the size of the gap to 1."
+            f"A gap of {gap} with a discordance of {discordance} is impossible; the discordance "
+            "must be between the size of the gap and 1."
         )

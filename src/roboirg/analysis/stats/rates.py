@@ -1,8 +1,8 @@
-"""Rates as they are printed: percent with two decimals, and averages of what is printed.
+"""Printed rates and gaps, and averages of printed rates.
 
-The rule is the one that gives all published averages to the last digit: a cell is rounded half up,
-and an average is the mean of the rounded cells, again rounded half up. Means of the unrounded rates
-differ in the last digit in six of the published averages.
+In tables of the paper a cell is rounded half up to two decimals, and an average is the mean of the
+rounded cells, again rounded half up. This rule gives every published average to the last digit;
+means of the unrounded rates differ in the last digit in six of them.
 """
 
 from __future__ import annotations
@@ -14,25 +14,43 @@ from typing import Literal
 
 DIGITS = Decimal("0.01")
 
+_SMALLEST_P = 0.001
+
 Change = Literal["up", "down", "same"]
 
 
 def percent(rate: Fraction) -> Decimal:
-    """A rate from 0 to 1 in percent with two decimals, rounded half up."""
+    """Return a rate from 0 to 1 in percent with two decimals, rounded half up."""
     return _rounded(100 * rate)
 
 
 def mean_percent(cells: Sequence[Decimal]) -> Decimal:
-    """The unweighted mean of printed rates, printed by the same rule."""
+    """Return the unweighted mean of printed rates, rounded by the same rule."""
     return _rounded(sum(map(Fraction, cells), Fraction(0)) / len(cells))
 
 
 def change(value: Decimal, reference: Decimal) -> Change:
-    """Whether a printed rate is above or below another, or the same."""
+    """Return whether a printed rate is above or below another, or the same."""
     return "same" if value == reference else "up" if value > reference else "down"
 
 
+def whole_percent(rate: float | Fraction) -> str:
+    """Return a rate from 0 to 1 as a whole percentage."""
+    return f"{100 * float(rate):.0f}"
+
+
+def points(gap: float, decimals: int = 0) -> str:
+    """Return a gap in signed percentage points, with a proper minus: ``−12``, ``+3``, ``±0``."""
+    text = f"{100 * gap:+.{decimals}f}".replace("-", "−")
+    return f"±{text[1:]}" if not text.strip("+−0.") else text
+
+
+def p_text(p_value: float) -> str:
+    """Return a p-value with its sign: ``p = 0.012``, ``p < 0.001``."""
+    return f"p < {_SMALLEST_P}" if p_value < _SMALLEST_P else f"p = {p_value:.3f}"
+
+
 def _rounded(value: Fraction) -> Decimal:
-    # Two decimals more than enough of an exact quotient would be rounded twice; so in integers.
+    # In integers: rounding a decimal quotient would round twice.
     hundredths = (200 * value.numerator + value.denominator) // (2 * value.denominator)
     return (Decimal(hundredths) * DIGITS).quantize(DIGITS, ROUND_HALF_UP)

@@ -1,1 +1,1 @@
-"""Tables of results, for terminals, papers and programs."""
+"""Tables of results for terminals, papers and programs."""

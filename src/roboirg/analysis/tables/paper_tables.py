@@ -1,4 +1,4 @@
-"""The tables of the paper, from samples: main, planners, context, real world, coverage."""
+"""The tables of the paper: main, planners, context, real world, coverage."""
 
 from __future__ import annotations
 
@@ -16,10 +16,18 @@ from roboirg.analysis.published import (
     published_rows,
     published_tasks,
 )
+from roboirg.analysis.stats.cells import (
+    CellKey,
+    CellResults,
+    Cells,
+    PolicyRun,
+    cell_interval,
+    labels,
+)
 from roboirg.analysis.stats.chance import chance_level
+from roboirg.analysis.stats.intervals import SEED
+from roboirg.analysis.stats.option_labels import setting_sort_key, staged_options
 from roboirg.analysis.stats.rates import percent
-from roboirg.analysis.stats.samples import CellResults, PolicyRun, Samples, labels, shown_interval
-from roboirg.analysis.stats.success_rates import EXPLICIT, SETTING_ORDER, SettingColumn
 from roboirg.analysis.tables.table import (
     ERROR_MARK,
     MISSING_MARK,
@@ -28,13 +36,14 @@ from roboirg.analysis.tables.table import (
     Entry,
     Row,
     Table,
-    averaged,
+    with_averages,
     with_best,
     with_changes,
 )
-from roboirg.analysis.tables.table_notes import notes_of
+from roboirg.analysis.tables.table_notes import is_shown, notes_of
 from roboirg.core.errors import UnknownNameError
-from roboirg.language import STAGE_SETS, settings_of
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.language.settings import EXPLICIT, all_settings, settings_of
 from roboirg.records.record import Job
 from roboirg.tasks import all_tasks
 
@@ -44,8 +53,6 @@ WHICH: tuple[Which, ...] = get_args(Which)
 OVERALL = AVERAGE
 OWN_NAME = "RoboIRGBench"
 CHANCE = "chance"
-SEED = 20_240_607
-"""Of the bootstrap behind the intervals; the same records give the same tables."""
 
 TITLES: Mapping[Which, str] = {
     "main": "Success by task and setting",
@@ -54,80 +61,77 @@ TITLES: Mapping[Which, str] = {
     "real": "Real world",
     "coverage": "Implicit references in benchmarks",
 }
-SHORTEST_CONTEXT = STAGE_SETS[0]
 
 
-class Place(NamedTuple):
-    """Where a row stands: its group, its name, and how its episodes were told."""
+class Position(NamedTuple):
+    """The group and name of a row, and the options of its instructions."""
 
     group: str
     name: str
-    variant: SettingColumn
+    options: InstructionOptions
 
 
-def make_table(
-    which: str, samples: Samples, *, published: bool = False, chance: bool = False
-) -> Table:
-    """One of the paper's tables.
+def make_table(which: str, cells: Cells, *, published: bool = False, chance: bool = False) -> Table:
+    """Make one of the paper's tables.
 
     Args:
         which: main, planner, context, real or coverage.
-        samples: as `gather` makes them; may be empty where published rows are shown.
-        published: whether the paper's own rows stand beside ours.
-        chance: whether the chance level stands below the policies.
+        cells: as `gather` makes them; may be empty if published rows are shown.
+        published: whether to add the paper's rows.
+        chance: whether to add the chance level below the policies.
 
     Raises:
-        UnknownNameError: there is no such table.
+        UnknownNameError: the table does not exist.
     """
     for known in WHICH:
         if which == known:
             if known == "coverage":
                 return _coverage()
-            return _rate_table(known, samples, published=published, chance=chance)
+            return _rate_table(known, cells, published=published, chance=chance)
     raise UnknownNameError("table", which, WHICH)
 
 
-def has_something_to_say(which: Which, samples: Samples) -> bool:
-    """Whether a run holds more than one row of a table, or anything at all of the main ones."""
+def is_informative(which: Which, cells: Cells) -> bool:
+    """Return whether a run has rows for a table; context and planners need several."""
     if which == "coverage":
         return True
-    rows = list(_our_places(which, samples))
+    rows = list(_positions(which, cells))
     if which == "planner":
-        return len({who for who, _ in rows}) > 1
+        return len({policy_run for policy_run, _ in rows}) > 1
     if which == "context":
-        return len({place.variant for _, place in rows}) > 1
+        return len({position.options for _, position in rows}) > 1
     return bool(rows)
 
 
-def _rate_table(which: RateTable, samples: Samples, *, published: bool, chance: bool) -> Table:
+def _rate_table(which: RateTable, cells: Cells, *, published: bool, chance: bool) -> Table:
     columns = _columns(which)
     rng = np.random.default_rng(SEED)
     rows = [
         Row(
-            place.group,
-            place.name,
+            position.group,
+            position.name,
             "ours",
-            averaged(columns, _our_entries(which, who, place.variant, samples, rng)),
+            with_averages(columns, _entries(which, policy_run, position.options, cells, rng)),
         )
-        for who, place in _our_places(which, samples)
+        for policy_run, position in _positions(which, cells)
     ]
     if chance:
-        rows += _chance_rows(which, columns, samples)
+        rows += _chance_rows(which, columns, cells)
     if published:
         rows += [_published_row(which, columns, row) for row in published_rows(which)]
-    rows = with_best(with_changes(columns, _grouped(which, rows), _referee(which, rows)))
+    rows = with_best(with_changes(columns, _grouped(which, rows), _reference_finder(which, rows)))
     return Table(
         key=which,
         title=TITLES[which],
         heads=("policy", "stages") if which == "context" else ("setting", "policy"),
         columns=columns,
         rows=tuple(rows),
-        notes=notes_of(which, rows, samples, published_tasks(which)),
+        notes=notes_of(which, rows, cells, published_tasks(which)),
     )
 
 
 def _columns(which: RateTable) -> tuple[Column, ...]:
-    """Tasks by suite with the suite's average in the main table; the overall average last."""
+    """Return the tasks, in the main table by suite with its average; the overall average last."""
     tasks = published_tasks(which)
     if which != "main":
         return (*(Column(task) for task in tasks), Column(OVERALL, averages=tasks))
@@ -143,126 +147,142 @@ def _columns(which: RateTable) -> tuple[Column, ...]:
     return (*columns, Column(OVERALL, averages=tasks))
 
 
-def _our_places(which: RateTable, samples: Samples) -> Iterator[tuple[PolicyRun, Place]]:
+def _positions(which: RateTable, cells: Cells) -> Iterator[tuple[PolicyRun, Position]]:
+    """Yield the position of each row, by policy run and instruction options."""
     tasks = set(published_tasks(which))
-    played = {(who, variant) for who, task, variant in samples if task in tasks}
-    names = labels(samples)
-    for who, name in names.items():
-        for variant in _variants(which):
-            if (who, variant) in played:
-                yield who, _place(which, name, variant)
+    played = {(key.policy_run, key.options) for key in cells if key.task in tasks}
+    shown = _shown_options(which, (options for _, options in played))
+    for policy_run, label in labels(cells).items():
+        for options in shown:
+            if (policy_run, options) in played:
+                yield policy_run, _position(which, label, options)
 
 
-def _variants(which: RateTable) -> list[SettingColumn]:
+def _shown_options(
+    which: RateTable, played: Iterable[InstructionOptions]
+) -> Sequence[InstructionOptions]:
+    """Return the options that a table has rows for, in order."""
     if which == "context":
-        return [SettingColumn("contextual", stages=stages) for stages in STAGE_SETS]
-    return [EXPLICIT._replace(setting=setting) for setting in SETTING_ORDER]
+        return staged_options()
+    shown = {options for options in played if is_shown(which, options)}
+    return sorted(shown, key=lambda options: setting_sort_key(options.setting))
 
 
-def _place(which: RateTable, policy: str, variant: SettingColumn) -> Place:
+def _position(which: RateTable, policy: str, options: InstructionOptions) -> Position:
     if which == "context":
-        return Place(policy, _stages(variant), variant)
-    return Place(variant.setting, policy, variant)
+        return Position(policy, _stages(options), options)
+    return Position(options.setting, policy, options)
 
 
-def _stages(variant: SettingColumn) -> str:
-    return ",".join(map(str, variant.stages))
+def _stages(options: InstructionOptions) -> str:
+    return ",".join(map(str, options.stages))
 
 
-def _our_entries(
+def _entries(
     which: RateTable,
-    who: PolicyRun,
-    variant: SettingColumn,
-    samples: Samples,
+    policy_run: PolicyRun,
+    options: InstructionOptions,
+    cells: Cells,
     rng: np.random.Generator,
 ) -> dict[str, Entry]:
     return {
-        task: _entry(samples.get((who, task, variant)), _applies(task, variant), rng)
+        task: _entry(
+            cells.get(CellKey(policy_run, task, options)), rng, applies=_applies(task, options)
+        )
         for task in published_tasks(which)
     }
 
 
-def _entry(sample: CellResults | None, applies: bool, rng: np.random.Generator) -> Entry:
-    if sample is None:
+def _entry(cell: CellResults | None, rng: np.random.Generator, *, applies: bool) -> Entry:
+    if cell is None:
         return Entry(applies=applies)
-    marks = (ERROR_MARK if sample.errors else "") + (MISSING_MARK if sample.missing else "")
+    marks = (ERROR_MARK if cell.errors else "") + (MISSING_MARK if cell.missing else "")
     return Entry(
-        percent=None if sample.rate is None else percent(sample.rate),
+        percent=None if cell.rate is None else percent(cell.rate),
         marks=marks,
         counts=Counts(
-            sample.successes,
-            sample.trials,
-            len(sample.by_episode()),
-            sample.errors,
-            sample.missing,
-            shown_interval(sample, rng),
+            cell.successes,
+            cell.trials,
+            len(cell.by_episode()),
+            cell.errors,
+            cell.missing,
+            cell_interval(cell, rng),
         ),
     )
 
 
-def _applies(task: str, variant: SettingColumn) -> bool:
+def _applies(task: str, options: InstructionOptions) -> bool:
+    """Whether a task has a setting; taken for granted if either is not installed."""
     known = all_tasks().get(task)
-    return known is None or variant.setting in settings_of(known)
+    is_known = known is not None and options.setting in all_settings()
+    return known is None or not is_known or options.setting in settings_of(known)
 
 
-def _chance_rows(which: RateTable, columns: Sequence[Column], samples: Samples) -> list[Row]:
-    """The chance level of each telling, on the episodes that anybody played in it."""
+def _chance_rows(which: RateTable, columns: Sequence[Column], cells: Cells) -> list[Row]:
+    """Return the chance level of each setting on the episodes that any policy played in it."""
     rows: list[Row] = []
     if which == "context":
         return rows
-    for variant in dict.fromkeys(place.variant for _, place in _our_places(which, samples)):
-        cells = {}
+    for options in dict.fromkeys(position.options for _, position in _positions(which, cells)):
+        entries = {}
         for task in published_tasks(which):
-            level = _chance(task, variant, samples)
-            applies = _applies(task, variant)
-            cells[task] = Entry(None if level is None else percent(level), applies=applies)
-        rows.append(Row(variant.setting, CHANCE, "chance", averaged(columns, cells)))
+            level = _chance(task, options, cells)
+            entries[task] = Entry(
+                None if level is None else percent(level), applies=_applies(task, options)
+            )
+        rows.append(Row(options.setting, CHANCE, "chance", with_averages(columns, entries)))
     return rows
 
 
-def _chance(task: str, variant: SettingColumn, samples: Samples) -> Fraction | None:
-    if task not in all_tasks():
+def _chance(task: str, options: InstructionOptions, cells: Cells) -> Fraction | None:
+    if task not in all_tasks() or options.setting not in all_settings():
         return None
     return chance_level(
-        Job(policy="", task=task, split=who.rules.split, episode=trial.episode, **variant._asdict())
-        for (who, played, told), sample in samples.items()
-        if (played, told) == (task, variant)
-        for trial in sample.verdicts
+        Job(
+            policy="",
+            task=task,
+            split=key.policy_run.conditions.split,
+            episode=trial.episode,
+            **options._asdict(),
+        )
+        for key, cell in cells.items()
+        if (key.task, key.options) == (task, options)
+        for trial in cell.verdicts
     )
 
 
 def _published_row(which: RateTable, columns: Sequence[Column], row: PublishedRow) -> Row:
-    cells = {
-        task: Entry(percent=rate, applies=rate is not None) for task, rate in row.rates.items()
-    }
-    entries = averaged(columns, cells)
-    place = _place(which, row.model, row.variant)
-    # The overall average as it is printed in the paper; those of suites are not printed there.
+    entries = with_averages(
+        columns,
+        {task: Entry(percent=rate, applies=rate is not None) for task, rate in row.rates.items()},
+    )
+    position = _position(which, row.model, row.options)
+    # The paper prints the overall average, but no averages of suites.
     entries = (*entries[:-1], Entry(percent=row.average))
-    return Row(place.group, place.name, "published", entries)
+    return Row(position.group, position.name, "published", entries)
 
 
 def _grouped(which: RateTable, rows: Iterable[Row]) -> list[Row]:
-    """The rows of each group together; settings in their order, policies as they come."""
+    """Put the rows of each group together: settings in their order, policies as they come."""
     found = list(rows)
     groups = list(dict.fromkeys(row.group for row in found))
     if which != "context":
-        groups.sort(key=SETTING_ORDER.index)
+        groups.sort(key=setting_sort_key)
     return [row for group in groups for row in found if row.group == group]
 
 
-def _referee(which: RateTable, rows: Sequence[Row]) -> Callable[[Row], Row | None]:
-    """With which row another is compared: explicit of the same policy, or the shortest context."""
-    by_place = {(row.group, row.name, row.source): row for row in rows}
-    shortest = ",".join(map(str, SHORTEST_CONTEXT))
+def _reference_finder(which: RateTable, rows: Sequence[Row]) -> Callable[[Row], Row | None]:
+    """Return a function that finds a row's reference: explicit, or the shortest context."""
+    by_position = {(row.group, row.name, row.source): row for row in rows}
+    shortest = _stages(staged_options()[0])
 
     def reference_of(row: Row) -> Row | None:
         if row.source == "chance":
             return None
         if which == "context":
-            found = by_place.get((row.group, shortest, row.source))
+            found = by_position.get((row.group, shortest, row.source))
         else:
-            found = by_place.get((EXPLICIT.setting, row.name, row.source))
+            found = by_position.get((EXPLICIT, row.name, row.source))
         is_itself = found is not None and (found.group, found.name) == (row.group, row.name)
         return None if is_itself else found
 
@@ -270,21 +290,21 @@ def _referee(which: RateTable, rows: Sequence[Row]) -> Callable[[Row], Row | Non
 
 
 def _coverage() -> Table:
-    """The paper's table; the row of this benchmark is read off its tasks."""
+    """Return the paper's table with this benchmark's row derived from its tasks."""
     rows = published_coverage()
     kinds = tuple(rows[0].covers)
     has = {setting for task in all_tasks().values() for setting in settings_of(task)}
-    drawn = []
+    table_rows = []
     for row in rows:
         words = {kind: "yes" if kind in has else "no" for kind in kinds}
         is_own = row.benchmark == OWN_NAME
         entries = tuple(Entry(word=word) for word in (words if is_own else row.covers).values())
-        drawn.append(Row(row.kind, row.benchmark, "ours" if is_own else "cited", entries))
+        table_rows.append(Row(row.kind, row.benchmark, "ours" if is_own else "cited", entries))
     return Table(
         key="coverage",
         title=TITLES["coverage"],
         heads=("kind", "benchmark"),
         columns=tuple(Column(kind) for kind in kinds),
-        rows=tuple(drawn),
-        notes=("partial: pronouns within a chain of actions only. As the paper has it.",),
+        rows=tuple(table_rows),
+        notes=("partial: pronouns within a chain of actions only. Source: the paper.",),
     )

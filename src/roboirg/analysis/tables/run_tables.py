@@ -1,153 +1,218 @@
-"""The table on the terminal: tasks × settings, one for each policy."""
+"""The terminal's table of a run: tasks × settings, one for each policy run."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 from rich.console import Console
-from rich.table import Table
+from rich.table import Table as Grid
 from rich.text import Text
 
-from roboirg.analysis.stats.success_rates import EXPLICIT, Cell, Panel, SettingColumn
-from roboirg.records.record import Result
+from roboirg.analysis.stats.cells import PolicyRun, gather, labels, policy_order, sort_cells
+from roboirg.analysis.stats.option_labels import options_label, options_sort_key
+from roboirg.analysis.stats.paired_tests import Overlap
+from roboirg.analysis.stats.rates import points, whole_percent
+from roboirg.analysis.stats.run_summary import (
+    ALL,
+    ALL_TASKS,
+    Scope,
+    ScopeKey,
+    ScopeResults,
+    group_by_scope,
+)
+from roboirg.analysis.tables.table import ERROR_MARK, MISSING_MARK
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.records.record import Job, Result
+from roboirg.util.plurals import counted
 
 MINIMUM_WIDTH = 100
-"""Columns to use where the output is not a terminal."""
+"""Columns to use if the output is not a terminal."""
 
-ERROR_MARK = "!"
-MISSING_MARK = "…"
-ALL_TASKS = "all tasks"
 NO_GAP = "–"
 
-MOST_FAILURES = 10
-"""Episodes of a policy that are named below the tables."""
+MAX_FAILURES = 10
+"""Episodes of a policy that are listed below the tables."""
 
 _GOOD, _FAIR = 0.75, 0.4
 
 
-def make_table(panel: Panel) -> Table:
-    """Tasks × settings of one policy: success rate and, in brackets, the gap to explicit."""
-    table = Table(
-        title=panel.label,
-        title_justify="left",
-        title_style="bold",
-        caption=_numbers(panel),
-        caption_justify="left",
-        caption_style="dim",
-    )
-    table.add_column("task")
-    for variant in panel.variants:
-        table.add_column(variant.label, justify="right")
-    rows: list[tuple[str, str | None]] = [(task, task) for task in panel.tasks]
-    if len(panel.tasks) > 1:
-        rows.append((ALL_TASKS, None))
-    for name, task in rows:
-        if task is None:
-            table.add_section()
-        cells = [
-            _text(panel.cells.get((task, variant)), is_reference=variant == EXPLICIT)
-            for variant in panel.variants
-        ]
-        table.add_row(Text(name, "bold" if task is None else ""), *cells)
-    return table
+@dataclass(frozen=True, slots=True)
+class RunTable:
+    """The results of one policy run.
+
+    Attributes:
+        label: policy, whether it is privileged, and the conditions if there are several.
+        tasks: the rows.
+        columns: the instruction options.
+        cells: results by scope (a task or `ALL`) and options.
+        privileged: whether the policy uses the simulator's state.
+    """
+
+    label: str
+    tasks: tuple[str, ...]
+    columns: tuple[InstructionOptions, ...]
+    cells: dict[tuple[Scope, InstructionOptions], ScopeResults]
+    privileged: bool = False
 
 
-def print_tables(panels: Sequence[Panel], console: Console) -> None:
-    """Print every policy's table and, below, what the signs mean."""
+def make_run_tables(records: Sequence[Result], planned: Sequence[Job] = ()) -> list[RunTable]:
+    """Make a table for each policy run, in the order of the plan.
+
+    Args:
+        records: one for each identity.
+        planned: jobs that should have a record; those without one are counted as missing.
+    """
+    found = gather([("", records)], planned)
+    policies = list(dict.fromkeys(job.policy for job in (*planned, *records)))
+    privileged = {record.policy for record in records if record.privileged}
+    cells = sort_cells(found, policy_order(found, policies))
+    results = {one.key: one for one in group_by_scope(cells)}
+    return [
+        _make_run_table(policy_run, label, results, privileged=policy_run.policy in privileged)
+        for policy_run, label in labels(cells, privileged).items()
+    ]
+
+
+def print_run_tables(tables: Sequence[RunTable], console: Console) -> None:
+    """Print every table and, below, what the signs mean."""
     if not console.is_terminal:
         console.width = max(console.width, MINIMUM_WIDTH)
-    for panel in panels:
-        console.print(make_table(panel))
-    legend = "success rate in %"
-    cells = [cell for panel in panels for cell in panel.cells.values()]
-    if any(
-        cell.gap is not None and cell.rate is not None and variant != EXPLICIT
-        for panel in panels
-        for (_, variant), cell in panel.cells.items()
-    ):
-        legend += ", in brackets the gap to explicit on the same episodes in points"
-    if any(
-        gap_text(cell) == NO_GAP and variant != EXPLICIT
-        for panel in panels
-        for (_, variant), cell in panel.cells.items()
-    ):
-        legend += f"; ({NO_GAP}) nothing succeeded in explicit either, which says nothing"
-    if any(cell.errors for cell in cells):
-        legend += f"; {ERROR_MARK} episodes ended in an error and are in no rate"
-    if any(cell.missing for cell in cells):
-        legend += f"; {MISSING_MARK} episodes are still to be played"
-    if any(panel.privileged for panel in panels):
-        legend += "; privileged policies look behind the scenes"
-    console.print(legend, style="dim", highlight=False)
+    for table in tables:
+        console.print(_grid(table))
+    console.print("; ".join(_legend(tables)), style="dim", highlight=False)
 
 
-def print_failures(records: Iterable[Result], console: Console, most: int = MOST_FAILURES) -> None:
-    """Name the episodes of each policy that did not succeed, and why; the rest are counted."""
-    lost: dict[str, list[Result]] = {}
+def print_failures(
+    records: Iterable[Result], console: Console, max_failures: int = MAX_FAILURES
+) -> None:
+    """List the episodes of each policy without success and the cause; count the rest."""
+    by_policy: dict[str, list[Result]] = {}
     for record in records:
         if record.outcome != "success":
-            lost.setdefault(record.policy, []).append(record)
-    for policy, failures in lost.items():
-        title = f"{len(failures)} episode{'' if len(failures) == 1 else 's'} without success"
+            by_policy.setdefault(record.policy, []).append(record)
+    for policy, failures in by_policy.items():
+        title = f"{counted(len(failures), 'episode')} without success"
         console.print(Text.assemble((policy, "bold"), f": {title}"))
-        # The same order, however many processes played.
+        # The same order for any number of worker processes.
         failures.sort(
-            key=lambda one: (one.task, one.split, one.episode, SettingColumn.of(one).sort_key())
+            key=lambda one: (one.task, one.split, one.episode, options_sort_key(one.options))
         )
-        for record in failures[:most]:
+        for record in failures[:max_failures]:
             console.print(Text(f"  {failure_text(record)}"), highlight=False, soft_wrap=True)
-        if len(failures) > most:
-            console.print(f"  and {len(failures) - most} more", highlight=False)
+        if len(failures) > max_failures:
+            console.print(f"  and {len(failures) - max_failures} more", highlight=False)
 
 
 def failure_text(record: Result) -> str:
-    """Which episode it was, how it was told, and what went wrong."""
-    mark = ERROR_MARK if record.outcome == "error" else ""
-    where = f"{record.task} {record.split}/{record.episode} {SettingColumn.of(record).label}"
+    """Return the episode, its instruction options and the cause of its failure."""
+    mark = f" {ERROR_MARK}" if record.outcome == "error" else ""
+    where = f"{record.task} {record.split}/{record.episode} {options_label(record.options)}"
     seed = f" (policy seed {record.policy_seed})" if record.policy_seed else ""
-    return f"{where}{seed}: {record.cause or record.outcome}{mark and f' {mark}'}"
+    return f"{where}{seed}: {record.cause or record.outcome}{mark}"
 
 
-def percent(rate: float) -> str:
-    """A rate as a whole per cent."""
-    return f"{100 * rate:.0f}"
+def gap_text(overlap: Overlap) -> str:
+    """Return the gap over paired trials.
 
-
-def points(gap: float) -> str:
-    """A gap in signed percentage points, with a proper minus."""
-    value = round(100 * gap)
-    return f"{value:+d}".replace("-", "−") if value else "±0"
-
-
-def count_text(least: int, most: int) -> str:
-    """A number of episodes, or the range of it."""
-    return f"{most}" if least == most else f"{least}–{most}"
-
-
-def gap_text(cell: Cell) -> str:
-    """The gap to explicit; a dash where explicit itself is at the floor, empty without pairs."""
-    if cell.gap is None:
+    A dash if neither has a success, which says nothing; empty without pairs.
+    """
+    if not overlap.trials:
         return ""
-    return NO_GAP if cell.is_at_floor and not cell.gap else points(cell.gap)
+    if not overlap.both and not overlap.only_first and not overlap.only_second:
+        return NO_GAP
+    return points((overlap.only_first - overlap.only_second) / overlap.trials)
 
 
-def _numbers(panel: Panel) -> str:
-    text = f"n = {count_text(*panel.trials(panel.tasks))} episodes per cell"
-    if len(panel.tasks) > 1:
-        text += f", {count_text(*panel.trials([None]))} for {ALL_TASKS}"
+def _make_run_table(
+    policy_run: PolicyRun,
+    label: str,
+    results: dict[ScopeKey, ScopeResults],
+    *,
+    privileged: bool,
+) -> RunTable:
+    cells = {
+        (key.scope, key.options): one
+        for key, one in results.items()
+        if key.policy_run == policy_run and key.scope.suite is None
+    }
+    tasks = dict.fromkeys(scope.task for scope, _ in cells if scope.task is not None)
+    columns = {options for _, options in cells}
+    return RunTable(
+        label, tuple(tasks), tuple(sorted(columns, key=options_sort_key)), cells, privileged
+    )
+
+
+def _grid(table: RunTable) -> Grid:
+    """Draw tasks × settings: the success rate and, in brackets, the gap to explicit."""
+    grid = Grid(
+        title=table.label,
+        title_justify="left",
+        title_style="bold",
+        caption=_sizes(table),
+        caption_justify="left",
+        caption_style="dim",
+    )
+    grid.add_column("task")
+    for options in table.columns:
+        grid.add_column(options_label(options), justify="right")
+    rows = [(task, Scope(task=task)) for task in table.tasks]
+    if len(table.tasks) > 1:
+        rows.append((ALL_TASKS, ALL))
+    for name, scope in rows:
+        if scope == ALL:
+            grid.add_section()
+        cells = [_text(table.cells.get((scope, options))) for options in table.columns]
+        grid.add_row(Text(name, "bold" if scope == ALL else ""), *cells)
+    return grid
+
+
+def _legend(tables: Sequence[RunTable]) -> list[str]:
+    """Explain the signs that occur."""
+    cells = [cell for table in tables for cell in table.cells.values()]
+    gaps = [gap_text(cell.explicit_overlap()) for cell in cells]
+    legend = ["success rate in %"]
+    if any(gaps):
+        legend[0] += ", in brackets the gap to explicit on the same episodes in points"
+    if NO_GAP in gaps:
+        legend.append(f"({NO_GAP}) explicit has no success either, so the gap says nothing")
+    if any(cell.errors for cell in cells):
+        legend.append(f"{ERROR_MARK} episodes ended in an error and are in no rate")
+    if any(cell.missing for cell in cells):
+        legend.append(f"{MISSING_MARK} episodes are still to be played")
+    if any(table.privileged for table in tables):
+        legend.append("privileged policies use the simulator's state")
+    return legend
+
+
+def _sizes(table: RunTable) -> str:
+    single = [cell.trials for (scope, _), cell in table.cells.items() if scope != ALL]
+    text = f"n = {_range(single)} {'episode' if max(single) == 1 else 'episodes'} per cell"
+    if len(table.tasks) > 1:
+        everything = [cell.trials for (scope, _), cell in table.cells.items() if scope == ALL]
+        text += f", {_range(everything)} for {ALL_TASKS}"
     return text
 
 
-def _text(cell: Cell | None, *, is_reference: bool) -> Text:
+def _range(counts: Sequence[int]) -> str:
+    low, high = min(counts), max(counts)
+    return f"{high}" if low == high else f"{low}–{high}"
+
+
+def _text(cell: ScopeResults | None) -> Text:
     if cell is None:
         return Text("–", "dim")
     text = Text()
-    if cell.rate is None:
+    # Pooled over trials: the gaps are over trials too.
+    rate = cell.pooled_rate
+    if rate is None:
         text.append("–", "dim")
     else:
-        text.append(percent(cell.rate), _color(cell.rate))
-        if cell.gap is not None and not is_reference:
-            text.append(f" ({gap_text(cell)})", "dim" if cell.gap >= 0 else "red")
+        text.append(whole_percent(rate), _color(float(rate)))
+        overlap = cell.explicit_overlap()
+        if gap := gap_text(overlap):
+            is_loss = overlap.only_first < overlap.only_second
+            text.append(f" ({gap})", "red" if is_loss else "dim")
     if cell.errors:
         text.append(f" {cell.errors}{ERROR_MARK}", "bold yellow")
     if cell.missing:

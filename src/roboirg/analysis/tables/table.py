@@ -1,4 +1,4 @@
-"""What a table is before it is drawn: rows of entries, each with all that its renderings show."""
+"""Tables before rendering: rows of entries with everything that a rendering shows."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from roboirg.analysis.stats.intervals import Interval
 from roboirg.analysis.stats.rates import Change, change, mean_percent
 
 Source = Literal["ours", "published", "cited", "chance"]
-"""Whose figures: the run's, the paper's about the same thing, the paper's about something else, or
-computed."""
+"""Origin of a row: the run, the paper's results, a citation of the paper, or computed."""
 
 NOT_APPLICABLE = "–"
 ERROR_MARK = "!"
@@ -21,15 +20,15 @@ PARTIAL_MARK = "*"
 
 
 class Counts(NamedTuple):
-    """What is behind an entry.
+    """The counts behind an entry.
 
     Attributes:
-        successes: trials.
-        trials: with a verdict.
-        episodes: with a verdict.
+        successes: trials that succeeded.
+        trials: trials with a verdict.
+        episodes: episodes with a verdict.
         errors: trials that ended in an error.
-        missing: trials of the plan without a result.
-        interval: of the rate, 95 %; None without.
+        missing: planned trials without a result.
+        interval: 95 % interval of the rate, or None.
     """
 
     successes: int = 0
@@ -45,14 +44,14 @@ class Entry:
     """One cell of a table.
 
     Attributes:
-        percent: as printed; None where there is nothing to print.
-        word: said instead of a rate; empty in tables of rates.
-        applies: False where the setting is not defined for the task.
-        change: against the row that this one is compared with; None without, or where either is
+        percent: as printed; None if there is nothing to print.
+        word: printed instead of a rate; empty in tables of rates.
+        applies: False if the setting is not defined for the task.
+        change: compared with the row's reference; None without a reference or if either is
             incomplete.
         best: whether it is the best, or among the best, of its group.
-        marks: what is amiss, as in the constants above.
-        counts: behind it; None where they are not known.
+        marks: of incomplete entries, as in the constants above.
+        counts: behind the rate; None if they are unknown.
     """
 
     percent: Decimal | None = None
@@ -65,7 +64,7 @@ class Entry:
 
     @property
     def text(self) -> str:
-        """The rate, a dash where there can be none, or the word; empty where nothing was played."""
+        """The rate, a dash if the setting does not apply, or the word; empty without results."""
         if self.word:
             return self.word
         if not self.applies:
@@ -77,9 +76,9 @@ class Column(NamedTuple):
     """A column of entries.
 
     Attributes:
-        name: a task, or what an average is of.
+        name: a task, or the name of an average.
         group: the suite, or empty.
-        averages: of an average the columns it is taken over; empty for a task.
+        averages: the columns that an average is taken over; empty for a task.
     """
 
     name: str
@@ -92,9 +91,9 @@ class Row:
     """A row of a table.
 
     Attributes:
-        group: the setting or policy that it stands under.
+        group: the setting or policy above it.
         name: of the row in its group.
-        source: whose figures they are.
+        source: origin of its rates.
         entries: one for each column.
     """
 
@@ -105,21 +104,21 @@ class Row:
 
     @property
     def label(self) -> str:
-        """Its name, and that it is published where it is."""
+        """The name, marked if the row is published."""
         return f"{self.name} (published)" if self.source == "published" else self.name
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table, ready to be drawn.
+    """A table, ready to be rendered.
 
     Attributes:
-        key: a short name, good as a file name.
+        key: a short name, usable as a file name.
         title: of the table.
-        heads: what the groups and the names of the rows are.
+        heads: headings of the groups and of the names of the rows.
         columns: of the entries.
-        rows: those of a group stand together.
-        notes: sentences below it.
+        rows: in groups.
+        notes: sentences below the table.
     """
 
     key: str
@@ -130,45 +129,45 @@ class Table:
     notes: tuple[str, ...] = ()
 
     def groups(self) -> dict[str, list[Row]]:
-        """The rows by group, in order."""
+        """Return the rows by group, in order."""
         groups: dict[str, list[Row]] = {}
         for row in self.rows:
             groups.setdefault(row.group, []).append(row)
         return groups
 
 
-def averaged(columns: Sequence[Column], cells: Mapping[str, Entry]) -> tuple[Entry, ...]:
-    """A row's entries: those of its tasks, and the averages over them.
+def with_averages(columns: Sequence[Column], entries: Mapping[str, Entry]) -> tuple[Entry, ...]:
+    """Return a row's entries: those of its tasks, and the averages over them.
 
-    An average is over the tasks that apply and have a rate, and marked where one of them has none
-    or is incomplete itself.
+    An average is over the tasks that apply and have a rate. It is marked if one of them has no
+    rate or is incomplete.
     """
     return tuple(
-        _average([cells[name] for name in column.averages])
+        _average([entries[name] for name in column.averages])
         if column.averages
-        else cells[column.name]
+        else entries[column.name]
         for column in columns
     )
 
 
-def _average(cells: Sequence[Entry]) -> Entry:
-    applying = [cell for cell in cells if cell.applies]
+def _average(entries: Sequence[Entry]) -> Entry:
+    applying = [entry for entry in entries if entry.applies]
     if not applying:
         return Entry(applies=False)
-    rates = [cell.percent for cell in applying if cell.percent is not None]
+    rates = [entry.percent for entry in applying if entry.percent is not None]
     if not rates:
         return Entry()
-    amiss = len(rates) < len(applying) or any(cell.marks for cell in applying)
-    return Entry(percent=mean_percent(rates), marks=PARTIAL_MARK if amiss else "")
+    is_partial = len(rates) < len(applying) or any(entry.marks for entry in applying)
+    return Entry(percent=mean_percent(rates), marks=PARTIAL_MARK if is_partial else "")
 
 
 def with_changes(
     columns: Sequence[Column], rows: Iterable[Row], reference_of: Callable[[Row], Row | None]
 ) -> list[Row]:
-    """The rows with what changed against others.
+    """Return the rows with the change of each entry compared with its reference.
 
-    An average is compared with the other row's average over the same tasks, so that a setting
-    which some tasks lack is not compared with all of them.
+    An average is compared with the reference's average over the same tasks, as some tasks lack
+    some settings.
     """
     return [
         replace(
@@ -197,10 +196,9 @@ def _change(columns: Sequence[Column], index: int, row: Row, reference: Row) -> 
 
 
 def with_best(rows: Sequence[Row]) -> list[Row]:
-    """The rows with the best of each column in each group, ours and published each by themselves.
+    """Return the rows with the best entries of each column, group and source marked.
 
-    Where all have the same rate (or only one has any), or one of them is incomplete, none is called
-    the best.
+    None is the best if all have the same rate, only one has a rate, or one is incomplete.
     """
     return [
         replace(

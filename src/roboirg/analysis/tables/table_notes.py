@@ -1,12 +1,17 @@
-"""The sentences below a table: what its signs mean, and all that is amiss with the run."""
+"""Notes below a table: the meaning of its signs, and limits of the results."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
 from roboirg.analysis.published import TRIALS, RateTable
-from roboirg.analysis.stats.samples import CellResults, PolicyRun, Samples
-from roboirg.analysis.stats.success_rates import SETTING_ORDER, SettingColumn
+from roboirg.analysis.stats.cells import CellResults, Cells, PolicyRun
+from roboirg.analysis.stats.option_labels import (
+    has_default_options,
+    options_label,
+    options_sort_key,
+    staged_options,
+)
 from roboirg.analysis.tables.table import (
     ERROR_MARK,
     MISSING_MARK,
@@ -15,7 +20,8 @@ from roboirg.analysis.tables.table import (
     Entry,
     Row,
 )
-from roboirg.language import STAGE_SETS
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.util.plurals import counted
 
 RATES_NOTE = (
     "Success rate in percent, the mean over policy seeds; averages are unweighted means over tasks."
@@ -24,136 +30,136 @@ ARROWS = {"up": "↑", "down": "↓", "same": "→"}
 
 
 def notes_of(
-    which: RateTable, rows: Sequence[Row], samples: Samples, tasks: Sequence[str]
+    which: RateTable, rows: Sequence[Row], cells: Cells, tasks: Sequence[str]
 ) -> tuple[str, ...]:
-    """The notes of a table of rates."""
-    ours = {
-        key: sample for key, sample in samples.items() if key[1] in tasks and _told(which, key[2])
+    """Return the notes of a table of rates."""
+    shown = {
+        key: cell
+        for key, cell in cells.items()
+        if key.task in tasks and is_shown(which, key.options)
     }
     entries = [entry for row in rows for entry in row.entries]
+    policy_runs = list(dict.fromkeys(key.policy_run for key in shown))
     return (
         RATES_NOTE,
-        *_signs(which, entries),
-        *_numbers(ours.values()),
-        *_amiss(ours.values(), entries),
-        *_company(ours),
-        *_left_out(which, samples, tasks),
-        *_published(which, rows),
+        *_sign_notes(which, entries),
+        *_size_notes(shown.values()),
+        *_incomplete_notes(shown.values(), entries),
+        *_version_notes(policy_runs),
+        *_omission_notes(which, cells, tasks),
+        *_published_notes(which, rows),
     )
 
 
-def _told(which: RateTable, variant: SettingColumn) -> bool:
-    if which == "context":
-        stages = variant.stages
-        return variant == SettingColumn("contextual", stages=stages) and stages in STAGE_SETS
-    return variant == SettingColumn(variant.setting) and variant.setting in SETTING_ORDER
+def is_shown(which: RateTable, options: InstructionOptions) -> bool:
+    """Return whether a table has rows for these instruction options."""
+    return options in staged_options() if which == "context" else has_default_options(options)
 
 
-def _signs(which: RateTable, entries: Iterable[Entry]) -> list[str]:
-    found = list(entries)
+def _sign_notes(which: RateTable, entries: Sequence[Entry]) -> list[str]:
     notes = []
-    if any(entry.change for entry in found):
-        than = "the shortest context" if which == "context" else "explicit"
+    if any(entry.change for entry in entries):
+        reference = "the shortest context" if which == "context" else "explicit"
         notes.append(
-            f"{ARROWS['up']} above, {ARROWS['down']} below, {ARROWS['same']} equal to {than} of "
-            "the same policy, as printed, on the same tasks; an arrow does not say that the "
-            "difference is more than chance."
+            f"{ARROWS['up']} above, {ARROWS['down']} below, {ARROWS['same']} equal to {reference} "
+            "of the same policy, as printed, on the same tasks; an arrow does not imply a "
+            "significant difference."
         )
-    if any(entry.best for entry in found):
+    if any(entry.best for entry in entries):
         notes.append("Bold: the best of its group.")
-    if any(not entry.applies for entry in found):
+    if any(not entry.applies for entry in entries):
         notes.append(f"{NOT_APPLICABLE} the setting is not defined for the task.")
     return notes
 
 
-def _numbers(samples: Iterable[CellResults]) -> list[str]:
-    judged = [sample for sample in samples if sample.trials]
+def _size_notes(cells: Iterable[CellResults]) -> list[str]:
+    judged = [cell for cell in cells if cell.trials]
     if not judged:
         return []
-    episodes = _span(len(sample.by_episode()) for sample in judged)
-    trials = _span(sample.trials for sample in judged)
-    if episodes == trials:
-        return [f"{episodes} episodes per cell, each played once."]
-    return [f"{episodes} episodes and {trials} trials per cell: several policy seeds."]
+    episodes = _range([len(cell.by_episode()) for cell in judged], "episode")
+    trials = _range([cell.trials for cell in judged], "trial")
+    if all(len(cell.by_episode()) == cell.trials for cell in judged):
+        return [f"{episodes} per cell, each played once."]
+    return [f"{episodes} and {trials} per cell: several policy seeds."]
 
 
-def _amiss(samples: Iterable[CellResults], entries: Iterable[Entry]) -> list[str]:
-    found = list(samples)
+def _incomplete_notes(cells: Iterable[CellResults], entries: Iterable[Entry]) -> list[str]:
+    found = list(cells)
     notes = []
     errors, missing = sum(one.errors for one in found), sum(one.missing for one in found)
     if errors:
-        notes.append(f"{ERROR_MARK} {_trials(errors)} ended in an error and are in no rate.")
-    if missing:
-        notes.append(f"{MISSING_MARK} {_trials(missing)} of the plan are still to be played.")
-    if any(PARTIAL_MARK in entry.marks for entry in entries):
+        verb = "is" if errors == 1 else "are"
         notes.append(
-            f"{PARTIAL_MARK} an average over what there is: a task is incomplete or was not played."
+            f"{ERROR_MARK} {counted(errors, 'trial')} ended in an error and {verb} in no rate."
         )
+    if missing:
+        verb = "is" if missing == 1 else "are"
+        notes.append(
+            f"{MISSING_MARK} {counted(missing, 'trial')} of the plan {verb} still to be played."
+        )
+    if any(PARTIAL_MARK in entry.marks for entry in entries):
+        notes.append(f"{PARTIAL_MARK} a partial average: a task is incomplete or was not played.")
     if errors or missing:
-        notes.append("What is incomplete has no arrow, and its column no best.")
+        notes.append("Incomplete entries have no arrow, and their columns no best.")
     return notes
 
 
-def _company(samples: Samples) -> list[str]:
-    """Whether there is somebody to compare with, and whether that is fair."""
+def _version_notes(policy_runs: Sequence[PolicyRun]) -> list[str]:
+    """Say whether there is a policy to compare with, and which rows are not comparable."""
     notes = []
-    contestants = list(dict.fromkeys(who for who, _, _ in samples))
-    if len({who.policy for who in contestants}) == 1 and len(contestants) == 1:
+    if len(policy_runs) == 1:
         notes.append("One policy was played; there is none to compare it with.")
     for name in ("language", "environment"):
-        versions = _versions(contestants, name)
+        versions = _versions(policy_runs, name)
         if len(versions) > 1:
             notes.append(
-                f"Results of several {name} versions ({', '.join(versions)}) stand apart: they are "
-                "not comparable."
+                f"Results of several {name} versions ({', '.join(versions)}) have separate rows; "
+                "they are not comparable."
             )
-    policies = {who.policy for who in contestants}
-    for policy in sorted(policies):
-        versions = _versions([who for who in contestants if who.policy == policy], "policy")
+    policies = sorted({one.policy for one in policy_runs})
+    by_policy = {name: [one for one in policy_runs if one.policy == name] for name in policies}
+    for policy, own in by_policy.items():
+        versions = _versions(own, "policy")
         if len(versions) > 1:
-            notes.append(f"Several versions of {policy} ({', '.join(versions)}) stand apart.")
-    if any(
-        len({who.rules for who in contestants if who.policy == policy}) > 1 for policy in policies
-    ):
-        notes.append("What was played under different rules stands apart.")
+            notes.append(
+                f"Several versions of {policy} ({', '.join(versions)}) have separate rows."
+            )
+    if any(len({one.conditions for one in own}) > 1 for own in by_policy.values()):
+        notes.append("Results under different conditions have separate rows.")
     return notes
 
 
-def _versions(contestants: Iterable[PolicyRun], name: str) -> list[str]:
-    return sorted({str(getattr(who.versions, name)) for who in contestants if who.versions})
+def _versions(policy_runs: Iterable[PolicyRun], name: str) -> list[str]:
+    return sorted({str(getattr(one.versions, name)) for one in policy_runs if one.versions})
 
 
-def _left_out(which: RateTable, samples: Samples, tasks: Sequence[str]) -> list[str]:
-    tasks_out = sorted({task for _, task, _ in samples if task not in tasks})
-    told_out = sorted(
-        {told.label for _, task, told in samples if task in tasks and not _told(which, told)}
+def _omission_notes(which: RateTable, cells: Cells, tasks: Sequence[str]) -> list[str]:
+    if which != "main":
+        return []
+    other_tasks = sorted({key.task for key in cells if key.task not in tasks})
+    other_options = sorted(
+        {key.options for key in cells if key.task in tasks and not is_shown(which, key.options)},
+        key=options_sort_key,
     )
     notes = []
-    if which == "main" and tasks_out:
-        notes.append(f"Not in this table: the results of {', '.join(tasks_out)}.")
-    if which == "main" and told_out:
-        notes.append(f"Not in this table: what was told as {'; '.join(told_out)}.")
+    if other_tasks:
+        notes.append(f"Not in this table: the results of {', '.join(other_tasks)}.")
+    if other_options:
+        notes.append(f"Not in this table: {'; '.join(map(options_label, other_options))}.")
     return notes
 
 
-def _published(which: RateTable, rows: Iterable[Row]) -> list[str]:
+def _published_notes(which: RateTable, rows: Iterable[Row]) -> list[str]:
     if not any(row.source == "published" for row in rows):
         return []
     episodes, seeds = TRIALS[which]
     trials = f"{episodes} trials" if seeds == 1 else f"{episodes} episodes × {seeds} seeds"
+    if which == "real":
+        return [f"(published): from the paper, {trials} per cell on its own robot."]
     suites = " The averages of suites are ours." if which == "main" else ""
-    return [
-        f"(published): from the paper, {trials} per cell, played in its own simulator.{suites}"
-        if which != "real"
-        else f"(published): from the paper, {trials} per cell on its own robot."
-    ]
+    return [f"(published): from the paper, {trials} per cell, played in its own simulator.{suites}"]
 
 
-def _trials(count: int) -> str:
-    return f"{count} trial{'' if count == 1 else 's'}"
-
-
-def _span(values: Iterable[int]) -> str:
-    found = list(values)
-    low, high = min(found), max(found)
-    return str(low) if low == high else f"{low} to {high}"
+def _range(counts: Sequence[int], noun: str) -> str:
+    low, high = min(counts), max(counts)
+    return counted(high, noun) if low == high else f"{low} to {counted(high, noun)}"

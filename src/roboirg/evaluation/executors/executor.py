@@ -1,9 +1,8 @@
-"""Where jobs are played: in this process, or in processes beside it.
+"""Executors: play jobs in this process or in worker processes.
 
-An executor gets jobs and a way to play them and yields one record for each, in the order in
-which they end. It stores nothing and tries nothing again: the caller does. Whoever writes another
-one implements `Executor` and nothing else; `roboirg.evaluation.executors.ray_cluster` is one for
-many machines.
+An executor gets jobs and a function that plays one, and yields one record for each job in the order
+in which they finish. Storing records and retrying errors is the caller's task. To write your own,
+implement `Executor`; `roboirg.evaluation.executors.ray_cluster` is one for many machines.
 """
 
 from __future__ import annotations
@@ -20,41 +19,41 @@ from roboirg.evaluation.executors.workers import MAX_FAILED_STARTS, POLL_S, Work
 from roboirg.evaluation.rollout import PlayJob
 from roboirg.records.record import Job, Record
 
-NO_LIMIT_S = float("inf")
+NO_TIMEOUT_S = float("inf")
 
 
 class Executor(Protocol):
-    """Plays jobs somewhere."""
+    """Interface of an executor."""
 
     def run(self, jobs: Sequence[Job], play: PlayJob) -> Iterator[Record]:
-        """Yield one record for each job, as they end; closing the iterator stops the rest.
+        """Yield one record for each job as they finish; closing the iterator stops the rest.
 
         Raises:
-            RoboIRGError: what would end every other job too (no Vulkan device, …).
+            RoboIRGError: an error that would end every other job too (no Vulkan device, …).
         """
 
 
 @dataclass(frozen=True, slots=True)
 class InProcess:
-    """Plays one job after the other right here: for debuggers.
+    """Plays one job after the other in this process, for debugging.
 
-    Nobody supervises it: a crash takes all with it, and what hangs, hangs.
+    There is no supervisor: a crash ends the run, and a hanging call is never ended.
     """
 
     def run(self, jobs: Sequence[Job], play: PlayJob) -> Iterator[Record]:
-        """Yield one record for each job, in their order."""
+        """Yield one record for each job, in order."""
         yield from map(play, jobs)
 
 
 @dataclass(frozen=True, slots=True)
 class LocalProcesses:
-    """Plays jobs in processes of this machine that live as long as there is work.
+    """Plays jobs in worker processes on this machine.
 
-    A process that dies (segmentation fault, out of memory) or hangs costs its job an error, is
-    replaced, and the others go on. The processes die with the one that made them, however it dies.
+    If a worker dies (segmentation fault, out of memory) or hangs, its job gets an error record, the
+    worker is replaced, and the others go on. Workers exit with their parent, however it dies.
 
     Args:
-        workers: how many at most, at least 1.
+        workers: most worker processes at a time, at least 1.
         episode_timeout_s: how long an episode may take.
 
     Raises:
@@ -62,58 +61,59 @@ class LocalProcesses:
     """
 
     workers: int
-    episode_timeout_s: float = NO_LIMIT_S
+    episode_timeout_s: float = NO_TIMEOUT_S
 
     def __post_init__(self) -> None:
         if self.workers < 1:
             raise InvalidValueError(f"workers is {self.workers}; it must be at least 1.")
 
     def run(self, jobs: Sequence[Job], play: PlayJob) -> Iterator[Record]:
-        """Yield one record for each job, as they end.
+        """Yield one record for each job as they finish.
 
         Raises:
-            RoboIRGError: no process can start, or whatever would end every other job too.
+            RoboIRGError: no worker can start, or an error would end every other job too.
         """
-        waiting, stillborn = deque(jobs), 0
-        # With a process on every core, Mesa's own threads would only take turns.
-        crowded = self.workers >= core_count()
-        crew: list[Worker] = []
-        retired: list[Worker] = []
+        waiting, failed_starts = deque(jobs), 0
+        # With a process on every core, more threads in Mesa would not help.
+        limit_threads = self.workers >= core_count()
+        active: list[Worker] = []
+        released: list[Worker] = []
         try:
-            while waiting or crew:
-                while waiting and len(crew) < self.workers:
-                    crew.append(Worker.hire(play, waiting.popleft(), crowded=crowded))
-                for worker, record in self._ended(crew):
-                    stillborn = stillborn + 1 if worker.is_stillborn else 0
-                    if stillborn >= MAX_FAILED_STARTS * self.workers:
+            while waiting or active:
+                while waiting and len(active) < self.workers:
+                    job = waiting.popleft()
+                    active.append(Worker.start(play, job, limit_threads=limit_threads))
+                for worker, record in self._finished(active):
+                    failed_starts = failed_starts + 1 if worker.failed_to_start else 0
+                    if failed_starts >= MAX_FAILED_STARTS * self.workers:
                         raise RoboIRGError(f"No worker process can start ({record.cause}).")
-                    if worker.is_gone:
-                        crew.remove(worker)
+                    if worker.is_dead:
+                        active.remove(worker)
                     elif waiting:
                         worker.assign(waiting.popleft())
                     else:
-                        crew.remove(worker)
-                        retired.append(worker)
-                        worker.dismiss()
+                        active.remove(worker)
+                        released.append(worker)
+                        worker.release()
                     yield record
         finally:
-            for worker in crew:
+            for worker in active:
                 worker.stop()
-            for worker in (*crew, *retired):
-                worker.bury()
+            for worker in (*active, *released):
+                worker.join()
 
-    def _ended(self, crew: list[Worker]) -> Iterator[tuple[Worker, Record]]:
-        """Wait a moment; every worker whose job has ended, one way or another."""
-        ready = wait([worker.connection for worker in crew], POLL_S)
-        for worker in tuple(crew):
+    def _finished(self, active: list[Worker]) -> Iterator[tuple[Worker, Record]]:
+        """Wait up to `POLL_S`; yield every worker whose job has finished or timed out."""
+        ready = wait([worker.connection for worker in active], POLL_S)
+        for worker in tuple(active):
             if worker.connection in ready:
                 yield worker, worker.receive()
-            elif (record := worker.overdue(self.episode_timeout_s)) is not None:
+            elif (record := worker.kill_if_overdue(self.episode_timeout_s)) is not None:
                 yield worker, record
 
 
-def choose_executor(workers: int | None, episode_timeout_s: float = NO_LIMIT_S) -> Executor:
-    """The executor for a number of workers: None for one per core, 0 for this process.
+def choose_executor(workers: int | None, episode_timeout_s: float = NO_TIMEOUT_S) -> Executor:
+    """Return the executor for a number of workers: None for one per core, 0 for this process.
 
     Raises:
         InvalidValueError: a negative number.
@@ -124,7 +124,7 @@ def choose_executor(workers: int | None, episode_timeout_s: float = NO_LIMIT_S) 
 
 
 def core_count() -> int:
-    """How many cores this process may use."""
+    """Return the number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

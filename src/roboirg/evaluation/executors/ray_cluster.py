@@ -1,9 +1,9 @@
-"""Jobs played on many machines, by means of Ray.
+"""Play jobs on many machines with Ray.
 
-Every seat of the cluster is an actor with one CPU that supervises a process of its own, just as
-`LocalProcesses` does, so that policies and simulator are kept apart in the same way. A machine that
-goes costs the jobs it had an error, which the runner tries again, and its seats are replaced where
-there is room.
+Each remote worker is an actor with one CPU that supervises a process of its own, as
+`LocalProcesses` does, so that policies and simulator are isolated in the same way. When a machine
+is lost, its current jobs get error records, which the runner retries, and its workers are replaced
+where CPUs are free.
 """
 
 from __future__ import annotations
@@ -24,38 +24,39 @@ from typing import Any, NamedTuple, Protocol, Self, cast, runtime_checkable
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, RoboIRGError
 from roboirg.evaluation.episode_errors import format_cause
-from roboirg.evaluation.executors.executor import NO_LIMIT_S
+from roboirg.evaluation.executors.executor import NO_TIMEOUT_S
 from roboirg.evaluation.executors.workers import MAX_FAILED_STARTS, WorkerSlot
 from roboirg.evaluation.rollout import PlayJob
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.records.record import Job, Record
+from roboirg.util.plurals import counted
 
 POLL_S = 1.0
-PATIENCE_S = 300.0
-"""How long a cluster may have no free CPU at all before the run gives up."""
+NO_CPU_TIMEOUT_S = 300.0
+"""How long a cluster may have no free CPU before the run stops."""
 CONNECT_S = 10.0
 
 
 @runtime_checkable
 class VideoRecorder(Protocol):
-    """A way to play that leaves films in a folder, and can do so in another one."""
+    """A function that plays jobs and writes videos to a folder that can be changed."""
 
     folder: Path
 
     def in_folder(self, folder: Path) -> Self:
-        """The same, for another folder."""
+        """Return a copy that writes its videos to another folder."""
 
 
-class _Played(NamedTuple):
-    """What comes back from another machine.
+class _RemoteResult(NamedTuple):
+    """Reply of a remote worker.
 
     Attributes:
-        record: of the job.
-        films: bytes by path relative to the run's folder.
+        record: record of the job.
+        files: contents of the videos and posters by path relative to the run's folder.
     """
 
     record: Record
-    films: dict[str, bytes]
+    files: dict[str, bytes]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,9 +64,9 @@ class RayCluster:
     """Plays jobs on a Ray cluster.
 
     Args:
-        workers: seats at most; None for one on every CPU that the cluster has.
-        address: of the cluster, as ``ray.init`` takes it; None joins the one that runs on this
-            machine, or starts one here.
+        workers: most workers at a time; None for one on every CPU of the cluster.
+        address: of the cluster, as for ``ray.init``; None joins the cluster that runs on this
+            machine or starts one.
         episode_timeout_s: how long an episode may take.
 
     Raises:
@@ -75,7 +76,7 @@ class RayCluster:
 
     workers: int | None = None
     address: str | None = None
-    episode_timeout_s: float = NO_LIMIT_S
+    episode_timeout_s: float = NO_TIMEOUT_S
 
     def __post_init__(self) -> None:
         if self.workers is not None and self.workers < 1:
@@ -83,24 +84,28 @@ class RayCluster:
         import_ray()
 
     def run(self, jobs: Sequence[Job], play: PlayJob) -> Iterator[Record]:
-        """Yield one record for each job, as they end."""
+        """Yield one record for each job as they finish.
+
+        Raises:
+            RoboIRGError: the cluster cannot be joined, has no free CPU, or no worker can start.
+        """
         ray = import_ray()
         with _connected(ray, self.address):
             count = self.workers or int(ray.cluster_resources().get("CPU", 1))
-            company = _WorkerPool(ray, play, self.episode_timeout_s, min(count, len(jobs)))
+            pool = _WorkerPool(ray, play, self.episode_timeout_s, min(count, len(jobs)))
             try:
-                yield from company.play_all(jobs)
+                yield from pool.play_all(jobs)
             finally:
-                company.disband()
+                pool.close()
 
 
 def import_ray() -> ModuleType:
-    """The `ray` module.
+    """Import and return the `ray` module.
 
     Raises:
         MissingDependencyError: it is not installed.
     """
-    # It would report who uses it to its makers.
+    # Ray would send usage statistics to its developers.
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     try:
         import ray
@@ -115,7 +120,7 @@ def import_ray() -> ModuleType:
 @contextlib.contextmanager
 def _connected(ray: ModuleType, address: str | None) -> Iterator[None]:
     if ray.is_initialized():
-        yield  # by whoever calls us, whose it stays
+        yield  # the caller connected, so the caller disconnects
         return
     _check_reachable(address)
     try:
@@ -129,21 +134,21 @@ def _connected(ray: ModuleType, address: str | None) -> Iterator[None]:
         ray.shutdown()
 
 
-def _own_paths() -> list[str]:
-    """Where modules are found here that are not installed, such as policies of the user's."""
+def _user_paths() -> list[str]:
+    """Return the import path without installed packages: where a user's policies are."""
     prefixes = tuple({sys.prefix, sys.base_prefix})
     return [path for path in sys.path if path and not path.startswith(prefixes)]
 
 
-def _filming(play: object) -> VideoRecorder | None:
+def _video_recorder(play: object) -> VideoRecorder | None:
     return play if isinstance(play, VideoRecorder) else None
 
 
 def _check_reachable(address: str | None) -> None:
-    """Complain now if nobody listens: Ray would wait for minutes, and then end this process."""
+    """Check that the address accepts connections; Ray would wait minutes and then exit."""
     host, _, port = (address or "").removeprefix("ray://").rpartition(":")
     if not host or not port.isdigit():
-        return  # a word, such as "auto"
+        return  # a word such as "auto"
     try:
         socket.create_connection((host, int(port)), timeout=CONNECT_S).close()
     except OSError as error:
@@ -153,31 +158,30 @@ def _check_reachable(address: str | None) -> None:
 
 
 class _RemoteWorker:
-    """What runs on the machines of the cluster: a seat whose films come back as bytes."""
+    """Actor that runs on a machine of the cluster and returns videos as bytes."""
 
     def __init__(self, play: PlayJob, episode_timeout_s: float) -> None:
         self._folder = Path(tempfile.mkdtemp(prefix="roboirg-"))
-        filming = _filming(play)
-        # A `VideoRecorder` play stays one wherever it films.
-        moved = play if filming is None else cast("PlayJob", filming.in_folder(self._folder))
-        self._seat = WorkerSlot(moved, episode_timeout_s)
+        recorder = _video_recorder(play)
+        moved = play if recorder is None else cast("PlayJob", recorder.in_folder(self._folder))
+        self._slot = WorkerSlot(moved, episode_timeout_s)
 
-    def begin(self) -> None:
-        """Answers as soon as the seat has found a place."""
+    def wait_until_started(self) -> None:
+        """Return as soon as the actor runs on a machine."""
 
-    def play(self, job: Job) -> _Played:
+    def play(self, job: Job) -> _RemoteResult:
         """Play a job."""
-        record = self._seat.play(job)
-        films = {}
+        record = self._slot.play(job)
+        files = {}
         for path in sorted(self._folder.rglob("*")):
             if path.is_file():
-                films[path.relative_to(self._folder).as_posix()] = path.read_bytes()
+                files[path.relative_to(self._folder).as_posix()] = path.read_bytes()
                 path.unlink()
-        return _Played(record, films)
+        return _RemoteResult(record, files)
 
 
 class _WorkerPool:
-    """The seats of a run and what each of them is playing."""
+    """The remote workers of a run and their current jobs."""
 
     def __init__(self, ray: ModuleType, play: PlayJob, episode_timeout_s: float, size: int) -> None:
         self._ray, self._play, self._episode_timeout_s = ray, play, episode_timeout_s
@@ -185,86 +189,87 @@ class _WorkerPool:
             num_cpus=1,
             max_restarts=0,
             scheduling_strategy="SPREAD",
-            runtime_env={"env_vars": {"PYTHONPATH": os.pathsep.join(_own_paths())}},
+            runtime_env={"env_vars": {"PYTHONPATH": os.pathsep.join(_user_paths())}},
         )(_RemoteWorker)
-        # What is awaited, with the seat it comes from and the job; None while it finds a place.
-        self._awaited: dict[Any, tuple[Any, Job | None]] = {}
+        # By pending call: its worker and its job, or None while the worker starts.
+        self._pending: dict[Any, tuple[Any, Job | None]] = {}
         self._idle: list[Any] = []
-        self._size, self._stillborn = size, 0
+        self._size, self._failed_starts = size, 0
         for _ in range(size):
-            self._open_seat()
+            self._start_worker()
 
     def play_all(self, jobs: Sequence[Job]) -> Iterator[Record]:
+        """Yield one record for each job as they finish."""
         waiting = deque(jobs)
-        left, lively = len(waiting), time.monotonic()
+        left, last_active = len(waiting), time.monotonic()
         while left:
             while waiting and self._idle:
-                seat, job = self._idle.pop(), waiting.popleft()
-                self._awaited[seat.play.remote(job)] = (seat, job)
-            ready, _ = self._ray.wait(list(self._awaited), num_returns=1, timeout=POLL_S)
+                worker, job = self._idle.pop(), waiting.popleft()
+                self._pending[worker.play.remote(job)] = (worker, job)
+            ready, _ = self._ray.wait(list(self._pending), num_returns=1, timeout=POLL_S)
             for reference in ready:
                 record = self._receive(reference)
                 if record is not None:
                     left -= 1
                     yield record
-            if ready or any(job is not None for _, job in self._awaited.values()):
-                lively = time.monotonic()
-            elif time.monotonic() - lively > PATIENCE_S:
+            if ready or any(job is not None for _, job in self._pending.values()):
+                last_active = time.monotonic()
+            elif time.monotonic() - last_active > NO_CPU_TIMEOUT_S:
                 raise RoboIRGError(
-                    f"The Ray cluster had no free CPU for {PATIENCE_S:g} s; {left} episodes are "
-                    "left, and the same command goes on with them."
+                    f"The Ray cluster had no free CPU for {NO_CPU_TIMEOUT_S:g} s; run the same "
+                    f"command again to play the remaining {counted(left, 'episode')}."
                 )
 
-    def disband(self) -> None:
-        """Give all seats back."""
-        for seat in [*self._idle, *(seat for seat, _ in self._awaited.values())]:
-            self._ray.kill(seat)
+    def close(self) -> None:
+        """Kill all workers."""
+        for worker in [*self._idle, *(worker for worker, _ in self._pending.values())]:
+            self._ray.kill(worker)
 
-    def _open_seat(self) -> None:
-        seat = self._actor.remote(self._play, self._episode_timeout_s)
-        self._awaited[seat.begin.remote()] = (seat, None)
+    def _start_worker(self) -> None:
+        worker = self._actor.remote(self._play, self._episode_timeout_s)
+        self._pending[worker.wait_until_started.remote()] = (worker, None)
 
     def _receive(self, reference: object) -> Record | None:
-        seat, job = self._awaited.pop(reference)
+        """Return the record of a finished call; None if the call only started a worker."""
+        worker, job = self._pending.pop(reference)
         try:
-            played = self._ray.get(reference)
+            reply = self._ray.get(reference)
         except (self._ray.exceptions.RayActorError, self._ray.exceptions.RaySystemError) as error:
             if job is None:
-                self._bear(error)
-            self._open_seat()
-            return None if job is None else _lost(job, error)
-        self._idle.append(seat)
+                self._count_failed_start(error)
+            self._start_worker()
+            return None if job is None else _lost_worker_record(job, error)
+        self._idle.append(worker)
         if job is None:
-            self._stillborn = 0
+            self._failed_starts = 0
             return None
-        self._keep_films(played)
-        record: Record = played.record
+        self._save_files(reply)
+        record: Record = reply.record
         return record
 
-    def _bear(self, error: BaseException) -> None:
-        """A seat could not begin: its machine went, or it can never begin anywhere."""
-        self._stillborn += 1
-        if self._stillborn >= MAX_FAILED_STARTS * self._size:
-            # The last line of Ray's text is the exception itself.
+    def _count_failed_start(self, error: BaseException) -> None:
+        """Count a worker that could not start; stop if that happens again and again."""
+        self._failed_starts += 1
+        if self._failed_starts >= MAX_FAILED_STARTS * self._size:
+            # The last line of Ray's message is the exception itself.
             words = str(error).strip().splitlines()[-1].strip()
             raise RoboIRGError(
-                f"No worker of the Ray cluster can begin ({words}); every machine needs roboirg, "
-                "and whatever the policies import."
+                f"No worker of the Ray cluster can start ({words}); every machine needs roboirg "
+                "and everything that the policies import."
             ) from error
 
-    def _keep_films(self, played: _Played) -> None:
-        filming = _filming(self._play)
-        if filming is None:
+    def _save_files(self, reply: _RemoteResult) -> None:
+        recorder = _video_recorder(self._play)
+        if recorder is None:
             return
-        for name, data in played.films.items():
-            path = filming.folder / name
+        for name, data in reply.files.items():
+            path = recorder.folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(data)
 
 
-def _lost(job: Job, error: BaseException) -> Record:
-    course = RolloutResult()
-    name = type(error).__name__
-    what = f"the machine or process that played it is gone ({name})"
-    course.fail("infrastructure", format_cause("infrastructure", what))
-    return make_record(job, course, started_at=utc_now())
+def _lost_worker_record(job: Job, error: BaseException) -> Record:
+    result = RolloutResult()
+    message = f"the machine or process that played it was lost ({type(error).__name__})"
+    result.record_error("infrastructure", format_cause("infrastructure", message))
+    return make_record(job, result, started_at=utc_now())

@@ -1,7 +1,7 @@
-"""What a worker process is at, told to whoever supervises it, without a message.
+"""Shared-memory heartbeat from a worker process to its supervisor.
 
-A process that hangs in a policy's native code answers nothing any more. So it notes beforehand, in
-memory that it shares with its supervisor, what it begins and until when that may take.
+A process that hangs in a policy's native code cannot answer messages. So before each phase it
+writes into shared memory which phase begins and its deadline.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from multiprocessing.context import SpawnContext
 from typing import Literal, get_args
 
 Phase = Literal[
-    "start",
-    "world",
+    "worker startup",
+    "environment",
     "policy's constructor",
     "policy's reset()",
     "policy's act()",
@@ -25,56 +25,56 @@ PHASES: tuple[Phase, ...] = get_args(Phase)
 
 
 class Watchdog:
-    """A note of one process for another: the phase, and until when it may take.
+    """Current phase of a process and its deadline, readable by another process.
 
-    Times are those of the machine's monotonic clock, which its processes share.
+    Times are from the monotonic clock, which all processes of a machine share.
 
     Args:
-        context: of the processes; the board has to be handed over when one is started.
+        context: creates the processes; pass the watchdog to a process when it is started.
     """
 
     def __init__(self, context: SpawnContext) -> None:
-        self._note = context.RawArray(c_double, 2)
+        self._shared = context.RawArray(c_double, 2)
 
     def write(self, phase: Phase, limit_s: float | None = None) -> None:
-        """Note what begins now.
+        """Write the phase that begins now.
 
         Args:
-            phase: what it is.
-            limit_s: how long it may take; None for no limit of its own.
+            phase: the phase.
+            limit_s: how long it may take; None for no limit.
         """
-        # No deadline while the two numbers do not belong together.
-        self._note[1] = 0.0
-        self._note[0] = PHASES.index(phase)
-        self._note[1] = 0.0 if limit_s is None else time.monotonic() + limit_s
+        # Clear the deadline first: a reader must not combine it with another phase.
+        self._shared[1] = 0.0
+        self._shared[0] = PHASES.index(phase)
+        self._shared[1] = 0.0 if limit_s is None else time.monotonic() + limit_s
 
     @property
     def phase(self) -> Phase:
-        """What was noted last."""
-        return PHASES[int(self._note[0])]
+        """The phase that began last."""
+        return PHASES[int(self._shared[0])]
 
     @property
     def is_overdue(self) -> bool:
-        """Whether it has taken longer than it may."""
-        return 0.0 < self._note[1] < time.monotonic()
+        """Whether the phase has exceeded its deadline."""
+        return 0.0 < self._shared[1] < time.monotonic()
 
 
-_boards: list[Watchdog] = []
-"""That of this process, if it is supervised."""
+_watchdogs: list[Watchdog] = []
+"""The watchdog of this process, if it is supervised."""
 
 
-def use_watchdog(board: Watchdog) -> None:
-    """From now on this process is supervised by means of this board."""
-    _boards[:] = [board]
+def use_watchdog(watchdog: Watchdog) -> None:
+    """Let this process write its phases to a watchdog from now on."""
+    _watchdogs[:] = [watchdog]
 
 
 @contextlib.contextmanager
 def watched(phase: Phase, limit_s: float | None = None) -> Iterator[None]:
-    """Note that a phase begins, and afterwards that its limit is over."""
-    for board in _boards:
-        board.write(phase, limit_s)
+    """Write that a phase begins, and remove its deadline afterwards."""
+    for watchdog in _watchdogs:
+        watchdog.write(phase, limit_s)
     try:
         yield
     finally:
-        for board in _boards:
-            board.write("world")
+        for watchdog in _watchdogs:
+            watchdog.write("environment")

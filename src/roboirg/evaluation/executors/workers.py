@@ -1,8 +1,8 @@
-"""A supervised process that plays jobs one after the other.
+"""Supervised worker process that plays one job after the other.
 
-Whatever happens in it, its supervisor gets one record for each job within bounded time: the
-process's own; an error that says what it was doing when it died; or, when a call of the policy or
-the whole episode takes longer than it may, an error after the process has been killed.
+The supervisor gets exactly one record for each job within bounded time: the worker's own; an error
+that names the phase in which the worker died; or, if a policy call or the whole episode exceeds its
+limit, a timeout error after the worker has been killed.
 """
 
 from __future__ import annotations
@@ -28,142 +28,148 @@ from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_no
 from roboirg.records.record import ErrorKind, Job, Record
 
 GRACE_S = 2.0
-"""How long a worker may take to go when it is told to."""
+"""How long a worker may take to exit when it is asked to."""
 
 MAX_FAILED_STARTS = 3
-"""So many processes for each that is wanted may fail to start, one after the other."""
+"""Consecutive failed starts, for each worker, after which the run stops."""
 
 POLL_S = 0.25
-"""How often a supervisor looks whether somebody is overdue."""
+"""How often a supervisor checks deadlines."""
 
 _PR_SET_PDEATHSIG = 1
-_FATAL = {error.__name__: error for error in (RenderDeviceError, MissingDependencyError)}
+_FATAL_ERRORS = {error.__name__: error for error in (RenderDeviceError, MissingDependencyError)}
 
 
-class _Fatal(NamedTuple):
+class _FatalError(NamedTuple):
+    """An error that ends the run, as a worker sends it."""
+
     kind: str
-    sentence: str
+    message: str
 
 
 @dataclass
 class Worker:
-    """A process, our end of the pipe to it, and what it is playing.
+    """A worker process, the supervisor's end of its pipe, and its current job.
 
     Attributes:
-        process: plays.
-        connection: readable when there is a record, or when the process is gone.
-        board: what it is at.
-        job: what it is playing.
-        started: when it began with that, seconds of the monotonic clock.
+        process: plays the jobs.
+        connection: readable when there is a record or the process has died.
+        watchdog: current phase of the process.
+        job: the current job.
+        started: when the job was assigned, seconds of the monotonic clock.
         started_at: the same for records.
     """
 
     process: BaseProcess
     connection: Connection
-    board: Watchdog
+    watchdog: Watchdog
     job: Job
     started: float = 0.0
     started_at: str = ""
 
     @classmethod
-    def hire(cls, play: PlayJob, job: Job, *, crowded: bool = False) -> Worker:
-        """Start a process and give it its first job.
+    def start(cls, play: PlayJob, job: Job, *, limit_threads: bool = False) -> Worker:
+        """Start a process and assign its first job.
 
         Args:
             play: plays one job.
-            job: the first.
-            crowded: whether there is a process on every core.
+            job: the first job.
+            limit_threads: render with one thread, because every core has its own process.
         """
         # Spawned, not forked: a forked Vulkan driver or thread pool is undefined behavior.
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
-        board = Watchdog(context)
+        watchdog = Watchdog(context)
         # Not a daemon in multiprocessing's sense: policies may have processes of their own.
-        process = context.Process(target=_work, args=(theirs, board, play, crowded, os.getpid()))
+        process = context.Process(
+            target=_worker_main, args=(theirs, watchdog, play, limit_threads, os.getpid())
+        )
         process.start()
-        # Ours must be the only other end, so that its death reads as the end of the file.
+        # Only the worker may keep this end open: then its death reads as end of file.
         theirs.close()
-        worker = cls(process, ours, board, job)
+        worker = cls(process, ours, watchdog, job)
         worker.assign(job)
         return worker
 
     def assign(self, job: Job) -> None:
-        """Give it the next job; it has none at the moment."""
+        """Send the next job to an idle worker."""
         self.job, self.started, self.started_at = job, time.monotonic(), utc_now()
-        # A process that is already dead is noticed at the next receive.
+        # If the process has already died, the next receive notices it.
         with contextlib.suppress(BrokenPipeError):
             self.connection.send(job)
 
     def receive(self) -> Record:
-        """The record of its job, once the connection is readable; it may be dead afterwards.
+        """Return the record of the job once the connection is readable.
+
+        The worker may be dead afterwards.
 
         Raises:
-            RoboIRGError: what would end every other job too (no Vulkan device, …).
+            RoboIRGError: an error that would end every other job too (no Vulkan device, …).
         """
         try:
             reply = self.connection.recv()
         except (EOFError, ConnectionResetError):
             self.process.join()
             self.connection.close()
-            kind, what = _death(self.board.phase, self.process.exitcode)
-            return self._error(kind, what)
-        if isinstance(reply, _Fatal):
-            raise _FATAL.get(reply.kind, RoboIRGError)(reply.sentence)
+            kind, message = _explain_exit(self.watchdog.phase, self.process.exitcode)
+            return self._error_record(kind, message)
+        if isinstance(reply, _FatalError):
+            raise _FATAL_ERRORS.get(reply.kind, RoboIRGError)(reply.message)
         if not isinstance(reply, Record):
             raise TypeError(f"a worker sent {type(reply).__name__}, not a Record")
         return reply
 
-    def overdue(self, episode_timeout_s: float) -> Record | None:
-        """The record of its job if that has taken too long; then the process has been killed."""
-        if self.board.is_overdue:
-            what = f"the {self.board.phase} did not come back in time"
+    def kill_if_overdue(self, episode_timeout_s: float) -> Record | None:
+        """Kill the process and return an error record if its job has exceeded a time limit."""
+        if self.watchdog.is_overdue:
+            message = f"the {self.watchdog.phase} did not return in time"
         elif time.monotonic() - self.started > episode_timeout_s:
-            what = (
+            message = (
                 f"the episode took longer than {episode_timeout_s:g} s "
-                f"(now in the {self.board.phase})"
+                f"(now in the {self.watchdog.phase})"
             )
         else:
             return None
         self.process.kill()
         self.process.join()
         self.connection.close()
-        return self._error("timeout", what)
+        return self._error_record("timeout", message)
 
     @property
-    def is_gone(self) -> bool:
-        """Whether it has died or been killed."""
+    def is_dead(self) -> bool:
+        """Whether the process has died or been killed."""
         return self.connection.closed
 
     @property
-    def is_stillborn(self) -> bool:
-        """Whether it is gone without ever having begun to play."""
-        return self.is_gone and self.board.phase == "start"
+    def failed_to_start(self) -> bool:
+        """Whether the process died before it played anything."""
+        return self.is_dead and self.watchdog.phase == "worker startup"
 
-    def dismiss(self) -> None:
-        """Let it go: it has nothing to do, so closing the pipe ends it."""
+    def release(self) -> None:
+        """Let an idle process exit by closing the pipe."""
         self.connection.close()
 
     def stop(self) -> None:
-        """End it in the middle of what it does."""
+        """Terminate the process, whatever it is doing."""
         self.process.terminate()
         self.connection.close()
 
-    def bury(self) -> None:
-        """See it gone."""
+    def join(self) -> None:
+        """Wait until the process has exited; kill it after `GRACE_S`."""
         self.process.join(GRACE_S)
         if self.process.exitcode is None:
             self.process.kill()
             self.process.join()
 
-    def _error(self, kind: ErrorKind, what: str) -> Record:
-        course = RolloutResult()
-        course.fail(kind, format_cause(kind, what))
+    def _error_record(self, kind: ErrorKind, message: str) -> Record:
+        result = RolloutResult()
+        result.record_error(kind, format_cause(kind, message))
         spent = round(time.monotonic() - self.started, 3)
-        return make_record(self.job, course, started_at=self.started_at, duration_s=spent)
+        return make_record(self.job, result, started_at=self.started_at, duration_s=spent)
 
 
 class WorkerSlot:
-    """A place where one job after the other is played by a supervised process.
+    """Plays one job after the other in a supervised process, replaced when it dies.
 
     Args:
         play: plays one job.
@@ -175,62 +181,62 @@ class WorkerSlot:
         self._worker: Worker | None = None
 
     def play(self, job: Job) -> Record:
-        """Play a job; the process that does it lives on for the next one.
+        """Play a job; the process is kept for the next one.
 
         Raises:
-            RoboIRGError: what would end every other job too (no Vulkan device, …).
+            RoboIRGError: an error that would end every other job too (no Vulkan device, …).
         """
         if self._worker is None:
-            self._worker = Worker.hire(self._play, job, crowded=True)
+            self._worker = Worker.start(self._play, job, limit_threads=True)
         else:
             self._worker.assign(job)
-        record = _await(self._worker, self._episode_timeout_s)
-        if self._worker.is_gone:
+        record = _wait_for_record(self._worker, self._episode_timeout_s)
+        if self._worker.is_dead:
             self._worker = None
         return record
 
     def close(self) -> None:
-        """End the process."""
+        """Terminate the process."""
         if self._worker is not None:
             self._worker.stop()
-            self._worker.bury()
+            self._worker.join()
             self._worker = None
 
 
-def _await(worker: Worker, episode_timeout_s: float) -> Record:
+def _wait_for_record(worker: Worker, episode_timeout_s: float) -> Record:
     while True:
         if wait([worker.connection], POLL_S):
             return worker.receive()
-        record = worker.overdue(episode_timeout_s)
+        record = worker.kill_if_overdue(episode_timeout_s)
         if record is not None:
             return record
 
 
-def _death(phase: Phase, exit_code: int | None) -> tuple[ErrorKind, str]:
-    """Whose fault it is that a process died, and how it did."""
+def _explain_exit(phase: Phase, exit_code: int | None) -> tuple[ErrorKind, str]:
+    """Return the kind of error and the message for a process that died."""
     if exit_code is not None and exit_code < 0:
         how = f"the process died of signal {-exit_code}"
     else:
         how = f"the process ended with exit code {exit_code}"
     if exit_code == -signal.SIGKILL:
-        # Nothing does that to itself: the machine ran out of memory, or somebody killed it.
+        # Not the worker's own doing: the machine ran out of memory, or a user killed it.
         return "infrastructure", f"{how} in the {phase}"
     if phase.startswith("policy"):
         return "policy", f"{how} in the {phase}"
     return "environment", f"{how} in the {phase}"
 
 
-def _work(
-    connection: Connection, board: Watchdog, play: PlayJob, crowded: bool, parent: int
+def _worker_main(
+    connection: Connection, watchdog: Watchdog, play: PlayJob, limit_threads: bool, parent: int
 ) -> None:
-    """The life of a worker process."""
-    # Ctrl-C reaches the whole process group; the parent decides what it means.
+    """Play jobs from the connection until it is closed; runs in the worker process."""
+    # Ctrl-C reaches the whole process group; the parent decides what to do.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    _die_with(parent)
-    use_watchdog(board)
-    if crowded:
-        # Read by lavapipe when it is loaded, which is later than this.
+    _exit_with_parent(parent)
+    use_watchdog(watchdog)
+    if limit_threads:
+        # lavapipe reads this when it is loaded, which is later.
         os.environ.setdefault("LP_NUM_THREADS", "1")
     while True:
         try:
@@ -238,28 +244,28 @@ def _work(
         except EOFError:
             return
         try:
-            with watched("world"):
-                reply: Record | _Fatal = play(job)
+            with watched("environment"):
+                reply: Record | _FatalError = play(job)
         except RoboIRGError as error:
-            reply = _Fatal(type(error).__name__, str(error))
+            reply = _FatalError(type(error).__name__, str(error))
         try:
             connection.send(reply)
         except BrokenPipeError:
             return
 
 
-def _die_with(parent: int) -> None:
-    """See to it that this process does not outlive the one that made it."""
+def _exit_with_parent(parent: int) -> None:
+    """Make sure that this process does not outlive its parent."""
     if sys.platform == "linux":
-        # Even when this process hangs in native code. Tied to the thread that made it, which
-        # waits for as long as there are workers.
+        # Works even if this process hangs in native code. Bound to the parent's thread that
+        # started it, which waits as long as there are workers.
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
-        os._exit(1)  # it died before the line above
-    maker = multiprocessing.parent_process()
-    if maker is not None:
-        watch = threading.Thread(target=_exit_when_ready, args=(maker.sentinel,), daemon=True)
-        watch.start()
+        os._exit(1)  # the parent died before the line above
+    parent_process = multiprocessing.parent_process()
+    if parent_process is not None:
+        sentinel = parent_process.sentinel
+        threading.Thread(target=_exit_when_ready, args=(sentinel,), daemon=True).start()
 
 
 def _exit_when_ready(sentinel: int) -> None:

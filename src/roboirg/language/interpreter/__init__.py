@@ -1,42 +1,54 @@
-"""The independent reader: from words and a scene to all the goals that fit.
+"""The interpreter: find all goals that fit a text about a scene.
 
-It shares nothing with the rooms that make the words: no template, constant or metadata. It knows
-English as far as the benchmark needs it, the objects on the table, what moves and what the video
-shows, and which goals a task can have at all.
+It is independent of the generator: it uses none of its templates, constants or metadata. It knows
+as much English as the benchmark needs, the objects on the table, what moves, what the video
+shows, and which goals a task can have. `docs/interpreter.md` explains its parts.
 """
 
 from __future__ import annotations
 
 import functools
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from roboirg.core.episode import Goal, Scene
 from roboirg.language.interpreter.command import is_command, read_command
-from roboirg.language.interpreter.constraints import tests_for
-from roboirg.language.interpreter.discourse_context import read_discourse
+from roboirg.language.interpreter.comprehension import (
+    ComprehensionGap,
+    find_gaps,
+    is_unknown_command,
+)
+from roboirg.language.interpreter.constraints import goal_constraints
+from roboirg.language.interpreter.discourse_context import read_discourse, read_remark
+from roboirg.language.interpreter.negations import is_negated_command, unread_negations
 from roboirg.language.interpreter.reference_resolution import ReferenceResolver
-from roboirg.language.interpreter.temporal_relations import time_told
+from roboirg.language.interpreter.temporal_relations import mentioned_times
 from roboirg.language.interpreter.tokens import Sentence, split_sentences
+from roboirg.language.interpreter.vocabulary import VERBS
 from roboirg.tasks import get_task
 
 __all__ = ["Interpretation", "interpret"]
 
 
 class Interpretation(NamedTuple):
-    """The outcome of reading.
+    """The result of reading a text.
 
     Attributes:
-        goals: every goal that fits the text; one if the text says all, none if it contradicts
-            itself or the scene.
-        not_understood: what was pointed at without having been introduced, and the like.
+        goals: every goal that fits the text. One if the text says everything; none if it
+            contradicts itself or the scene, gives no command, or gives one that the interpreter
+            does not understand to the end.
+        not_understood: complaints in plain sentences.
+        unknown_words: the words of the command that the interpreter does not know or cannot use,
+            in lower case and American spelling, each once.
     """
 
     goals: tuple[Goal, ...]
     not_understood: tuple[str, ...]
+    unknown_words: tuple[str, ...] = ()
 
 
 def interpret(text: str, scene: Scene, task: str) -> Interpretation:
-    """All goals of a task that fit what is said; any text will do, whole prompts or their ends.
+    """Return all goals of a task that fit a text: a whole prompt, its command, or any other text.
 
     Args:
         text: the prompt.
@@ -50,29 +62,82 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
     candidates = _possible_goals(scene, task)
     sentences = split_sentences(text)
     first, last = _command_span(sentences)
+    gaps = _command_gaps(sentences, first, last)
+    if gaps:
+        return Interpretation(
+            (),
+            _distinct(gap.complaint for gap in gaps),
+            _distinct(word for gap in gaps for word in gap.words),
+        )
     context = read_discourse(sentences[:first])
-    order: Sentence = tuple(word for part in sentences[first:last] for word in (*part, ","))
-    command = read_command(order)
-    listener = ReferenceResolver(scene, context, context.times | time_told(command.text))
-    slots = candidates[0].as_mapping() if candidates else ()
-    tests = tests_for(slots, command, listener)
-    goals = tuple(goal for goal in candidates if all(fits(goal) for fits in tests))
-    complaints = listener.complaints if first < last else ["no command", *listener.complaints]
-    return Interpretation(goals, tuple(dict.fromkeys(complaints)))
+    command = read_command(_joined(sentences[first:last]))
+    times = context.times | mentioned_times(command.text)
+    resolver = ReferenceResolver(scene, context, times)
+    constraints = goal_constraints(candidates, command, resolver)
+    goals = tuple(goal for goal in candidates if all(limit.fits(goal) for limit in constraints))
+    complaints = list(resolver.complaints)
+    if candidates and not goals:
+        unmet = [limit for limit in constraints if not any(map(limit.fits, candidates))]
+        complaints += [limit.complaint for limit in unmet]
+        complaints = complaints or ["no goal of the task fits everything that the text says"]
+    return Interpretation(goals, _distinct(complaints))
 
 
 @functools.lru_cache(maxsize=64)
 def _possible_goals(scene: Scene, task: str) -> tuple[Goal, ...]:
-    # Kept, because the same scene is read about in many settings.
+    # Cached, because a scene is read about in many settings.
     return get_task(task).goals(scene)
 
 
+def _commands(words: Sentence) -> bool:
+    """Return whether a sentence gives a command, understood or not."""
+    return is_command(words) or is_negated_command(words) or is_unknown_command(words)
+
+
 def _command_span(sentences: tuple[Sentence, ...]) -> tuple[int, int]:
-    """Where the last run of commanding sentences begins and ends."""
+    """Return where the last run of commanding sentences begins and ends."""
     last = len(sentences)
-    while last and not is_command(sentences[last - 1]):
+    while last and not _commands(sentences[last - 1]):
         last -= 1
     first = last
-    while first and is_command(sentences[first - 1]):
+    while first and _commands(sentences[first - 1]):
         first -= 1
     return (first, last) if last else (len(sentences), len(sentences))
+
+
+def _command_gaps(sentences: tuple[Sentence, ...], first: int, last: int) -> list[ComprehensionGap]:
+    """Return what the interpreter does not understand of the command.
+
+    Args:
+        sentences: all of them.
+        first: index of the first commanding sentence.
+        last: index after the last one; the same as `first` if there is no command.
+    """
+    negated = [words for words in sentences[:first] if is_negated_command(words)]
+    following = [words for words in sentences[last:] if _matters(words)]
+    gaps = [] if first < last else [ComprehensionGap("finds no command")]
+    gaps += [
+        ComprehensionGap(f'does not read what follows the command: "{" ".join(words)}"')
+        for words in following
+    ]
+    for words in (*negated, *(sentences[first:last] or sentences[-1:]), *following):
+        gaps += find_gaps(words)
+    return gaps
+
+
+def _matters(words: Sentence) -> bool:
+    """Return whether a sentence after the command may change what it asks for."""
+    remark = read_remark(words)
+    if remark.dismissed:
+        return False
+    named = remark.colors or remark.numbers or remark.positions or remark.moments or remark.places
+    return bool(named or unread_negations(words)) or not VERBS.isdisjoint(words)
+
+
+def _joined(sentences: Iterable[Sentence]) -> Sentence:
+    """Return the words of all sentences, with a comma after each sentence."""
+    return tuple(word for words in sentences for word in (*words, ","))
+
+
+def _distinct(texts: Iterable[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(texts))

@@ -1,39 +1,44 @@
-"""The command: which sentences it is, and the words for the things that are to be handled."""
+"""Commands: which sentences give them, and the words for the things to handle."""
 
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from roboirg.language.interpreter.descriptions import Description, describe
 from roboirg.language.interpreter.quantities import CountExpression, Quantity, quantities
 from roboirg.language.interpreter.tokens import Sentence, colors_in, word_set
+from roboirg.language.interpreter.vocabulary import PUTTING, TAKING, VERBS
 
-_TAKING = word_set(
-    "take pick grab grasp lift raise carry move bring fetch get uncover remove hold swing"
+BEFORE_VERB = word_set(", ; : and then to finally now after that next afterwards but first")
+_REQUESTS = frozenset(
+    pair
+    for modal in ("can", "could", "will", "would", "must", "should")
+    for pair in ((modal, "you"), ("you", modal))
 )
-_PUTTING = word_set("put place set lower return drop lay throw toss")
-_PRESSING = word_set("press push hit tap stop halt make let")
-_BEFORE_VERB = word_set(", ; : and then please to finally now after that next afterwards but first")
+"""Pairs of words before a verb that make a sentence a command."""
 _INTO = word_set("into inside in")
 _BARE_PRONOUNS = word_set("it them that")
+_PARTICLES = word_set("up down back")
 _SINGULAR = word_set("it cube one")
+_ADVERBS = word_set("once twice thrice")
 
 
 class Item(NamedTuple):
-    """So many things of one sort; without a number, nothing tells how many."""
+    """A number of things of one color; the number is None if the command gives none."""
 
     number: CountExpression | None
     thing: Description
 
 
 class Command(NamedTuple):
-    """What a command says.
+    """The parts of a command.
 
     Attributes:
         text: all its words.
-        handled: the words for each thing that is handled, in order; each thing once.
-        added: the words for things of other colors that are only said to be put somewhere.
+        handled: the words for each thing to handle, in order; each thing once.
+        added: the words for things of other colors that only a verb of putting names.
         entered: the words for each thing that something is put into.
     """
 
@@ -44,55 +49,62 @@ class Command(NamedTuple):
 
     @property
     def things(self) -> tuple[Description, ...]:
-        """What is told about the things one by one."""
+        """The descriptions of the things to handle."""
         return tuple(describe(words) for words in self.handled)
 
     @property
     def boxes(self) -> tuple[Description, ...]:
-        """What is told about the things that something is put into."""
+        """The descriptions of the things that something is put into."""
         return tuple(describe(words) for words in self.entered)
 
     @property
     def items(self) -> tuple[Item, ...]:
-        """What is told about the things with their numbers."""
+        """The descriptions of the things to handle, with their numbers."""
         return tuple(item for words in (*self.handled, *self.added) for item in _items(words))
 
 
 def is_command(words: Sentence) -> bool:
-    """Whether the sentence tells somebody to handle something."""
+    """Return whether a sentence contains a known verb in the place of a command's verb."""
     return any(_is_verb(words, at) for at in range(len(words)))
 
 
 @functools.lru_cache(maxsize=4096)
 def read_command(words: Sentence) -> Command:
-    """The commanding sentences, and the things to handle."""
+    """Read the words of all commanding sentences as one command."""
     clauses = _clauses(words)
-    taken = [clause for clause in clauses if clause[0] in _TAKING]
-    put = [clause for clause in clauses if clause[0] in _PUTTING]
-    # "Put the cube on the target" handles a cube too, "put it back" the one in the hand.
-    told = taken or put
-    fresh = [clause for clause in told if clause is told[0] or not _goes_on(clause)]
-    known = {color for clause in taken for color in colors_in(clause)}
-    added = [clause for clause in put if taken and set(colors_in(clause)) - known]
+    taken = [clause for clause in clauses if clause[0] in TAKING]
+    put = [clause for clause in clauses if clause[0] in PUTTING]
     return Command(
         " ".join(words),
-        tuple(clause[1:] for clause in fresh),
-        tuple(clause[1:] for clause in added),
+        # "Put the cube on the target" handles a cube too, "put it back" the one in the hand.
+        _first_mentions(taken or put),
+        _other_colors(put, taken) if taken else (),
         tuple(found for clause in clauses if (found := _entered(clause))),
     )
 
 
+def _first_mentions(clauses: Sequence[Sentence]) -> tuple[Sentence, ...]:
+    """Return the words after each verb, unless they continue with the thing in the hand."""
+    return tuple(clause[1:] for clause in clauses if clause is clauses[0] or not _continues(clause))
+
+
+def _other_colors(put: Sequence[Sentence], taken: Sequence[Sentence]) -> tuple[Sentence, ...]:
+    """Return the words for things that are put somewhere, of colors that are not taken."""
+    known = {color for clause in taken for color in colors_in(clause)}
+    return tuple(clause[1:] for clause in put if set(colors_in(clause)) - known)
+
+
 def _entered(clause: Sentence) -> Sentence:
-    """``it`` of ``put the tape into it``; empty if nothing is put into anything."""
-    if clause[0] not in _TAKING | _PUTTING:
+    """Return ``it`` of ``put the tape into it``; empty if nothing is put into anything."""
+    if clause[0] not in TAKING | PUTTING:
         return ()
     at = next((at for at, word in enumerate(clause) if word in _INTO), len(clause))
     return clause[at + 1 :]
 
 
-def _goes_on(clause: Sentence) -> bool:
-    """Whether it only says what to do with the thing at hand: ``carry it over``."""
-    objects = [word for word in clause[1:3] if word not in ("up", "down", "back")]
+def _continues(clause: Sentence) -> bool:
+    """Return whether a clause goes on with the thing in the hand: ``carry it over``."""
+    objects = [word for word in clause[1:3] if word not in _PARTICLES]
     return not objects or objects[0] in _BARE_PRONOUNS
 
 
@@ -103,29 +115,27 @@ def _clauses(words: Sentence) -> list[Sentence]:
 
 
 def _is_verb(words: Sentence, at: int) -> bool:
-    if words[at] not in _TAKING | _PUTTING | _PRESSING:
+    if words[at] not in VERBS:
         return False
-    return at == 0 or words[at - 1] in _BEFORE_VERB
+    if at == 0 or words[at - 1] in BEFORE_VERB or words[max(0, at - 2) : at] in _REQUESTS:
+        return True
+    return words[at - 1] in ("you", "do") and words[max(0, at - 2) : at - 1] in ((), (",",))
 
 
 def _items(words: Sentence) -> tuple[Item, ...]:
-    """``two red cubes and one that is blue``: each quantity begins the words for one sort."""
+    """Split ``two red cubes and one that is blue``: each quantity begins a new item."""
     text = " ".join(words)
-    found = [one for one in quantities(text) if _counts_things(one, text)]
+    found = [quantity for quantity in quantities(text) if _counts_things(quantity, text)]
     if not found:
         alone = "them" not in words and not _SINGULAR.isdisjoint(words)
         return (Item(CountExpression(quantity=1) if alone else None, describe(words)),)
-    ends = [*(one.start for one in found[1:]), len(text)]
+    ends = [*(quantity.start for quantity in found[1:]), len(text)]
+    # A derived quantity has its color inside: "one fewer red cube than that".
     return tuple(
-        Item(one.told, describe(_words_of(text, one, end)))
-        for one, end in zip(found, ends, strict=True)
+        Item(quantity.expression, describe(tuple(text[quantity.start : end].split())))
+        for quantity, end in zip(found, ends, strict=True)
     )
 
 
-def _counts_things(one: Quantity, text: str) -> bool:
-    return not one.plain or text[one.start : one.end] not in ("once", "twice", "thrice")
-
-
-def _words_of(text: str, one: Quantity, end: int) -> Sentence:
-    # A derived quantity has its color inside: "one fewer red cube than that".
-    return tuple(text[one.start : end].split())
+def _counts_things(quantity: Quantity, text: str) -> bool:
+    return not quantity.plain or text[quantity.start : quantity.end] not in _ADVERBS

@@ -1,57 +1,92 @@
-"""From what was understood to tests of goals, one for each slot that a task's goals have."""
+"""Constraints: turn a command into tests of goals, one for each slot that goals of a task have."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
+from typing import NamedTuple
 
 from roboirg.core.episode import Goal
 from roboirg.language.interpreter.command import Command
 from roboirg.language.interpreter.ordinals import read_position
 from roboirg.language.interpreter.quantities import read_times
-from roboirg.language.interpreter.reference_resolution import Amounts, ReferenceResolver, common
+from roboirg.language.interpreter.reference_resolution import (
+    Amounts,
+    ReferenceResolver,
+    common_options,
+)
 from roboirg.language.interpreter.temporal_relations import read_temporal_relation
 
-Test = Callable[[Goal], bool]
+GoalTest = Callable[[Goal], bool]
 
 
-def tests_for(slots: Collection[str], command: Command, listener: ReferenceResolver) -> list[Test]:
-    """What a goal must pass to fit the command.
+class Constraint(NamedTuple):
+    """A test of goals, and the complaint for the case that no goal of the task passes it."""
+
+    fits: GoalTest
+    complaint: str
+
+
+def goal_constraints(
+    candidates: Sequence[Goal], command: Command, resolver: ReferenceResolver
+) -> list[Constraint]:
+    """Return what a goal must pass to fit the command.
 
     Args:
-        slots: names of the slots that the goals have.
-        command: what was said last.
-        listener: who knows what was said before.
+        candidates: all goals of the task; they have the same slots.
+        command: the command.
+        resolver: resolves the references of the command.
     """
-    tests: list[Test] = []
+    slots = candidates[0].as_mapping() if candidates else ()
+    constraints: list[Constraint] = []
     if "counts" in slots:
-        tests.append(_amounts(command, listener))
+        constraints.append(Constraint(_amounts(command, resolver), _no_goal("amounts")))
     elif "colors" in slots:
-        tests.append(_things_in_order(command, listener))
+        constraints.append(Constraint(_things_in_order(command, resolver), _no_goal("things")))
     if "color" in slots:
-        things = command.boxes if listener.chooses_box else command.things
-        colors = common(listener.objects(thing) for thing in things)
-        tests.append(lambda goal: colors is None or goal.text("color") in colors)
-    if "repeats" in slots:
-        tests.append(_number("repeats", listener.times(read_times(command.text))))
-    tests += [
-        _number(series, listener.positions(read_position(command.text)))
-        for series in ("visit", "placement")
-        if series in slots
-    ]
+        things = command.boxes if resolver.chooses_box else command.things
+        constraints.append(_text("color", common_options(map(resolver.objects, things))))
+    constraints += _numbers(slots, candidates, command, resolver)
     if "relation" in slots:
-        moments = listener.moments(read_temporal_relation(command.text))
-        tests.append(lambda goal: moments is None or goal.text("relation") in moments)
-    return tests
+        moments = resolver.moments(read_temporal_relation(command.text))
+        constraints.append(_text("relation", moments))
+    return constraints
 
 
-def _number(slot: str, options: Collection[int] | None) -> Test:
-    return lambda goal: options is None or goal.number(slot) in options
+def _numbers(
+    slots: Collection[str],
+    candidates: Sequence[Goal],
+    command: Command,
+    resolver: ReferenceResolver,
+) -> Iterator[Constraint]:
+    """Yield the constraints of the slots that hold one number."""
+    if "repeats" in slots:
+        yield _number("repeats", resolver.times(read_times(command.text)), candidates)
+    for series in ("visit", "placement"):
+        if series in slots:
+            options = resolver.positions(read_position(command.text))
+            yield _number(series, options, candidates)
 
 
-def _things_in_order(command: Command, listener: ReferenceResolver) -> Test:
-    """As many colors as things, each among those that its words leave open."""
-    wanted = [listener.objects(thing) for thing in command.things]
+def _number(slot: str, options: Collection[int] | None, candidates: Sequence[Goal]) -> Constraint:
+    possible = sorted({goal.number(slot) for goal in candidates})
+    return Constraint(
+        lambda goal: options is None or goal.number(slot) in options,
+        f"the number is out of range: {slot} can be {possible[0]} to {possible[-1]}",
+    )
+
+
+def _text(slot: str, options: Collection[str] | None) -> Constraint:
+    return Constraint(lambda goal: options is None or goal.text(slot) in options, _no_goal(slot))
+
+
+def _no_goal(part: str) -> str:
+    return f"no goal of the task has the {part} that the command names"
+
+
+def _things_in_order(command: Command, resolver: ReferenceResolver) -> GoalTest:
+    """Return a test for as many colors as things, each among those that its words allow."""
+    wanted = [resolver.objects(thing) for thing in command.things]
 
     def fits(goal: Goal) -> bool:
         colors = goal.texts("colors")
@@ -63,23 +98,23 @@ def _things_in_order(command: Command, listener: ReferenceResolver) -> Test:
     return fits
 
 
-def _amounts(command: Command, listener: ReferenceResolver) -> Test:
-    """Each color with its number is one of the items, in any order, and each item is one."""
-    items = [listener.amounts(item) for item in command.items]
+def _amounts(command: Command, resolver: ReferenceResolver) -> GoalTest:
+    """Return a test for colors with numbers that match the items one to one, in any order."""
+    items = [resolver.amounts(item) for item in command.items]
 
     def fits(goal: Goal) -> bool:
-        told = list(zip(goal.texts("colors"), goal.numbers("counts"), strict=True))
+        amounts = list(zip(goal.texts("colors"), goal.numbers("counts"), strict=True))
         if not items:
             return True
-        return len(items) == len(told) and any(
-            _agree(told, order) for order in itertools.permutations(items)
+        return len(items) == len(amounts) and any(
+            _match(amounts, order) for order in itertools.permutations(items)
         )
 
     return fits
 
 
-def _agree(told: Sequence[tuple[str, int]], items: Sequence[Amounts]) -> bool:
-    for (color, number), options in zip(told, items, strict=True):
+def _match(amounts: Sequence[tuple[str, int]], items: Sequence[Amounts]) -> bool:
+    for (color, number), options in zip(amounts, items, strict=True):
         if color not in options:
             return False
         numbers = options[color]

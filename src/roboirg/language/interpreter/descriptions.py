@@ -1,4 +1,4 @@
-"""Descriptions: how words tell which thing, or of which color, is meant."""
+"""Descriptions: read the words for a thing or a color."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 from typing import Literal, NamedTuple
 
 from roboirg.language.interpreter.places import Place, read_places
-from roboirg.language.interpreter.temporal_relations import Time, time_told
+from roboirg.language.interpreter.temporal_relations import Time, mentioned_times
 from roboirg.language.interpreter.tokens import (
     COLOR,
     Sentence,
@@ -26,22 +26,22 @@ DescriptionKind = Literal["any", "color", "not", "other", "place", "introduced",
 
 
 class Description(NamedTuple):
-    """How a command tells one thing that is to be handled.
+    """A description of one thing to handle.
 
     Attributes:
-        kind: ``any`` says nothing; ``color`` names it; ``not`` excludes colors; ``other`` is
-            the remaining one of some colors; ``place`` names where it is; ``introduced`` and
-            ``introduced place`` point at what was named before.
-        colors: named colors; empty where the words point at those of the context.
-        minus: for ``other``, the color that it is not; None if the words only point at it.
+        kind: ``any`` describes nothing; ``color`` names a color; ``not`` excludes colors; ``other``
+            is the remaining one of some colors; ``place`` names a place; ``introduced`` and
+            ``introduced place`` point at an earlier color or place.
+        colors: named colors; empty if the words point at those of the context.
+        excluded: for ``other``, the excluded color; None if the words only point at it.
         place: the named place.
-        times: whether that place was said to be before or after things moved.
-        position: which of the introduced ones, from 0; None if any of them.
+        times: whether the place is the one before or after things move.
+        position: index of the introduced value; None for any of them.
     """
 
     kind: DescriptionKind
     colors: tuple[str, ...] = ()
-    minus: str | None = None
+    excluded: str | None = None
     place: Place | None = None
     times: frozenset[Time] = frozenset()
     position: int | None = None
@@ -57,12 +57,12 @@ _NOT = re.compile(rf"\b(?:not|other than|except) (?:in |for |the )?({COLOR})\b")
 
 
 def describe(words: Sentence) -> Description:
-    """What the words for one thing tell about it."""
+    """Return the description that the words for one thing give."""
     text = " ".join(words)
     colors = colors_in(words)
     places = read_places(words)
     if places:
-        return Description("place", place=places[0], times=time_told(text))
+        return Description("place", place=places[0], times=mentioned_times(text))
     if _OTHER_OF.search(text) or _ONE_NOT.search(text):
         return _complement(text, colors)
     if _THAN.search(text):
@@ -74,13 +74,13 @@ def describe(words: Sentence) -> Description:
 
 def _complement(text: str, colors: tuple[str, ...]) -> Description:
     found = _NOT.search(text)
-    minus = color_of(found[1]) if found else None
+    excluded = color_of(found[1]) if found else None
     among = tuple(dict.fromkeys(colors))
-    return Description("other", () if among == (minus,) else among, minus)
+    return Description("other", () if among == (excluded,) else among, excluded)
 
 
 def _pointer(words: Sentence) -> Description | None:
-    times = time_told(" ".join(words))
+    times = mentioned_times(" ".join(words))
     if "there" in words:
         return Description("introduced place", times=times)
     for before, word, after in zip(("", *words), words, (*words[1:], ""), strict=False):
@@ -94,7 +94,7 @@ def _pointer(words: Sentence) -> Description | None:
 
 
 def _position(before: str, word: str) -> int | None:
-    """``the former``, ``the second``; a bare ``first`` is an adverb."""
+    """Return the index of ``the former`` or ``the second``; a bare ``first`` is an adverb."""
     if word in _FORMER:
         return _FORMER[word]
     rank = ordinal_of(word)

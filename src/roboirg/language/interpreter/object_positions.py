@@ -1,4 +1,4 @@
-"""Where things stand, before and after they change places."""
+"""Object positions: find what stands at a place before and after things move."""
 
 from __future__ import annotations
 
@@ -8,34 +8,34 @@ from dataclasses import replace
 
 from roboirg.core.episode import Scene, SceneObject
 from roboirg.core.motions import Swap
-from roboirg.language.interpreter.places import Place, find
+from roboirg.language.interpreter.places import Place, find_objects
 from roboirg.language.interpreter.temporal_relations import Time
 
 
 def objects_at(
     place: Place, scene: Scene, kind: str, times: Collection[Time], *, mirrored: bool
 ) -> tuple[SceneObject, ...]:
-    """What stands at a place at one of these times; at any time if none is given.
+    """Return what stands at a place at one of these times, or at any time for no times.
 
     Args:
-        place: where.
-        scene: everything on the table, and what will move.
-        kind: of the things that are compared.
+        place: the place.
+        scene: everything on the table, and what moves.
+        kind: kind of the things to compare.
         times: before or after things move.
         mirrored: whether left and right are those of the front camera's picture.
     """
     found: list[str] = []
     if "at first" in times or not times:
-        found += [item.name for item in find(place, scene, kind, mirrored=mirrored)]
+        found += [item.name for item in find_objects(place, scene, kind, mirrored=mirrored)]
     if "at last" in times or not times:
-        settled = _settled(scene)
-        found += [item.name for item in find(place, settled, kind, mirrored=mirrored)]
+        final = _final_scene(scene)
+        found += [item.name for item in find_objects(place, final, kind, mirrored=mirrored)]
     return tuple(scene[name] for name in dict.fromkeys(found))
 
 
 @functools.lru_cache(maxsize=256)
-def _settled(scene: Scene) -> Scene:
-    """The scene with everything where it stands after the last exchange."""
+def _final_scene(scene: Scene) -> Scene:
+    """Return the scene with everything where it stands after the last swap."""
     places = {item.name: item.position for item in scene.objects}
     for motion in scene.motions:
         if isinstance(motion, Swap):

@@ -1,4 +1,4 @@
-"""Ordinals: an element of a series, named, pointed at, or told by another element."""
+"""Ordinals: an element of a series, named, pointed at, or derived from another element."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ _LATER = ("after", "following", "later than", "behind", "next")
 
 
 class OrdinalExpression(NamedTuple):
-    """How a command tells an element of a series.
+    """A description of an element of a series.
 
     Attributes:
         base: the number of an element; ``that`` for an introduced one, ``last`` for the last.
-        offsets: how far the wanted one may be from it.
-        value: instead of these, its number by its relation to another number.
+        offsets: the possible distances from the base to the element.
+        value: an expression for the number of the element, instead of base and offsets.
     """
 
     base: Base = "that"
@@ -51,42 +51,44 @@ class OrdinalExpression(NamedTuple):
     def results(
         self, positions: Collection[int], numbers: Collection[int], length: int
     ) -> set[int] | None:
-        """Numbers of the elements that it can be; None if it can be any.
+        """Return the numbers of the possible elements; None for any element.
 
         Args:
             positions: introduced elements.
             numbers: introduced numbers.
-            length: how many elements the series has.
+            length: number of elements of the series.
         """
+        elements = set(range(1, length + 1))
         if self.value is not None:
-            results = self.value.results(numbers or positions)
-            return None if results is None else results & set(range(1, length + 1))
-        if self.base == "that":
-            bases = positions or numbers
-            if not bases and self.offsets == (0,):
+            values = self.value.results(numbers or positions)
+            return None if values is None else values & elements
+        bases = self._bases(positions or numbers, length)
+        if not bases and self.base == "that":
+            if self.offsets == (0,):
                 return None
-            bases = bases or range(1, length + 1)
-        else:
-            bases = [length if self.base == "last" else self.base]
-        # What does not exist has no neighbors, and is none.
-        existing = [one for one in bases if 1 <= one <= length]
-        results = {one + offset for one in existing for offset in self.offsets}
-        return {one for one in results if 1 <= one <= length}
+            bases = elements
+        # An element outside the series has no neighbors.
+        return {base + offset for base in bases & elements for offset in self.offsets} & elements
+
+    def _bases(self, introduced: Collection[int], length: int) -> set[int]:
+        if self.base == "that":
+            return set(introduced)
+        return {length if self.base == "last" else self.base}
 
     @property
     def points(self) -> bool:
-        """Whether it takes something introduced to understand it."""
+        """Whether the context must introduce an element or a number."""
         return self.value.quantity is None if self.value is not None else self.base == "that"
 
 
 def named_positions(text: str) -> tuple[int, ...]:
-    """The elements of a series that a sentence names by number, in order."""
+    """Return the elements of a series that a sentence names by number, in order."""
     numbers = (_number(found) for found in _ELEMENT.finditer(text))
     return tuple(one for one in numbers if isinstance(one, int))
 
 
 def read_position(text: str) -> OrdinalExpression | None:
-    """The element of a series that a command tells; None if it tells none."""
+    """Return the description of an element of a series; None if there is none."""
     value = read_value(text)
     if value is not None:
         return OrdinalExpression(value=value)
@@ -94,7 +96,7 @@ def read_position(text: str) -> OrdinalExpression | None:
 
 
 def _read_relative(text: str) -> OrdinalExpression | None:
-    # Before the others: in "the preceding one" no number one is preceded.
+    # First of all: the "one" of "the preceding one" is no number.
     following = _NEXT.search(text)
     if following:
         return OrdinalExpression("that", (1 if following["way"] in _LATER else -1,))

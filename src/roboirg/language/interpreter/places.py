@@ -1,15 +1,15 @@
-"""Places: reading the words for one, and finding what stands there.
+"""Places: read the words for a place, and find what stands there.
 
-A place compares all things of one kind: it orders them along a direction or by their distance
-from something, and means the first, second, ... of that order.
+A place orders all things of one kind along a direction, or by their distance from something, and
+means the first, second, ... of that order.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from roboirg.core.episode import Scene, SceneObject
 from roboirg.core.motions import Away
@@ -17,12 +17,12 @@ from roboirg.language.interpreter.tokens import Sentence, color_of, ordinal_of
 
 Side = Literal["left", "right"]
 _SIDES: dict[str, Side] = {"left": "left", "right": "right"}
-_MOST: dict[str, Side] = {"leftmost": "left", "rightmost": "right"}
+_OUTERMOST: dict[str, Side] = {"leftmost": "left", "rightmost": "right"}
 _NEAR = frozenset({"near", "close", "closest", "nearest", "front"})
 _FAR = frozenset({"far", "farthest", "furthest", "away", "back"})
-_LEAST = frozenset({"closest", "nearest"})
-_UTMOST = frozenset({"farthest", "furthest"})
-_LISTENER = frozenset({"you", "robot", "yourself"})
+_NEAREST = frozenset({"closest", "nearest"})
+_FARTHEST = frozenset({"farthest", "furthest"})
+_ROBOT = frozenset({"you", "robot", "yourself"})
 _FIXTURES = frozenset({"button", "target", "bin"})
 _FILLERS = frozenset({"the", "to", "from", "a", "on", "at"})
 _CORNER_FILLERS = frozenset({"of", "the", "table", "that", "is"})
@@ -33,7 +33,7 @@ _TO_A_SIDE = frozenset({"on", "to", "at"})
 _SIDE_FILLERS = frozenset({"the", "your", "far"})
 
 _MAX_DEPTH = 4
-"""Places told by places told by ...: further down nobody follows."""
+"""Levels of places that other places describe; deeper ones are not read."""
 
 _TABLE_FRONT, _TABLE_BACK = -0.7402, 0.4689
 _TABLE_RIGHT, _TABLE_LEFT = -1.2149, 1.2030
@@ -43,19 +43,19 @@ _VIEW = (-0.3, 0.0, -0.6)
 """The front camera's eye and where it looks from there."""
 _CUBE_HEIGHT = 0.02
 _TIE = 0.01
-"""Meters; what differs by less could be meant by the same words."""
+"""Meters; the same words may mean things that differ by less."""
 _TANGENT_TIE = 2 / 128
 """Two pixels, as a tangent: the picture is 256 pixels wide and 90 degrees."""
 
 
 @dataclass(frozen=True, slots=True)
-class Towards:
-    """Along a direction of the table, or towards a corner if there are both a side and a depth.
+class DirectionalPlace:
+    """A place along a direction of the table, or towards a corner if it has a side and a depth.
 
     Attributes:
-        side: to that side of the listener, or None.
+        side: side of the robot, or None.
         depth: +1 away from the robot, -1 towards it, 0 neither.
-        rank: 1 for the utmost one.
+        rank: 1 for the thing farthest in this direction.
     """
 
     side: Side | None
@@ -64,14 +64,14 @@ class Towards:
 
 
 @dataclass(frozen=True, slots=True)
-class Beside:
-    """By distance from something.
+class RelativePlace:
+    """A place by its distance from an anchor.
 
     Attributes:
-        anchor: a fixture's kind, a color, or a place of its own.
-        kind: kind of the things that the anchor is one of, for a place.
+        anchor: kind of a fixture, a color, or a place.
+        kind: kind of the anchor.
         nearest: whether small distances come first.
-        rank: 1 for the utmost one.
+        rank: 1 for the first.
     """
 
     anchor: str | Place
@@ -80,31 +80,42 @@ class Beside:
     rank: int = 1
 
 
-Place = Towards | Beside
+Place = DirectionalPlace | RelativePlace
 
 
-def read_places(words: Sentence) -> tuple[Place, ...]:
-    """Every place that a sentence names, in order."""
-    found: list[Place] = []
+class PlaceMention(NamedTuple):
+    """A place, and from which word to which it goes."""
+
+    place: Place
+    start: int
+    end: int
+
+
+def place_mentions(words: Sentence) -> Iterator[PlaceMention]:
+    """Yield every place that a sentence names, in order."""
     at = 0
     while at < len(words):
         read = _read(words, at)
         if read is None:
             at += 1
         else:
-            place, at = read
-            found.append(place)
-    return tuple(found)
+            yield PlaceMention(read[0], at, read[1])
+            at = read[1]
+
+
+def read_places(words: Sentence) -> tuple[Place, ...]:
+    """Return every place that a sentence names, in order."""
+    return tuple(mention.place for mention in place_mentions(words))
 
 
 def _read(words: Sentence, at: int, depth: int = 0) -> tuple[Place, int] | None:
-    """The place whose words begin exactly here, and where they end."""
+    """Return the place whose words begin at this word, and the index after its last word."""
     word = _word(words, at)
     rank = ordinal_of(word)
     if rank is not None:
         return _read_from(words, at + 1, rank) or _read_relative(words, at + 1, rank, depth)
-    if word in _MOST:
-        return Towards(_MOST[word], 0), at + 1
+    if word in _OUTERMOST:
+        return DirectionalPlace(_OUTERMOST[word], 0), at + 1
     return (
         _read_side(words, at)
         or _read_corner(words, at)
@@ -114,10 +125,10 @@ def _read(words: Sentence, at: int, depth: int = 0) -> tuple[Place, int] | None:
 
 
 def _read_side(words: Sentence, at: int) -> tuple[Place, int] | None:
-    """``left box``, ``tape on your right``: of things that stand on either side."""
+    """Read ``left box``, ``tape on your right``: the place of one of two things."""
     word, following = _word(words, at), _word(words, at + 1)
     if word in _SIDES and following in _PAIRED:
-        return Towards(_SIDES[word], 0), at + 2
+        return DirectionalPlace(_SIDES[word], 0), at + 2
     if word not in _PAIRED or following not in _TO_A_SIDE:
         return None
     after = at + 2
@@ -126,22 +137,22 @@ def _read_side(words: Sentence, at: int) -> tuple[Place, int] | None:
     side = _SIDES.get(_word(words, after))
     if side is None or _word(words, after + 1) in ("corner", *_PAIRED):
         return None
-    return Towards(side, 0), after + 1
+    return DirectionalPlace(side, 0), after + 1
 
 
 def _read_extreme(words: Sentence, at: int) -> tuple[Place, int] | None:
-    """``far left``, ``furthest to the right``."""
+    """Read ``far left``, ``furthest to the right``."""
     if _word(words, at) not in _FAR:
         return None
     after = _skip(words, at + 1)
     side = _SIDES.get(_word(words, after))
-    return None if side is None else (Towards(side, 0), after + 1)
+    return None if side is None else (DirectionalPlace(side, 0), after + 1)
 
 
 def _read_corner(words: Sentence, at: int) -> tuple[Place, int] | None:
-    """``near left corner``, ``left corner that is far from you``, whatever leads up to it."""
+    """Read ``near left corner``, ``closest to the left corner that is far from you``."""
     start = at
-    if _word(words, at) in _LEAST:
+    if _word(words, at) in _NEAREST:
         start = _skip(words, at + 1)
     word = _word(words, start)
     if word in _SIDES and _word(words, start + 1) == "corner":
@@ -149,57 +160,57 @@ def _read_corner(words: Sentence, at: int) -> tuple[Place, int] | None:
         while _word(words, after) in _CORNER_FILLERS:
             after += 1
         depth = _depth(_word(words, after))
-        listener = _skip(words, after + 1)
-        if depth and _word(words, listener) in _LISTENER:
-            return Towards(_SIDES[word], depth), listener + 1
+        robot = _skip(words, after + 1)
+        if depth and _word(words, robot) in _ROBOT:
+            return DirectionalPlace(_SIDES[word], depth), robot + 1
     side, depth = _SIDES.get(_word(words, start + 1)), _depth(word)
     if side is not None and depth and _word(words, start + 2) == "corner":
-        return Towards(side, depth), start + 3
+        return DirectionalPlace(side, depth), start + 3
     return None
 
 
 def _read_from(words: Sentence, at: int, rank: int) -> tuple[Place, int] | None:
-    """``(second) from the left``."""
+    """Read ``from the left``, after an ordinal."""
     if _word(words, at) != "from":
         return None
     after = _skip(words, at)
     word = _word(words, after)
     if word in _SIDES:
-        return Towards(_SIDES[word], 0, rank), after + 1
+        return DirectionalPlace(_SIDES[word], 0, rank), after + 1
     if word in ("front", "back"):
-        return Towards(None, -1 if word == "front" else 1, rank), after + 1
+        return DirectionalPlace(None, -1 if word == "front" else 1, rank), after + 1
     return None
 
 
 def _read_relative(words: Sentence, at: int, rank: int, depth: int) -> tuple[Place, int] | None:
-    """``closest to you``, ``farthest from the button``, ``nearest to the cube at the far left``."""
+    """Read ``closest to you``, ``farthest from the button``, ``nearest to the red cube``."""
     word = _word(words, at)
-    if word not in _LEAST and word not in _UTMOST:
+    if word not in _NEAREST and word not in _FARTHEST:
         return None
-    nearest = word in _LEAST
+    nearest = word in _NEAREST
     after = _skip(words, at + 1)
     noun, following = _word(words, after), _word(words, after + 1)
-    if noun in _LISTENER:
-        return Towards(None, -1 if nearest else 1, rank), after + 1
+    if noun in _ROBOT:
+        return DirectionalPlace(None, -1 if nearest else 1, rank), after + 1
     if noun in _FIXTURES:
         return _read_fixture(words, after, nearest=nearest, rank=rank)
     if color_of(noun) and following in _COLORED:
-        return Beside(noun, following, nearest, rank), after + 2
+        return RelativePlace(noun, following, nearest, rank), after + 2
     if noun in _THINGS and depth < _MAX_DEPTH:
         inner = _read(words, _skip(words, after + 1), depth + 1)
         if inner is not None:
-            return Beside(inner[0], noun, nearest, rank), inner[1]
+            return RelativePlace(inner[0], noun, nearest, rank), inner[1]
     return None
 
 
 def _read_fixture(
     words: Sentence, at: int, *, nearest: bool, rank: int
 ) -> tuple[Place, int] | None:
-    """``button``, ``target on your left``."""
+    """Read ``button``, ``target on your left``."""
     noun, side = words[at], _SIDES.get(_word(words, at + 3))
     if side is not None and words[at + 1 : at + 3] in (("on", "your"), ("on", "the")):
-        return Beside(Towards(side, 0), noun, nearest, rank), at + 4
-    return Beside(noun, noun, nearest, rank), at + 1
+        return RelativePlace(DirectionalPlace(side, 0), noun, nearest, rank), at + 4
+    return RelativePlace(noun, noun, nearest, rank), at + 1
 
 
 def _word(words: Sentence, at: int) -> str:
@@ -216,19 +227,21 @@ def _depth(word: str) -> int:
     return -1 if word in _NEAR else 1 if word in _FAR else 0
 
 
-def find(place: Place, scene: Scene, kind: str, *, mirrored: bool) -> tuple[SceneObject, ...]:
-    """What stands at a place, among the things of one kind: several if it is nearly a tie.
+def find_objects(
+    place: Place, scene: Scene, kind: str, *, mirrored: bool
+) -> tuple[SceneObject, ...]:
+    """Return what stands at a place among the things of one kind; several for near ties.
 
-    Cubes that appear later are nowhere yet; containers all come at once.
+    Cubes that appear later are not compared; containers appear together.
 
     Args:
-        place: where.
+        place: the place.
         scene: everything on the table.
-        kind: of the things that are compared.
+        kind: kind of the things to compare.
         mirrored: whether left and right are those of the front camera's picture.
     """
     candidates = _present(scene, kind)
-    if isinstance(place, Towards):
+    if isinstance(place, DirectionalPlace):
         return _ranked(candidates, place.rank, *_measure(place, mirrored=mirrored))
     found: list[SceneObject] = []
     for anchor in _anchors(place, scene, mirrored=mirrored):
@@ -250,24 +263,26 @@ def _present(scene: Scene, kind: str) -> list[SceneObject]:
 def _ranked(
     items: list[SceneObject], rank: int, measure: Callable[[SceneObject], float], tie: float
 ) -> tuple[SceneObject, ...]:
-    """The items that could be meant by the one of that rank, small measures first."""
+    """Return the items of a rank, small measures first, with those that tie with them."""
     if rank > len(items):
         return ()
     wanted = sorted(map(measure, items))[rank - 1]
     return tuple(item for item in items if abs(measure(item) - wanted) <= tie)
 
 
-def _measure(place: Towards, *, mirrored: bool) -> tuple[Callable[[SceneObject], float], float]:
-    """What a direction compares, the smallest first, and how much is a tie."""
+def _measure(
+    place: DirectionalPlace, *, mirrored: bool
+) -> tuple[Callable[[SceneObject], float], float]:
+    """Return the measure of a direction, the smallest first, and the margin of a tie."""
     if place.side is None:
         return lambda item: -place.depth * item.position.x, _TIE
-    robots_left = (place.side == "left") != mirrored
+    left_of_robot = (place.side == "left") != mirrored
     if place.depth:
         x = _TABLE_FRONT if place.depth < 0 else _TABLE_BACK
-        return _distance_to(x, _TABLE_LEFT if robots_left else _TABLE_RIGHT, 1.0), _TIE
+        return _distance_to(x, _TABLE_LEFT if left_of_robot else _TABLE_RIGHT, 1.0), _TIE
     if not mirrored:
-        return lambda item: -item.position.y if robots_left else item.position.y, _TIE
-    return lambda item: _tangent(item) * (-1.0 if robots_left else 1.0), _TANGENT_TIE
+        return lambda item: -item.position.y if left_of_robot else item.position.y, _TIE
+    return lambda item: _tangent(item) * (-1.0 if left_of_robot else 1.0), _TANGENT_TIE
 
 
 def _distance_to(x: float, y: float, sign: float) -> Callable[[SceneObject], float]:
@@ -275,15 +290,15 @@ def _distance_to(x: float, y: float, sign: float) -> Callable[[SceneObject], flo
 
 
 def _tangent(item: SceneObject) -> float:
-    """Tangent of the angle by which the front camera sees something beside the picture's middle."""
+    """Return the tangent of the horizontal angle from the front camera's axis to something."""
     offset = [part - eye for part, eye in zip(item.position[:2], _CAMERA[:2], strict=True)]
     ahead = offset[0] * _VIEW[0] + offset[1] * _VIEW[1] + (_CUBE_HEIGHT - _CAMERA[2]) * _VIEW[2]
     return item.position.y * math.hypot(*_VIEW) / ahead
 
 
-def _anchors(place: Beside, scene: Scene, *, mirrored: bool) -> tuple[SceneObject, ...]:
+def _anchors(place: RelativePlace, scene: Scene, *, mirrored: bool) -> tuple[SceneObject, ...]:
     if not isinstance(place.anchor, str):
-        return find(place.anchor, scene, place.kind, mirrored=mirrored)
+        return find_objects(place.anchor, scene, place.kind, mirrored=mirrored)
     like = _present(scene, place.kind)
     if color_of(place.anchor):
         like = [item for item in like if item.color == place.anchor]

@@ -1,4 +1,4 @@
-"""Quantities: plain numbers, numbers told by another one, and words that point at one."""
+"""Quantities: plain numbers, numbers derived from another one, and words that point at one."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import NamedTuple
 from roboirg.language.interpreter.tokens import COLOR, NUMBER, THING, THINGS, Sentence, number_of
 
 _CONCEIVABLE = range(1, 11)
-"""What a quantity that was not heard may have been."""
+"""The values that a quantity may have if no text introduces it."""
 
 
 class CountExpression(NamedTuple):
-    """``factor * quantity + offset``; without a quantity, one of the context."""
+    """The number ``factor * quantity + offset``; the context gives a missing quantity."""
 
     factor: float = 1.0
     offset: int = 0
@@ -21,12 +21,12 @@ class CountExpression(NamedTuple):
 
     @property
     def derived(self) -> bool:
-        """Whether something is computed."""
+        """Whether the number differs from the quantity."""
         return (self.factor, self.offset) != (1.0, 0)
 
-    def results(self, told: Iterable[int]) -> set[int] | None:
-        """What it can be if the context names these numbers; None if it can be anything."""
-        quantities = [self.quantity] if self.quantity is not None else list(told)
+    def results(self, introduced: Iterable[int]) -> set[int] | None:
+        """Return the possible values if the context names these numbers; None for any value."""
+        quantities = [self.quantity] if self.quantity is not None else list(introduced)
         if not quantities and not self.derived:
             return None
         results = [self.factor * one + self.offset for one in quantities or _CONCEIVABLE]
@@ -34,9 +34,9 @@ class CountExpression(NamedTuple):
 
 
 class Quantity(NamedTuple):
-    """A quantity in a text, and from which to which character it goes."""
+    """A quantity in a text, and from which character to which it goes."""
 
-    told: CountExpression
+    expression: CountExpression
     start: int
     end: int
     plain: bool = False
@@ -65,7 +65,7 @@ _NOT_AFTER = (
     "number", "visit", "placement",
 )  # fmt: skip
 _POINTED = "".join(rf"(?<!\b{word} )" for word in _NOT_AFTER)
-"""After these words a number word only points, as in ``those two``, ``the red one``."""
+"""After one of these words a number word only points: ``those two``, ``the red one``."""
 _PLAIN = re.compile(rf"{_POINTED}\b(?P<number>{NUMBER})\b(?! times as)")
 _SINGLE = re.compile(
     r"(?<!\bas )(?<!\bthan )(?<!\bto )(?<!\bfrom )(?<!\bof )(?<!\bhides )(?<!\bover )"
@@ -102,11 +102,11 @@ _READINGS: tuple[Reading, ...] = (
     (_PLAIN, lambda found: CountExpression(quantity=number_of(found["number"])), True),
     (_SINGLE, lambda _found: CountExpression(quantity=1), True),
 )
-"""How to read a quantity; where two overlap, the first of this order holds."""
+"""Pattern, reader, and whether it is a plain number; of two that overlap, the first one counts."""
 
 
 def quantities(text: str) -> tuple[Quantity, ...]:
-    """All quantities of a sentence, in order."""
+    """Return all quantities of a sentence, in order."""
     found: list[Quantity] = []
     for pattern, read, plain in _READINGS:
         for match in pattern.finditer(text):
@@ -117,21 +117,22 @@ def quantities(text: str) -> tuple[Quantity, ...]:
 
 
 def plain_numbers(words: Sentence) -> tuple[int, ...]:
-    """The numbers that a sentence names outright."""
+    """Return the plain numbers of a sentence."""
     found = _PLAIN.finditer(" ".join(words))
     numbers = (number_of(match["number"]) for match in found)
     return tuple(number for number in numbers if number is not None)
 
 
 def read_value(text: str) -> CountExpression | None:
-    """A number that is told by another one: ``one less than that``."""
-    return next((one.told for one in quantities(text) if one.told.derived), None)
+    """Return the first derived number: ``one less than that``."""
+    return next((one.expression for one in quantities(text) if one.expression.derived), None)
 
 
 def read_times(text: str) -> CountExpression | None:
-    """How often something is to be done; None if nothing tells."""
+    """Return the number of repetitions; None if the text gives none."""
     found = quantities(text)
-    told = [one for one in found if not one.plain]
-    told += [one for one in found if one.plain and text[one.start : one.end] in _ADVERBS]
-    told += [one for one in found if one.plain and _TIMES.match(text, one.end)]
-    return told[0].told if told else None
+    plain = [one for one in found if one.plain]
+    times = [one for one in found if not one.plain]
+    times += [one for one in plain if text[one.start : one.end] in _ADVERBS]
+    times += [one for one in plain if _TIMES.match(text, one.end)]
+    return times[0].expression if times else None

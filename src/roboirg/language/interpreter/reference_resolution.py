@@ -1,4 +1,4 @@
-"""The listener: what each part of the command can mean, given the context and the scene."""
+"""Reference resolution: find what each part of a command can mean, given context and scene."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from roboirg.language.interpreter.temporal_relations import (
     neighbors,
 )
 
-Told = TypeVar("Told")
-_CHOSEN: tuple[ObjectKind, ...] = ("container", "box", "tape")
-"""Kinds of things among which commands choose, rather than among cubes, the first that there is."""
+Referent = TypeVar("Referent")
+_CHOICE_KINDS: tuple[ObjectKind, ...] = ("container", "box", "tape")
+"""Commands choose among the things of the first kind here that the scene has, else among cubes."""
 
 Amounts = dict[str, set[int] | None]
-"""For each color that is possible, how many; None if any number is."""
+"""The possible numbers for each possible color; None if any number is possible."""
 
 
 class ReferenceResolver:
-    """Evaluates the command's descriptions; None stands for "nothing tells".
+    """Resolver of descriptions; its methods return None where the command allows everything.
 
     Attributes:
-        complaints: what was pointed at without having been introduced, and the like.
+        complaints: what the descriptions point at in vain, in plain sentences.
     """
 
     def __init__(self, scene: Scene, context: DiscourseContext, times: frozenset[Time]) -> None:
@@ -43,19 +43,19 @@ class ReferenceResolver:
         self._context = context
         self._times = times
         kinds = {item.kind for item in scene.objects}
-        self._kind = next((kind for kind in _CHOSEN if kind in kinds), "cube")
+        self._kind = next((kind for kind in _CHOICE_KINDS if kind in kinds), "cube")
 
     @property
     def chooses_box(self) -> bool:
-        """Whether commands choose among boxes to put something into."""
+        """Whether commands choose among boxes."""
         return self._kind == "box"
 
     def objects(self, thing: Description) -> set[str] | None:
-        """The colors that a description leaves open; None if it says nothing."""
+        """Return the colors that fit a description."""
         if thing.kind == "any":
             return None
         if thing.kind == "color":
-            return set(thing.colors)
+            return self._present_colors(thing.colors)
         if thing.kind == "place" and thing.place is not None:
             return self._at(thing.place, thing.times)
         if thing.kind == "introduced place":
@@ -65,31 +65,33 @@ class ReferenceResolver:
         return self._derived(thing)
 
     def amounts(self, item: Item) -> Amounts:
-        """For each color that an item leaves open, the numbers that it leaves open."""
+        """Return the colors that fit an item, with the numbers that fit it."""
         colors = self.objects(item.thing)
         if colors is None:
             colors = self._colors()
         count = item.number
         if count is None:
             return dict.fromkeys(colors)
-        return {color: count.results(self._told(count, color)) for color in sorted(colors)}
+        return {
+            color: count.results(self._introduced_numbers(count, color)) for color in sorted(colors)
+        }
 
     def times(self, count: CountExpression | None) -> set[int] | None:
-        """The numbers that the command leaves open."""
-        return None if count is None else count.results(self._told(count, None))
+        """Return the numbers that fit an expression."""
+        return None if count is None else count.results(self._introduced_numbers(count, None))
 
-    def _told(self, count: CountExpression, color: str | None) -> tuple[int, ...]:
-        """The introduced numbers that a count may start from; of that color, if there are any."""
+    def _introduced_numbers(self, count: CountExpression, color: str | None) -> tuple[int, ...]:
+        """Return the numbers to start from: those introduced with the color, else all."""
         if count.quantity is not None:
             return ()
         of_color = tuple(number for shade, number in self._context.amounts if shade == color)
-        told = of_color or self._context.numbers
-        if not told:
+        numbers = of_color or self._context.numbers
+        if not numbers:
             self._complain("a number")
-        return told
+        return numbers
 
     def positions(self, position: OrdinalExpression | None) -> set[int] | None:
-        """The elements of the series that the command leaves open."""
+        """Return the elements of the series that fit a description."""
         if position is None:
             return None
         positions, numbers = self._context.positions, self._context.numbers
@@ -98,24 +100,24 @@ class ReferenceResolver:
         return position.results(positions, numbers, self._series_length())
 
     def moments(self, when: TemporalRelation | None) -> set[PressRelation] | None:
-        """The moments about the press that the command leaves open."""
+        """Return the moments about the press that fit a description."""
         if when is None:
             return None
-        told = set(when.moments) or self._introduced_moments(when)
-        if not told:
+        moments = set(when.moments) or self._introduced_moments(when)
+        if not moments:
             self._complain("a moment")
             return None
         if when.kind == "neighbor":
-            return neighbors(told, self._scene.past)
+            return neighbors(moments, self._scene.past)
         if when.kind == "other":
-            # Of two that were named without a choice, either may be the other one.
-            return set(MOMENTS) - told if len(told) == 1 else set(MOMENTS)
-        return told
+            # Without a preference, either of the two may be the other one.
+            return set(MOMENTS) - moments if len(moments) == 1 else set(MOMENTS)
+        return moments
 
     def _introduced_moments(self, when: TemporalRelation) -> set[PressRelation]:
-        chosen = self._context.chosen
-        if chosen is not None and (when.kind != "introduced" or len(self._context.moments) > 1):
-            return {chosen}
+        preferred = self._context.preferred_moment
+        if preferred and (when.kind != "introduced" or len(self._context.moments) > 1):
+            return {preferred}
         return set(self._context.moments)
 
     def _series_length(self) -> int:
@@ -128,13 +130,13 @@ class ReferenceResolver:
         named = set(thing.colors or self._context.colors)
         if thing.kind == "not":
             if not named:
-                self._complain("excluded colors")
+                self._complain("the excluded colors")
                 return None
             return self._colors() - named
-        minus = thing.minus or self._context.singled
-        if not named or minus is None:
-            self._complain("the one that is not meant")
-        return (named or self._colors()) - {str(minus)}
+        excluded = thing.excluded or self._context.preferred_color
+        if not named or excluded is None:
+            self._complain("the excluded color")
+        return (named or self._colors()) - {str(excluded)}
 
     def _introduced(self, thing: Description) -> set[str] | None:
         if self._context.places and not self._context.colors:
@@ -162,8 +164,16 @@ class ReferenceResolver:
         )
         cubes = [item if item.color else self._scene.hidden_in(item.name) for item in found]
         if None in cubes or not cubes:
-            self.complaints.append(f"nothing to handle at {place}")
+            self.complaints.append("there is nothing to handle at the place that the text names")
         return {str(cube.color) for cube in cubes if cube is not None}
+
+    def _present_colors(self, colors: Iterable[str]) -> set[str]:
+        """Return the colors, and complain about one that nothing in the scene has."""
+        present = self._colors()
+        for color in colors:
+            if color not in present:
+                self.complaints.append(f"there is nothing {color} in the scene")
+        return set(colors)
 
     def _colors(self) -> set[str]:
         return {str(cube.color) for cube in self._cubes()}
@@ -172,17 +182,17 @@ class ReferenceResolver:
         return (item for item in self._scene.objects if item.color is not None)
 
     def _complain(self, what: str) -> None:
-        self.complaints.append(f"{what}: nothing before the command introduces it")
+        self.complaints.append(f"nothing before the command introduces {what}")
 
 
-def common(options: Iterable[set[str] | None]) -> set[str] | None:
-    """What all of these leave open; None if none of them says anything."""
-    told = [one for one in options if one is not None]
-    return set.intersection(*told) if told else None
+def common_options(options: Iterable[set[str] | None]) -> set[str] | None:
+    """Return what all of these allow; None if all of them allow everything."""
+    limits = [one for one in options if one is not None]
+    return set.intersection(*limits) if limits else None
 
 
-def _chosen(introduced: tuple[Told, ...], position: int | None) -> tuple[Told, ...]:
-    """The introduced one at a position, or all of them."""
+def _chosen(introduced: tuple[Referent, ...], position: int | None) -> tuple[Referent, ...]:
+    """Return the referent at a position, or all referents for the position None."""
     if position is None:
         return introduced
     return introduced[position:][:1]

@@ -1,4 +1,4 @@
-"""Moments: before or after a press of the button, and before or after things changed places."""
+"""Moments: before or after the button press, and before or after things change places."""
 
 from __future__ import annotations
 
@@ -44,12 +44,13 @@ _AT_LAST = re.compile(
 
 
 class TemporalRelation(NamedTuple):
-    """How a command tells a moment.
+    """A description of a moment.
 
     Attributes:
-        kind: ``named`` names it; ``other`` names or points at the one that it is not; ``neighbor``
-            names or points at the placement beside it; ``introduced`` points at it.
-        moments: those that are named.
+        kind: ``named`` names the moment; ``other`` names or points at the other moment;
+            ``neighbor`` names or points at the neighboring placement; ``introduced`` points at the
+            moment.
+        moments: the named moments.
     """
 
     kind: Literal["named", "other", "neighbor", "introduced"]
@@ -57,24 +58,24 @@ class TemporalRelation(NamedTuple):
 
 
 def named_moments(text: str) -> tuple[PressRelation, ...]:
-    """The moments about a press of the button that a sentence names, in order."""
+    """Return the moments about the button press that a sentence names, in order."""
     if not _PRESS.search(text):
         return ()
     return tuple(_WORD[found[1]] for found in _NAMED.finditer(text))
 
 
-def time_told(text: str) -> frozenset[Time]:
-    """Whether a sentence speaks of how things were before they moved, or afterwards."""
-    told: set[Time] = set()
+def mentioned_times(text: str) -> frozenset[Time]:
+    """Return whether a sentence is about places before things move, after that, or both."""
+    times: set[Time] = set()
     if _AT_FIRST.search(text):
-        told.add("at first")
+        times.add("at first")
     if _AT_LAST.search(text):
-        told.add("at last")
-    return frozenset(told)
+        times.add("at last")
+    return frozenset(times)
 
 
 def read_temporal_relation(text: str) -> TemporalRelation | None:
-    """The moment that a command tells; None if it tells none."""
+    """Return the description of a moment; None if there is none."""
     named = named_moments(text)
     if _NEIGHBOR.search(text):
         return TemporalRelation("neighbor", named)
@@ -89,11 +90,11 @@ def read_temporal_relation(text: str) -> TemporalRelation | None:
 
 
 def neighbors(moments: Collection[PressRelation], past: tuple[Fact, ...]) -> set[PressRelation]:
-    """The moments about the press whose placements come next to those of the given ones."""
+    """Return the moments whose placements are neighbors of those of the given moments."""
     kinds = [fact.kind for fact in past]
     pressed = kinds.index("pressed") if "pressed" in kinds else 0
     earlier = kinds[:pressed].count("placed")
-    # Placements are numbered from 1; these two are the last before and the first after the press.
+    # Placements count from 1: the last one before the press and the first one after it.
     numbers: dict[PressRelation, int] = {"before": earlier, "after": earlier + 1}
     near = {numbers[one] + step for one in moments for step in (-1, 1)}
     return {one for one, number in numbers.items() if number in near}

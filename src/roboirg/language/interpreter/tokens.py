@@ -1,15 +1,22 @@
-"""Text into sentences of lower-case words, and words into numbers."""
+"""Split text into sentences of lower-case words; look up numbers and colors."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
 Sentence = tuple[str, ...]
 
-_WORD = re.compile(r"[0-9]+(?:st|nd|rd|th)\b|[a-z]+(?:'[a-z]+)?|[0-9]+|[,;:]")
-_SENTENCE_END = re.compile(r"[.!?\n]+")
+_WORD = re.compile(
+    r"[0-9]+(?:st|nd|rd|th)\b|[0-9]+[.][0-9]+|[^\W\d_]+(?:'[^\W\d_]+)?|[0-9]+|[,;:]|[^\W_]"
+)
+_SENTENCE_END = re.compile(r"(?:[.](?![0-9])|[!?\n。！？¿¡।])+")
+_MINUS = re.compile(r"(?<!\w)[-−](?=[0-9])")
 _SPELLINGS = (
     ("’", "'"),
+    ("cannot", "can not"),
+    ("can't", "can not"),
+    ("won't", "will not"),
     ("n't", " not"),
     ("colour", "color"),
     ("neighbour", "neighbor"),
@@ -18,60 +25,79 @@ _SPELLINGS = (
 
 _NUMBERS = {
     "zero": 0, "one": 1, "two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "seven": 7,
-    "eight": 8, "nine": 9, "ten": 10, "eleven": 11, "twelve": 12,
+    "eight": 8, "nine": 9, "ten": 10, "eleven": 11, "twelve": 12, "thirteen": 13, "fourteen": 14,
+    "fifteen": 15, "sixteen": 16, "seventeen": 17, "eighteen": 18, "nineteen": 19, "twenty": 20,
 }  # fmt: skip
 _ORDINALS = {
     "first": 1, "second": 2, "third": 3, "fourth": 4, "fifth": 5,
+    "sixth": 6, "seventh": 7, "eighth": 8, "ninth": 9, "tenth": 10,
     "1st": 1, "2nd": 2, "3rd": 3, "4th": 4, "5th": 5,
+    "6th": 6, "7th": 7, "8th": 8, "9th": 9, "10th": 10,
 }  # fmt: skip
 _COLOR_NAMES = ("red", "green", "blue", "yellow", "gray", "purple")
 _COLORS = {word: name for name in _COLOR_NAMES for word in (name, f"{name}s")}
 
-NUMBER = rf"(?:{'|'.join(_NUMBERS)}|[0-9]+)"
-"""A regular expression for a cardinal number, in words or digits."""
-ORDINAL = rf"(?:{'|'.join(_ORDINALS)})"
-"""The same for an ordinal number."""
-COLOR = rf"(?:{'|'.join(_COLOR_NAMES)})"
-"""The same for a color."""
-THING = r"(?:cube|box|tape)"
-"""The same for one of the things that have colors; the plural is `THINGS`."""
-THINGS = r"(?:cubes|boxes|tapes)"
-
 
 def word_set(words: str) -> frozenset[str]:
-    """The words of a string, for membership tests."""
+    """Return the words of a string, for membership tests."""
     return frozenset(words.split())
 
 
-def split_sentences(text: str) -> tuple[Sentence, ...]:
-    """The sentences of a text as words and commas; empty ones are left out.
+FILLERS = word_set("please okay kindly carefully gently slowly quickly softly neatly calmly")
+"""Words that change nothing in any position; `split_sentences` drops them."""
 
-    American and British spelling, and short forms of *not*, come out alike.
+_LARGEST_NUMBER = 10**9
+"""Stands for every number with more digits."""
+
+
+def _alternatives(words: Iterable[str]) -> str:
+    """Return a regular expression for any of these words, the longest first."""
+    return "|".join(sorted(words, key=len, reverse=True))
+
+
+NUMBER = rf"(?:{_alternatives(_NUMBERS)}|[0-9]+)"
+"""A regular expression for a cardinal number, in words or digits."""
+ORDINAL = rf"(?:{_alternatives(_ORDINALS)})"
+"""A regular expression for an ordinal number."""
+COLOR = rf"(?:{_alternatives(_COLOR_NAMES)})"
+"""A regular expression for a color."""
+THING = r"(?:cube|box|tape)"
+"""A regular expression for a thing that has a color."""
+THINGS = r"(?:cubes|boxes|tapes)"
+"""The plural of `THING`."""
+
+
+def split_sentences(text: str) -> tuple[Sentence, ...]:
+    """Return the sentences of a text as words and commas, without fillers and empty sentences.
+
+    American and British spelling, and short forms of *not*, give the same words.
     """
     text = text.lower()
     for variant, usual in _SPELLINGS:
         text = text.replace(variant, usual)
-    parts = (tuple(_WORD.findall(part)) for part in _SENTENCE_END.split(text))
-    return tuple(part for part in parts if part)
+    text = _MINUS.sub("minus ", text)
+    parts = (_WORD.findall(part) for part in _SENTENCE_END.split(text))
+    kept = (tuple(word for word in part if word not in FILLERS) for part in parts)
+    return tuple(part for part in kept if part)
 
 
 def number_of(word: str) -> int | None:
-    """The number that a word or a string of digits names."""
+    """Return the number that a word or a string of digits names."""
     if word.isascii() and word.isdigit():
-        return int(word) if len(word) <= 3 else None  # noqa: PLR2004 (nobody counts higher)
+        return int(word) if len(word) < len(str(_LARGEST_NUMBER)) else _LARGEST_NUMBER
     return _NUMBERS.get(word)
 
 
 def ordinal_of(word: str) -> int | None:
-    """1 for ``first``, 2 for ``second``, ..."""
+    """Return 1 for ``first``, 2 for ``second``, ..."""
     return _ORDINALS.get(word)
 
 
 def color_of(word: str) -> str | None:
-    """The color that a word names, as an adjective or a noun."""
+    """Return the color that a word names, as an adjective or a noun."""
     return _COLORS.get(word)
 
 
 def colors_in(words: Sentence) -> tuple[str, ...]:
-    """All colors that a sentence names, in order."""
+    """Return all colors that a sentence names, in order."""
     return tuple(_COLORS[word] for word in words if word in _COLORS)

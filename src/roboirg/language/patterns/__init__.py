@@ -1,4 +1,4 @@
-"""The reasoning patterns by name; a pattern has a way for each kind of value that it can derive."""
+"""The reasoning patterns by name, each with one rule for every slot type that it can derive."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from roboirg.language.patterns import before_after, deduction, exclusion, sequen
 from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
 from roboirg.language.request import InstructionRequest
 
-__all__ = ["PATTERNS", "REFERENCE", "Derived", "Pattern", "way"]
+__all__ = ["PATTERNS", "REFERENCE", "Derived", "Pattern", "find_pattern"]
 
 PATTERNS: Mapping[str, tuple[Pattern, ...]] = {
     "color exclusion": (exclusion.ONE_COLOR,),
@@ -18,6 +18,6 @@ PATTERNS: Mapping[str, tuple[Pattern, ...]] = {
 }
 
 
-def way(name: str, request: InstructionRequest) -> Pattern | None:
-    """How a pattern derives the episode's goal, or None if it cannot."""
+def find_pattern(name: str, request: InstructionRequest) -> Pattern | None:
+    """Return the rule by which a pattern derives the episode's goal; None if it cannot."""
     return next((one for one in PATTERNS[name] if one.allows(request)), None)

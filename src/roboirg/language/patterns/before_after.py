@@ -1,4 +1,4 @@
-"""The two moments around the press of the button: the other one, or the neighbor."""
+"""Patterns of the two moments around the button press: the other moment, or the neighbor."""
 
 from __future__ import annotations
 
@@ -11,40 +11,40 @@ from roboirg.language.slot_types import relation
 PAIR = "right before and right after the button press"
 
 
-def _rejected(part: GoalValue) -> str:
-    return next(one for one in templates.MOMENTS if one != part.value)
+def _rejected(goal_value: GoalValue) -> str:
+    return next(one for one in templates.MOMENTS if one != goal_value.value)
 
 
 def _single(request: InstructionRequest, rejected: str) -> str:
-    """The command's words for the moment or placement that is not meant."""
+    """Return the command's words for the moment or placement that is not meant."""
     return f"the one {templates.MOMENTS[rejected]}" if request.resolved else "that one"
 
 
 def _other(request: InstructionRequest) -> Derived:
-    """Of the two moments, not the one that somebody chose."""
-    (part,) = request.parts_of("relation")
-    rejected = _rejected(part)
-    template = request.chooser.pick("two moments", templates.TWO_MOMENTS_INTRODUCTIONS)
+    """Derive a moment: of the two, the one that was not chosen."""
+    (goal_value,) = request.values_of("relation")
+    rejected = _rejected(goal_value)
+    template = request.sampler.pick("two moments", templates.TWO_MOMENTS_INTRODUCTIONS)
     introduced: dict[str, Phrase] = {
         "pair": antecedent(PAIR, REFERENCE, " and ".join(templates.MOMENTS)),
         "single": antecedent(f"the one right {rejected} it", REFERENCE, rejected),
     }
-    complement = request.chooser.pick("complement", templates.MOMENT_COMPLEMENTS)
+    complement = request.sampler.pick("complement", templates.MOMENT_COMPLEMENTS)
     words = complement.format(single=_single(request, rejected))
     other = (
-        antecedent(words, part.slot, part.value)
+        antecedent(words, goal_value.slot, goal_value.value)
         if request.resolved
-        else anaphor(words, "other", part.slot, part.value)
+        else anaphor(words, "other", goal_value.slot, goal_value.value)
     )
-    fields = relation.placed(part, (*plain("at "), *other))
+    fields = relation.placed(goal_value, (*plain("at "), *other))
     return Derived(fill(template, introduced), fields, {"patterns": ["contextual logic"]})
 
 
 def _neighbor(request: InstructionRequest) -> Derived:
-    """The placement that is next to another one; there are only these two."""
-    (part,) = request.parts_of("relation")
-    rejected = _rejected(part)
-    template = request.chooser.pick("neighbor introduction", templates.NEIGHBOR_INTRODUCTIONS)
+    """Derive a placement: of two, the neighbor of the other one."""
+    (goal_value,) = request.values_of("relation")
+    rejected = _rejected(goal_value)
+    template = request.sampler.pick("neighbor introduction", templates.NEIGHBOR_INTRODUCTIONS)
     context = fill(
         template, {"moment": antecedent(templates.MOMENTS[rejected], REFERENCE, rejected)}
     )
@@ -54,17 +54,17 @@ def _neighbor(request: InstructionRequest) -> Derived:
         if request.resolved
         else anaphor(words, "that", REFERENCE, rejected)
     )
-    which = (*plain("the target of "), *fill(templates.NEIGHBOR, {"single": single}))
+    placement = (*plain("the target of "), *fill(templates.NEIGHBOR, {"single": single}))
     notes: dict[str, object] = {
         "patterns": ["sequential relation"],
         "relation": "neighbor",
         "reference": rejected,
     }
-    return Derived(context, {part.field: which}, notes)
+    return Derived(context, {goal_value.field: placement}, notes)
 
 
 def _allows(request: InstructionRequest) -> bool:
-    return bool(request.parts_of("relation"))
+    return bool(request.values_of("relation"))
 
 
 OTHER = Pattern(_allows, _other)

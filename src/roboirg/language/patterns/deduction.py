@@ -1,4 +1,4 @@
-"""Number deduction: a number by its relation to another quantity."""
+"""Number deduction: a number follows from its relation to another quantity."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ NUMBER_SLOTS = ("repeats", "visit", "counts")
 
 
 class Deduction(NamedTuple):
-    """A relation, and for each result the quantity that it starts from."""
+    """A relation, and the quantity from which it gives each result."""
 
     relation: templates.Relation
     references: tuple[int, ...]
 
 
 def deductions(results: Sequence[int], choices: Sequence[Sequence[int]]) -> list[Deduction]:
-    """The relations that give all of these results, each from a quantity of its own.
+    """Return the relations that give all of these results, each from a quantity of its own.
 
     Args:
         results: the goal's numbers.
-        choices: what somebody could want instead; a relation that only one of them can come from
-            would give the result away.
+        choices: all results that are possible in the scene. A relation that can give only one
+            of them would give the result away.
     """
     found: list[Deduction] = []
     for relation in templates.RELATIONS:
@@ -59,17 +59,19 @@ def _open(relation: templates.Relation, choices: Sequence[Sequence[int]]) -> boo
 
 
 def _deductions(request: InstructionRequest) -> list[Deduction]:
-    (slot,) = {part.slot for part in request.parts if part.slot in NUMBER_SLOTS}
-    results = [part.number for part in request.parts if part.slot == slot]
-    return deductions(results, request.numbers_instead(slot))
+    (slot,) = {
+        goal_value.slot for goal_value in request.goal_values if goal_value.slot in NUMBER_SLOTS
+    }
+    results = [goal_value.number for goal_value in request.goal_values if goal_value.slot == slot]
+    return deductions(results, request.alternative_numbers(slot))
 
 
-def _possible(request: InstructionRequest, kind: SlotTypeName) -> bool:
-    return bool(request.parts_of(kind)) and bool(_deductions(request))
+def _possible(request: InstructionRequest, slot_type: SlotTypeName) -> bool:
+    return bool(request.values_of(slot_type)) and bool(_deductions(request))
 
 
 def _chosen(request: InstructionRequest) -> Deduction:
-    return request.chooser.pick("relation", _deductions(request))
+    return request.sampler.pick("relation", _deductions(request))
 
 
 def _pointer(request: InstructionRequest, number: int) -> Phrase:
@@ -79,49 +81,49 @@ def _pointer(request: InstructionRequest, number: int) -> Phrase:
 
 
 def _notes(deduction: Deduction) -> dict[str, object]:
-    first, *more = deduction.references
+    first, *others = deduction.references
     return {
         "patterns": ["number deduction"],
         "relation": deduction.relation.name,
-        "reference": [first, *more] if more else first,
+        "reference": [first, *others] if others else first,
     }
 
 
 def _times(request: InstructionRequest) -> Derived:
-    (part,) = request.parts_of("number")
+    (goal_value,) = request.values_of("number")
     deduction = _chosen(request)
     (number,) = deduction.references
     words = fill(deduction.relation.times, {"number": _pointer(request, number)})
     context = introduce_quantity(request, REFERENCE, number)
-    return Derived(context, {part.field: words}, _notes(deduction))
+    return Derived(context, {goal_value.field: words}, _notes(deduction))
 
 
 def _visit(request: InstructionRequest) -> Derived:
-    (part,) = request.parts_of("visit")
+    (goal_value,) = request.values_of("visit")
     deduction = _chosen(request)
     (number,) = deduction.references
     value = fill(deduction.relation.value, {"number": _pointer(request, number)})
     context = introduce_quantity(request, REFERENCE, number)
-    return Derived(context, ordinal.by_number(part, value), _notes(deduction))
+    return Derived(context, ordinal.by_number(goal_value, value), _notes(deduction))
 
 
 def _amounts(request: InstructionRequest) -> Derived:
-    """The same relation for each color, each with its own quantity."""
-    parts = request.parts_of("amount")
+    """Derive all counts by one relation, each from its own quantity."""
+    goal_values = request.values_of("amount")
     deduction = _chosen(request)
     items = [
         fill(
             deduction.relation.cubes,
             {"color": _shade(shade), "number": _pointer(request, number)},
         )
-        for (shade, _), number in zip(amount.pairs(parts), deduction.references, strict=True)
+        for (shade, _), number in zip(amount.pairs(goal_values), deduction.references, strict=True)
     ]
-    context = amount.introduce_references(request, parts, REFERENCE, deduction.references)
+    context = amount.introduce_references(request, goal_values, REFERENCE, deduction.references)
     return Derived(context, {amount.FIELD: listed(items)}, _notes(deduction))
 
 
-def _shade(part: GoalValue) -> Phrase:
-    return antecedent(part.color, part.slot, part.value)
+def _shade(goal_value: GoalValue) -> Phrase:
+    return antecedent(goal_value.color, goal_value.slot, goal_value.value)
 
 
 TIMES = Pattern(lambda request: _possible(request, "number"), _times)

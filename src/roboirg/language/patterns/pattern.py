@@ -1,4 +1,4 @@
-"""What a reasoning pattern is."""
+"""The definition of a reasoning pattern."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from roboirg.language.request import InstructionRequest
 from roboirg.language.slot_types import Fields
 
 REFERENCE = "reference"
-"""Slot of the mentions that stand for what the goal is derived from, not for the goal."""
+"""Slot of the mentions that only lead to the goal, such as a number to count from."""
 
 
 class Derived(NamedTuple):
-    """A goal told by something else.
+    """Words from which the goal follows.
 
     Attributes:
         context: the introduction.
-        fields: the fields of the command that are derived from it.
-        notes: for the metadata.
+        fields: the fields of the command that point at the introduction.
+        notes: entries of the metadata.
     """
 
     context: Phrase
@@ -30,11 +30,11 @@ class Derived(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """One way to derive a goal.
+    """One rule that derives a goal.
 
     Attributes:
-        allows: whether an episode can be told this way.
-        derive: how it is told.
+        allows: whether the rule works for an episode.
+        derive: applies the rule.
     """
 
     allows: Callable[[InstructionRequest], bool]

@@ -1,4 +1,4 @@
-"""Sequential relation: an element of a series by its distance from another one."""
+"""Sequential relation: an element of a series follows from its distance to another one."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from roboirg.language.slot_types import ordinal
 
 
 def steps(position: int, length: int, choices: Sequence[int]) -> list[templates.Step]:
-    """The steps that lead to a position from another one of a series of this length.
+    """Return the steps that lead to a position from another one of the series.
 
     Args:
-        position: the goal's.
-        length: of the series.
-        choices: positions that somebody could want; a step that leads to only one of them would
-            give it away.
+        position: position in the goal.
+        length: length of the series.
+        choices: all positions that are possible in the scene. A step that leads to only one of
+            them would give it away.
     """
     if length == 2:  # noqa: PLR2004
-        # Of two, the one right after another can only be the last: they are neighbors instead.
+        # Of two, the one right after the other is always the last: say neighbor instead.
         return [templates.NEIGHBORS[position]]
     return [
         step
@@ -37,38 +37,38 @@ def _leads(step: templates.Step, position: int, length: int) -> bool:
     return 1 <= position - step.offset <= length
 
 
-def _steps(request: InstructionRequest, part: GoalValue) -> list[templates.Step]:
-    length = ordinal.series_length(request, part)
-    choices = [number for (number,) in request.numbers_instead(part.slot)]
-    return steps(part.number, length, choices)
+def _steps(request: InstructionRequest, goal_value: GoalValue) -> list[templates.Step]:
+    length = ordinal.series_length(request, goal_value)
+    choices = [number for (number,) in request.alternative_numbers(goal_value.slot)]
+    return steps(goal_value.number, length, choices)
 
 
-def _part(request: InstructionRequest) -> GoalValue | None:
-    return next(iter((*request.parts_of("visit"), *request.parts_of("placement"))), None)
+def _goal_value(request: InstructionRequest) -> GoalValue | None:
+    return next(iter((*request.values_of("visit"), *request.values_of("placement"))), None)
 
 
 def _allows(request: InstructionRequest) -> bool:
-    part = _part(request)
-    return part is not None and bool(_steps(request, part))
+    goal_value = _goal_value(request)
+    return goal_value is not None and bool(_steps(request, goal_value))
 
 
 def _derive(request: InstructionRequest) -> Derived:
-    (part,) = (*request.parts_of("visit"), *request.parts_of("placement"))
-    step = request.chooser.pick("relation", _steps(request, part))
-    position = part.number - step.offset
+    (goal_value,) = (*request.values_of("visit"), *request.values_of("placement"))
+    step = request.sampler.pick("relation", _steps(request, goal_value))
+    position = goal_value.number - step.offset
     reference = (
         antecedent(f"the {ordinal_word(position)}", REFERENCE, position)
         if request.resolved
         else anaphor("that", "that", REFERENCE, position)
     )
-    which = (*plain(f"the {part.kind} "), *fill(step.words, {"reference": reference}))
+    element = (*plain(f"the {goal_value.slot_type} "), *fill(step.words, {"reference": reference}))
     notes: dict[str, object] = {
         "patterns": ["sequential relation"],
         "relation": step.name,
         "reference": position,
     }
-    context = ordinal.introduce_position(request, part, REFERENCE, position)
-    return Derived(context, ordinal.wrapped(part, which), notes)
+    context = ordinal.introduce_position(request, goal_value, REFERENCE, position)
+    return Derived(context, ordinal.wrapped(goal_value, element), notes)
 
 
 ORDINAL = Pattern(_allows, _derive)

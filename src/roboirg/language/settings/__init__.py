@@ -1,7 +1,4 @@
-"""The settings, one file each; a file that defines ``SETTING`` is a setting of the language.
-
-Installed packages add theirs through entry points of the group ``roboirg.settings``.
-"""
+"""The settings of the language: one file each, or installed with another package."""
 
 from __future__ import annotations
 
@@ -14,35 +11,53 @@ from roboirg.language.setting import Setting
 from roboirg.tasks import Task
 from roboirg.util.discovery import discover
 
-__all__ = ["EXPLICIT", "all_settings", "get_setting", "setting_names", "settings_of"]
+__all__ = [
+    "ACCEPTANCE_SETTINGS",
+    "EXPLICIT",
+    "all_settings",
+    "get_setting",
+    "setting_names",
+    "settings_of",
+]
 
 EXPLICIT = "explicit"
-"""The setting that every other one is compared with."""
+"""The setting with which every other one is compared."""
+
+ACCEPTANCE_SETTINGS = ("explicit", "direct", "reasoning", "contextual", "spatial")
+"""Settings that must be able to express an episode for its seed to be accepted into a split.
+
+Frozen: a new setting must not change which episodes the splits hold, or older results could no
+longer be compared. A new setting may refuse some of these episodes instead.
+"""
 
 
 @functools.cache
 def all_settings() -> Mapping[str, Setting]:
-    """Every setting by name, explicit first."""
+    """Return every setting by name, explicit first.
+
+    Raises:
+        InvalidValueError: an entry point of another package does not give a valid setting.
+    """
     found = discover(sys.modules[__name__], "SETTING", Setting, "roboirg.settings")
     return {one.name: one for one in sorted(found, key=lambda one: (one.order, one.name))}
 
 
 def setting_names() -> tuple[str, ...]:
-    """The names of all settings, explicit first."""
+    """Return the names of all settings, explicit first."""
     return tuple(all_settings())
 
 
 def settings_of(task: Task) -> tuple[str, ...]:
-    """The names of the settings in which a task can be stated, explicit first."""
+    """Return the names of the settings that a task has, explicit first."""
     return tuple(one.name for one in all_settings().values() if one.applies_to(task))
 
 
 def get_setting(name: str, task: Task) -> Setting:
-    """The setting of that name.
+    """Return a setting of a task by name.
 
     Raises:
-        UnknownNameError: there is none.
-        InvalidValueError: it is not defined for the task.
+        UnknownNameError: the setting does not exist.
+        InvalidValueError: the task lacks it.
     """
     if name not in all_settings():
         raise UnknownNameError("setting", name, all_settings())

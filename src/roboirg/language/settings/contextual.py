@@ -1,10 +1,11 @@
-"""Contextual: direct, with reinforcement, distractors and a cue before the command."""
+"""The contextual setting: direct, with reinforcement, distractors and a cue before the command."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
 
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import templates
 from roboirg.language.phrases import Phrase, fill, plain, sentences
 from roboirg.language.request import (
@@ -14,58 +15,77 @@ from roboirg.language.request import (
     InstructionSpec,
     UtteranceSpec,
 )
-from roboirg.language.setting import Setting
+from roboirg.language.setting import Instruct, Setting
 from roboirg.language.settings import direct
 from roboirg.language.slot_types import slot_types_in
 
-REINFORCE, DISTRACT, ANNOUNCE = 2, 3, 4
+REINFORCEMENT, DISTRACTOR, CUE = 2, 3, 4
 """Numbers of the stages between introduction and command."""
+
+MANY_DISTRACTORS = 4
+"""Length of the context that must begin with the distractors of the default one."""
 
 
 def say(request: InstructionRequest) -> InstructionSpec:
-    """The stages that were asked for; 1 and 5 alone are the direct instruction."""
-    said = [direct.introduction(request)]
-    if REINFORCE in request.stages:
-        said.append(reinforcement(request))
-    if DISTRACT in request.stages:
-        said += [UtteranceSpec("distractor", phrase) for phrase in distractors(request)]
-    if ANNOUNCE in request.stages:
-        cue = request.chooser.pick("cue", templates.CUES)
-        said.append(UtteranceSpec("cue", plain(cue)))
-    said.append(direct.command(request))
-    notes: dict[str, object] = {"stages": list(request.stages)}
-    if DISTRACT in request.stages:
-        notes |= {"distractor": request.distractor, "distractors": request.distractors}
-    return InstructionSpec(tuple(said), notes)
+    """Return the requested stages; 1 and 5 alone are the direct instruction."""
+    options = request.options
+    utterances = [direct.introduction(request)]
+    if REINFORCEMENT in options.stages:
+        utterances.append(reinforcement(request))
+    if DISTRACTOR in options.stages:
+        utterances += [UtteranceSpec("distractor", phrase) for phrase in distractors(request)]
+    if CUE in options.stages:
+        cue = request.sampler.pick("cue", templates.CUES)
+        utterances.append(UtteranceSpec("cue", plain(cue)))
+    utterances.append(direct.command(request))
+    notes: dict[str, object] = {"stages": list(options.stages)}
+    if DISTRACTOR in options.stages:
+        notes |= {"distractor": options.distractor, "distractors": options.distractors}
+    return InstructionSpec(tuple(utterances), notes)
 
 
 def reinforcement(request: InstructionRequest) -> UtteranceSpec:
-    """A further remark on each referent, in the order of the introduction."""
+    """Return one more remark on each referent, in the order of the introduction."""
     remarks: list[Phrase] = []
-    for kind, parts in slot_types_in(request):
-        template = request.chooser.pick(f"{kind.name} reinforcement", kind.reinforcements)
-        pointing = kind.pointing(request, parts)
-        remarks.append(fill(template, {"ref": pointing}, plural=kind.plural(parts)))
+    for slot_type, goal_values in slot_types_in(request):
+        template = request.sampler.pick(f"{slot_type.name} reinforcement", slot_type.reinforcements)
+        pointing = slot_type.pointing(request, goal_values)
+        remarks.append(fill(template, {"ref": pointing}, plural=slot_type.plural(goal_values)))
     return UtteranceSpec("reinforcement", sentences(remarks))
 
 
 def distractors(request: InstructionRequest) -> tuple[Phrase, ...]:
-    """As many remarks as asked for; fewer of them are always the beginning of more."""
-    source = _competing(request) if request.distractor == "competing" else _neutral(request)
-    return tuple(next(source) for _ in range(request.distractors))
+    """Return the requested number of remarks; a longer list begins with every shorter one."""
+    competing = request.options.distractor == "competing"
+    source = _competing(request) if competing else _neutral(request)
+    return tuple(itertools.islice(source, request.options.distractors))
 
 
 def _neutral(request: InstructionRequest) -> Iterator[Phrase]:
-    # One order, gone through again and again: the same remark returns as late as possible.
+    # The order stays the same in each cycle, so that repetitions are as far apart as possible.
     remarks = [plain(sentence) for sentence in templates.NEUTRAL_DISTRACTORS]
-    return request.chooser.endless("distractor", remarks)
+    return request.sampler.cycle("distractor", remarks)
 
 
 def _competing(request: InstructionRequest) -> Iterator[Phrase]:
-    rivals = [
-        rival for kind, parts in slot_types_in(request) for rival in kind.rivals(request, parts)
+    remarks = [
+        remark
+        for slot_type, goal_values in slot_types_in(request)
+        for remark in slot_type.competing(request, goal_values)
     ]
-    return request.chooser.endless("competing distractor", rivals)
+    return request.sampler.cycle("competing distractor", remarks)
+
+
+def _pairing_rules(instruct: Instruct) -> Iterator[str]:
+    direct_one = instruct(InstructionOptions("direct"))
+    contextual = instruct(InstructionOptions("contextual"))
+    if instruct(InstructionOptions("contextual", stages=(1, 5))).turns != direct_one.turns:
+        yield "stages 1 and 5 are not the direct instruction"
+    if (contextual.turns[0], contextual.command) != (direct_one.turns[0], direct_one.command):
+        yield "introduction or command are not those of direct"
+    long = instruct(InstructionOptions("contextual", distractors=MANY_DISTRACTORS))
+    if (long.turns[:3], long.turns[-2:]) != (contextual.turns[:3], contextual.turns[-2:]):
+        yield "few distractors are not the beginning of many"
 
 
 SETTING = Setting(
@@ -79,5 +99,6 @@ SETTING = Setting(
         {"stages": stages, "distractor": distractor}
         for stages, distractor in itertools.product(STAGE_SETS, DISTRACTORS)
     ),
+    pairing_rules=_pairing_rules,
     example=1,
 )

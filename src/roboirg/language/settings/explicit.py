@@ -1,4 +1,4 @@
-"""Explicit: one command that states every slot."""
+"""The explicit setting: one command states every slot."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from roboirg.language.slot_types import Fields, slot_types_in
 
 
 def stated(request: InstructionRequest) -> Fields:
-    """The fields of the command, every value named outright."""
+    """Return the fields of the command with every value named."""
     fields: Fields = {}
-    for kind, parts in slot_types_in(request):
-        fields |= kind.stated(request, parts)
+    for slot_type, goal_values in slot_types_in(request):
+        fields |= slot_type.stated(request, goal_values)
     return fields
 
 
 def say(request: InstructionRequest) -> InstructionSpec:
-    """The command alone."""
+    """Return the command alone."""
     return InstructionSpec((UtteranceSpec("command", request.command(stated(request))),))
 
 

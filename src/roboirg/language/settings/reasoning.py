@@ -1,14 +1,14 @@
-"""Reasoning: the context gives an intermediate reference, from which the goal is derived.
+"""The reasoning setting: the goal follows from an intermediate reference in the context.
 
-Every task lists its patterns; the episodes cycle through them. A slot that the pattern does not
-cover is stated explicitly in the command.
+Every task lists its patterns, and the episodes cycle through them. The command states the slots
+that the pattern does not cover.
 """
 
 from __future__ import annotations
 
 from roboirg.core.episode import Goal
 from roboirg.language.instruction import Instruction
-from roboirg.language.patterns import Pattern, way
+from roboirg.language.patterns import Pattern, find_pattern
 from roboirg.language.request import COLOR_SLOTS, InstructionRequest, InstructionSpec, UtteranceSpec
 from roboirg.language.setting import Setting
 from roboirg.language.settings.explicit import stated
@@ -24,33 +24,36 @@ _DERIVED = {
 _HIDE_ONLY_COLOR = ("color exclusion", "contextual logic")
 
 BLOCK = 4
-"""Difficulties repeat after so many episodes; see `pattern_of`."""
+"""Number of episodes after which difficulties repeat; see `pattern_of`."""
 
 
 def pattern_of(request: InstructionRequest) -> tuple[str, Pattern]:
-    """The main pattern of an episode, by name, and how it derives the goal.
+    """Return the name of an episode's main pattern, and how it derives the goal.
 
-    The cycle goes through the patterns that the episode allows, so that none takes the turns of
-    another. It moves on by one more after each block of four episodes: otherwise a task with two
-    patterns would use only one of them for its hard episodes.
+    Cycle through the patterns that the episode allows, so that none takes the turns of another.
+    Move on by one more after each block of four episodes: otherwise a task with two patterns
+    would use only one of them in its hard episodes.
     """
-    ways = [(name, way(name, request)) for name in request.task.commands.patterns]
-    possible = [(name, one) for name, one in ways if one is not None]
+    found = [(name, find_pattern(name, request)) for name in request.task.commands.patterns]
+    possible = [(name, pattern) for name, pattern in found if pattern is not None]
     index = request.episode.index
     return possible[(index + index // BLOCK) % len(possible)]
 
 
 def say(request: InstructionRequest) -> InstructionSpec:
-    """An intermediate reference, and a command that derives the goal from it."""
+    """Return an intermediate reference, and a command that derives the goal from it."""
     name, pattern = pattern_of(request)
     derived = pattern.derive(request)
     command = request.command(stated(request) | derived.fields)
-    said = (UtteranceSpec("introduction", derived.context), UtteranceSpec("command", command))
-    return InstructionSpec(said, {"pattern": name, **derived.notes})
+    utterances = (
+        UtteranceSpec("introduction", derived.context),
+        UtteranceSpec("command", command),
+    )
+    return InstructionSpec(utterances, {"pattern": name, **derived.notes})
 
 
 def _hidden_slots(instruction: Instruction, goal: Goal) -> frozenset[str]:
-    """The slots of the goal that the episode's pattern derives."""
+    """Return the slots of the goal that the episode's pattern derives."""
     return frozenset(goal.as_mapping()) & _DERIVED[str(instruction.metadata["pattern"])]
 
 

@@ -1,4 +1,4 @@
-"""Spatial: the color is told by a place, which the introduction names and the command points at.
+"""The spatial setting: the introduction names a place instead of a color; the command points there.
 
 Counts stay explicit.
 """
@@ -34,13 +34,13 @@ POINTING: Mapping[int, tuple[tuple[str, Expression], ...]] = {
 }
 
 
-def usable(request: InstructionRequest, part: GoalValue) -> tuple[Landmark, ...]:
-    """The landmarks of the best class that could tell where a thing of this part is."""
+def usable(request: InstructionRequest, goal_value: GoalValue) -> tuple[Landmark, ...]:
+    """Return the landmarks of the best class that locate a thing of this color."""
     thing = request.task.commands.thing
     scene = request.episode.scene
     found = [
         landmark
-        for target in request.targets(part)
+        for target in request.targets(goal_value)
         for landmark in landmarks(scene, thing, target, request.frame)
     ]
     best = min((landmark.level for landmark in found), default=0)
@@ -48,45 +48,48 @@ def usable(request: InstructionRequest, part: GoalValue) -> tuple[Landmark, ...]
 
 
 def refusal(request: InstructionRequest) -> str | None:
-    """Say that no landmark tells a target apart, unless every color has a thing with one."""
-    if all(usable(request, part) for part in request.colored):
+    """Return a reason if some color of the goal has no thing with a landmark."""
+    if all(usable(request, goal_value) for goal_value in request.color_values):
         return None
-    return "no landmark tells its target from the other objects"
+    return "no landmark singles out a target"
 
 
 def say(request: InstructionRequest) -> InstructionSpec:
-    """An introduction with a landmark for each color, and a command that points there."""
-    parts = request.colored
+    """Return an introduction with a landmark for each color, and a command that points there."""
+    colors = request.color_values
     chosen = [
-        request.chooser.pick(f"landmark-{part.field}", usable(request, part)) for part in parts
+        request.sampler.pick(f"landmark-{color.field}", usable(request, color)) for color in colors
     ]
     things: list[Phrase] = []
-    pointing = POINTING[len(parts)]
-    for part, landmark, (words, expression) in zip(parts, chosen, pointing, strict=True):
+    pointing = POINTING[len(colors)]
+    for color, landmark, (words, expression) in zip(colors, chosen, pointing, strict=True):
         place = (
-            antecedent(landmark.phrase, part.slot, part.value)
+            antecedent(landmark.phrase, color.slot, color.value)
             if request.resolved
-            else anaphor(words, expression, part.slot, part.value)
+            else anaphor(words, expression, color.slot, color.value)
         )
-        things.append(request.by_place(place, plural=request.count_of(part) > 1))
+        things.append(request.by_place(place, plural=request.count_of(color) > 1))
     fields = stated(request) | described(request, things)
-    said = (introduction(request, parts, chosen), UtteranceSpec("command", request.command(fields)))
+    utterances = (
+        introduction(request, colors, chosen),
+        UtteranceSpec("command", request.command(fields)),
+    )
     notes = {
         "landmarks": [landmark.phrase for landmark in chosen],
         "landmark_classes": [landmark.level for landmark in chosen],
         "frame": request.frame,
     }
-    return InstructionSpec(said, notes)
+    return InstructionSpec(utterances, notes)
 
 
 def introduction(
-    request: InstructionRequest, parts: Sequence[GoalValue], chosen: Sequence[Landmark]
+    request: InstructionRequest, colors: Sequence[GoalValue], chosen: Sequence[Landmark]
 ) -> UtteranceSpec:
-    """The places, whose left and right is meant where it matters, and when, if things move."""
+    """Name the places; say where needed whose left and right is meant, and at what time."""
     noun = plain(f"the {request.task.commands.thing} ")
     things: list[Phrase] = [
-        (*noun, *antecedent(landmark.phrase, part.slot, part.value))
-        for part, landmark in zip(parts, chosen, strict=True)
+        (*noun, *antecedent(landmark.phrase, color.slot, color.value))
+        for color, landmark in zip(colors, chosen, strict=True)
     ]
     if not any(landmark.sided for landmark in chosen):
         purpose, options = "place introduction", templates.PLACE_INTRODUCTIONS
@@ -94,17 +97,17 @@ def introduction(
         purpose, options = "sided place introduction", templates.SIDED_PLACE_INTRODUCTIONS
     else:
         purpose, options = "camera place introduction", templates.CAMERA_PLACE_INTRODUCTIONS
-    template = request.chooser.pick(purpose, options)
-    said = [fill(template, {"things": listed(things)}, plural=len(things) > 1)]
+    template = request.sampler.pick(purpose, options)
+    remarks = [fill(template, {"things": listed(things)}, plural=len(things) > 1)]
     if any(isinstance(motion, Swap) for motion in request.episode.scene.motions):
-        said.append(plain(request.chooser.pick("moved", templates.MOVED_INTRODUCTIONS)))
-    return UtteranceSpec("introduction", sentences(said))
+        remarks.append(plain(request.sampler.pick("moved", templates.MOVED_INTRODUCTIONS)))
+    return UtteranceSpec("introduction", sentences(remarks))
 
 
 SETTING = Setting(
     name="spatial",
     order=4,
-    summary="a place tells the thing; the command points there",
+    summary="a place identifies the object; the command points there",
     color="#CC79A7",
     say=say,
     applies_to=lambda task: task.spatial,

@@ -1,4 +1,4 @@
-"""The kinds of values that a goal can hold, and how each is spoken of.
+"""The types of goal slots, and the words for their values.
 
 The order is the order of speaking: colors come last, so that ``it`` in the command follows the
 sentence about its cube.
@@ -16,8 +16,8 @@ from roboirg.language.slot_types.slot_type import Fields, SlotType
 __all__ = ["SLOT_TYPES", "Fields", "SlotType", "described", "slot_types_in"]
 
 SLOT_TYPES: Mapping[SlotTypeName, SlotType] = {
-    kind.name: kind
-    for kind in (
+    slot_type.name: slot_type
+    for slot_type in (
         number.NUMBER,
         ordinal.VISIT,
         ordinal.PLACEMENT,
@@ -29,17 +29,17 @@ SLOT_TYPES: Mapping[SlotTypeName, SlotType] = {
 
 
 def slot_types_in(request: InstructionRequest) -> Iterator[tuple[SlotType, tuple[GoalValue, ...]]]:
-    """The kinds that the goal has values of, in the order of speaking, with these values."""
-    for name, kind in SLOT_TYPES.items():
-        parts = request.parts_of(name)
-        if parts:
-            yield kind, parts
+    """Yield the slot types in the goal with their values, in the order of speaking."""
+    for name, slot_type in SLOT_TYPES.items():
+        goal_values = request.values_of(name)
+        if goal_values:
+            yield slot_type, goal_values
 
 
 def described(request: InstructionRequest, things: Sequence[Phrase]) -> Fields:
-    """The fields of the command for the goal's colors, given a description for each of them."""
+    """Return the fields of the command for the goal's colors, given a description of each."""
     fields: Fields = {}
-    for kind, parts in slot_types_in(request):
-        if kind.described is not None:
-            fields |= kind.described(parts, things)
+    for slot_type, goal_values in slot_types_in(request):
+        if slot_type.described is not None:
+            fields |= slot_type.described(goal_values, things)
     return fields

@@ -1,4 +1,4 @@
-"""Amounts: how many cubes of each of one, two or three colors."""
+"""Amounts: numbers of cubes of one, two or three colors."""
 
 from __future__ import annotations
 
@@ -13,44 +13,44 @@ from roboirg.language.slot_types import color, number
 from roboirg.language.slot_types.slot_type import Fields, SlotType
 
 FIELD = "cubes"
-"""All amounts together are one field of the command."""
+"""The field of the command that holds all amounts."""
 
 
-def pairs(parts: tuple[GoalValue, ...]) -> tuple[tuple[GoalValue, GoalValue], ...]:
-    """Each color with its count."""
-    colors = [part for part in parts if part.slot == "colors"]
-    counts = [part for part in parts if part.slot == "counts"]
+def pairs(goal_values: tuple[GoalValue, ...]) -> tuple[tuple[GoalValue, GoalValue], ...]:
+    """Return each color with its count."""
+    colors = [goal_value for goal_value in goal_values if goal_value.slot == "colors"]
+    counts = [goal_value for goal_value in goal_values if goal_value.slot == "counts"]
     return tuple(zip(colors, counts, strict=True))
 
 
 def amount(count: Phrase, thing: Phrase) -> Phrase:
-    """``two`` and ``red cubes``."""
+    """Join a count and a thing: ``two red cubes``."""
     return (*count, *plain(" "), *thing)
 
 
 def cubes(shade: GoalValue, count: int) -> Phrase:
-    """``red cube`` or ``red cubes``."""
+    """Return ``red cube`` or ``red cubes``."""
     return antecedent(f"{shade.color} {noun(count)}", shade.slot, shade.value)
 
 
 def noun(count: int) -> str:
-    """``cube`` or ``cubes``."""
+    """Return ``cube`` or ``cubes``."""
     return "cube" if count == 1 else "cubes"
 
 
-def _count(part: GoalValue) -> Phrase:
-    return antecedent(cardinal(part.number), part.slot, part.value)
+def _count(goal_value: GoalValue) -> Phrase:
+    return antecedent(cardinal(goal_value.number), goal_value.slot, goal_value.value)
 
 
-def _stated(_request: InstructionRequest, parts: tuple[GoalValue, ...]) -> Fields:
-    """``two red cubes and one blue cube``."""
-    things = [cubes(shade, count.number) for shade, count in pairs(parts)]
-    return _described(parts, things)
+def _stated(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+    """Return ``two red cubes and one blue cube``."""
+    things = [cubes(shade, count.number) for shade, count in pairs(goal_values)]
+    return _described(goal_values, things)
 
 
-def _reduced(_request: InstructionRequest, parts: tuple[GoalValue, ...]) -> Fields:
-    """``that many of them``; ``that many of the former and that many of the latter``; ..."""
-    matched = pairs(parts)
+def _reduced(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+    """Return ``that many of them``, or ``that many of the former and that many of the latter``."""
+    matched = pairs(goal_values)
     them: tuple[tuple[str, Expression], ...] = (("them", "them"),)
     pointers = them if len(matched) == 1 else color.REDUCED[len(matched)]
     items = [
@@ -63,37 +63,41 @@ def _reduced(_request: InstructionRequest, parts: tuple[GoalValue, ...]) -> Fiel
     return {FIELD: listed(items)}
 
 
-def _introduce(request: InstructionRequest, parts: tuple[GoalValue, ...]) -> Phrase:
-    template = request.chooser.pick("amount introduction", templates.AMOUNT_INTRODUCTIONS)
-    # "One of the red cubes", so that "them" is right for a single one too.
+def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
+    template = request.sampler.pick("amount introduction", templates.AMOUNT_INTRODUCTIONS)
+    # "One of the red cubes": "them" then also fits a count of one.
     things = [
-        (*_count(count), *plain(" of the "), *cubes(shade, 2)) for shade, count in pairs(parts)
+        (*_count(count), *plain(" of the "), *cubes(shade, 2))
+        for shade, count in pairs(goal_values)
     ]
     return fill(template, {"things": listed(things)})
 
 
 def introduce_references(
-    request: InstructionRequest, parts: tuple[GoalValue, ...], slot: str, quantities: Sequence[int]
+    request: InstructionRequest,
+    goal_values: tuple[GoalValue, ...],
+    slot: str,
+    quantities: Sequence[int],
 ) -> Phrase:
-    """A sentence that names another quantity for each color."""
+    """Return a sentence that names a reference quantity for each color."""
     purpose, options = "reference amounts", templates.REFERENCE_AMOUNT_INTRODUCTIONS
     things = [
         amount(antecedent(cardinal(quantity), slot, quantity), cubes(shade, quantity))
-        for (shade, _), quantity in zip(pairs(parts), quantities, strict=True)
+        for (shade, _), quantity in zip(pairs(goal_values), quantities, strict=True)
     ]
-    return fill(request.chooser.pick(purpose, options), {"things": listed(things)})
+    return fill(request.sampler.pick(purpose, options), {"things": listed(things)})
 
 
-def _pointing(request: InstructionRequest, parts: tuple[GoalValue, ...]) -> Phrase:
-    return color.those(request, tuple(shade for shade, _ in pairs(parts)))
+def _pointing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
+    return color.those(request, tuple(shade for shade, _ in pairs(goal_values)))
 
 
-def _rivals(request: InstructionRequest, parts: tuple[GoalValue, ...]) -> list[Phrase]:
-    return [*color.rivals(request, parts), *number.rivals(request, parts)]
+def _competing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> list[Phrase]:
+    return [*color.competing(request, goal_values), *number.competing(request, goal_values)]
 
 
-def _described(parts: tuple[GoalValue, ...], things: Sequence[Phrase]) -> Fields:
-    counts = [_count(count) for _, count in pairs(parts)]
+def _described(goal_values: tuple[GoalValue, ...], things: Sequence[Phrase]) -> Fields:
+    counts = [_count(count) for _, count in pairs(goal_values)]
     return {FIELD: listed([amount(*one) for one in zip(counts, things, strict=True)])}
 
 
@@ -105,6 +109,6 @@ AMOUNT = SlotType(
     pointing=_pointing,
     plural=lambda _parts: True,
     reinforcements=templates.COLOR_REINFORCEMENTS,
-    rivals=_rivals,
+    competing=_competing,
     described=_described,
 )

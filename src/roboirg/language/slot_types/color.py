@@ -1,4 +1,4 @@
-"""Colors: which cube, box or tape, or the container over which cube."""
+"""Colors: which cube, box or tape to handle, or which cube's container."""
 
 from __future__ import annotations
 
@@ -9,63 +9,69 @@ from roboirg.language.instruction import Expression
 from roboirg.language.number_words import plural
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed
 from roboirg.language.request import GoalValue, InstructionRequest
-from roboirg.language.slot_types.slot_type import Fields, SlotType, rival_sentences
+from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_remarks
 
 REDUCED: Mapping[int, tuple[tuple[str, Expression], ...]] = {
     1: (("it", "it"),),
     2: (("the former", "former"), ("the latter", "latter")),
     3: (("the first", "first"), ("the second", "second"), ("the third", "third")),
 }
-"""What points back at one, two or three introduced cubes."""
+"""The words that point back at one, two or three introduced cubes."""
 
 
-def named(request: InstructionRequest, part: GoalValue) -> Phrase:
-    """``the red cube``."""
+def named(request: InstructionRequest, goal_value: GoalValue) -> Phrase:
+    """Return ``the red cube``."""
     noun = request.task.commands.colored
-    return antecedent(f"the {part.color} {noun}", part.slot, part.value)
+    return antecedent(f"the {goal_value.color} {noun}", goal_value.slot, goal_value.value)
 
 
-def _stated(request: InstructionRequest, parts: tuple[GoalValue, ...]) -> Fields:
-    """``the red cube``, or the container that hides it."""
-    return {part.field: request.by_color(named(request, part)) for part in parts}
-
-
-def _reduced(request: InstructionRequest, parts: tuple[GoalValue, ...]) -> Fields:
-    """``it``; ``the former`` and ``the latter``; ..."""
+def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+    """Return ``the red cube``, or words for the container that hides it."""
     return {
-        part.field: request.by_color(anaphor(words, expression, part.slot, part.value))
-        for part, (words, expression) in zip(parts, REDUCED[len(parts)], strict=True)
+        goal_value.field: request.by_color(named(request, goal_value)) for goal_value in goal_values
     }
 
 
-def _introduce(request: InstructionRequest, parts: tuple[GoalValue, ...]) -> Phrase:
-    template = request.chooser.pick("color introduction", templates.COLOR_INTRODUCTIONS)
-    things = listed([named(request, part) for part in parts])
-    return fill(template, {"things": things}, plural=len(parts) > 1)
+def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+    """Return ``it``, ``the former`` and ``the latter``, or ``the first``, etc."""
+    return {
+        goal_value.field: request.by_color(
+            anaphor(words, expression, goal_value.slot, goal_value.value)
+        )
+        for goal_value, (words, expression) in zip(
+            goal_values, REDUCED[len(goal_values)], strict=True
+        )
+    }
 
 
-def _pointing(request: InstructionRequest, parts: tuple[GoalValue, ...]) -> Phrase:
-    if len(parts) == 1:
+def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
+    template = request.sampler.pick("color introduction", templates.COLOR_INTRODUCTIONS)
+    things = listed([named(request, goal_value) for goal_value in goal_values])
+    return fill(template, {"things": things}, plural=len(goal_values) > 1)
+
+
+def _pointing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
+    if len(goal_values) == 1:
         words = f"that {request.task.commands.colored}"
-        return anaphor(words, "that", parts[0].slot, parts[0].value)
-    return those(request, parts)
+        return anaphor(words, "that", goal_values[0].slot, goal_values[0].value)
+    return those(request, goal_values)
 
 
-def those(request: InstructionRequest, parts: tuple[GoalValue, ...]) -> Phrase:
-    """A plural for the cubes, boxes or tapes of all colors."""
-    values = " and ".join(part.color for part in parts)
+def those(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
+    """Return a plural that refers to the things of all colors of the goal."""
+    values = " and ".join(goal_value.color for goal_value in goal_values)
     words = f"those {plural(request.task.commands.colored)}"
-    return anaphor(words, "them", parts[0].slot, values)
+    return anaphor(words, "them", goal_values[0].slot, values)
 
 
-def rivals(request: InstructionRequest, parts: tuple[GoalValue, ...]) -> list[Phrase]:
-    """Remarks that name other colors."""
+def competing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> list[Phrase]:
+    """Return remarks that name other colors."""
     colors = request.task.commands.colors
-    return rival_sentences(templates.COMPETING_COLOR_DISTRACTORS, colors, str, parts)
+    return competing_remarks(templates.COMPETING_COLOR_DISTRACTORS, colors, str, goal_values)
 
 
-def _described(parts: tuple[GoalValue, ...], things: Sequence[Phrase]) -> Fields:
-    return {part.field: thing for part, thing in zip(parts, things, strict=True)}
+def _described(goal_values: tuple[GoalValue, ...], things: Sequence[Phrase]) -> Fields:
+    return {goal_value.field: thing for goal_value, thing in zip(goal_values, things, strict=True)}
 
 
 COLOR = SlotType(
@@ -75,6 +81,6 @@ COLOR = SlotType(
     introduce=_introduce,
     pointing=_pointing,
     reinforcements=templates.COLOR_REINFORCEMENTS,
-    rivals=rivals,
+    competing=competing,
     described=_described,
 )

@@ -1,4 +1,4 @@
-"""Counts: how often something is to be done."""
+"""Numbers of repetitions."""
 
 from __future__ import annotations
 
@@ -6,40 +6,48 @@ from roboirg.language import templates
 from roboirg.language.number_words import cardinal, times
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill
 from roboirg.language.request import GoalValue, InstructionRequest
-from roboirg.language.slot_types.slot_type import Fields, SlotType, rival_sentences
+from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_remarks
 
-RIVALS = tuple(range(1, 11))
-"""Numbers that a remark may name."""
-
-
-def _stated(_request: InstructionRequest, parts: tuple[GoalValue, ...]) -> Fields:
-    """``three times``."""
-    return {part.field: antecedent(times(part.number), part.slot, part.value) for part in parts}
+COMPETING_NUMBERS = tuple(range(1, 11))
+"""The numbers that a competing remark may name."""
 
 
-def _reduced(_request: InstructionRequest, parts: tuple[GoalValue, ...]) -> Fields:
-    """``that many times``."""
-    return {part.field: anaphor("that many times", "that", part.slot, part.value) for part in parts}
+def _stated(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+    """Return ``three times``."""
+    return {
+        goal_value.field: antecedent(times(goal_value.number), goal_value.slot, goal_value.value)
+        for goal_value in goal_values
+    }
 
 
-def _introduce(request: InstructionRequest, parts: tuple[GoalValue, ...]) -> Phrase:
-    return introduce_quantity(request, parts[0].slot, parts[0].number)
+def _reduced(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+    """Return ``that many times``."""
+    return {
+        goal_value.field: anaphor("that many times", "that", goal_value.slot, goal_value.value)
+        for goal_value in goal_values
+    }
+
+
+def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
+    return introduce_quantity(request, goal_values[0].slot, goal_values[0].number)
 
 
 def introduce_quantity(request: InstructionRequest, slot: str, quantity: int) -> Phrase:
-    """A sentence that names any quantity."""
-    template = request.chooser.pick("number introduction", templates.NUMBER_INTRODUCTIONS)
+    """Return a sentence that names a quantity."""
+    template = request.sampler.pick("number introduction", templates.NUMBER_INTRODUCTIONS)
     return fill(template, {"number": antecedent(cardinal(quantity), slot, quantity)})
 
 
-def _pointing(_request: InstructionRequest, parts: tuple[GoalValue, ...]) -> Phrase:
-    return anaphor("that number", "that", parts[0].slot, parts[0].value)
+def _pointing(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
+    return anaphor("that number", "that", goal_values[0].slot, goal_values[0].value)
 
 
-def rivals(_request: InstructionRequest, parts: tuple[GoalValue, ...]) -> list[Phrase]:
-    """Remarks that name other numbers."""
+def competing(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> list[Phrase]:
+    """Return remarks that name other numbers."""
     sentences = templates.COMPETING_NUMBER_DISTRACTORS
-    return rival_sentences(sentences, RIVALS, lambda value: cardinal(int(value)), parts)
+    return competing_remarks(
+        sentences, COMPETING_NUMBERS, lambda value: cardinal(int(value)), goal_values
+    )
 
 
 NUMBER = SlotType(
@@ -49,5 +57,5 @@ NUMBER = SlotType(
     introduce=_introduce,
     pointing=_pointing,
     reinforcements=templates.NUMBER_REINFORCEMENTS,
-    rivals=rivals,
+    competing=competing,
 )

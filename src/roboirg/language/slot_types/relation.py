@@ -1,4 +1,4 @@
-"""Moments: right before or right after the press of the button in the video."""
+"""Moments: right before or right after the button press in the video."""
 
 from __future__ import annotations
 
@@ -6,48 +6,50 @@ from roboirg.language import templates
 from roboirg.language.instruction import Expression
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain
 from roboirg.language.request import GoalValue, InstructionRequest
-from roboirg.language.slot_types.slot_type import Fields, SlotType, rival_sentences
+from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_remarks
 
 EXPRESSIONS: dict[str, Expression] = {"at that moment": "that", "then": "then"}
 
 
-def placed(part: GoalValue, moment: Phrase) -> Fields:
-    """``the target where a cube was placed ...``.
+def placed(goal_value: GoalValue, moment: Phrase) -> Fields:
+    """Return ``the target where a cube was placed ...``.
 
-    Not *it*: only one cube is placed in the video, so that would tell which is meant.
+    Not *it*: only one cube is placed in the video, so *it* would give the cube away.
     """
-    return {part.field: (*plain("the target where a cube was placed "), *moment)}
+    return {goal_value.field: (*plain("the target where a cube was placed "), *moment)}
 
 
-def named(part: GoalValue) -> Phrase:
-    """``right before the button press``."""
-    return antecedent(templates.MOMENTS[str(part.value)], part.slot, part.value)
+def named(goal_value: GoalValue) -> Phrase:
+    """Return ``right before the button press``."""
+    return antecedent(templates.MOMENTS[str(goal_value.value)], goal_value.slot, goal_value.value)
 
 
-def _stated(_request: InstructionRequest, parts: tuple[GoalValue, ...]) -> Fields:
-    return placed(parts[0], named(parts[0]))
+def _stated(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+    return placed(goal_values[0], named(goal_values[0]))
 
 
-def _reduced(request: InstructionRequest, parts: tuple[GoalValue, ...]) -> Fields:
-    """``at that moment``, or ``then``."""
-    (part,) = parts
-    words = request.chooser.pick("moment anaphor", templates.MOMENT_ANAPHORS)
-    return placed(part, anaphor(words, EXPRESSIONS[words], part.slot, part.value))
+def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+    """Return ``at that moment``, or ``then``."""
+    (goal_value,) = goal_values
+    words = request.sampler.pick("moment anaphor", templates.MOMENT_ANAPHORS)
+    return placed(goal_value, anaphor(words, EXPRESSIONS[words], goal_value.slot, goal_value.value))
 
 
-def _introduce(request: InstructionRequest, parts: tuple[GoalValue, ...]) -> Phrase:
-    template = request.chooser.pick("moment introduction", templates.MOMENT_INTRODUCTIONS)
-    return fill(template, {"moment": named(parts[0])})
+def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
+    template = request.sampler.pick("moment introduction", templates.MOMENT_INTRODUCTIONS)
+    return fill(template, {"moment": named(goal_values[0])})
 
 
-def _pointing(_request: InstructionRequest, parts: tuple[GoalValue, ...]) -> Phrase:
-    return anaphor("that moment", "that", parts[0].slot, parts[0].value)
+def _pointing(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
+    return anaphor("that moment", "that", goal_values[0].slot, goal_values[0].value)
 
 
-def _rivals(_request: InstructionRequest, parts: tuple[GoalValue, ...]) -> list[Phrase]:
+def _competing(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> list[Phrase]:
     values = tuple(templates.MOMENTS)
     sentences = templates.COMPETING_MOMENT_DISTRACTORS
-    return rival_sentences(sentences, values, lambda value: templates.MOMENTS[str(value)], parts)
+    return competing_remarks(
+        sentences, values, lambda value: templates.MOMENTS[str(value)], goal_values
+    )
 
 
 RELATION = SlotType(
@@ -57,5 +59,5 @@ RELATION = SlotType(
     introduce=_introduce,
     pointing=_pointing,
     reinforcements=templates.VIDEO_REINFORCEMENTS,
-    rivals=_rivals,
+    competing=_competing,
 )

@@ -1,4 +1,4 @@
-"""What has to be known about a kind of value to speak of it in every setting."""
+"""The definition of a slot type: how every setting speaks of its values."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ Fields = dict[str, Phrase]
 
 @dataclass(frozen=True, slots=True)
 class SlotType:
-    """One kind of value.
+    """One type of goal slots.
 
     Attributes:
         name: as in `SlotTypeName`.
-        stated: the fields of the command, every value named outright.
-        reduced: the same fields with words that point back at the introduced values.
-        introduce: a sentence that names the values.
-        pointing: the words that a reinforcement uses for the values.
+        stated: returns the fields of the command with every value named.
+        reduced: returns the same fields with words that point back at the introduced values.
+        introduce: returns a sentence that names the values.
+        pointing: returns the words by which a reinforcement refers to the values.
         plural: whether these words are a plural.
         reinforcements: sentences with a field ``{ref}`` for those words.
-        rivals: sentences that name values which are not meant.
-        described: of a kind that has colors: the fields, given a description of the thing or
-            things of each color.
+        competing: returns remarks that name other values.
+        described: for types that have colors: returns the fields, given a description of the
+            thing or things of each color.
     """
 
     name: SlotTypeName
@@ -35,22 +35,22 @@ class SlotType:
     introduce: Callable[[InstructionRequest, tuple[GoalValue, ...]], Phrase]
     pointing: Callable[[InstructionRequest, tuple[GoalValue, ...]], Phrase]
     reinforcements: tuple[str, ...]
-    rivals: Callable[[InstructionRequest, tuple[GoalValue, ...]], list[Phrase]]
-    plural: Callable[[tuple[GoalValue, ...]], bool] = lambda parts: len(parts) > 1
+    competing: Callable[[InstructionRequest, tuple[GoalValue, ...]], list[Phrase]]
+    plural: Callable[[tuple[GoalValue, ...]], bool] = lambda goal_values: len(goal_values) > 1
     described: Callable[[tuple[GoalValue, ...], Sequence[Phrase]], Fields] | None = None
 
 
-def rival_sentences(
+def competing_remarks(
     templates: Sequence[str],
-    values: Sequence[str | int],
+    candidates: Sequence[str | int],
     word: Callable[[str | int], str],
-    parts: tuple[GoalValue, ...],
+    goal_values: tuple[GoalValue, ...],
 ) -> list[Phrase]:
-    """Every template with every value that the goal does not have."""
-    taken = {part.value for part in parts}
+    """Fill every template with every candidate that is no value of the goal."""
+    taken = {one.value for one in goal_values}
     return [
-        fill(template, {"other": plain(word(value))}, plural=value != 1)
-        for value in values
-        if value not in taken
+        fill(template, {"other": plain(word(candidate))}, plural=candidate != 1)
+        for candidate in candidates
+        if candidate not in taken
         for template in templates
     ]

@@ -1,9 +1,9 @@
-"""The proof that the words are valid: one goal, not without context, no leaks, paired words."""
+"""Validation of the instructions: read every one back, and check its rules."""
 
 from __future__ import annotations
 
 from roboirg.language.validation.episode_checks import check_episode
-from roboirg.language.validation.evidence import RuleViolation, ValidationResults
+from roboirg.language.validation.validation_results import RuleViolation, ValidationResults
 from roboirg.language.validation.validation_run import (
     Batch,
     batches,

@@ -1,4 +1,4 @@
-"""One episode, told in every way and read back by the independent reader."""
+"""Check every instruction of one episode with the independent interpreter."""
 
 from __future__ import annotations
 
@@ -6,110 +6,112 @@ import functools
 from collections.abc import Callable, Iterator
 
 from roboirg.core.episode import Episode
-from roboirg.language.generator import expressible
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.language.generator import expressible, find_refusal, instruct_with
 from roboirg.language.instruction import Instruction
 from roboirg.language.interpreter import Interpretation, interpret
-from roboirg.language.landmarks import FRAMES
-from roboirg.language.settings import settings_of
-from roboirg.language.validation.evidence import (
-    CommandGroup,
-    LandmarkGroup,
-    Rule,
-    RuleViolation,
-    ValidationResults,
-)
-from roboirg.language.validation.leaks import leaked
+from roboirg.language.setting import Setting
+from roboirg.language.settings import ACCEPTANCE_SETTINGS, all_settings, settings_of
+from roboirg.language.validation.leaks import find_leaks
 from roboirg.language.validation.necessity import only_candidate
 from roboirg.language.validation.pairing import unpaired
-from roboirg.language.variants import tellings
+from roboirg.language.validation.validation_results import (
+    CommandGroup,
+    Refusal,
+    Rule,
+    RuleViolation,
+    SceneGroup,
+    ValidationResults,
+)
+from roboirg.language.variants import expressible_options
 from roboirg.tasks import get_task
 
-ROBOT, CAMERA = FRAMES
-SPATIAL = "spatial"
-
 Read = Callable[[str], Interpretation]
-"""Reads a text about the scene at hand."""
-Broken = tuple[Rule, str]
+"""Interprets a text in the scene at hand."""
+Violation = tuple[Rule, str]
 """A rule and the words that break it."""
 
 
 def check_episode(episode: Episode, *, must_be_expressible: bool = False) -> ValidationResults:
-    """Everything that the words of an episode have to prove.
+    """Check all rules on all instructions of an episode.
 
     Args:
-        episode: any, of a split or not.
-        must_be_expressible: whether it fails if the robot's frame cannot tell its places.
+        episode: of a split or not.
+        must_be_expressible: whether the refusal of a setting that selects seeds is a violation.
     """
-    found = ValidationResults()
-    # Texts return (stages 1 and 5 are the direct ones): each is read once.
+    results = ValidationResults()
+    # Texts repeat (stages 1 and 5 are the direct ones): read each once.
     read = functools.cache(lambda text: interpret(text, episode.scene, episode.task))
     commands: dict[str, set[str]] = {}
-    for telling in tellings(episode):
-        instruction = telling.of(episode)
-        found.texts[episode.task, telling.setting] += 1
-        broken = list(not_read_back(instruction, episode, read))
-        if telling.implicit:
-            known = commands.setdefault(telling.setting, set())
+    for options in expressible_options(episode):
+        setting = options.setting
+        instruction = instruct_with(episode, options)
+        results.texts[episode.task, setting] += 1
+        violations = list(not_read_back(instruction, episode, read))
+        if options.form == "implicit" and all_settings()[setting].implicit:
+            known = commands.setdefault(setting, set())
             if instruction.command not in known:
                 exception = only_candidate(episode, instruction)
                 if not known:
-                    _count(instruction, episode, found, exception=exception)
+                    _count_command(instruction, episode, results, exception=exception)
                 known.add(instruction.command)
-                broken += not_needed(instruction, episode, read, exception=exception)
-                broken += leaking(instruction, episode)
-        elif instruction.metadata["frame"] != CAMERA:
-            # Whose left the camera's picture means is no reference: it stays in the introduction.
-            broken += not_self_contained(instruction, episode, read)
-        found.failures += [
-            _failure(episode, telling.setting, rule, words) for rule, words in broken
-        ]
-    found.failures += [
-        _failure(episode, setting, "pairing", words)
-        for setting, words in unpaired(episode, expressible(episode))
-    ]
-    _look_for_landmarks(episode, found, must_be_expressible=must_be_expressible)
-    return found
+                violations += not_needed(instruction, episode, read, exception=exception)
+                violations += leaking(instruction, episode)
+        elif instruction.metadata["frame"] != "camera":
+            # The introduction alone says that left and right are the camera's: no reference.
+            violations += not_self_contained(instruction, episode, read)
+        _add_violations(results, episode, setting, violations)
+    for setting, words in unpaired(episode, expressible(episode)):
+        _add_violations(results, episode, setting, [("pairing", words)])
+    for setting in settings_of(get_task(episode.task)):
+        _count_refusals(all_settings()[setting], episode, results)
+        reason = find_refusal(episode, InstructionOptions(setting))
+        if reason is not None and must_be_expressible and setting in ACCEPTANCE_SETTINGS:
+            _add_violations(results, episode, setting, [("expressible", reason)])
+    return results
 
 
-def not_read_back(instruction: Instruction, episode: Episode, read: Read) -> Iterator[Broken]:
-    """The prompt, unless it is read as exactly the episode's goal and understood to the end."""
-    heard = read(instruction.text)
-    if heard.goals != (episode.goal,) or heard.not_understood:
+def not_read_back(instruction: Instruction, episode: Episode, read: Read) -> Iterator[Violation]:
+    """Yield the prompt unless it reads as exactly the goal and is understood to the end."""
+    found = read(instruction.text)
+    if found.goals != (episode.goal,) or found.not_understood:
         yield "read back", instruction.text
 
 
-def not_self_contained(instruction: Instruction, episode: Episode, read: Read) -> Iterator[Broken]:
-    """An explicit or resolved command that is not read as the goal without its context."""
-    heard = read(instruction.command)
-    if heard.goals != (episode.goal,) or heard.not_understood:
+def not_self_contained(
+    instruction: Instruction, episode: Episode, read: Read
+) -> Iterator[Violation]:
+    """Yield an explicit or resolved command that does not read as the goal on its own."""
+    found = read(instruction.command)
+    if found.goals != (episode.goal,) or found.not_understood:
         yield "self-contained", instruction.command
 
 
 def not_needed(
     instruction: Instruction, episode: Episode, read: Read, *, exception: bool
-) -> Iterator[Broken]:
-    """An implicit command that tells the goal without its context, or contradicts it.
+) -> Iterator[Violation]:
+    """Yield an implicit command that gives the goal on its own, or contradicts it.
 
     Args:
         instruction: of an implicit form.
-        episode: whose it is.
-        read: the reader.
-        exception: whether the scene leaves one candidate; then the command has to tell it.
+        episode: its episode.
+        read: the interpreter.
+        exception: whether the scene leaves one candidate; the command must then give the goal.
     """
-    left = read(instruction.command).goals
-    if episode.goal not in left or (len(left) == 1) != exception:
+    goals = read(instruction.command).goals
+    if episode.goal not in goals or (len(goals) == 1) != exception:
         yield "necessity", instruction.command
 
 
-def leaking(instruction: Instruction, episode: Episode) -> Iterator[Broken]:
-    """An implicit command that contains a hidden value."""
-    words = leaked(instruction, episode.goal)
+def leaking(instruction: Instruction, episode: Episode) -> Iterator[Violation]:
+    """Yield an implicit command that contains a hidden value."""
+    words = find_leaks(instruction, episode.goal)
     if words:
         yield "no leak", f"{', '.join(sorted(words))} in: {instruction.command}"
 
 
-def _count(
-    instruction: Instruction, episode: Episode, found: ValidationResults, *, exception: bool
+def _count_command(
+    instruction: Instruction, episode: Episode, results: ValidationResults, *, exception: bool
 ) -> None:
     pattern = instruction.metadata["pattern"]
     group = CommandGroup(
@@ -118,24 +120,27 @@ def _count(
         pattern=None if pattern is None else str(pattern),
         difficulty=episode.difficulty,
     )
-    found.commands[group] += 1
-    found.exceptions[group] += exception
+    results.commands[group] += 1
+    results.exceptions[group] += exception
 
 
-def _look_for_landmarks(
-    episode: Episode, found: ValidationResults, *, must_be_expressible: bool
-) -> None:
-    if SPATIAL not in settings_of(get_task(episode.task)):
+def _count_refusals(setting: Setting, episode: Episode, results: ValidationResults) -> None:
+    if not setting.may_refuse:
         return
-    for frame in FRAMES:
-        group = LandmarkGroup(episode.task, episode.difficulty, frame)
-        lacking = SPATIAL not in expressible(episode, frame=frame)
-        found.scenes[group] += 1
-        found.unplaced[group] += lacking
-        if lacking and must_be_expressible and frame == ROBOT:
-            words = "no landmark tells its target"
-            found.failures.append(_failure(episode, SPATIAL, "expressible", words))
+    for changes in setting.variants:
+        variant = ", ".join(str(value) for value in changes.values())
+        group = SceneGroup(episode.task, setting.name, variant, episode.difficulty)
+        reason = find_refusal(episode, InstructionOptions(setting.name)._replace(**changes))
+        results.scenes[group] += 1
+        results.refused[group] += reason is not None
+        if reason is not None:
+            results.reasons[Refusal(setting.name, reason)] += 1
 
 
-def _failure(episode: Episode, setting: str, rule: Rule, words: str) -> RuleViolation:
-    return RuleViolation(rule, episode.task, setting, episode.key, episode.seed, words)
+def _add_violations(
+    results: ValidationResults, episode: Episode, setting: str, violations: list[Violation]
+) -> None:
+    results.failures += [
+        RuleViolation(rule, episode.task, setting, episode.key, episode.seed, words)
+        for rule, words in violations
+    ]

@@ -1,4 +1,4 @@
-"""No leak: what an implicit command must not contain, in any spelling."""
+"""No leak: an implicit command contains no hidden value, in any spelling."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ _TIME_WORDS = frozenset(
 _RANKS = ("first", "second", "third")
 
 
-def leaked(instruction: Instruction, goal: Goal) -> frozenset[str]:
-    """The words of an implicit command that give a hidden value away, and its landmarks."""
+def find_leaks(instruction: Instruction, goal: Goal) -> frozenset[str]:
+    """Return the words and landmarks of an implicit command that give a hidden value away."""
     words = frozenset(re.findall(r"[a-z0-9]+", _without_ranks(instruction).lower()))
     hidden = all_settings()[instruction.setting].hidden_slots(instruction, goal)
     found = [words & _spellings(goal[slot]) for slot in hidden]
@@ -41,12 +41,12 @@ def _spellings(value: SlotValue) -> frozenset[str]:
         return frozenset().union(*(_spellings(one) for one in several))
     if isinstance(value, int):
         return _NUMBERS[value]
-    # Any color: naming another one tells something too.
+    # Any color: naming another one gives something away, too.
     return _COLOR_WORDS if value in ALL_COLORS else _TIME_WORDS
 
 
 def _without_ranks(instruction: Instruction) -> str:
-    """The command without what only ranks the introduced values: *the first* of three colors."""
+    """Return the command without words that rank introduced values: *the first* of three."""
     text = instruction.command
     last = len(instruction.utterances) - 1
     for mention in reversed(instruction.mentions):

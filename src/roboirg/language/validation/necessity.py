@@ -1,4 +1,4 @@
-"""Necessity: the one case in which a command alone may tell the goal."""
+"""Necessity: an implicit command alone gives the goal only if the scene leaves one candidate."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ _NUMBER_SLOTS = ("repeats", "counts")
 
 
 def only_candidate(episode: Episode, instruction: Instruction) -> bool:
-    """Whether the scene leaves a single goal with the numbers that the command states.
+    """Return whether the scene leaves one goal with the numbers that the command states.
 
-    It does where all cubes have one color, and in BinFill also where only one choice of colors
-    has so many cubes each, or where all colors are wanted in equal numbers.
+    It does if all cubes have the same color. In BinFill it also does if only one choice of colors
+    has enough cubes, or if the goal wants all colors in equal numbers.
     """
     if not all_settings()[instruction.setting].hides_only_color(instruction):
         return False

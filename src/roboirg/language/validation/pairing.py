@@ -1,54 +1,45 @@
-"""Pairing: the settings and forms of an episode share their words but for what is studied."""
+"""Pairing: settings and forms of an episode share their words, except those under study."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import functools
+from collections.abc import Iterator, Sequence
 
 from roboirg.core.episode import Episode
-from roboirg.language.generator import instruct
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.language.generator import instruct_with
 from roboirg.language.instruction import Instruction, Mention
-from roboirg.language.settings import EXPLICIT
-
-MANY = 4
-"""Distractors of the long context that a short one must be the beginning of."""
+from roboirg.language.settings import all_settings
 
 
-def unpaired(episode: Episode, settings: tuple[str, ...]) -> Iterator[tuple[str, str]]:
-    """Settings whose words are not those of their counterpart, each with what is wrong."""
-    explicit, direct, contextual = (
-        instruct(episode, setting) for setting in ("explicit", "direct", "contextual")
-    )
-    if instruct(episode, "contextual", stages=(1, 5)).turns != direct.turns:
-        yield "contextual", "stages 1 and 5 are not the direct instruction"
-    if (contextual.turns[0], contextual.command) != (direct.turns[0], direct.command):
-        yield "contextual", "introduction or command are not those of direct"
-    if instruct(episode, "direct", "resolved").turns != (direct.turns[0], explicit.command):
-        yield "direct", "resolved, its command is not the explicit one"
-    long = instruct(episode, "contextual", distractors=MANY)
-    if (long.turns[:3], long.turns[-2:]) != (contextual.turns[:3], contextual.turns[-2:]):
-        yield "contextual", "few distractors are not the beginning of many"
-    for setting in settings:
-        implicit = instruct(episode, setting)
-        resolved = instruct(episode, setting, "resolved")
+def unpaired(episode: Episode, settings: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Yield settings whose words differ from their counterpart, each with the difference."""
+    for name in settings:
+        setting = all_settings()[name]
+        for complaint in setting.pairing_rules(functools.partial(instruct_with, episode)):
+            yield name, complaint
+        implicit, resolved = (
+            instruct_with(episode, InstructionOptions(name, form))
+            for form in ("implicit", "resolved")
+        )
         if implicit.turns[:-1] != resolved.turns[:-1]:
-            yield setting, "resolved, its context differs"
+            yield name, "resolved, its context differs"
         if without_references(implicit) != without_references(resolved):
-            yield setting, "resolved, more than its references differ"
-        if setting != EXPLICIT and implicit.command == resolved.command:
-            yield setting, "resolved, its command is still the implicit one"
-        if any(mention.role == "anaphor" for mention in _last(resolved)):
-            yield setting, "resolved, its command still points back"
+            yield name, "resolved, more than its references differ"
+        if setting.implicit and implicit.command == resolved.command:
+            yield name, "resolved, its command is still the implicit one"
+        if any(mention.role == "anaphor" for mention in _command_mentions(resolved)):
+            yield name, "resolved, its command still points back"
 
 
 def without_references(instruction: Instruction) -> str:
-    """The command with a mark in the place of every mention."""
+    """Return the command with a mark in the place of every mention."""
     text = instruction.command
-    for mention in reversed(_last(instruction)):
+    for mention in reversed(_command_mentions(instruction)):
         text = f"{text[: mention.start]}@{text[mention.end :]}"
     return text
 
 
-def _last(instruction: Instruction) -> list[Mention]:
-    """The mentions of the command."""
+def _command_mentions(instruction: Instruction) -> list[Mention]:
     last = len(instruction.utterances) - 1
     return [mention for mention in instruction.mentions if mention.utterance == last]

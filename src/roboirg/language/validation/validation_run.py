@@ -1,4 +1,4 @@
-"""The proof over many episodes, in batches and in processes."""
+"""Validate many episodes, in batches and in processes."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from roboirg.core.episode import Episode, Split
 from roboirg.core.errors import InvalidValueError, SceneRejectedError
 from roboirg.episodes.splits import SEED_STRIDE, SIZES, get_episode, make_episode, slot_difficulty
 from roboirg.language.validation.episode_checks import check_episode
-from roboirg.language.validation.evidence import ValidationResults
+from roboirg.language.validation.validation_results import ValidationResults
 from roboirg.util.parallel_map import parallel_map
 
 RANDOM_BASE = 10_000_000
-"""First random seed; those of the splits are smaller."""
+"""The first random seed; the seeds of the splits are smaller."""
 BATCH = 50
-"""Episodes that a process examines in one go."""
+"""Maximum size of a batch, in episodes."""
 
 
 class Batch(NamedTuple):
-    """Episodes in a row.
+    """Consecutive episodes.
 
     Attributes:
         task: name of the task.
-        split: theirs; None for random ones.
-        first: index of the first.
-        size: how many.
+        split: name of the split; None for random episodes.
+        first: index of the first episode.
+        size: number of episodes.
     """
 
     task: str
@@ -36,10 +36,15 @@ class Batch(NamedTuple):
 
 
 def batches(tasks: Sequence[str], splits: Sequence[Split], seeds: int) -> tuple[Batch, ...]:
-    """All episodes of the splits and so many random ones for each task.
+    """Return batches of all episodes of the splits and of random ones.
+
+    Args:
+        tasks: names.
+        splits: names.
+        seeds: number of random episodes for each task.
 
     Raises:
-        InvalidValueError: a negative number of random ones, or nothing at all to examine.
+        InvalidValueError: the number is negative, or there is nothing to validate.
     """
     if seeds < 0:
         raise InvalidValueError(f"The number of random seeds is {seeds}; it must be at least 0.")
@@ -52,15 +57,15 @@ def batches(tasks: Sequence[str], splits: Sequence[Split], seeds: int) -> tuple[
         for first in range(0, amount, BATCH)
     )
     if not found:
-        raise InvalidValueError("There is nothing to examine: neither a split nor a random seed.")
+        raise InvalidValueError("There is nothing to validate: no split and no random seed.")
     return found
 
 
 def random_episode(task: str, index: int) -> Episode:
-    """An episode that no split has; difficulties take turns as in the splits.
+    """Return an episode of no split; difficulties alternate as in the splits.
 
     Raises:
-        SceneRejectedError: no seed of that number gives a scene.
+        SceneRejectedError: none of the seeds for this index gives a scene.
     """
     first = RANDOM_BASE + SEED_STRIDE * index
     for seed in range(first, first + SEED_STRIDE):
@@ -70,22 +75,26 @@ def random_episode(task: str, index: int) -> Episode:
 
 
 def validate_batch(batch: Batch) -> ValidationResults:
-    """What the episodes of a batch prove."""
-    found = ValidationResults()
+    """Check the episodes of a batch."""
+    results = ValidationResults()
     for index in range(batch.first, batch.first + batch.size):
         if batch.split is None:
-            found.add(check_episode(random_episode(batch.task, index)))
+            results.add(check_episode(random_episode(batch.task, index)))
         else:
             episode = get_episode(batch.task, batch.split, index)
-            found.add(check_episode(episode, must_be_expressible=True))
-    return found
+            results.add(check_episode(episode, must_be_expressible=True))
+    return results
 
 
 def validate(work: Sequence[Batch], workers: int) -> Iterator[tuple[Batch, ValidationResults]]:
-    """Every batch with what it proves, as they end, in so many processes; 0 for this one.
+    """Yield every batch with its results, in the order of completion.
+
+    Args:
+        work: the batches.
+        workers: number of processes; 0 for this one.
 
     Raises:
-        InvalidValueError: a negative number of workers.
+        InvalidValueError: the number of workers is negative.
         RoboIRGError: a process died.
     """
     return parallel_map(validate_batch, work, workers)

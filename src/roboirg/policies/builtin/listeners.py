@@ -1,4 +1,4 @@
-"""Listeners: a reader of words in front of the oracle's hands."""
+"""Listeners: the interpreter in front of the scripted expert."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ if TYPE_CHECKING:
 
 
 class ListenerPolicy(ScriptedPolicy):
-    """Hears all that is said and understands it with the resolver.
+    """Language oracle: understands the whole instruction with the interpreter.
 
     It knows the scene (for hidden cubes what the video shows) but not the goal. If several goals
-    fit the words it chooses one of them at random, if none does one of all.
+    fit the words, it chooses one of them at random; if none does, one of all goals.
     """
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
-        """A goal that fits what was heard."""
+        """Return a goal that fits the instruction."""
         episode = env.episode
         goals = interpret(instruction, episode.scene, episode.task).goals
         choices = goals or get_task(episode.task).goals(episode.scene)
-        # Seeded by what is heard and where, so that the choice does not depend on what the
+        # Seeded by instruction and episode, so that the choice does not depend on what this
         # process played before.
         rng = np.random.default_rng([self.seed, episode.seed, zlib.crc32(instruction.encode())])
         return choices[int(rng.integers(len(choices)))]
 
 
 class ForgetfulPolicy(ListenerPolicy):
-    """Hears only the final command, then guesses uniformly among the goals that fit it.
+    """Command-only baseline: hears the final command and guesses among the goals that fit it.
 
-    What it reaches is the chance level of a setting: the share that needs no context.
+    Its success rate is the chance level of a setting: the share that needs no context.
     """
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:  # noqa: ARG002
-        """A goal that fits the final command alone."""
+        """Return a goal that fits the final command alone."""
         return super().decide(env, env.instruction.command)

@@ -1,4 +1,4 @@
-"""The oracle: knows the goal and where everything is."""
+"""The oracle: knows the goal and the poses of all objects."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
 
 class OraclePolicy(ScriptedPolicy):
-    """Privileged hands and mind; the upper bound, and the proof that an episode can be solved."""
+    """Executes the true goal: the upper bound, and the proof that an episode can be solved."""
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:  # noqa: ARG002
-        """The episode's goal, whatever is said."""
+        """Return the episode's goal; the instruction is ignored."""
         return env.episode.goal

@@ -1,4 +1,4 @@
-"""The random policy: valid actions without any sense."""
+"""The random policy: valid but meaningless actions."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from roboirg.core.actions import ARM_JOINTS, JOINT_HIGH, JOINT_LOW
 from roboirg.core.observations import Demonstration, Observation
 
 CHUNK = 16
-LARGEST_STEP = 0.045
-"""Radians per control step: 0.9 rad/s, the speed limit of the oracle's hands."""
+MAX_STEP = 0.045
+"""Radians per control step: 0.9 rad/s, the speed limit of the scripted expert."""
 
 
 class RandomPolicy:
-    """Wanders towards random joint positions and opens and closes the gripper."""
+    """Moves toward random joint positions, and opens and closes the gripper."""
 
     cameras: ClassVar[tuple[str, ...]] = ()
 
@@ -30,10 +30,10 @@ class RandomPolicy:
         self._rng = np.random.default_rng([self.seed, zlib.crc32(instruction.encode())])
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
-        """Sixteen actions towards a target within the joint limits."""
+        """Return sixteen actions toward a target within the joint limits."""
         joints = np.asarray(observation["joint_positions"], dtype=np.float64)
         target = self._rng.uniform(JOINT_LOW, JOINT_HIGH)
-        step = np.clip((target - joints) / CHUNK, -LARGEST_STEP, LARGEST_STEP)
+        step = np.clip((target - joints) / CHUNK, -MAX_STEP, MAX_STEP)
         path = joints + step * np.arange(1, CHUNK + 1)[:, None]
         gripper = self._rng.uniform(-1.0, 1.0)
         actions = np.column_stack([path, np.full(CHUNK, gripper)])

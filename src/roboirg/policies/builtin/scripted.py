@@ -1,4 +1,4 @@
-"""A mind in front of the oracle's hands: whoever decides on a goal, the hands do it."""
+"""Policies that choose a goal and execute it with the scripted expert."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
 MAX_RETRIES = 3
-"""How often in an episode the hands try again what did not work."""
+"""Retries of failed primitives per episode."""
 UNDOES_PICK = frozenset({"place_on", "put_down", "drop_into", "put_into", "move_over"})
-"""Primitives that need the object in the hand: to repeat one, it has to be picked up again."""
+"""Primitives that need an object in the gripper: to repeat one, the pick is repeated first."""
 
 
 class ScriptedPolicy(ABC):
-    """Decides on a goal at reset and then has the oracle's hands do it.
+    """Decides on a goal at reset and executes it with the scripted expert.
 
-    Privileged: the hands know where everything is.
+    Privileged: the expert reads the poses of all objects.
     """
 
     cameras: ClassVar[tuple[str, ...]] = ()
@@ -35,27 +35,27 @@ class ScriptedPolicy(ABC):
     def __init__(self, seed: int = 0) -> None:
         self.seed = seed
         self._env: RoboIRGEnv | None = None
-        self._pieces: Iterator[NDArray[np.float64]] = iter(())
+        self._chunks: Iterator[NDArray[np.float64]] = iter(())
 
     @abstractmethod
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
-        """The goal that this policy takes to be meant."""
+        """Return the goal to execute."""
 
     def attach(self, env: RoboIRGEnv) -> None:
-        """Get hold of the world in which the hands move."""
+        """Receive the environment in which the expert acts."""
         self._env = env
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:  # noqa: ARG002
-        """Decide what is meant and begin."""
+        """Decide on a goal and plan its stages."""
         env = self._attached()
         goal = self.decide(env, instruction)
         stages = get_task(env.episode.task).stages(env.episode.scene, goal)
-        self._pieces = _work(env, stages)
+        self._chunks = _execute(env, stages)
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:  # noqa: ARG002
-        """The next piece of movement; afterwards, to stay at rest."""
-        piece = next(self._pieces, None)
-        return piece if piece is not None else _rest(self._attached())
+        """Return the next chunk of the motion; after the last one, actions that hold still."""
+        chunk = next(self._chunks, None)
+        return chunk if chunk is not None else _hold_still(self._attached())
 
     def _attached(self) -> RoboIRGEnv:
         if self._env is None:
@@ -63,15 +63,15 @@ class ScriptedPolicy(ABC):
         return self._env
 
 
-def _work(env: RoboIRGEnv, stages: tuple[Stage, ...]) -> Iterator[NDArray[np.float64]]:
-    """Do one stage after the other; what did not work is tried again."""
+def _execute(env: RoboIRGEnv, stages: tuple[Stage, ...]) -> Iterator[NDArray[np.float64]]:
+    """Yield action chunks, stage by stage; a primitive that fails is retried."""
     from roboirg.simulation.expert.primitives import MotionPrimitives
 
-    hands, progress = MotionPrimitives(env.session.world), _Progress(env, stages)
+    primitives, progress = MotionPrimitives(env.session.world), _StageProgress(env, stages)
     index, retries = 0, 0
     while index < len(stages):
         primitive = stages[index].primitive
-        yield from hands.perform(primitive)
+        yield from primitives.execute(primitive)
         if progress.completed() > index:
             index += 1
         elif retries < MAX_RETRIES:
@@ -81,12 +81,12 @@ def _work(env: RoboIRGEnv, stages: tuple[Stage, ...]) -> Iterator[NDArray[np.flo
             return
 
 
-class _Progress:
-    """How many of the stages that somebody has in mind are completed.
+class _StageProgress:
+    """Counts the completed stages of a plan.
 
     Args:
-        env: where they are played; what happened before is not looked at.
-        stages: what is to be completed, in order.
+        env: of the episode; facts before now do not count.
+        stages: to be completed, in order.
     """
 
     def __init__(self, env: RoboIRGEnv, stages: tuple[Stage, ...]) -> None:
@@ -98,7 +98,7 @@ class _Progress:
         self._judge.update(self._step, self._facts)
 
     def completed(self) -> int:
-        """The number of completed stages, now."""
+        """Return the number of stages that are completed now."""
         session = self._env.session
         changes = iter(session.events[self._read :])
         change = next(changes, None)
@@ -113,8 +113,8 @@ class _Progress:
         return self._judge.index
 
 
-def _rest(env: RoboIRGEnv) -> NDArray[np.float64]:
-    """One second of staying where the robot is, with the gripper as it is."""
+def _hold_still(env: RoboIRGEnv) -> NDArray[np.float64]:
+    """Return one second of actions that keep the arm and the gripper as they are."""
     robot = env.session.world.robot
     gripper = 1.0 if robot.finger_positions.min() > 0.039 else -1.0  # noqa: PLR2004
     return np.tile(np.append(robot.arm_positions, gripper), (20, 1))

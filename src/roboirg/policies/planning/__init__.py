@@ -1,10 +1,10 @@
-"""Vision-language models behind policies: planners, and listeners that say what is meant.
+"""Vision-language models behind policies: planners, and listeners that name the goal.
 
-| part | what it is |
+| part | content |
 | --- | --- |
-| `content`, `models/` | pictures, clips and words to a model of any provider, and its reply |
-| `asking`, `prompts` | one question with one retry, what it cost, and our own words as data |
-| `slots`, `listener` | what is meant as structured output; the oracle's hands do it |
-| `planners/`, `planned` | subgoals in front of a policy that follows them |
-| `specs`, `systems` | how a name on the command line becomes one of these |
+| `model_content`, `models/` | pictures, clips and words to a model of any provider, and its reply |
+| `vlm_query`, `prompts` | one query with one retry, its cost, and our own words as data |
+| `goal_schema`, `vlm_listener` | goals as structured output, executed by the scripted expert |
+| `planners/`, `hierarchical_policy` | subgoals for a policy that follows them |
+| `policy_specs`, `systems` | from a name on the command line to one of these policies |
 """

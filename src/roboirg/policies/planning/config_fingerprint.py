@@ -1,27 +1,23 @@
-"""What tells one configuration of a model from another in the records."""
+"""Versions that distinguish the configurations of a model in the records."""
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Mapping
 from typing import Any
 
 from roboirg.policies.planning.models import ModelOptions
-
-FINGERPRINT_LENGTH = 12
-"""Hexadecimal digits."""
+from roboirg.util.short_hash import short_hash
 
 
-def fingerprint_of(model: ModelOptions, about: Mapping[str, Any]) -> str:
-    """The model's name and a fingerprint of all else that may change what it answers."""
-    settled = json.dumps(_without_address(about), sort_keys=True)
-    digest = hashlib.sha256(settled.encode()).hexdigest()
-    return f"{model.model} {digest[:FINGERPRINT_LENGTH]}"
+def config_version(model: ModelOptions, about: Mapping[str, Any]) -> str:
+    """Return the model's name and a fingerprint of all else that may change its answers."""
+    canonical = json.dumps(_without_address(about), sort_keys=True)
+    return f"{model.model} {short_hash(canonical)}"
 
 
 def _without_address(about: object) -> object:
-    """The same model at another port is the same model."""
+    """Leave out addresses: a model at another port is the same model."""
     if isinstance(about, Mapping):
-        return {name: _without_address(held) for name, held in about.items() if name != "address"}
+        return {name: _without_address(value) for name, value in about.items() if name != "address"}
     return about

@@ -1,7 +1,7 @@
-"""What can be meant in a task, as a JSON schema, and how an answer becomes a goal.
+"""All goals of a task as a JSON schema, and the goal of an answer.
 
-Everything follows from the goals that the task has in its training scenes: the names of the slots
-and all their possible values. Nothing is taken from the scene that is being played.
+The names of the slots and all their values come from the goals of the task's training scenes.
+Nothing comes from the scene of the episode.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 from roboirg.core.episode import Goal, SlotValue, Split
 from roboirg.episodes.splits import SIZES, get_episode
 from roboirg.language.request import COLOR_SLOTS, SLOT_TYPE_NAMES
-from roboirg.policies.planning.vlm_query import UnparsableReply, json_object
+from roboirg.policies.planning.vlm_query import UnparsableReplyError, json_object
 from roboirg.tasks import get_task
 
 Answer = Mapping[str, Any]
@@ -24,7 +24,7 @@ Answer = Mapping[str, Any]
 SOURCE: Split = "train"
 AMOUNT = "amount"
 LISTED = "colors"
-LONGEST_QUOTE = 80
+MAX_QUOTE_LENGTH = 80
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,9 @@ class Field:
 
     Attributes:
         name: of the field: a goal slot, or a color whose cubes are counted.
-        kind: what kind of value it holds, as in the goal's slots; ``colors`` for several.
-        values: every value it can have, or that an item of it can have.
-        lengths: of a list, its least and its greatest length; None for one value.
+        kind: slot type of the value; ``amount`` for a count, ``colors`` for a list of colors.
+        values: every possible value, or item of a list.
+        lengths: smallest and largest length of a list; None for a single value.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Field:
     lengths: tuple[int, int] | None = None
 
     def schema(self) -> dict[str, Any]:
-        """JSON schema of the field."""
+        """Return the JSON schema of the field."""
         kind = "integer" if isinstance(self.values[0], int) else "string"
         one: dict[str, Any] = {"type": kind, "enum": list(self.values)}
         if self.lengths is None:
@@ -55,12 +55,12 @@ class Field:
 
 @dataclass(frozen=True)
 class GoalSchema:
-    """All that can be meant in one task.
+    """All goals of one task, and the form of an answer that names one.
 
     Attributes:
         fields: of an answer, in order.
         goals: every goal, by its answer as canonical JSON.
-        thing: what has the colors, in words.
+        thing: noun for the objects that have the colors.
     """
 
     fields: tuple[Field, ...]
@@ -68,7 +68,7 @@ class GoalSchema:
     thing: str
 
     def schema(self, reasoning: str | None = None) -> dict[str, Any]:
-        """JSON schema of an answer; with `reasoning`, the words for a field in which to think."""
+        """Return the JSON schema of an answer; `reasoning` describes a field in which to think."""
         properties: dict[str, Any] = {}
         if reasoning is not None:
             properties["reasoning"] = {"type": "string", "description": reasoning}
@@ -81,48 +81,48 @@ class GoalSchema:
         }
 
     def read(self, text: str) -> Goal:
-        """The goal that a reply names.
+        """Return the goal that a reply names.
 
         Raises:
-            UnparsableReply: it names none; the sentence says what is wrong.
+            UnparsableReplyError: it names none; the message says why.
         """
         reply = json_object(text)
         answer = {}
         for field in self.fields:
             if field.name not in reply:
-                raise UnparsableReply(f"The field {field.name!r} is missing.")
-            answer[field.name] = _tidy(reply[field.name])
+                raise UnparsableReplyError(f"The field {field.name!r} is missing.")
+            answer[field.name] = _normalize(reply[field.name])
         try:
             return self.goals[_canonical(answer)]
         except KeyError:
             pass
         for field in self.fields:
             if not _allowed(answer[field.name], field):
-                raise UnparsableReply(
+                raise UnparsableReplyError(
                     f"The field {field.name!r} cannot be "
-                    f"{json.dumps(answer[field.name])[:LONGEST_QUOTE]}; "
+                    f"{json.dumps(answer[field.name])[:MAX_QUOTE_LENGTH]}; "
                     f"its values are {', '.join(map(str, field.values))}."
                 )
-        raise UnparsableReply("These values cannot be meant together.")
+        raise UnparsableReplyError("These values cannot be meant together.")
 
 
 @functools.cache
 def goal_schema(task: str) -> GoalSchema:
-    """All that can be meant in a task.
+    """Return the goal schema of a task.
 
     Raises:
         UnknownNameError: there is no such task.
     """
-    known = get_task(task)
+    known_task = get_task(task)
     goals: dict[str, Goal] = {}
     for index in range(SIZES[SOURCE]):
-        for goal in known.goals(get_episode(task, SOURCE, index).scene):
-            goals.setdefault(_canonical(answer_for(goal)), goal)
-    return _complete(goals, known.commands.colored)
+        for goal in known_task.goals(get_episode(task, SOURCE, index).scene):
+            goals.setdefault(_canonical(_answer(goal)), goal)
+    return _complete(goals, known_task.commands.colored)
 
 
-def answer_for(goal: Goal) -> dict[str, Any]:
-    """The answer that names a goal; colors it counts none of are left out."""
+def _answer(goal: Goal) -> dict[str, Any]:
+    """Return the answer that names a goal; colors with a count of 0 are left out."""
     slots = goal.as_mapping()
     if "counts" in slots:
         return dict(zip(goal.texts("colors"), goal.numbers("counts"), strict=True))
@@ -131,15 +131,9 @@ def answer_for(goal: Goal) -> dict[str, Any]:
     }
 
 
-def full_answer(goal: Goal, slots: GoalSchema) -> dict[str, Any]:
-    """The answer that names a goal, every field of the task filled."""
-    answer = answer_for(goal)
-    return {field.name: answer.get(field.name, 0) for field in slots.fields}
-
-
 def _complete(goals: Mapping[str, Goal], thing: str) -> GoalSchema:
-    """Fields from all goals; amounts that a goal does not name are 0."""
-    answers = [answer_for(goal) for goal in goals.values()]
+    """Return the schema of all goals; amounts that a goal does not name are 0."""
+    answers = [_answer(goal) for goal in goals.values()]
     names = max(answers, key=len).keys()
     counted = any("counts" in goal.as_mapping() for goal in goals.values())
     fields = tuple(_field(name, [one.get(name, 0) for one in answers], counted) for name in names)
@@ -152,15 +146,15 @@ def _complete(goals: Mapping[str, Goal], thing: str) -> GoalSchema:
 
 
 def _field(name: str, values: Iterable[SlotValue | list[str]], counted: bool) -> Field:
-    held = list(values)
+    values = list(values)
     if counted:
-        return Field(name, AMOUNT, _sorted(held))
-    if isinstance(held[0], list):
-        items = _sorted(item for value in held if isinstance(value, list) for item in value)
-        lengths = [len(value) for value in held if isinstance(value, list)]
+        return Field(name, AMOUNT, _sorted(values))
+    if isinstance(values[0], list):
+        items = _sorted(item for value in values if isinstance(value, list) for item in value)
+        lengths = [len(value) for value in values if isinstance(value, list)]
         return Field(name, LISTED, items, (min(lengths), max(lengths)))
     kind = "color" if name in COLOR_SLOTS else SLOT_TYPE_NAMES[name]
-    return Field(name, kind, _sorted(held))
+    return Field(name, kind, _sorted(values))
 
 
 def _sorted(values: Iterable[Any]) -> tuple[Any, ...]:
@@ -178,13 +172,13 @@ def _allowed(value: object, field: Field) -> bool:
     )
 
 
-def _tidy(value: object) -> object:
-    """Words as they are compared."""
+def _normalize(value: object) -> object:
+    """Return a value with its words in lower case and stripped."""
     if isinstance(value, str):
         return value.strip().lower()
-    return [_tidy(item) for item in value] if isinstance(value, list) else value
+    return [_normalize(item) for item in value] if isinstance(value, list) else value
 
 
 def _canonical(answer: Answer) -> str:
-    # JSON keeps true from 1 and 1.0 from 1, which Python would not.
+    # JSON distinguishes true and 1.0 from 1; Python dictionaries do not.
     return json.dumps(answer, sort_keys=True)

@@ -1,4 +1,4 @@
-"""A planner in front of a policy: together they are a policy."""
+"""A planner and a low-level policy as one policy."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from roboirg.core.actions import WAYPOINT
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Demonstration, DemonstrationFrames, Observation
-from roboirg.policies.base import Policy, SubgoalFollower
+from roboirg.policies.base import Policy, SubgoalFollower, close_policy
 from roboirg.policies.planning.observation_merging import (
     DemonstrationSubset,
-    both_cameras,
-    both_frames,
-    both_histories,
-    cut_history,
+    merge_cameras,
+    merge_demonstration_frames,
+    merge_observe_every,
+    select_history,
 )
 from roboirg.policies.planning.planner import Planner
 from roboirg.policies.requirements import (
@@ -32,53 +32,53 @@ if TYPE_CHECKING:
 
 
 class HierarchicalPolicy:
-    """Asks the planner before each of the policy's chunks and tells the policy what to do next.
+    """Gets a subgoal from the planner before each chunk and passes it to the policy.
 
-    Wishes of both are met: the environment shows what either wants, and each gets to see its own
-    part. Costs are added up.
+    The requirements of both are merged: the environment shows what either wants, and each
+    receives its own part. Costs are added.
 
     Args:
         planner: names subgoals.
         policy: follows them.
-        name: of the whole, for the records.
+        name: of the system, for the records.
 
     Raises:
         InvalidValueError: the policy has no method ``follow``.
     """
 
     def __init__(self, planner: Planner, policy: Policy, name: str | None = None) -> None:
-
         if not isinstance(policy, SubgoalFollower):
             raise InvalidValueError(
-                f"{type(policy).__name__} has no method follow(subgoal), so a planner cannot "
-                "stand in front of it."
+                f"{type(policy).__name__} has no method follow(subgoal), so it cannot take "
+                "subgoals from a planner."
             )
         self.planner, self.policy, self.name = planner, policy, name
         self.actions = wanted_actions(policy).name
-        self.cameras = both_cameras(wanted_cameras(policy), _cameras(planner))
+        self.cameras = merge_cameras(wanted_cameras(policy), _cameras(planner))
         self._frames = _frames(planner), wanted_demonstration_frames(policy)
-        self.demonstration_frames: DemonstrationFrames = both_frames(*self._frames)
-        self._looks = _observe_every(planner), wanted_history(policy)
-        self.observe_every = both_histories(*self._looks)
-        recalled = wanted_history_cameras(policy)
-        self.history_cameras = both_cameras(
-            wanted_cameras(policy) if recalled is None else recalled, _cameras(planner)
+        self.demonstration_frames: DemonstrationFrames = merge_demonstration_frames(*self._frames)
+        self._periods = _observe_every(planner), wanted_history(policy)
+        self.observe_every = merge_observe_every(*self._periods)
+        history_cameras = wanted_history_cameras(policy)
+        self.history_cameras = merge_cameras(
+            wanted_cameras(policy) if history_cameras is None else history_cameras,
+            _cameras(planner),
         )
         if self.actions == WAYPOINT.name and self.observe_every is None:
-            # Only what is seen tells how many control steps a way point took.
+            # Only the history tells how many control steps a waypoint took.
             self.observe_every = 1
         self.grounded = any(getattr(one, "grounded", False) for one in (planner, policy))
-        self._looked = self._step = self._rows = 0
+        self._observed = self._step = self._rows = 0
 
     @property
     def version(self) -> str:
-        """Of both."""
+        """The versions of both."""
         versions = (getattr(one, "version", "unknown") for one in (self.planner, self.policy))
         return " + ".join(str(version) for version in versions)
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """What both say of themselves."""
+        """The metadata of both."""
         return {
             "system": self.name,
             "planner": dict(getattr(self.planner, "metadata", {})),
@@ -86,8 +86,8 @@ class HierarchicalPolicy:
         }
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """A new episode begins for both."""
-        self._looked = self._step = self._rows = 0
+        """Begin an episode with both."""
+        self._observed = self._step = self._rows = 0
         views = [
             DemonstrationSubset(demonstration, self.demonstration_frames, one)
             for one in self._frames
@@ -96,19 +96,19 @@ class HierarchicalPolicy:
         self.policy.reset(instruction, views[1])
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
-        """Ask the planner, tell the policy, and let it act."""
+        """Pass the planner's subgoal to the policy, and return the policy's actions."""
         history = observation.get("history", ())
-        # Other than in way points, a row is a control step.
+        # Except for waypoints, a row is a control step.
         self._step += (
             len(history) * (self.observe_every or 1)
             if self.actions == WAYPOINT.name
             else self._rows
         )
         views = [
-            cut_history(observation, self._looked, self.observe_every, wanted)
-            for wanted in self._looks
+            select_history(observation, self._observed, self.observe_every, wanted)
+            for wanted in self._periods
         ]
-        self._looked += len(history)
+        self._observed += len(history)
         subgoal = self.planner.plan(views[0], self._step)
         if subgoal is not None and isinstance(self.policy, SubgoalFollower):
             self.policy.follow(subgoal)
@@ -117,7 +117,7 @@ class HierarchicalPolicy:
         return rows
 
     def usage(self) -> dict[str, float]:
-        """What both cost."""
+        """Return the cost of both."""
         total: dict[str, float] = {}
         for one in (self.planner, self.policy):
             usage = one.usage() if hasattr(one, "usage") else {}
@@ -126,25 +126,25 @@ class HierarchicalPolicy:
         return total
 
     def close(self) -> None:
-        """Close both, the second even if the first cannot be closed."""
+        """Close both, the second even if closing the first fails."""
         try:
-            _close(self.planner)
+            close_policy(self.planner)
         finally:
-            _close(self.policy)
+            close_policy(self.policy)
 
 
 class PrivilegedHierarchicalPolicy(HierarchicalPolicy):
-    """A planner and a policy of which at least one looks behind the scenes."""
+    """A planner and a policy of which at least one is privileged."""
 
     def attach(self, env: RoboIRGEnv) -> None:
-        """Hand the environment on."""
+        """Pass the environment on."""
         for one in (self.planner, self.policy):
             if hasattr(one, "attach"):
                 one.attach(env)
 
 
 def with_planner(planner: Planner, policy: Policy, name: str | None = None) -> HierarchicalPolicy:
-    """Planner and policy as one policy, which is privileged if either is.
+    """Join a planner and a policy; the result is privileged if either is.
 
     Raises:
         InvalidValueError: the policy has no method ``follow``.
@@ -159,16 +159,10 @@ def _cameras(planner: Planner) -> tuple[str, ...]:
 
 
 def _frames(planner: Planner) -> DemonstrationFrames:
-    wish: DemonstrationFrames = getattr(planner, "demonstration_frames", "none")
-    return wish
+    frames: DemonstrationFrames = getattr(planner, "demonstration_frames", "none")
+    return frames
 
 
 def _observe_every(planner: Planner) -> int | None:
-    wish: int | None = getattr(planner, "observe_every", None)
-    return wish
-
-
-def _close(one: object) -> None:
-    close = getattr(one, "close", None)
-    if close is not None:
-        close()
+    every: int | None = getattr(planner, "observe_every", None)
+    return every

@@ -1,22 +1,22 @@
-"""MemER's memory: frames that a model chose to keep, near ones merged into one."""
+"""MemER's memory: key frames chosen by a model, of which near ones are merged."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-NEAR = 8
-"""Control steps between neighbors of one group (MME-VLA; a comment of theirs says 10)."""
+MAX_GAP = 8
+"""Largest gap between neighbors of a group, control steps (MME-VLA; a comment there says 10)."""
 
 
-def merged(steps: Iterable[int], near: int = NEAR) -> tuple[int, ...]:
-    """One step for each group of near ones: the middle one, of two the later.
+def merge_keyframes(steps: Iterable[int], near: int = MAX_GAP) -> tuple[int, ...]:
+    """Replace each group of near steps by its middle one, of two the later.
 
     Args:
-        steps: at which frames were taken; in any order, repeated or not.
-        near: the most by which neighbors of a group are apart.
+        steps: of the frames, in any order, possibly repeated.
+        near: largest gap between neighbors of a group.
 
     Returns:
-        In order of time, each of them one of `steps`.
+        Some of `steps`, ascending.
     """
     groups: list[list[int]] = []
     for step in sorted(set(steps)):

@@ -1,4 +1,4 @@
-"""What a model is shown and told: words, pictures and clips, and how these become files."""
+"""The parts of a message to a model: words, pictures and clips, and their encoding."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from roboirg.core.errors import MissingDependencyError
 Pixels = NDArray[np.uint8]
 
 VIDEO_RATE = 30
-"""Frames per second at which MME-VLA's planners show control steps; the world has 20 a second."""
+"""Frames per second at which MME-VLA's planners show control steps (20 per second of the world)."""
 QUALITY = 23
 """x264's constant rate factor, its default."""
 
@@ -33,7 +33,7 @@ class Picture(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Clip:
-    """A short film.
+    """A short video.
 
     Attributes:
         frames: uint8 (T, height, width, 3), T >= 1; height and width are even.
@@ -45,42 +45,42 @@ class Clip:
 
     @functools.cached_property
     def file(self) -> bytes:
-        """As `mp4` makes it; made once, as a conversation shows its clips again and again."""
-        return mp4(self)
+        """The clip as MP4, encoded once: a conversation repeats its clips."""
+        return encode_mp4(self)
 
 
 Part = str | Picture | Clip
 
 
 class ChatTurn(NamedTuple):
-    """What one side of a conversation says."""
+    """One turn of a conversation."""
 
     role: Literal["user", "model"]
     parts: tuple[Part, ...]
 
 
-def evenly(frames: Pixels, most: int) -> Pixels:
-    """At most so many of the frames, evenly spaced, the first and the last among them."""
+def sample_evenly(frames: Pixels, most: int) -> Pixels:
+    """Return at most `most` frames, evenly spaced, including the first and the last."""
     if len(frames) <= most:
         return frames
     kept: Pixels = frames[np.linspace(0, len(frames) - 1, most).round().astype(int)]
     return kept
 
 
-def summary(frames: Pixels, most: int, steps: int) -> Clip:
-    """At most so many frames of a video, spread over the time that the whole of it would take.
+def summary_clip(frames: Pixels, most: int, steps: int) -> Clip:
+    """Return a clip of at most `most` frames that lasts as long as the whole video.
 
     Args:
         frames: uint8 (T, height, width, 3), T >= 1.
-        most: frames to keep.
-        steps: control steps from the first frame to after the last; each takes 1/30 s.
+        most: limit of the frames of the clip.
+        steps: control steps of the video; each takes 1/30 s.
     """
-    kept = evenly(frames, most)
+    kept = sample_evenly(frames, most)
     return Clip(kept, Fraction(VIDEO_RATE * len(kept), max(steps, len(kept))))
 
 
-def png(picture: Picture) -> bytes:
-    """A picture as a PNG file.
+def encode_png(picture: Picture) -> bytes:
+    """Return a picture as a PNG file.
 
     Raises:
         MissingDependencyError: PyAV is not installed.
@@ -97,8 +97,8 @@ def png(picture: Picture) -> bytes:
     return b"".join(bytes(packet) for packet in (*codec.encode(frame), *codec.encode(None)))
 
 
-def mp4(clip: Clip) -> bytes:
-    """A clip as an MP4 file, H.264.
+def encode_mp4(clip: Clip) -> bytes:
+    """Return a clip as an MP4 file, H.264.
 
     Raises:
         MissingDependencyError: PyAV is not installed.

@@ -1,4 +1,4 @@
-"""Two who look through one environment: what both get to see, and what is cut for each of them."""
+"""Merge the observation requirements of planner and policy, and select each one's part."""
 
 from __future__ import annotations
 
@@ -10,79 +10,86 @@ from numpy.typing import NDArray
 
 from roboirg.core.observations import CAMERAS, Demonstration, DemonstrationFrames, Observation
 
-DRAWN = tuple(f"{camera}_{kind}" for camera in CAMERAS for kind in ("rgb", "depth"))
-"""Fields of a demonstration of which every n-th entry may be asked for."""
+PICTURE_FIELDS = tuple(f"{camera}_{kind}" for camera in CAMERAS for kind in ("rgb", "depth"))
+"""Fields of a demonstration that may have only every n-th frame."""
 
 
-def both_cameras(one: tuple[str, ...], other: tuple[str, ...]) -> tuple[str, ...]:
-    """The cameras that either of them wants."""
+def merge_cameras(one: tuple[str, ...], other: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the cameras that either wants."""
     return tuple(camera for camera in CAMERAS if camera in (*one, *other))
 
 
-def both_frames(one: DemonstrationFrames, other: DemonstrationFrames) -> DemonstrationFrames:
-    """The pictures of the video in which each of them finds what it wants."""
-    wishes = [1 if wish == "all" else int(wish) for wish in (one, other) if wish != "none"]
-    if not wishes:
+def merge_demonstration_frames(
+    one: DemonstrationFrames, other: DemonstrationFrames
+) -> DemonstrationFrames:
+    """Return the frames of the video that contain those that each wants."""
+    strides = [1 if frames == "all" else int(frames) for frames in (one, other) if frames != "none"]
+    if not strides:
         return "none"
-    every = math.gcd(*wishes)
+    every = math.gcd(*strides)
     return "all" if every == 1 else every
 
 
-def both_histories(one: int | None, other: int | None) -> int | None:
-    """After how many steps to look, so that each of them sees what it wants."""
-    wishes = [wish for wish in (one, other) if wish is not None]
-    return math.gcd(*wishes) if wishes else None
+def merge_observe_every(one: int | None, other: int | None) -> int | None:
+    """Return the control steps between observations that contain those that each wants."""
+    periods = [every for every in (one, other) if every is not None]
+    return math.gcd(*periods) if periods else None
 
 
 class DemonstrationSubset(Mapping[str, NDArray[Any]]):
-    """A demonstration as one of the two wants it; still drawn only when it is read.
+    """The frames of a demonstration that one of the two wants; rendered only when read.
 
     Args:
-        demonstration: what the environment shows.
-        drawn: which pictures that has.
-        wanted: which pictures this one wants.
+        demonstration: of the environment.
+        available: its frames.
+        wanted: the frames to select.
     """
 
     def __init__(
-        self, demonstration: Demonstration, drawn: DemonstrationFrames, wanted: DemonstrationFrames
+        self,
+        demonstration: Demonstration,
+        available: DemonstrationFrames,
+        wanted: DemonstrationFrames,
     ) -> None:
         self._all = demonstration
-        self._hidden = DRAWN if wanted == "none" else ()
-        have, want = (1 if wish in ("all", "none") else int(wish) for wish in (drawn, wanted))
-        self._stride = want // have
+        self._hidden = PICTURE_FIELDS if wanted == "none" else ()
+        available_stride, wanted_stride = (
+            1 if frames in ("all", "none") else int(frames) for frames in (available, wanted)
+        )
+        self._stride = wanted_stride // available_stride
 
     def __getitem__(self, field: str) -> NDArray[Any]:
-        """The field's entries that are wanted; KeyError if there are none."""
+        """Return the selected entries of a field; KeyError if the field is not wanted."""
         if field in self._hidden:
             raise KeyError(field)
-        held = self._all[field]
-        return held[:: self._stride] if field in DRAWN and self._stride > 1 else held
+        values = self._all[field]
+        return values[:: self._stride] if field in PICTURE_FIELDS and self._stride > 1 else values
 
     def __iter__(self) -> Iterator[str]:
         return (field for field in self._all if field not in self._hidden)
 
     def __len__(self) -> int:
-        """The number of fields."""
+        """Return the number of fields."""
         return sum(1 for _ in self)
 
 
-def cut_history(
-    observation: Observation, looked: int, every: int | None, wanted: int | None
+def select_history(
+    observation: Observation, earlier: int, every: int | None, wanted: int | None
 ) -> Observation:
-    """An observation with as much of its history as one of the two wants.
+    """Return an observation with the part of its history that one of the two wants.
 
     Args:
-        observation: what the environment shows.
-        looked: how many looks of earlier histories there were in this episode.
-        every: control steps between looks.
-        wanted: control steps between the looks that are wanted, a multiple; None for none at all.
+        observation: of the environment.
+        earlier: observations in the earlier histories of this episode.
+        every: control steps between observations of the history.
+        wanted: control steps between the wanted ones, a multiple of `every`; None for no history.
     """
     if every is None or wanted == every:
         return observation
-    cut = {name: held for name, held in observation.items() if name != "history"}
+    selected = {name: value for name, value in observation.items() if name != "history"}
     if wanted is not None:
-        due = wanted // every
-        # Looks are taken at multiples of the period, counted from the beginning of the turn.
-        looks = enumerate(observation["history"], start=looked + 1)
-        cut["history"] = tuple(look for number, look in looks if number % due == 0)
-    return cast("Observation", cut)
+        stride = wanted // every
+        # Observations are taken at multiples of the period, counted from the start of the turn.
+        numbered = enumerate(observation["history"], start=earlier + 1)
+        selected["history"] = tuple(one for number, one in numbered if number % stride == 0)
+    return cast("Observation", selected)

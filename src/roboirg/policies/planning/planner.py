@@ -1,39 +1,29 @@
-"""The contract of planners: what stands in front of a policy and tells it what to do next."""
+"""The contract of planners, which give subgoals to a low-level policy."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 from roboirg.core.observations import Demonstration, Observation
-
-if TYPE_CHECKING:
-    from roboirg.envs.environment import RoboIRGEnv
 
 
 @runtime_checkable
 class Planner(Protocol):
-    """Names the next subgoal whenever a policy is about to choose its next actions.
+    """Names the next subgoal before each chunk of a policy.
 
-    The attributes ``cameras`` (by default none), ``demonstration_frames`` (none),
-    ``observe_every`` and ``grounded`` say what it wants to see, ``metadata``, ``usage()``,
-    ``close()`` and ``version`` what goes into the records, all as with a policy; all are optional.
+    As for policies, the attributes ``cameras`` (default: none), ``demonstration_frames``
+    (``"none"``), ``observe_every`` and ``grounded`` are its requirements, ``metadata``, ``usage()``
+    and ``version`` go into the records, ``close()`` ends an episode, and ``attach(env)`` makes it
+    privileged; all are optional.
     """
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """A new episode begins."""
+        """Begin an episode."""
 
     def plan(self, observation: Observation, step: int) -> str | None:
-        """The subgoal to pursue from now on; None for none.
+        """Return the subgoal from now on; None for none.
 
         Args:
-            observation: what is seen now; ``history`` with the planner's own ``observe_every``.
-            step: control steps that the policy has made in this episode.
+            observation: now; its ``history`` follows the planner's own ``observe_every``.
+            step: control steps of the policy in this episode so far.
         """
-
-
-@runtime_checkable
-class PrivilegedPlanner(Planner, Protocol):
-    """A planner that looks behind the scenes."""
-
-    def attach(self, env: RoboIRGEnv) -> None:
-        """The environment of the episode that is about to begin, called before ``reset``."""

@@ -1,21 +1,21 @@
-"""Points in subgoals: from the forms that models write to pixels of the front picture.
+"""Convert the points in a model's subgoals to pixels of the front picture.
 
-A policy that follows grounded subgoals reads ``at <y, x>``: row and column of the front picture of
-256 x 256 pixels. Models count to 1000 in both directions, and here too the row comes first.
+Policies that follow grounded subgoals read ``at <y, x>``: row and column of the front picture of
+256 x 256 pixels. Models use 0 to 1000 in both directions, also with the row first.
 """
 
 from __future__ import annotations
 
 import re
 
-from roboirg.policies.planning.vlm_query import UnparsableReply
+from roboirg.policies.planning.vlm_query import UnparsableReplyError
 
 PICTURE_SIZE = 256
 """Rows and columns of the front picture."""
 SCALE = 1000
-"""What models take for the whole height or width."""
-LONGEST_SUBGOAL = 300
-"""Characters; the policies cut what is longer than 128 tokens."""
+"""The whole height or width in a model's coordinates."""
+MAX_SUBGOAL_LENGTH = 300
+"""Characters; the policies truncate after 128 tokens."""
 
 _BOX = re.compile(r"(?:<\|box_start\|>)?\(\s*(\d+)\s*,\s*(\d+)\s*\)(?:<\|box_end\|>)?")
 _POINT = re.compile(r"<\s*(\d+)\s*,\s*(\d+)\s*>")
@@ -24,66 +24,65 @@ _END = re.compile(r"<\|(?:im_end|endoftext)\|>\s*$")
 _FINISHED = re.compile(r"\b(?:complete|completed|finished|done)\b")
 
 
-def pixel(value: int) -> int:
-    """A coordinate of a model's as a row or column, 0 to 255.
+def to_pixel(value: int) -> int:
+    """Return a model's coordinate as a row or column, 0 to 255.
 
-    1000 is the far edge. MME-VLA makes 256 of it, which is outside of the picture.
+    1000 is the far edge; MME-VLA converts it to 256, which is outside the picture.
     """
     return min(PICTURE_SIZE * value // SCALE, PICTURE_SIZE - 1)
 
 
-def from_boxes(text: str) -> str:
-    """A subgoal with box tokens ``<|box_start|>(y,x)<|box_end|>`` as one with pixels.
+def parse_boxes(text: str) -> str:
+    """Convert a subgoal with box tokens ``<|box_start|>(y,x)<|box_end|>`` to one with pixels.
 
-    The tokens around the numbers may be missing: servers strip them from what they return unless
-    told otherwise.
-
-    Raises:
-        UnparsableReply: there is no subgoal, or one with broken points.
-    """
-    return _checked(_BOX.sub(_as_pixels, tidied(text)))
-
-
-def from_points(text: str) -> str:
-    """A subgoal with points ``<y, x>`` of 0 to 1000 as one with pixels, all in one pass.
+    The tokens around the numbers may be missing, as servers strip them by default.
 
     Raises:
-        UnparsableReply: there is no subgoal, or one with broken points.
+        UnparsableReplyError: there is no subgoal, or its points are malformed.
     """
-    return _checked(_POINT.sub(_as_pixels, tidied(text)))
+    return _check_subgoal(_BOX.sub(_as_pixels, normalize_subgoal(text)))
 
 
-def tidied(text: str) -> str:
-    """A subgoal as a model wrote it, in one line, without quotes, full stop and end token.
+def parse_points(text: str) -> str:
+    """Convert a subgoal with points ``<y, x>`` of 0 to 1000 to one with pixels, in one pass.
 
-    In lower case, as everything that the policies were trained on.
+    Raises:
+        UnparsableReplyError: there is no subgoal, or its points are malformed.
+    """
+    return _check_subgoal(_POINT.sub(_as_pixels, normalize_subgoal(text)))
+
+
+def normalize_subgoal(text: str) -> str:
+    """Return a model's subgoal in one line, without quotes, full stop and end token.
+
+    It is in lower case, like all text that the policies were trained on.
     """
     return " ".join(_END.sub("", text).split()).lower().strip("\"'`. ")
 
 
-def without_places(subgoal: str) -> str:
-    """A subgoal without ``at <y, x>``: what is done, wherever it is."""
+def strip_points(subgoal: str) -> str:
+    """Return a subgoal without its ``at <y, x>``."""
     return _PLACE.sub("", subgoal)
 
 
 def says_finished(subgoal: str) -> bool:
-    """Whether a model says that there is nothing more to do; policies know no such subgoal."""
+    """Return whether a subgoal says that the task is complete, which policies do not know."""
     return _FINISHED.search(subgoal) is not None
 
 
 def _as_pixels(found: re.Match[str]) -> str:
     row, column = (int(number) for number in found.groups())
     if max(row, column) > SCALE:
-        raise UnparsableReply(f"The point {found[0]} is outside of 0 to {SCALE}.")
-    return f"<{pixel(row)}, {pixel(column)}>"
+        raise UnparsableReplyError(f"The point {found[0]} is outside of 0 to {SCALE}.")
+    return f"<{to_pixel(row)}, {to_pixel(column)}>"
 
 
-def _checked(subgoal: str) -> str:
+def _check_subgoal(subgoal: str) -> str:
     if not subgoal:
-        raise UnparsableReply("There is no subgoal.")
-    if len(subgoal) > LONGEST_SUBGOAL:
-        raise UnparsableReply(f"A subgoal has at most {LONGEST_SUBGOAL} characters.")
+        raise UnparsableReplyError("There is no subgoal.")
+    if len(subgoal) > MAX_SUBGOAL_LENGTH:
+        raise UnparsableReplyError(f"A subgoal has at most {MAX_SUBGOAL_LENGTH} characters.")
     rest = re.sub(r"<\d+, \d+>", "", subgoal)
     if any(sign in rest for sign in "<>|{}"):
-        raise UnparsableReply("The subgoal holds signs that are part of no point.")
+        raise UnparsableReplyError("The subgoal holds signs that are part of no point.")
     return subgoal

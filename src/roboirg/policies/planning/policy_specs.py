@@ -1,24 +1,24 @@
-"""How ``system:…`` and ``vlm-listener:…`` on the command line become policies.
+"""Make policies from ``system:…`` and ``vlm-listener:…`` on the command line.
 
-| spec | what it is |
+| spec | meaning |
 | --- | --- |
-| ``system:NAME?server=host:port&vlm=URL`` | a system of the paper, or one from a file |
-| ``vlm-listener:PROVIDER?model=NAME&base_url=URL`` | a model says what is meant |
+| ``system:NAME?server=host:port&vlm=URL`` | a system of the paper, or of a file |
+| ``vlm-listener:PROVIDER?model=NAME&base_url=URL`` | a model names the goal |
 
-Values with ``&`` or ``#`` in them are percent-encoded.
+Values that contain ``&`` or ``#`` are percent-encoded.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
-from urllib.parse import parse_qsl
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.policies.base import Policy
+from roboirg.policies.option_checking import check_options
 from roboirg.policies.planning.models import ModelOptions
-from roboirg.policies.planning.option_checking import check_options
 from roboirg.policies.planning.vlm_listener import ListenerOptions, VLMListener
+from roboirg.policies.policy_urls import parse_query
 from roboirg.policies.requirements import (
     wanted_actions,
     wanted_cameras,
@@ -37,16 +37,15 @@ Build = Callable[[int], Policy]
 
 
 class PolicyFactory:
-    """Makes policies, and has the attributes that a class of such policies would have.
+    """Makes policies, and has the attributes of a class of such policies.
 
     Args:
-        spec: what it was made from.
-        build: a policy from a seed; without network, and without the libraries of providers.
+        spec: names the policies.
+        build: makes a policy from a seed, without network or the libraries of providers.
         sample: a policy that `build` made.
     """
 
     def __init__(self, spec: str, build: Build, sample: Policy) -> None:
-
         self.spec, self._build = spec, build
         self.__name__ = spec
         self.cameras = wanted_cameras(sample)
@@ -58,32 +57,32 @@ class PolicyFactory:
         self.version = str(getattr(sample, "version", "unknown"))
 
     def __call__(self, seed: int = 0) -> Policy:
-        """A fresh policy."""
+        """Make a fresh policy."""
         return self._build(seed)
 
 
 class PrivilegedPolicyFactory(PolicyFactory):
-    """Makes policies that look behind the scenes; having ``attach`` says so."""
+    """Makes privileged policies; having ``attach`` declares it."""
 
     def attach(self, env: RoboIRGEnv) -> None:
-        """Not for factories: attach what they make."""
-        raise TypeError(f"{self.spec} makes policies; attach(env) is for one of those, not {env}.")
+        """Raise TypeError: only the policies themselves can be attached."""
+        raise TypeError(f"{self.spec} makes policies; call attach({env}) on one of those.")
 
 
 def find_policy_factory(spec: str) -> PolicyFactory | None:
-    """What makes the policies of a spec; None if the spec is of another kind.
+    """Return the factory of a spec; None if the spec is of another kind.
 
-    Needs no network, and no client library of any provider.
+    Needs neither a network nor a provider's client library.
 
     Raises:
         UnknownNameError: there is no such system, provider or option.
-        InvalidValueError: an option is missing, or has a value that it cannot have.
+        InvalidValueError: an option is missing or has an invalid value.
     """
     kind, colon, rest = spec.partition(":")
     if not colon or kind not in BUILDERS:
         return None
     name, _, query = rest.partition("?")
-    build = BUILDERS[kind](spec, name, _options(spec, query))
+    build = BUILDERS[kind](spec, name, parse_query(spec, query))
     sample = build(0)
     made = PrivilegedPolicyFactory if hasattr(sample, "attach") else PolicyFactory
     return made(spec, build, sample)
@@ -99,35 +98,21 @@ def _system(spec: str, name: str, options: Mapping[str, str]) -> Build:
 
 
 def _listener(_spec: str, name: str, options: Mapping[str, str]) -> Build:
-    """Options of listener and model stand side by side."""
+    """Return the builder of a VLM listener; its options and its model's stand side by side."""
     own = [option for option in ListenerOptions.model_fields if option != "model"]
-    asked = [option for option in ModelOptions.model_fields if option != "provider"]
+    of_model = [option for option in ModelOptions.model_fields if option != "provider"]
     for option in options:
-        if option not in (*own, *asked):
-            raise UnknownNameError(f"option of {LISTENER}:", option, [*own, *asked])
+        if option not in (*own, *of_model):
+            raise UnknownNameError(f"option of {LISTENER}:", option, [*own, *of_model])
     values: dict[str, Any] = {key: value for key, value in options.items() if key in own}
     model: dict[str, Any] = {key: value for key, value in options.items() if key not in own}
     origin = f"policy {LISTENER}:{name}"
     values["model"] = check_options(ModelOptions, {"provider": name, **model}, origin)
-    settled = check_options(ListenerOptions, values, origin)
-    return lambda seed: VLMListener(settled, seed)
+    checked = check_options(ListenerOptions, values, origin)
+    return lambda seed: VLMListener(checked, seed)
 
 
 BUILDERS: Mapping[str, Callable[[str, str, Mapping[str, str]], Build]] = {
     SYSTEM: _system,
     LISTENER: _listener,
 }
-
-
-def _options(spec: str, query: str) -> dict[str, str]:
-    try:
-        pairs = parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query))
-    except ValueError as error:
-        raise InvalidValueError(
-            f"Policy {spec!r}: options are written ?name=value&name=value, not {query!r}."
-        ) from error
-    names = [name for name, _ in pairs]
-    for name in names:
-        if names.count(name) > 1:
-            raise InvalidValueError(f"Policy {spec!r} gives the option {name!r} twice.")
-    return dict(pairs)

@@ -1,8 +1,7 @@
-"""The words that models are told: data in ``prompts/``, versioned by their hash."""
+"""The prompts of models: data in ``prompts/``, versioned by their hash."""
 
 from __future__ import annotations
 
-import hashlib
 import tomllib
 from dataclasses import dataclass
 from importlib import resources
@@ -11,22 +10,21 @@ from string import Template
 from typing import Any
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.util.short_hash import short_hash
 
 FOLDER = "prompts"
 SHARED = "subgoals"
-"""The file with the forms that subgoals have, which all planners are told."""
-FINGERPRINT_LENGTH = 12
-"""Hexadecimal digits."""
+"""The file with the forms of subgoals, for the prompts of all planners."""
 
 
 @dataclass(frozen=True)
 class Prompts:
-    """The words for one kind of question.
+    """The prompts of one planner or listener.
 
     Attributes:
         texts: by name, nested as in the file.
-        fingerprint: of the file, so that records of other words can be told apart.
-        origin: which file it is, for complaints.
+        fingerprint: of the file, to distinguish records of other prompts.
+        origin: the file, for error messages.
     """
 
     texts: dict[str, Any]
@@ -34,10 +32,10 @@ class Prompts:
     origin: str
 
     def __getitem__(self, name: str) -> Template:
-        """The words of that name; a dot goes into a table.
+        """Return the text of a name; a dot descends into a table.
 
         Raises:
-            InvalidValueError: the file has no such words.
+            InvalidValueError: the file has no such text.
         """
         found: Any = self.texts
         for part in name.split("."):
@@ -47,10 +45,10 @@ class Prompts:
         return Template(found.strip())
 
     def fill(self, name: str, /, **fields: str) -> str:
-        """The words of that name with their fields filled.
+        """Return the text of a name with its fields filled.
 
         Raises:
-            InvalidValueError: there are no such words, or they have a field nobody fills.
+            InvalidValueError: the file has no such text, or the text has an unknown field.
         """
         try:
             return self[name].substitute(fields)
@@ -61,15 +59,19 @@ class Prompts:
             ) from error
 
     def lines(self, name: str) -> tuple[str, ...]:
-        """A list of texts."""
+        """Return the list of texts of a name.
+
+        Raises:
+            InvalidValueError: the file has no such list.
+        """
         found = self.texts.get(name)
         if not isinstance(found, list) or not all(isinstance(line, str) for line in found):
-            raise InvalidValueError(f"Prompts {self.origin}: {name!r} is no list of texts.")
+            raise InvalidValueError(f"Prompts {self.origin}: {name!r} is not a list of texts.")
         return tuple(found)
 
 
 def load_prompts(name: str, file: str | None = None) -> Prompts:
-    """Our own words of that name, or somebody's from a file with the same entries.
+    """Load our own prompts of that name, or those of a file with the same entries.
 
     Raises:
         InvalidValueError: the file cannot be read or is not TOML.
@@ -87,4 +89,4 @@ def load_prompts(name: str, file: str | None = None) -> Prompts:
         texts = tomllib.loads(content.decode())
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InvalidValueError(f"Prompts {origin!r} are not TOML ({error}).") from error
-    return Prompts(texts, hashlib.sha256(content).hexdigest()[:FINGERPRINT_LENGTH], origin)
+    return Prompts(texts, short_hash(content), origin)

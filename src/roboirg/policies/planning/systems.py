@@ -1,4 +1,4 @@
-"""Systems: a policy, perhaps with a planner in front, as a file; those of the paper are at hand."""
+"""Systems: configurations of a policy and an optional planner, such as the paper's seven."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from pydantic import BaseModel, ConfigDict
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.policies.base import Policy
+from roboirg.policies.option_checking import check_options
 from roboirg.policies.planning.hierarchical_policy import with_planner
-from roboirg.policies.planning.option_checking import check_options
 from roboirg.policies.planning.planners import make_planner
 from roboirg.policies.policy_classes import find_class, make_from_class
 from roboirg.policies.policy_urls import is_url, split_url
@@ -24,20 +24,20 @@ SUFFIX = ".toml"
 
 SERVER, VLM, MODEL = "server", "vlm", "model"
 POLICY, PLANNER = "policy.", "planner."
-SHORT: Mapping[str, str] = {VLM: "planner.model.base_url", MODEL: "planner.model.model"}
-"""Options with names of their own, and the entries that they set."""
-OPTIONS = (SERVER, *SHORT, "policy.OPTION", "planner.OPTION", "planner.model.OPTION")
+SHORTCUTS: Mapping[str, str] = {VLM: "planner.model.base_url", MODEL: "planner.model.model"}
+"""Short names of options, and the entries that they set."""
+OPTIONS = (SERVER, *SHORTCUTS, "policy.OPTION", "planner.OPTION", "planner.model.OPTION")
 
 
 class Published(BaseModel):
-    """Where a system comes from and how its servers are started.
+    """Origin of a system, and the commands that start its servers.
 
     Attributes:
         checkpoint: of the policy, in its public release.
-        server: the command that serves the policy, in the release's repository.
-        vlm: the command that serves the planner's model, if there is one to serve.
-        flags: what RoboMME's own client is given for this system and not for others.
-        differs: what is not the same here, in words.
+        server: command that serves the policy, in the release's repository.
+        vlm: command that serves the planner's model, if it is served locally.
+        flags: of RoboMME's own client, specific to this system.
+        differs: differences of this configuration from the release.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -50,14 +50,14 @@ class Published(BaseModel):
 
 
 class System(BaseModel):
-    """A system to be evaluated.
+    """A system to evaluate.
 
     Attributes:
         name: as on the command line.
         about: one sentence.
-        policy: spec of the policy that acts.
-        planner: ``kind`` and options of the planner in front of it, or None.
-        published: where it comes from; None for own systems.
+        policy: spec of the low-level policy.
+        planner: ``kind`` and options of its planner, or None.
+        published: its origin; None for systems of your own.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -72,7 +72,7 @@ class System(BaseModel):
 def load_system(
     name_or_file: str, overrides: Mapping[str, str] | None = None, seed: int = 0
 ) -> Policy:
-    """A system as a policy; nothing is connected.
+    """Load a system as a policy; nothing is connected.
 
     Args:
         name_or_file: a name such as ``GroundSG-QwenVL``, or a TOML file with the same entries.
@@ -82,19 +82,19 @@ def load_system(
 
     Raises:
         UnknownNameError: there is no such system or option.
-        InvalidValueError: the file cannot be read, or an option has a value that it cannot have.
+        InvalidValueError: the file cannot be read, or an option has an invalid value.
     """
     return build_system(find_system(name_or_file, overrides or {}), seed)
 
 
 def all_systems() -> tuple[str, ...]:
-    """The names of the systems at hand."""
+    """Return the names of the systems in this package."""
     files = resources.files(PACKAGE).joinpath(FOLDER).iterdir()
     return tuple(sorted(_stem(one.name) for one in files if one.name.endswith(SUFFIX)))
 
 
 def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
-    """A system with some entries overridden; see `load_system`."""
+    """Load a system with some entries overridden; see `load_system`."""
     if name_or_file in all_systems():
         file = resources.files(PACKAGE).joinpath(FOLDER, f"{name_or_file}{SUFFIX}")
         content = file.read_bytes()
@@ -114,11 +114,11 @@ def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
 
 
 def build_system(system: System, seed: int) -> Policy:
-    """A system as a policy; nothing is connected.
+    """Make the policy of a system; nothing is connected.
 
     Raises:
         UnknownNameError: there is no such planner, policy or option.
-        InvalidValueError: an option has a value that it cannot have.
+        InvalidValueError: an option has an invalid value.
     """
     policy = make_from_class(system.policy, find_class(system.policy), seed)
     if system.planner is None:
@@ -132,7 +132,7 @@ def build_system(system: System, seed: int) -> Policy:
 def _overridden(system: System, overrides: Mapping[str, str], origin: str) -> System:
     policy, planner = system.policy, system.planner
     for option, value in overrides.items():
-        entry = SHORT.get(option, option)
+        entry = SHORTCUTS.get(option, option)
         if option == SERVER or option.startswith(POLICY):
             policy = _policy_with(policy, option, value, origin)
         elif not entry.startswith(PLANNER):
@@ -145,10 +145,10 @@ def _overridden(system: System, overrides: Mapping[str, str], origin: str) -> Sy
 
 
 def _policy_with(spec: str, option: str, value: str, origin: str) -> str:
-    """A policy's URL with another server or another option."""
+    """Return a policy's URL with another server or another option."""
     if not is_url(spec):
         raise InvalidValueError(
-            f"Option {option!r}: the policy of {origin} is {spec!r}, which is no URL."
+            f"Option {option!r}: the policy of {origin} is {spec!r}, which is not a URL."
         )
     url = split_url(spec)
     place, options = url.place, dict(url.options)
@@ -164,8 +164,8 @@ def _nested(entries: Mapping[str, Any], path: list[str], value: str) -> dict[str
     first, *rest = path
     if not rest:
         return {**entries, first: value}
-    held = entries.get(first, {})
-    return {**entries, first: _nested(held if isinstance(held, dict) else {}, rest, value)}
+    table = entries.get(first, {})
+    return {**entries, first: _nested(table if isinstance(table, dict) else {}, rest, value)}
 
 
 def _stem(name: str) -> str:

@@ -1,8 +1,8 @@
-"""A vision-language model in front of the oracle's hands: it says what is meant, they do it.
+"""A vision-language model names the goal; the scripted expert executes it.
 
-What the model is told is what a policy may know: the words, the video, the first picture, and for
-each slot of the task the values that it can have in any scene. The scene itself is looked at only
-to move the hands.
+The model receives what a policy may know: the instruction, the video, the first picture, and for
+each slot of the task its possible values in any scene. The scene itself is read only to execute
+the goal.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from pydantic import Field as Option
 from roboirg.core.episode import Goal
 from roboirg.core.observations import Demonstration
 from roboirg.policies.builtin.scripted import ScriptedPolicy
-from roboirg.policies.planning.config_fingerprint import fingerprint_of
+from roboirg.policies.planning.config_fingerprint import config_version
 from roboirg.policies.planning.goal_schema import Field, GoalSchema, goal_schema
-from roboirg.policies.planning.model_content import ChatTurn, Part, Picture, summary
+from roboirg.policies.planning.model_content import ChatTurn, Part, Picture, summary_clip
 from roboirg.policies.planning.models import ModelOptions, ModelQuery
 from roboirg.policies.planning.prompts import load_prompts
 from roboirg.policies.planning.vlm_query import VLMQuery
@@ -32,14 +32,14 @@ PROMPTS = "listener"
 
 
 class ListenerOptions(BaseModel):
-    """How a listener asks.
+    """Options of a VLM listener.
 
     Attributes:
-        model: which model it asks, and how.
-        frames: pictures of the video at most, evenly spaced.
-        frames_every: control steps between the pictures of the video that are drawn at all.
-        reasoning: whether the answer has a field in which the model may think first.
-        prompts: a file with other words, or None for our own.
+        model: the model and its options.
+        frames: maximum of video frames, evenly spaced.
+        frames_every: control steps between the video frames that are rendered.
+        reasoning: whether the answer begins with a field in which the model may think.
+        prompts: a file with other prompts, or None for our own.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -51,16 +51,16 @@ class ListenerOptions(BaseModel):
     prompts: str | None = None
 
 
-class NotUnderstood(Exception):  # noqa: N818 - an outcome; never leaves `VLMListener.reset`
-    """There is no goal to pursue."""
+class NotUnderstoodError(Exception):
+    """The model named no goal of this scene; caught by `VLMListener.reset`."""
 
 
 class VLMListener(ScriptedPolicy):
-    """Understands what a vision-language model understands, and does it with the oracle's hands.
+    """Executes the goal that a vision-language model names.
 
-    If the model gives no valid answer, even when asked again, or means what is not there, the
-    robot stays at rest until time is up: a failure of understanding like any other, and never a
-    lucky one. `usage` tells how often (``unparsed``, ``impossible``).
+    If the model gives no valid answer even to a second query, or names objects that the scene does
+    not have, the robot holds still until time is up: a failure that cannot succeed by luck.
+    `usage` counts both cases (``unparsed``, ``impossible``).
 
     Raises:
         InvalidValueError: the prompts cannot be read.
@@ -74,24 +74,24 @@ class VLMListener(ScriptedPolicy):
         self.demonstration_frames = options.frames_every
         self.prompts = load_prompts(PROMPTS, options.prompts)
         self.understood: Goal | None = None
-        self._asker = VLMQuery(options.model, self.prompts["again"])
+        self._vlm = VLMQuery(options.model, self.prompts["again"])
         self._demonstration: Demonstration = {}
         self._impossible = 0
 
     @property
     def version(self) -> str:
-        """The model, and a fingerprint of the options and words that may change its answers."""
-        return fingerprint_of(self.options.model, self.metadata_of_options())
+        """The model, and a fingerprint of the options and prompts that may change its answers."""
+        return config_version(self.options.model, self.metadata_of_options())
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """Options and words, and what the model took to be meant (None if nothing valid)."""
+        """Options and prompts, and the goal that the model named (None if none was valid)."""
         goal = self.understood
         understood = None if goal is None else dict(goal.as_mapping())
         return {**self.metadata_of_options(), "understood": understood}
 
     def metadata_of_options(self) -> dict[str, Any]:
-        """What is known before anything is asked; no key is in it."""
+        """Return the options and prompts; there is no key among them."""
         own = self.options.model_dump(mode="json", exclude={"model", "prompts"})
         return {
             "model": self.options.model.about(),
@@ -100,61 +100,63 @@ class VLMListener(ScriptedPolicy):
         }
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Ask what is meant and begin to do it.
+        """Query the goal and begin to execute it.
 
         Raises:
             PolicyConnectionError: the model cannot be reached.
             PolicyTimeoutError: it did not answer in time.
-            PolicyReplyError: it answered with an error.
+            PolicyReplyError: it replied with an error.
         """
-        self._asker.start()
+        self._vlm.start()
         self._demonstration, self.understood, self._impossible = demonstration, None, 0
-        self._pieces = iter(())
+        self._chunks = iter(())
         try:
             super().reset(instruction, demonstration)
-        except NotUnderstood:
+        except NotUnderstoodError:
             return
         finally:
             self._demonstration = {}
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
-        """The goal that the model takes to be meant.
+        """Return the goal that the model names.
 
         Raises:
-            NotUnderstood: it gave no valid answer, or none that this scene allows.
+            NotUnderstoodError: there was no valid answer, or the scene has no such goal.
         """
-        slots = goal_schema(env.episode.task)
+        schema = goal_schema(env.episode.task)
         picture = Picture(env.picture(CAMERA))
-        goal = self._asker.ask(self._query(slots, instruction, picture), slots.read)
+        goal = self._vlm.ask(self._build_query(schema, instruction, picture), schema.read)
         self.understood = goal
         if goal is None:
-            raise NotUnderstood
+            raise NotUnderstoodError
         if goal not in get_task(env.episode.task).goals(env.episode.scene):
             self._impossible += 1
-            raise NotUnderstood
+            raise NotUnderstoodError
         return goal
 
     def usage(self) -> dict[str, float]:
-        """What the episode cost."""
-        return {**self._asker.usage(), "impossible": self._impossible}
+        """Return the cost of the episode."""
+        return {**self._vlm.usage(), "impossible": self._impossible}
 
     def close(self) -> None:
-        """Let go of the connection."""
-        self._asker.close()
+        """Close the connection."""
+        self._vlm.close()
 
-    def _query(self, slots: GoalSchema, instruction: str, picture: Picture) -> ModelQuery:
-        words, reasoning = self.prompts, None
+    def _build_query(self, schema: GoalSchema, instruction: str, picture: Picture) -> ModelQuery:
+        prompts, reasoning = self.prompts, None
         if self.options.reasoning:
-            reasoning = words.fill("reasoning_field")
-        listing = "\n".join(self._lines(slots, reasoning))
+            reasoning = prompts.fill("reasoning_field")
+        fields = "\n".join(self._describe_fields(schema, reasoning))
         parts: tuple[Part, ...] = (
-            words.fill("instruction", instruction=instruction),
+            prompts.fill("instruction", instruction=instruction),
             *self._video(),
-            words.fill("now"),
+            prompts.fill("now"),
             picture,
-            words.fill("question", fields=listing),
+            prompts.fill("question", fields=fields),
         )
-        return ModelQuery(words.fill("system"), (ChatTurn("user", parts),), slots.schema(reasoning))
+        return ModelQuery(
+            prompts.fill("system"), (ChatTurn("user", parts),), schema.schema(reasoning)
+        )
 
     def _video(self) -> Iterator[Part]:
         steps = len(self._demonstration.get("joint_positions", ()))
@@ -162,14 +164,14 @@ class VLMListener(ScriptedPolicy):
             yield self.prompts.fill("no_video")
             return
         yield self.prompts.fill("video", steps=str(steps))
-        yield summary(self._demonstration[f"{CAMERA}_rgb"], self.options.frames, steps)
+        yield summary_clip(self._demonstration[f"{CAMERA}_rgb"], self.options.frames, steps)
 
-    def _lines(self, slots: GoalSchema, reasoning: str | None) -> Iterator[str]:
+    def _describe_fields(self, schema: GoalSchema, reasoning: str | None) -> Iterator[str]:
         if reasoning is not None:
             yield f"- reasoning: {reasoning}"
-        for field in slots.fields:
+        for field in schema.fields:
             meaning = self.prompts.fill(
-                f"meanings.{field.kind}", color=field.name, thing=slots.thing
+                f"meanings.{field.kind}", color=field.name, thing=schema.thing
             )
             values = self._values(field)
             yield self.prompts.fill("field", name=field.name, meaning=meaning, values=values)

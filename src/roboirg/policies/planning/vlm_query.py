@@ -1,4 +1,4 @@
-"""One question, one retry if the reply does not parse, and what it all cost."""
+"""Query a model, with one retry if the reply does not parse, and count the cost."""
 
 from __future__ import annotations
 
@@ -18,18 +18,20 @@ SILENCE = "(no answer)"
 """Stands for an empty reply when it is quoted back; services refuse empty turns."""
 
 
-class UnparsableReply(Exception):  # noqa: N818 - caught by `VLMQuery.ask`, which asks again
-    """A reply is not what was asked for; the sentence tells the model why."""
+class UnparsableReplyError(Exception):
+    """A reply is unusable; `VLMQuery.ask` sends the message to the model and asks again."""
 
 
 @dataclass
 class VLMQuery:
-    """Asks one model and keeps the account of an episode.
+    """Queries one model and counts the cost of an episode.
 
     Attributes:
-        options: of the model. The connection is made at the first question.
-        again: what the model is told when its reply does not parse, with ``$why``.
-        unparsed: questions that had no usable answer even at the second try.
+        options: of the model, which is connected at the first query.
+        again: prompt for the second try, with ``$why``.
+        calls: requests, second tries included.
+        input_tokens, output_tokens: of all calls.
+        unparsed: queries without a usable reply even at the second try.
     """
 
     options: ModelOptions
@@ -41,32 +43,32 @@ class VLMQuery:
     _model: Model | None = field(default=None, init=False, repr=False)
 
     def ask(self, query: ModelQuery, parse: Callable[[str], Value]) -> Value | None:
-        """What `parse` makes of the reply; None if it could make nothing of two of them.
+        """Return the parsed reply; None if `parse` rejects two replies.
 
         Raises:
             PolicyConnectionError: the service cannot be reached or is overloaded.
-            PolicyTimeoutError: there was no answer in time.
-            PolicyReplyError: the service answered with an error or with something else.
+            PolicyTimeoutError: there was no reply in time.
+            PolicyReplyError: the service replied with an error or with something else.
         """
-        reply = self._answer(query)
+        reply = self._request(query)
         try:
             return parse(reply.text)
-        except UnparsableReply as error:
-            said = ChatTurn("model", (reply.text or SILENCE,))
-            asked = ChatTurn("user", (self.again.substitute(why=str(error)),))
+        except UnparsableReplyError as error:
+            rejected = ChatTurn("model", (reply.text or SILENCE,))
+            retry = ChatTurn("user", (self.again.substitute(why=str(error)),))
         try:
-            second = self._answer(query._replace(turns=(*query.turns, said, asked)))
+            second = self._request(query._replace(turns=(*query.turns, rejected, retry)))
             return parse(second.text)
-        except UnparsableReply:
+        except UnparsableReplyError:
             self.unparsed += 1
             return None
 
     def start(self) -> None:
-        """A new episode begins: nothing has been asked."""
+        """Reset the counts for a new episode."""
         self.calls = self.input_tokens = self.output_tokens = self.unparsed = 0
 
     def usage(self) -> dict[str, float]:
-        """Calls, tokens and questions without a usable answer; the cost if prices are known."""
+        """Return calls, tokens and queries without a usable reply; the cost if prices are known."""
         usage: dict[str, float] = {
             "calls": self.calls,
             "input_tokens": self.input_tokens,
@@ -75,17 +77,18 @@ class VLMQuery:
         }
         prices = self.options.input_price, self.options.output_price
         if prices != (None, None):
-            into, out = (price or 0.0 for price in prices)
-            usage["cost_usd"] = (self.input_tokens * into + self.output_tokens * out) / MILLION
+            input_price, output_price = (price or 0.0 for price in prices)
+            total = self.input_tokens * input_price + self.output_tokens * output_price
+            usage["cost_usd"] = total / MILLION
         return usage
 
     def close(self) -> None:
-        """Let go of the connection."""
+        """Close the connection."""
         model, self._model = self._model, None
         if model is not None:
             model.close()
 
-    def _answer(self, query: ModelQuery) -> ModelReply:
+    def _request(self, query: ModelQuery) -> ModelReply:
         if self._model is None:
             self._model = make_model(self.options)
         self.calls += 1
@@ -96,10 +99,10 @@ class VLMQuery:
 
 
 def json_object(text: str) -> dict[str, Any]:
-    """The JSON object in a reply, which may have words or a code fence around it.
+    """Return the JSON object in a reply, which may have words or a code fence around it.
 
     Raises:
-        UnparsableReply: there is none.
+        UnparsableReplyError: there is none.
     """
     decoder = json.JSONDecoder()
     start = text.find("{")
@@ -111,16 +114,16 @@ def json_object(text: str) -> dict[str, Any]:
             continue
         if isinstance(found, dict):
             return found
-    raise UnparsableReply("The reply holds no JSON object.")
+    raise UnparsableReplyError("The reply holds no JSON object.")
 
 
 def text_of(reply: dict[str, Any], name: str) -> str:
-    """A field of a reply that has to hold words, in one line.
+    """Return a text field of a reply, in one line.
 
     Raises:
-        UnparsableReply: it does not.
+        UnparsableReplyError: there is no such text.
     """
     value = reply.get(name)
     if not isinstance(value, str) or not value.strip():
-        raise UnparsableReply(f"The field {name!r} has to hold words.")
+        raise UnparsableReplyError(f"The field {name!r} has to hold words.")
     return " ".join(value.split())

@@ -1,1 +1,1 @@
-"""Policies behind a network connection: one file per wire protocol over shared pieces."""
+"""What remote policies share: endpoints, server locks, connections and the message codec."""

@@ -1,4 +1,4 @@
-"""What is common to all connections: their limits, and how long to try to open one."""
+"""What all connections share: their limits, retries while opening, and the reading of replies."""
 
 from __future__ import annotations
 
@@ -8,15 +8,14 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 
 from roboirg.core.errors import PolicyConnectionError, PolicyReplyError
 from roboirg.policies.remote.endpoints import Endpoint, RemoteOptions
-from roboirg.policies.remote.message_codec import CodecError, unpack
 
-FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
+FIRST_PAUSE, MAX_PAUSE = 0.1, 5.0
 """Seconds between two attempts to connect; each pause is twice the one before."""
-_LONGEST_WORDS = 300
+_MAX_ERROR_LENGTH = 300
 
 
 class ConnectionSpec(NamedTuple):
-    """A server and how it is spoken to.
+    """A server and the options of its connections.
 
     Attributes:
         scheme: of the policy's URL.
@@ -33,72 +32,74 @@ class ConnectionSpec(NamedTuple):
 
 
 class Connection(Protocol):
-    """A connection that is open.
+    """An open connection.
 
     Attributes:
-        metadata: what the server said about itself.
+        metadata: the server's description of itself.
     """
 
     metadata: Mapping[str, Any]
 
-    def ask(self, message: Mapping[str, Any]) -> dict[str, Any]:
-        """Send a message and wait for the reply to it.
+    def request(self, message: Mapping[str, Any]) -> dict[str, Any]:
+        """Send a message and return the reply to it.
 
         Raises:
             PolicyConnectionError: the connection broke.
             PolicyTimeoutError: the server took too long.
-            PolicyReplyError: the server answered with an error, or with no message.
+            PolicyReplyError: the server replied with an error, or with no message.
         """
 
     def close(self) -> None:
-        """End it; may be called again."""
+        """Close the connection; repeated calls do nothing."""
 
 
-class TryAgainError(Exception):
+class RetryableError(Exception):
     """An attempt to connect failed in a way that may pass, as while a server starts."""
 
 
 Opened = TypeVar("Opened")
 
 
-def keep_trying(link: ConnectionSpec, attempt: Callable[[float], Opened]) -> Opened:
-    """Connect, again and again if need be.
+def connect_with_retries(spec: ConnectionSpec, attempt: Callable[[float], Opened]) -> Opened:
+    """Connect, with growing pauses between attempts.
 
     Args:
-        link: to whom, and for how long to try.
-        attempt: one attempt, given the seconds that are left.
+        spec: the server; ``connect`` of its options limits the time.
+        attempt: one attempt, called with the seconds that are left.
 
     Raises:
-        PolicyConnectionError: it did not work in time.
+        PolicyConnectionError: every attempt within the limit failed.
     """
-    deadline = time.monotonic() + link.options.connect
+    deadline = time.monotonic() + spec.options.connect
     pause = FIRST_PAUSE
     while True:
         try:
             return attempt(deadline - time.monotonic())
-        except TryAgainError as error:
+        except RetryableError as error:
             if time.monotonic() + pause >= deadline:
                 raise PolicyConnectionError(
-                    f"{link} cannot be reached ({error}); tried for {link.options.connect:g} s."
+                    f"{spec} cannot be reached ({error}); tried for {spec.options.connect:g} s."
                 ) from error
         time.sleep(pause)
-        pause = min(2 * pause, LONGEST_PAUSE)
+        pause = min(2 * pause, MAX_PAUSE)
 
 
-def read_reply(link: ConnectionSpec, data: bytes) -> dict[str, Any]:
-    """The message in a reply.
+def read_reply(spec: ConnectionSpec, data: bytes) -> dict[str, Any]:
+    """Return the message in a reply.
 
     Raises:
-        PolicyReplyError: there is none.
+        PolicyReplyError: the bytes are no message.
     """
+    from roboirg.policies.remote.message_codec import CodecError, unpack
+
     try:
         return unpack(data)
     except CodecError as error:
-        raise PolicyReplyError(f"{link} sent something else than a message: {error}.") from error
+        raise PolicyReplyError(f"{spec} sent something other than a message: {error}.") from error
 
 
-def refusal(link: ConnectionSpec, text: str) -> PolicyReplyError:
-    """The error of a server that answers with a traceback: its last line tells most."""
+def error_reply(spec: ConnectionSpec, text: str) -> PolicyReplyError:
+    """Return the error for a server's traceback, of which the last line says most."""
     lines = [line.strip() for line in text.splitlines() if line.strip()]
-    words = lines[-1][:_LONGEST_WORDS].rstrip(".") if lines else "an empty text"
-    return PolicyReplyError(f"{link} answered with an error: {words}.")
+    words = lines[-1][:_MAX_ERROR_LENGTH].rstrip(".") if lines else "an empty text"
+    return PolicyReplyError(f"{spec} replied with an error: {words}.")

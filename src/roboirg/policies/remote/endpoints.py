@@ -1,23 +1,27 @@
-"""Where a remote policy is: one or several servers, and the options all protocols have."""
+"""Addresses of policy servers, and the options that all protocols share."""
 
 from __future__ import annotations
 
 import os
 import socket
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 from urllib.parse import urlsplit
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
+from roboirg.core.actions import find_action_space
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies.policy_urls import PolicyUrl, UrlOptions
 
 MIB = 2**20
 _LOOPBACK = {"localhost", "127.0.0.1", "::1"}
 
+ActionSpaceName = Annotated[str, AfterValidator(lambda name: find_action_space(name).name)]
+"""An option that names an action space."""
+
 
 class Endpoint(NamedTuple):
-    """A server's host, lower case, and port."""
+    """Host (lower case) and port of a server."""
 
     host: str
     port: int
@@ -27,14 +31,14 @@ class Endpoint(NamedTuple):
 
     @property
     def identity(self) -> str:
-        """The same for every way to write this computer, and good as a file name."""
+        """A file name, the same for every spelling of this computer's address."""
         here = self.host in _LOOPBACK
         host = f"{socket.gethostname()}-itself" if here else self.host.replace(":", "_")
         return f"{host}-{self.port}"
 
 
 class RemoteOptions(UrlOptions):
-    """What can be asked of every remote policy.
+    """Options of every remote policy.
 
     Attributes:
         timeout: seconds to wait for a reply.
@@ -42,8 +46,8 @@ class RemoteOptions(UrlOptions):
         wait: seconds to wait for a server that another episode uses.
         shared: whether several episodes may use a server at the same time.
         tls: whether to encrypt (wss, https).
-        api_key_env: name of the environment variable that holds the server's key.
-        max_reply_mib: the largest reply that is accepted, MiB.
+        api_key_env: environment variable that holds the server's key.
+        max_reply_mib: size limit of a reply, MiB.
         version: of the checkpoint, for the records.
     """
 
@@ -58,7 +62,7 @@ class RemoteOptions(UrlOptions):
 
     @property
     def headers(self) -> dict[str, str]:
-        """Headers of a request.
+        """HTTP headers of a request.
 
         Raises:
             InvalidValueError: the environment variable with the key is not set.
@@ -74,15 +78,15 @@ class RemoteOptions(UrlOptions):
 
     @property
     def max_reply(self) -> int:
-        """The largest reply that is accepted, bytes."""
+        """Size limit of a reply, bytes."""
         return int(self.max_reply_mib * MIB)
 
 
 def read_endpoints(url: PolicyUrl) -> tuple[Endpoint, ...]:
-    """The servers that a URL names, separated by commas.
+    """Return the servers of a URL, which commas separate.
 
     Raises:
-        InvalidValueError: something is no ``host:port``, or is named twice.
+        InvalidValueError: a part is not ``host:port``, or occurs twice.
     """
     found = tuple(_endpoint(url, part) for part in url.place.rstrip("/").split(","))
     for endpoint in found:
@@ -94,8 +98,8 @@ def read_endpoints(url: PolicyUrl) -> tuple[Endpoint, ...]:
 def _endpoint(url: PolicyUrl, text: str) -> Endpoint:
     if "@" in text:
         raise InvalidValueError(
-            f"Policies of {url.scheme}:// hold no key or password in the URL; put it into an "
-            "environment variable and name that with api_key_env=NAME."
+            f"A URL of {url.scheme}:// cannot hold a key or password; put it into an environment "
+            "variable and name that with api_key_env=NAME."
         )
     try:
         parts = urlsplit(f"//{text}")
@@ -104,7 +108,7 @@ def _endpoint(url: PolicyUrl, text: str) -> Endpoint:
         host, port = None, None
     if not host or not port or parts.path or parts.fragment or " " in text:
         raise InvalidValueError(
-            f"Policy {url.text!r}: {text!r} is no server; write {url.scheme}://host:port, several "
-            "with commas."
+            f"Policy {url.text!r}: {text!r} is not a server; write {url.scheme}://host:port, "
+            "several with commas."
         )
     return Endpoint(host, port)

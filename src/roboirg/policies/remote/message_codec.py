@@ -1,8 +1,8 @@
-"""The bytes of a message: msgpack with NumPy arrays, as openpi, MME-VLA and RoboMME write them.
+"""Messages as bytes: msgpack with NumPy arrays, as in openpi, MME-VLA and RoboMME.
 
 An array is a map with four keys of type bytes: ``__ndarray__`` (true), ``data`` (C order),
 ``dtype`` (such as ``<f4``) and ``shape``; a NumPy scalar one with ``__npgeneric__``, ``data`` and
-``dtype``. Nothing is ever unpickled.
+``dtype``. Nothing is unpickled.
 """
 
 from __future__ import annotations
@@ -23,57 +23,57 @@ except ImportError as error:
     ) from error
 
 _ARRAY, _SCALAR = b"__ndarray__", b"__npgeneric__"
-_REFUSED = "VOc"
+_UNSUPPORTED = "VOc"
 """Kinds of dtype that are not sent: structures, Python objects, complex numbers."""
 _MALFORMED = (ValueError, TypeError, OverflowError, RecursionError, SyntaxError)
-"""What msgpack and NumPy raise for bytes that make no sense."""
+"""Raised by msgpack and NumPy for malformed bytes."""
 
 
 class CodecError(ValueError):
-    """Bytes that are no message, or a message that cannot be written."""
+    """Malformed bytes, or a message that cannot be encoded."""
 
 
 def pack(message: Mapping[str, Any]) -> bytes:
-    """A message as bytes; maps keep their order.
+    """Return a message as bytes; maps keep their order.
 
     Raises:
-        CodecError: it holds something that cannot be written.
+        CodecError: it holds something that cannot be encoded.
     """
     try:
         packed: bytes = msgpack.packb(message, default=_encode)
     except (TypeError, ValueError, OverflowError) as error:
-        raise CodecError(f"the message cannot be written ({error})") from error
+        raise CodecError(f"the message cannot be encoded ({error})") from error
     return packed
 
 
 def unpack(data: bytes) -> dict[str, Any]:
-    """The message that bytes hold; its arrays are read-only views of them.
+    """Return the message in bytes; its arrays are read-only views of them.
 
     Raises:
-        CodecError: they hold none.
+        CodecError: the bytes are malformed.
     """
     try:
         message = msgpack.unpackb(data, object_hook=_decode)
     except (*_MALFORMED, msgpack.exceptions.UnpackException) as error:
         words = " ".join(str(error).split()) or type(error).__name__
-        raise CodecError(f"the bytes are no msgpack message ({words})") from error
+        raise CodecError(f"the bytes are not a msgpack message ({words})") from error
     if not isinstance(message, dict):
-        raise CodecError(f"the message is no map but of type {type(message).__name__}")
+        raise CodecError(f"the message is of type {type(message).__name__}, not a map")
     for key in message:
         if not isinstance(key, str):
-            raise CodecError(f"the message has a key {key!r} that is no text")
+            raise CodecError(f"the message has a key {key!r} that is not a text")
     return message
 
 
 def _encode(value: object) -> dict[bytes, Any]:
     if not isinstance(value, np.ndarray | np.generic):
-        raise TypeError(f"there is no way to write type {type(value).__name__}")
-    if value.dtype.kind in _REFUSED:
+        raise TypeError(f"type {type(value).__name__} cannot be encoded")
+    if value.dtype.kind in _UNSUPPORTED:
         raise ValueError(f"arrays of dtype {value.dtype} are not sent")
     if isinstance(value, np.ndarray):
         return {
             _ARRAY: True,
-            # A view, as pictures are large; contiguous arrays are copied once, into the message.
+            # A view, as pictures are large: a contiguous array is copied once, into the message.
             b"data": np.ascontiguousarray(value).reshape(-1).view(np.uint8).data,
             b"dtype": value.dtype.str,
             b"shape": value.shape,
@@ -98,7 +98,7 @@ def _array(found: dict[Any, Any]) -> np.ndarray[Any, Any]:
         raise ValueError(f"the data of an array is {type(data).__name__}, not bytes")
     if not isinstance(shape, list) or not all(type(size) is int and size >= 0 for size in shape):
         raise ValueError(f"the shape of an array is {shape!r}")
-    # Python's integers do not overflow: no shape can claim more than there is.
+    # Python's integers do not overflow, so no shape can claim more bytes than there are.
     if math.prod(shape) * dtype.itemsize != len(data):
         raise ValueError(f"an array {dtype.str} of shape {shape} has {len(data)} bytes")
     array: np.ndarray[Any, Any] = np.ndarray(shape=tuple(shape), dtype=dtype, buffer=data)
@@ -111,6 +111,6 @@ def _dtype(found: dict[Any, Any]) -> np.dtype[Any]:
     if not isinstance(text, str):
         raise ValueError(f"the dtype of an array is {text!r}")
     dtype = np.dtype(text)
-    if dtype.kind in _REFUSED:
+    if dtype.kind in _UNSUPPORTED:
         raise ValueError(f"arrays of dtype {text!r} are not accepted")
     return dtype

@@ -1,4 +1,4 @@
-"""What all remote policies share: an episode's session, and the check of what comes back."""
+"""Base class of the clients of all protocols: the session of an episode, checked replies."""
 
 from __future__ import annotations
 
@@ -11,36 +11,43 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.core.actions import JOINT_ANGLE, ActionSpace, check_chunk
+from roboirg.core.actions import JOINT_ANGLE, check_chunk, find_action_space
 from roboirg.core.errors import InvalidActionError, PolicyReplyError
 from roboirg.core.observations import CAMERAS, Demonstration, Observation
 from roboirg.policies.policy_urls import read_options, split_url
 from roboirg.policies.remote.endpoints import RemoteOptions, read_endpoints
-from roboirg.policies.remote.server_session import Connect, ServerSession
-from roboirg.policies.remote.websocket_connection import WebsocketConnection
+from roboirg.policies.remote.server_session import ServerSession
+from roboirg.policies.transport import WEBSOCKET, Transport
 
 UNKNOWN_VERSION = "unknown"
-_LARGEST_LISTED = 64
-"""Numbers of an array in the metadata that are written out."""
-_LONGEST_TEXT = 1000
+_MAX_LISTED = 64
+"""Numbers of an array that are written out in the metadata."""
+_MAX_TEXT_LENGTH = 1000
 
 
 class RemotePolicy(ABC):
-    """A policy behind a network connection, which begins at `reset` and ends with `close`.
+    """A policy on a server, connected from `reset` to `close`.
 
-    Made offline: a URL is checked and nothing is connected.
+    Subclasses define `begin_episode` and `request_actions`, and set ``options_type`` and
+    ``transport`` if they differ. The constructor checks the URL and connects to nothing.
 
     Args:
-        url: the server or servers, and options.
-        seed: is not sent; servers have seeds of their own.
+        url: one or several servers, and options.
+        seed: not sent; servers have seeds of their own.
+
+    Attributes:
+        options: of the URL; one named ``actions`` selects the action space.
+        metadata: of the server, as JSON values, from `reset` on.
+        instruction: of the current episode.
 
     Raises:
-        UnknownNameError: the URL gives an option that there is not.
+        UnknownNameError: the URL has an unknown option.
         InvalidValueError: the URL names no server, or an option has a wrong value.
+        MissingDependencyError: the library of the transport is not installed.
     """
 
     options_type: ClassVar[type[RemoteOptions]] = RemoteOptions
-    connect: ClassVar[Connect] = WebsocketConnection
+    transport: ClassVar[Transport] = WEBSOCKET
     cameras: tuple[str, ...] = CAMERAS
     actions: str = JOINT_ANGLE.name
 
@@ -49,92 +56,115 @@ class RemotePolicy(ABC):
         parts = split_url(url)
         self.options = read_options(parts, self.options_type)
         self.metadata: dict[str, Any] = {}
-        self._space: ActionSpace = JOINT_ANGLE
-        self._instruction = ""
+        self._space = find_action_space(getattr(self.options, "actions", self.actions))
+        self.actions = self._space.name
+        self.instruction = ""
         self._session = ServerSession(
-            parts.scheme, read_endpoints(parts), self.options, type(self).connect
+            parts.scheme, read_endpoints(parts), self.options, self.transport.load_client()
         )
-        # Whoever forgets close() keeps the server no longer than the policy.
+        # Without a close() the server is unlocked when the policy is deleted.
         weakref.finalize(self, self._session.end)
 
     @property
     def version(self) -> str:
-        """Of the checkpoint: what the URL says, else what the server says, else ``unknown``."""
-        told = self.metadata.get("version")
-        return self.options.version or (UNKNOWN_VERSION if told is None else str(told))
+        """Version of the checkpoint: the URL's, else the server's, else ``unknown``."""
+        version = self.metadata.get("version")
+        return self.options.version or (UNKNOWN_VERSION if version is None else str(version))
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Take a server, connect, and begin an episode.
+        """Lock a server, connect, and begin an episode.
 
         Raises:
             PolicyConnectionError: no server can be reached.
             PolicyTimeoutError: no server was free, or it did not answer in time.
-            PolicyReplyError: the server answered with an error or with something else.
+            PolicyReplyError: the server replied with an error or with something else.
         """
-        self._instruction = instruction
+        self.instruction = instruction
         server = self._session.begin()
-        self.metadata = {"server": str(self._session.link.endpoint), **as_json(server)}
-        with self._ends_with_error():
-            self.begin(demonstration)
+        self.metadata = {"server": str(self._session.spec.endpoint), **as_json(server)}
+        with self._closed_on_error():
+            self.begin_episode(demonstration)
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
-        """The server's next actions; after an error the episode is over.
+        """Return the server's next actions; an error ends the episode.
 
         Raises:
             PolicyConnectionError: the server went away.
             PolicyTimeoutError: the server took too long.
-            PolicyReplyError: the server answered with an error or with something else.
+            PolicyReplyError: the server replied with an error or with something else.
         """
-        with self._ends_with_error():
-            return self.answer(observation)
+        with self._closed_on_error():
+            return self.request_actions(observation)
 
     @abstractmethod
-    def begin(self, demonstration: Demonstration) -> None:
-        """Tell the server of a new episode; what is shown may be kept until `answer`."""
+    def begin_episode(self, demonstration: Demonstration) -> None:
+        """Reset the server; the demonstration may be kept for `request_actions`."""
 
     @abstractmethod
-    def answer(self, observation: Observation) -> NDArray[np.floating[Any]]:
-        """Ask the server for actions."""
+    def request_actions(self, observation: Observation) -> NDArray[np.floating[Any]]:
+        """Return the server's next actions, (n, size); see `request` and `read_actions`."""
 
     def close(self) -> None:
-        """End the episode: disconnect and let others have the server; may be called again."""
+        """End the episode: disconnect and unlock the server; repeated calls do nothing."""
         self._session.end()
 
+    def request(self, message: Mapping[str, Any]) -> dict[str, Any]:
+        """Send a message to the server and return the reply.
+
+        Raises:
+            PolicyConnectionError: the connection broke, or there is none.
+            PolicyTimeoutError: the server took too long.
+            PolicyReplyError: the server replied with an error, or with no message.
+        """
+        return self._session.request(message)
+
+    def request_confirmed(self, message: Mapping[str, Any], key: str) -> None:
+        """Send a message whose reply must have True under a key.
+
+        Raises:
+            PolicyReplyError: it does not.
+        """
+        reply = self.request(message)
+        if reply.get(key) is not True:
+            raise PolicyReplyError(
+                f"{self._session.spec} did not confirm {next(iter(message))!r}: {key!r} in its "
+                f"reply is {str(reply.get(key))[:80]}."
+            )
+
+    def reconnect(self) -> None:
+        """Connect to the server of the episode again."""
+        self._session.reconnect()
+
+    def read_actions(self, reply: Mapping[str, Any]) -> NDArray[np.float64]:
+        """Return the ``actions`` of a reply, (n, size).
+
+        Raises:
+            PolicyReplyError: there are none, or they have a wrong shape or are not finite.
+        """
+        if "actions" not in reply:
+            keys = ", ".join(map(repr, list(reply)[:8])) or "nothing"
+            raise PolicyReplyError(
+                f"{self._session.spec} sent a reply without 'actions'; it holds {keys}."
+            )
+        try:
+            return check_chunk(reply["actions"], self._space)
+        except InvalidActionError as error:
+            raise PolicyReplyError(
+                f"{self._session.spec} sent actions that cannot be executed: {error}"
+            ) from error
+
     @contextlib.contextmanager
-    def _ends_with_error(self) -> Iterator[None]:
-        """Let others have the server as soon as an episode cannot go on."""
+    def _closed_on_error(self) -> Iterator[None]:
+        """Unlock the server as soon as an episode cannot go on."""
         try:
             yield
         except Exception:
             self.close()
             raise
 
-    def _rows(self, reply: Mapping[str, Any]) -> NDArray[np.float64]:
-        """The actions in a reply, (n, size) and finite."""
-        if "actions" not in reply:
-            keys = ", ".join(map(repr, list(reply)[:8])) or "nothing"
-            raise PolicyReplyError(
-                f"{self._session.link} sent a reply without 'actions'; it holds {keys}."
-            )
-        try:
-            return check_chunk(reply["actions"], self._space)
-        except InvalidActionError as error:
-            raise PolicyReplyError(
-                f"{self._session.link} sent actions that cannot be executed: {error}"
-            ) from error
-
-    def _confirm(self, message: Mapping[str, Any], key: str) -> None:
-        """Send what the server has to confirm with a key."""
-        reply = self._session.ask(message)
-        if reply.get(key) is not True:
-            raise PolicyReplyError(
-                f"{self._session.link} did not confirm {next(iter(message))!r}: {key!r} in its "
-                f"reply is {str(reply.get(key))[:80]}."
-            )
-
 
 def proprioception(joints: NDArray[Any], gripper: NDArray[Any]) -> NDArray[np.float32]:
-    """The state as openpi and MME-VLA have it.
+    """Return the state as openpi and MME-VLA define it.
 
     Args:
         joints: (..., 7) rad.
@@ -150,10 +180,10 @@ def proprioception(joints: NDArray[Any], gripper: NDArray[Any]) -> NDArray[np.fl
 
 
 def as_json(value: object) -> Any:  # noqa: ANN401 - JSON has no narrower type
-    """A message's content as JSON values; large arrays are described, long texts cut."""
+    """Return a message's content as JSON values; large arrays are described, long texts cut."""
     if isinstance(value, Mapping):
         return {str(key): as_json(held) for key, held in value.items()}
-    if isinstance(value, np.ndarray) and value.size > _LARGEST_LISTED:
+    if isinstance(value, np.ndarray) and value.size > _MAX_LISTED:
         return f"array of shape {value.shape}, {value.dtype}"
     if isinstance(value, np.ndarray | np.generic):
         return as_json(value.tolist())
@@ -162,4 +192,4 @@ def as_json(value: object) -> Any:  # noqa: ANN401 - JSON has no narrower type
     plain = value is None or isinstance(value, bool | int)
     if plain or (isinstance(value, float) and np.isfinite(value)):
         return value
-    return str(value)[:_LONGEST_TEXT]
+    return str(value)[:_MAX_TEXT_LENGTH]

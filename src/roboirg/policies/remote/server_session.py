@@ -1,25 +1,24 @@
-"""What an episode holds of a server: the right to use it, and a connection."""
+"""The lock and the connection that an episode holds of a policy server."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from roboirg.core.errors import PolicyConnectionError
 from roboirg.policies.remote.connections import Connection, ConnectionSpec
 from roboirg.policies.remote.endpoints import Endpoint, RemoteOptions
 from roboirg.policies.remote.server_lock import ServerLock, lock_server
-
-Connect = Callable[[ConnectionSpec], Connection]
+from roboirg.policies.transport import Connect
 
 
 class ServerSession:
-    """Begins and ends with an episode; can begin again.
+    """One episode's use of a server; can begin again after its end.
 
     Args:
         scheme: of the policy's URL.
         endpoints: the servers to choose from.
-        options: how they are spoken to.
+        options: of their connections.
         connect: opens a connection.
     """
 
@@ -32,65 +31,65 @@ class ServerSession:
     ) -> None:
         self._scheme, self._endpoints = scheme, endpoints
         self._options, self._connect = options, connect
-        self._lease: ServerLock | None = None
+        self._lock: ServerLock | None = None
         self._connection: Connection | None = None
 
     @property
-    def link(self) -> ConnectionSpec:
-        """The server in use, for messages the first of those to choose from if there is none."""
-        endpoint = self._endpoints[0] if self._lease is None else self._lease.endpoint
+    def spec(self) -> ConnectionSpec:
+        """The server in use, or the first to choose from if there is none."""
+        endpoint = self._endpoints[0] if self._lock is None else self._lock.endpoint
         return ConnectionSpec(self._scheme, endpoint, self._options)
 
     def begin(self) -> Mapping[str, Any]:
-        """Take a server, connect, and give its metadata.
+        """Lock a server, connect, and return its metadata.
 
         Raises:
-            PolicyTimeoutError: all servers were in use for too long, or one said nothing.
+            PolicyTimeoutError: all servers were in use for too long, or one sent no metadata.
             PolicyConnectionError: it cannot be reached.
-            PolicyReplyError: it began with something else than its metadata.
+            PolicyReplyError: its metadata are malformed.
         """
         self.end()
-        self._lease = lock_server(
+        self._lock = lock_server(
             self._endpoints, wait=self._options.wait, shared=self._options.shared
         )
         try:
-            self._connection = self._connect(self.link)
+            self._connection = self._connect(self.spec)
         except BaseException:
             self.end()
             raise
         return self._connection.metadata
 
-    def ask(self, message: Mapping[str, Any]) -> dict[str, Any]:
-        """Send a message and wait for the reply.
+    def request(self, message: Mapping[str, Any]) -> dict[str, Any]:
+        """Send a message and return the reply.
 
         Raises:
             PolicyConnectionError: the connection broke, or there is none.
             PolicyTimeoutError: the server took too long.
-            PolicyReplyError: the server answered with an error, or with no message.
+            PolicyReplyError: the server replied with an error, or with no message.
         """
         if self._connection is None:
-            raise PolicyConnectionError(f"{self.link} is not connected; call reset() first.")
-        return self._connection.ask(message)
+            raise PolicyConnectionError(f"{self.spec} is not connected; call reset() first.")
+        return self._connection.request(message)
 
     def reconnect(self) -> None:
         """Connect to the same server again.
 
         Raises:
             PolicyConnectionError: it cannot be reached.
-            PolicyTimeoutError: it said nothing.
-            PolicyReplyError: it began with something else than its metadata.
+            PolicyTimeoutError: it sent no metadata.
+            PolicyReplyError: its metadata are malformed.
         """
         if self._connection is not None:
             self._connection.close()
-            self._connection = self._connect(self.link)
+            self._connection = self._connect(self.spec)
 
     def end(self) -> None:
-        """Disconnect and let others have the server; may be called again."""
+        """Disconnect and unlock the server; repeated calls do nothing."""
         connection, self._connection = self._connection, None
-        lease, self._lease = self._lease, None
+        lock, self._lock = self._lock, None
         try:
             if connection is not None:
                 connection.close()
         finally:
-            if lease is not None:
-                lease.release()
+            if lock is not None:
+                lock.release()

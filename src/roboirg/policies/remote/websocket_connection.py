@@ -1,7 +1,7 @@
-"""One websocket connection: requests and replies in turn, and every wait has an end.
+"""Requests over a websocket, one at a time, each with a time limit.
 
-No pings are sent. The published servers compute in the thread that would answer them, so that a
-ping's time limit kills what is merely slow; what is dead is noticed by the time limit of replies.
+No pings are sent. The published servers compute in the thread that would answer them, so a ping's
+time limit would end a connection that is merely slow; the time limit of replies finds a dead one.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from roboirg.core.errors import (
 )
 from roboirg.policies.remote.connections import (
     ConnectionSpec,
-    TryAgainError,
-    keep_trying,
+    RetryableError,
+    connect_with_retries,
+    error_reply,
     read_reply,
-    refusal,
 )
 from roboirg.policies.remote.message_codec import pack
 from roboirg.policies.remote.write_timeout import WriteTimeout
@@ -39,62 +39,64 @@ except ImportError as error:
     ) from error
 
 CLOSE_TIMEOUT = 2.0
-"""Seconds to wait for a server's farewell."""
+"""Seconds to wait for a server's closing frame."""
 _TOO_BIG = 1009
-"""Websocket close code of whoever was sent too much."""
-_PASSING = frozenset({408, 425, 429, 500, 502, 503, 504})
-"""HTTP statuses that a server or a proxy in front of it may have while it starts."""
+"""Websocket close code for a message above the size limit."""
+_RETRYABLE = frozenset({408, 425, 429, 500, 502, 503, 504})
+"""HTTP statuses of a server, or of a proxy, while the server starts."""
 
 
 class WebsocketConnection:
-    """A connection to a policy server, open until it is closed or something goes wrong.
+    """A connection to a policy server, open until `close` or an error.
 
     Args:
-        link: the server, and the limits of every wait and reply.
+        spec: the server, and the limits of waits and replies.
 
     Raises:
-        PolicyConnectionError: no connection came about in time, or the server refused it.
-        PolicyTimeoutError: the server accepted it and then said nothing.
-        PolicyReplyError: the server began with something else than its metadata.
+        PolicyConnectionError: the server cannot be reached in time, or refuses.
+        PolicyTimeoutError: the server accepts but sends no metadata.
+        PolicyReplyError: its metadata are malformed.
     """
 
-    def __init__(self, link: ConnectionSpec) -> None:
-        self._link = link
+    def __init__(self, spec: ConnectionSpec) -> None:
+        self._spec = spec
         self._closing = contextlib.ExitStack()
-        self._socket: ClientConnection | None = keep_trying(link, self._attempt)
-        self._gave_up = False
-        # The library has no time limit for sending. The socket's own would also end the thread that
-        # receives, and begins anew with every piece that is taken in.
-        self._limit = WriteTimeout(link.options.timeout, partial(self._give_up, self._socket))
-        self._closing.callback(self._limit.close)
+        self._socket: ClientConnection | None = connect_with_retries(spec, self._attempt)
+        self._write_timed_out = False
+        # The library has no time limit for sending. The socket's own would also end the receiving
+        # thread, and it starts again with every piece that the peer takes in.
+        self._write_timeout = WriteTimeout(
+            spec.options.timeout, partial(self._abort_write, self._socket)
+        )
+        self._closing.callback(self._write_timeout.close)
         self.metadata: Mapping[str, Any] = self._receive(
-            "its metadata", link.options.connect, time.monotonic() + link.options.connect
+            "its metadata", spec.options.connect, time.monotonic() + spec.options.connect
         )
 
-    def ask(self, message: Mapping[str, Any]) -> dict[str, Any]:
-        """Send a message and wait for the reply to it; after any error the connection is closed.
+    def request(self, message: Mapping[str, Any]) -> dict[str, Any]:
+        """Send a message and return the reply; any error closes the connection.
 
         Raises:
             PolicyConnectionError: the connection broke.
             PolicyTimeoutError: the server took too long.
-            PolicyReplyError: the server answered with an error, or with no message.
+            PolicyReplyError: the server replied with an error, or with no message.
         """
-        seconds = self._link.options.timeout
+        seconds = self._spec.options.timeout
         deadline = time.monotonic() + seconds
         self._send(pack(message))
         return self._receive("a reply", seconds, deadline)
 
     def close(self) -> None:
-        """Say farewell; may be called again."""
+        """Close the connection; repeated calls do nothing."""
         self._socket = None
         self._closing.close()
 
     def _attempt(self, left: float) -> ClientConnection:
-        link, options = self._link, self._link.options
+        spec, options = self._spec, self._spec.options
         try:
             return self._closing.enter_context(
                 connect(
-                    f"{'wss' if options.tls else 'ws'}://{link.endpoint}",
+                    f"{'wss' if options.tls else 'ws'}://{spec.endpoint}",
                     additional_headers=options.headers,
                     compression=None,
                     max_size=options.max_reply,
@@ -106,44 +108,44 @@ class WebsocketConnection:
             )
         except InvalidStatus as error:
             status = error.response.status_code
-            if status in _PASSING:
-                raise TryAgainError(f"HTTP status {status}") from error
-            hint = "; its key is named with api_key_env=NAME" if status in (401, 403) else ""
+            if status in _RETRYABLE:
+                raise RetryableError(f"HTTP status {status}") from error
+            hint = "; name the key with api_key_env=NAME" if status in (401, 403) else ""
             raise PolicyConnectionError(
-                f"{link} refused the connection with HTTP status {status}{hint}."
+                f"{spec} refused the connection with HTTP status {status}{hint}."
             ) from error
         except socket.gaierror as error:
             raise PolicyConnectionError(
-                f"{link} cannot be reached: there is no computer {link.endpoint.host!r}."
+                f"{spec} cannot be reached: there is no host {spec.endpoint.host!r}."
             ) from error
         except (OSError, EOFError, WebSocketException) as error:
-            raise TryAgainError(_words(error)) from error
+            raise RetryableError(_describe(error)) from error
 
     def _send(self, data: bytes) -> None:
         connection = self._open()
         try:
-            self._refuse_surplus(connection)
-            with self._limit.watching():
+            self._reject_surplus(connection)
+            with self._write_timeout.watching():
                 connection.send(data)
         except ConnectionClosed as error:
             raise self._broken(error) from error
 
-    def _give_up(self, connection: ClientConnection) -> None:
-        """Wake the thread that sends, by another one."""
-        self._gave_up = True
+    def _abort_write(self, connection: ClientConnection) -> None:
+        """Shut the socket down, from another thread, to wake the thread that sends."""
+        self._write_timed_out = True
         with contextlib.suppress(OSError):
             connection.socket.shutdown(socket.SHUT_RDWR)
 
-    def _refuse_surplus(self, connection: ClientConnection) -> None:
-        """A reply that nobody asked for would be taken for the next one."""
+    def _reject_surplus(self, connection: ClientConnection) -> None:
+        """Raise if an unrequested reply has come, which would be taken for the next one."""
         try:
             surplus = connection.recv(timeout=0)
         except TimeoutError:
             return
         self.close()
         if isinstance(surplus, str):
-            raise refusal(self._link, surplus)
-        raise PolicyReplyError(f"{self._link} sent a message that nobody had asked for.")
+            raise error_reply(self._spec, surplus)
+        raise PolicyReplyError(f"{self._spec} sent a message without a request.")
 
     def _receive(self, what: str, seconds: float, deadline: float) -> dict[str, Any]:
         connection = self._open()
@@ -152,41 +154,41 @@ class WebsocketConnection:
         except TimeoutError as error:
             self.close()
             raise PolicyTimeoutError(
-                f"{self._link} did not send {what} within {seconds:g} s."
+                f"{self._spec} did not send {what} within {seconds:g} s."
             ) from error
         except ConnectionClosed as error:
             raise self._broken(error) from error
         try:
             if isinstance(data, str):
-                raise refusal(self._link, data)
-            return read_reply(self._link, data)
+                raise error_reply(self._spec, data)
+            return read_reply(self._spec, data)
         except PolicyReplyError:
             self.close()
             raise
 
     def _open(self) -> ClientConnection:
         if self._socket is None:
-            raise PolicyConnectionError(f"The connection to {self._link} is closed; call reset().")
+            raise PolicyConnectionError(f"The connection to {self._spec} is closed; call reset().")
         return self._socket
 
     def _broken(self, error: ConnectionClosed) -> RoboIRGError:
-        """The error for a connection that has ended."""
+        """Close, and return the error for a connection that has ended."""
         self.close()
         if error.sent is not None and error.sent.code == _TOO_BIG:
             return PolicyReplyError(
-                f"{self._link} sent a reply of more than {self._link.options.max_reply_mib:g} MiB; "
+                f"{self._spec} sent a reply of more than {self._spec.options.max_reply_mib:g} MiB; "
                 "option max_reply_mib raises that limit."
             )
-        if self._gave_up:
+        if self._write_timed_out:
             return PolicyTimeoutError(
-                f"{self._link} did not take in a message within {self._link.options.timeout:g} s."
+                f"{self._spec} did not take in a message within {self._spec.options.timeout:g} s."
             )
-        code = f"close code {error.rcvd.code}" if error.rcvd else "without a farewell"
-        return PolicyConnectionError(f"{self._link} ended the connection ({code}).")
+        code = f"close code {error.rcvd.code}" if error.rcvd else "without a close code"
+        return PolicyConnectionError(f"{self._spec} ended the connection ({code}).")
 
 
-def _words(error: BaseException) -> str:
+def _describe(error: BaseException) -> str:
     if isinstance(error, ConnectionRefusedError):
         return "nothing listens there"
-    words = " ".join(str(error).split()).rstrip(".")
-    return f"{type(error).__name__}: {words}" if words else type(error).__name__
+    message = " ".join(str(error).split()).rstrip(".")
+    return f"{type(error).__name__}: {message}" if message else type(error).__name__

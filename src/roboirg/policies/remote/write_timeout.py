@@ -1,4 +1,4 @@
-"""A time limit for sending."""
+"""A time limit for sending a message."""
 
 from __future__ import annotations
 
@@ -7,47 +7,47 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-LOOKS = 20
-"""Within the limit; it may be overrun by the time between two."""
-LONGEST_NAP = 1.0
-"""Seconds between two looks."""
+CHECKS = 20
+"""Per time limit, which may be exceeded by the time between two checks."""
+MAX_PAUSE = 1.0
+"""Seconds between two checks."""
 
 
 class WriteTimeout:
-    """Gives up when a message has not been sent in time, by a thread of its own.
+    """Calls a function when a message is not sent in time, from a thread of its own.
 
-    The thread looks from time to time, because starting a timer with every message costs more than
-    sending two pictures does.
+    The thread polls, because starting a timer for each message costs more than sending two
+    pictures.
 
     Args:
-        seconds: that a message may take.
-        give_up: is called by the thread; has to wake the one that sends.
+        seconds: limit for one message.
+        on_timeout: called by the thread; must wake the thread that sends.
     """
 
-    def __init__(self, seconds: float, give_up: Callable[[], object]) -> None:
+    def __init__(self, seconds: float, on_timeout: Callable[[], object]) -> None:
         self._seconds = seconds
-        self._give_up = give_up
-        self._due: float | None = None
+        self._on_timeout = on_timeout
+        self._deadline: float | None = None
         self._closed = threading.Event()
-        threading.Thread(target=self._watch, name="send limit", daemon=True).start()
+        threading.Thread(target=self._watch, name="write timeout", daemon=True).start()
 
     @contextmanager
     def watching(self) -> Iterator[None]:
-        """Within it a message is being sent."""
-        self._due = time.monotonic() + self._seconds
+        """Limit the time of the block, which sends a message."""
+        self._deadline = time.monotonic() + self._seconds
         try:
             yield
         finally:
-            self._due = None
+            self._deadline = None
 
     def close(self) -> None:
-        """Have the thread end; may be called again."""
+        """End the thread; repeated calls do nothing."""
         self._closed.set()
 
     def _watch(self) -> None:
-        nap = min(self._seconds / LOOKS, LONGEST_NAP)
-        while not self._closed.wait(nap):
-            due = self._due
-            if due is not None and time.monotonic() > due:
-                self._give_up()
+        pause = min(self._seconds / CHECKS, MAX_PAUSE)
+        while not self._closed.wait(pause):
+            deadline = self._deadline
+            if deadline is not None and time.monotonic() > deadline:
+                self._on_timeout()
                 return

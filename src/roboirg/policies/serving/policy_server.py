@@ -1,42 +1,18 @@
-"""From a policy's name to a server that listens."""
+"""Serve a policy, given by name, in any protocol."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.policies.base import Policy
 from roboirg.policies.loading import is_privileged, load_policy_class, make_policy, policy_version
+from roboirg.policies.protocols import protocols_by_scheme
 from roboirg.policies.remote.endpoints import Endpoint
-from roboirg.policies.serving.challenge_server import ChallengeService
-from roboirg.policies.serving.http_server import open_http
-from roboirg.policies.serving.mme_vla_server import MmeVlaService
-from roboirg.policies.serving.openpi_server import OpenpiService
-from roboirg.policies.serving.service import MakePolicy, Service
-from roboirg.policies.serving.websocket_server import open_websocket
+from roboirg.policies.transport import ListeningServer
 
-PROTOCOLS: Mapping[str, Callable[[MakePolicy], Service]] = {
-    "openpi": OpenpiService,
-    "mme-vla": MmeVlaService,
-    "challenge": ChallengeService,
-    "challenge+http": ChallengeService,
-}
-"""By the scheme of the URL with which a client names the server."""
 LOOPBACK = "127.0.0.1"
-_LARGEST_PORT = 65535
-
-
-class Listening(Protocol):
-    """What websockets' and http.server's servers have in common."""
-
-    socket: Any
-
-    def serve_forever(self) -> None:
-        """Answer until `shutdown` is called, by another thread."""
-
-    def shutdown(self) -> None:
-        """Stop."""
+_MAX_PORT = 65535
 
 
 class PolicyServer(NamedTuple):
@@ -44,10 +20,10 @@ class PolicyServer(NamedTuple):
 
     Attributes:
         listening: the server.
-        url: what a client names as its policy.
+        url: names the policy for clients.
     """
 
-    listening: Listening
+    listening: ListeningServer
     url: str
 
 
@@ -64,35 +40,38 @@ def open_server(
 
     Args:
         spec: of the policy, as for `roboirg.policies.make_policy`.
-        protocol: openpi, mme-vla, challenge or challenge+http.
-        host: to listen at.
-        port: to listen at; 0 for any that is free.
+        protocol: a scheme of `roboirg.policies.protocols.protocols_by_scheme`.
+        host: address to listen at.
+        port: port to listen at; 0 for any free one.
         seed: of the policy.
-        key: clients have to send ``Authorization: Api-Key KEY``; None lets everybody in.
+        key: clients must send ``Authorization: Api-Key KEY``; None admits all clients.
 
     Raises:
         UnknownNameError: there is no such policy or protocol.
-        InvalidValueError: the policy is privileged, or the address cannot be listened at.
+        InvalidValueError: the policy is privileged, or the address cannot be used.
+        MissingDependencyError: the protocol's network library is not installed.
     """
-    if protocol not in PROTOCOLS:
-        raise UnknownNameError("protocol", protocol, PROTOCOLS)
-    if not 0 <= port <= _LARGEST_PORT:
-        raise InvalidValueError(f"The port is {port}; it has to be 0 to {_LARGEST_PORT}.")
+    protocols = protocols_by_scheme()
+    if protocol not in protocols:
+        raise UnknownNameError("protocol", protocol, protocols)
+    if not 0 <= port <= _MAX_PORT:
+        raise InvalidValueError(f"The port is {port}; it must be 0 to {_MAX_PORT}.")
     load_policy_class(spec)
     if is_privileged(spec):
         raise InvalidValueError(
-            f"Policy {spec!r} looks behind the scenes of a world that plays in the same process; "
-            "it cannot be served."
+            f"Policy {spec!r} is privileged: it reads the simulator in its own process, so it "
+            "cannot be served."
         )
 
     def make() -> Policy:
         return make_policy(spec, seed)
 
+    found = protocols[protocol]
     metadata = {"policy": spec, "version": policy_version(spec), "protocol": protocol}
-    opened = open_http if protocol == "challenge+http" else open_websocket
+    listen = found.clients[protocol].transport.load_server()
     try:
-        listening: Listening = opened(PROTOCOLS[protocol](make), metadata, host, port, key)
+        listening = listen(found.service(make), metadata, host, port, key)
     except OSError as error:
-        raise InvalidValueError(f"Nothing can listen at {host}:{port} ({error}).") from error
-    place = Endpoint(host, listening.socket.getsockname()[1])
-    return PolicyServer(listening, f"{protocol}://{place}")
+        raise InvalidValueError(f"Cannot listen at {host}:{port} ({error}).") from error
+    endpoint = Endpoint(host, listening.socket.getsockname()[1])
+    return PolicyServer(listening, f"{protocol}://{endpoint}")

@@ -1,4 +1,4 @@
-"""What a server makes of messages, whatever transports them."""
+"""Answers of a policy server to messages, whatever the transport."""
 
 from __future__ import annotations
 
@@ -14,47 +14,49 @@ from numpy.typing import NDArray
 from roboirg.core.actions import check_chunk
 from roboirg.core.observations import Observation
 from roboirg.policies.base import Policy
-from roboirg.policies.requirements import (
-    wanted_actions,
-)
+from roboirg.policies.requirements import wanted_actions
 
 Message = Mapping[str, Any]
-Answer = Callable[[Message], dict[str, Any]]
+Handler = Callable[[Message], dict[str, Any]]
+"""Returns the reply to a message; whatever it raises goes to the client as a traceback."""
 MakePolicy = Callable[[], Policy]
 
 STATE_SIZE = 8
-"""Seven joints and the first finger, as openpi and MME-VLA have it."""
+"""Seven joints and the first finger, as in openpi and MME-VLA."""
 _PICTURE_AXES = 3
 
 
 class Service(ABC):
-    """Answers messages with policies; one message at a time, whoever sends it.
+    """Answers messages with policies, one message at a time over all connections.
 
     Args:
-        make: makes a fresh policy.
+        make_policy: makes a fresh policy.
+
+    Attributes:
+        make_policy: makes a fresh policy.
     """
 
-    def __init__(self, make: MakePolicy) -> None:
-        self._make = make
+    def __init__(self, make_policy: MakePolicy) -> None:
+        self.make_policy = make_policy
         self._lock = Lock()
 
-    def connection(self) -> Answer:
-        """What answers the messages of a new connection."""
-        answer = self.open()
+    def connection(self) -> Handler:
+        """Return the handler of a new connection, under the lock of the service."""
+        handle = self.new_handler()
 
-        def in_turn(message: Message) -> dict[str, Any]:
+        def handle_locked(message: Message) -> dict[str, Any]:
             with self._lock:
-                return answer(message)
+                return handle(message)
 
-        return in_turn
+        return handle_locked
 
     @abstractmethod
-    def open(self) -> Answer:
-        """What answers the messages of a new connection, called one at a time."""
+    def new_handler(self) -> Handler:
+        """Return the handler of a new connection; its calls never overlap."""
 
 
 def act(policy: Policy, observation: Observation) -> tuple[NDArray[np.float64], float]:
-    """A policy's actions, checked, and the milliseconds that they took.
+    """Return a policy's actions, checked, and the milliseconds they took.
 
     Raises:
         InvalidActionError: the policy gave something else.
@@ -64,27 +66,22 @@ def act(policy: Policy, observation: Observation) -> tuple[NDArray[np.float64], 
     return actions, 1000 * (time.perf_counter() - start)
 
 
-def finish(policy: Policy | None) -> None:
-    """Tell a policy that its episode is over, if it wants to know."""
-    close = getattr(policy, "close", None)
-    if callable(close):
-        close()
-
-
 def read_picture(message: Message, key: str) -> NDArray[np.uint8]:
-    """A picture (H, W, 3).
+    """Return a picture (H, W, 3) of a message.
 
     Raises:
         ValueError: there is none.
     """
     picture = np.asarray(message.get(key))
     if picture.dtype != np.uint8 or picture.ndim != _PICTURE_AXES or picture.shape[-1] != 3:  # noqa: PLR2004
-        raise ValueError(f"{key!r} has to be uint8 (H, W, 3); got {_describe(message.get(key))}.")
+        raise ValueError(f"{key!r} must be uint8 (H, W, 3); got {_describe(message.get(key))}.")
     return picture
 
 
 def read_state(message: Message, key: str) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Joints (..., 7) and fingers (..., 2) in a state (..., 8); both fingers are taken to agree.
+    """Return joints (..., 7) and fingers (..., 2) of a state (..., 8).
+
+    The state has one finger; the other is taken to be the same.
 
     Raises:
         ValueError: there is none.
@@ -92,39 +89,39 @@ def read_state(message: Message, key: str) -> tuple[NDArray[np.float32], NDArray
     state = np.asarray(message.get(key))
     if state.dtype.kind not in "fiu" or state.ndim < 1 or state.shape[-1] != STATE_SIZE:
         raise ValueError(
-            f"{key!r} has to hold {STATE_SIZE} real numbers; got {_describe(message.get(key))}."
+            f"{key!r} must hold {STATE_SIZE} real numbers; got {_describe(message.get(key))}."
         )
     numbers = state.astype(np.float32)
     return numbers[..., :-1], np.repeat(numbers[..., -1:], 2, axis=-1)
 
 
 def read_text(message: Message, key: str) -> str:
-    """A text.
+    """Return a text of a message.
 
     Raises:
         ValueError: there is none.
     """
     text = message.get(key)
     if not isinstance(text, str):
-        raise ValueError(f"{key!r} has to be a text; got {_describe(text)}.")
+        raise ValueError(f"{key!r} must be a text; got {_describe(text)}.")
     return text
 
 
 def read_request(message: Message) -> Observation:
-    """The observation in a request of openpi and MME-VLA, which tell no end effector's pose.
+    """Return the observation in a request of openpi or MME-VLA; it has no end effector pose.
 
     Raises:
         ValueError: something is missing or malformed.
     """
     joints, gripper = read_state(message, "observation/state")
-    seen: Any = {
+    observation: Any = {
         "front_rgb": read_picture(message, "observation/image"),
         "wrist_rgb": read_picture(message, "observation/wrist_image"),
         "joint_positions": joints,
         "gripper": gripper,
         "instruction": read_text(message, "prompt"),
     }
-    return cast("Observation", seen)
+    return cast("Observation", observation)
 
 
 def _describe(value: object) -> str:

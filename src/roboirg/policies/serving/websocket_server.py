@@ -1,4 +1,4 @@
-"""The websocket side: metadata first, then an answer for each message, errors as text."""
+"""Serve over a websocket: metadata first, then a reply per message, errors as text."""
 
 from __future__ import annotations
 
@@ -21,37 +21,37 @@ if TYPE_CHECKING:
     from websockets.sync.server import Server
 
 LARGEST_REQUEST = 1024 * MIB
-"""Bytes: room for the longest video of both cameras in one message."""
+"""Bytes; fits the longest video of both cameras in one message."""
 _INTERNAL_ERROR = 1011
 
 
-class _Connection(ServerConnection):
-    """Reads large pieces: a request holds up to hundreds of megabytes of pictures."""
+class _LargeReadConnection(ServerConnection):
+    """Reads large pieces, as requests hold up to hundreds of megabytes of pictures."""
 
-    # Room for still larger ones comes fresh from the system at every read, which costs more.
+    # A still larger buffer is allocated by the system at every read, which costs more.
     recv_bufsize = 256 * 1024
 
 
 def open_websocket(
     service: Service, metadata: Mapping[str, Any], host: str, port: int, key: str | None
 ) -> Server:
-    """A server that listens; it answers once `serve_forever` is called.
+    """Return a server that listens; it answers once `serve_forever` is called.
 
     Args:
-        service: answers.
-        metadata: what a client is told first.
-        host: to listen at.
-        port: to listen at; 0 for any that is free.
-        key: what clients have to know, if anything.
+        service: answers messages.
+        metadata: sent first on every connection.
+        host: address to listen at.
+        port: port to listen at; 0 for any free one.
+        key: clients must send it; None admits all clients.
 
     Raises:
-        OSError: the address is in use or is not this computer's.
+        OSError: the address is in use or not this computer's.
     """
 
-    def request(connection: ServerConnection, asked: Request) -> Response | None:
-        if asked.path == "/healthz":
+    def check_request(connection: ServerConnection, request: Request) -> Response | None:
+        if request.path == "/healthz":
             return connection.respond(http.HTTPStatus.OK, "OK\n")
-        if not knows(key, asked.headers.get("Authorization")):
+        if not is_authorized(key, request.headers.get("Authorization")):
             return connection.respond(
                 http.HTTPStatus.UNAUTHORIZED, "The key is missing or wrong.\n"
             )
@@ -60,13 +60,13 @@ def open_websocket(
     def converse(connection: ServerConnection) -> None:
         with contextlib.suppress(ConnectionClosed):
             connection.send(pack(metadata))
-            answer = service.connection()
+            handle = service.connection()
             for data in connection:
                 try:
                     if isinstance(data, str):
-                        raise TypeError("Messages are binary; a text came.")
-                    reply = pack(answer(unpack(data)))
-                except Exception:  # noqa: BLE001 - the boundary: the policy's author wants to see all of it
+                        raise TypeError("Messages must be binary, not text.")
+                    reply = pack(handle(unpack(data)))
+                except Exception:  # noqa: BLE001 - the boundary: the policy's author sees the traceback
                     connection.send(traceback.format_exc())
                     connection.close(_INTERNAL_ERROR, "Internal server error.")
                     return
@@ -78,14 +78,14 @@ def open_websocket(
         port,
         compression=None,
         max_size=LARGEST_REQUEST,
-        process_request=request,
+        process_request=check_request,
         ping_interval=None,
-        create_connection=_Connection,
+        create_connection=_LargeReadConnection,
     )
 
 
-def knows(key: str | None, header: str | None) -> bool:
-    """Whether a request's header ``Authorization`` holds the key, or none is needed."""
+def is_authorized(key: str | None, header: str | None) -> bool:
+    """Return whether the header ``Authorization`` holds the key, or no key is needed."""
     if key is None:
         return True
     return hmac.compare_digest((header or "").encode(), f"Api-Key {key}".encode())

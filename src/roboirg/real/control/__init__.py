@@ -1,1 +1,1 @@
-"""The control loop on a real robot or its simulated twin."""
+"""Control a real robot or its simulated twin."""

@@ -1,4 +1,4 @@
-"""Policies whose answers may be longer than a chunk, given out a chunk at a time."""
+"""Split the long trajectories of privileged policies into chunks of the horizon."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 
 class ChunkedPolicy:
-    """A privileged policy, whose whole movements have to be done, in chunks of the horizon.
+    """A privileged policy that returns its trajectories a chunk at a time.
 
-    It looks behind the scenes and does not go by observations, so what is left of a movement needs
-    none. All other policies look again after every chunk.
+    It reads the simulator's state instead of observations, so the rest of a trajectory stays valid.
+    All other policies get a new observation after every chunk.
     """
 
     def __init__(self, policy: Policy) -> None:
@@ -27,17 +27,17 @@ class ChunkedPolicy:
         self._left: NDArray[np.floating[Any]] = np.zeros((0, 8))
 
     def attach(self, env: RoboIRGEnv) -> None:
-        """Hand the environment on."""
+        """Pass the environment on."""
         if isinstance(self._policy, PrivilegedPolicy):
             self._policy.attach(env)
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Begin."""
+        """Start an episode."""
         self._left = self._left[:0]
         self._policy.reset(instruction, demonstration)
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
-        """At most a horizon of actions."""
+        """Return at most `HORIZON` actions."""
         if not len(self._left):
             self._left = np.atleast_2d(self._policy.act(observation))
         chunk, self._left = self._left[:HORIZON], self._left[HORIZON:]

@@ -1,4 +1,4 @@
-"""Time, real or virtual: the control loop asks nobody else what time it is."""
+"""Real and virtual time for the control loop."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Protocol
 
 
 class Clock(Protocol):
-    """Seconds since some moment, and waiting.
+    """A monotonic clock that can be waited for.
 
     Attributes:
         is_real: whether time passes by itself.
@@ -16,10 +16,10 @@ class Clock(Protocol):
     is_real: bool
 
     def now(self) -> float:
-        """Seconds since some moment."""
+        """Return the time, seconds since an arbitrary start."""
 
     def wait_until(self, moment: float) -> None:
-        """Return when it is that late; at once if it is already."""
+        """Return at that time; at once if it has passed."""
 
 
 class RealClock:
@@ -28,17 +28,17 @@ class RealClock:
     is_real = True
 
     def now(self) -> float:
-        """Seconds since some moment."""
+        """Return the time, seconds since an arbitrary start."""
         return time.monotonic()
 
     def wait_until(self, moment: float) -> None:
-        """Sleep until then."""
+        """Sleep until that time."""
         while (left := moment - time.monotonic()) > 0:
             time.sleep(left)
 
 
 class VirtualClock:
-    """Time that passes only while somebody waits: as fast as possible, and exact."""
+    """A clock that advances only in `wait_until`: as fast as possible, and exact."""
 
     is_real = False
 
@@ -46,9 +46,9 @@ class VirtualClock:
         self._now = 0.0
 
     def now(self) -> float:
-        """Seconds since some moment."""
+        """Return the time, seconds since the start."""
         return self._now
 
     def wait_until(self, moment: float) -> None:
-        """It is that late now."""
+        """Advance to that time."""
         self._now = max(self._now, moment)

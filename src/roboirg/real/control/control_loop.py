@@ -1,16 +1,16 @@
 """The control loop: one trial of one policy on one robot.
 
-At every control period, in this order: sense; check the cameras, the policy and the loop itself;
-send one checked command, or hold the position. Whatever is wrong stops the arm in the period in
-which it is noticed, before anything else happens.
+Every control period has three steps: read the sensors; check the cameras, the policy and the loop
+itself; send one checked command, or hold the position. Any fault stops the arm in the period in
+which it is detected, before anything else happens.
 
-| what goes wrong | kind of error |
+| fault | kind of error |
 | --- | --- |
 | the policy raises, or its process dies | policy |
-| it takes longer than it may | timeout |
+| the policy exceeds its time limit | timeout |
 | its command is malformed or outside the limits | invalid_action |
 | a camera has no new picture, the robot raises | environment |
-| the loop itself came to a halt | infrastructure |
+| the loop itself hangs | infrastructure |
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from numpy.typing import NDArray
 from roboirg.core.actions import ARM_JOINTS, check_chunk
 from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
 from roboirg.evaluation.rollout_result import RolloutResult
-from roboirg.real.control.deadman import LoopWatchdog
 from roboirg.real.control.limits import Limits
-from roboirg.real.control.policy_process import PolicyHost, PolicyReply
+from roboirg.real.control.loop_watchdog import LoopWatchdog
+from roboirg.real.control.policy_workers import PolicyReply, PolicyWorker
 from roboirg.real.control.robot import HORIZON, Command, JudgingRobot, Robot, SensorReading
 from roboirg.records.record import Job
 
-ANSWER_SHARE = 0.5
-"""Share of a control period that the loop waits for an answer before it holds the arm."""
+REPLY_WAIT_SHARE = 0.5
+"""Share of a control period that the loop waits for a reply before it holds the arm."""
 SETUP_TIMEOUT_S = 600.0
 """For loading a policy and its reset; the arm is at rest."""
 _SLACK = 1e-9
@@ -51,189 +51,193 @@ class ControlLoop:
 
     Attributes:
         robot: connected.
-        host: the policy's.
+        worker: runs the policy.
         limits: of commands and times.
-        cameras: whose pictures the policy wants.
-        ended: whether an operator has ended the trial; asked in every period.
+        cameras: names of the cameras that the policy uses.
+        stop_requested: returns whether the operator has ended the trial; called in every period.
         held: control periods in which the arm waited for the policy.
         overruns: control periods that took longer than a period.
     """
 
     robot: Robot
-    host: PolicyHost
+    worker: PolicyWorker
     limits: Limits
     cameras: Sequence[str] = ()
-    ended: Callable[[], bool] = _never
+    stop_requested: Callable[[], bool] = _never
     held: int = 0
     overruns: int = 0
-    _rows: deque[Command] = field(default_factory=deque)
-    _asked: float | None = None
+    _actions: deque[Command] = field(default_factory=deque)
+    _requested_at: float | None = None
     _reply: PolicyReply | None = None
     _instruction: str = ""
     _is_prepared: bool = False
     _last: NDArray[np.float64] = field(default_factory=lambda: np.zeros(ARM_JOINTS))
 
     def play(self, job: Job, spec: str, seed: int, instruction: str) -> RolloutResult:
-        """Play a trial to its end; the arm is at rest afterwards, whatever happened.
+        """Play a trial to its end; the arm is always at rest afterwards.
 
-        The course of a robot that does not judge is left without a verdict.
+        Args:
+            job: the trial.
+            spec: of the policy.
+            seed: of the policy.
+            instruction: given to the policy.
+
+        Returns:
+            Without a verdict if the robot does not judge.
         """
-        course = RolloutResult(cause=None, error=None)
+        result = RolloutResult(cause=None, error=None)
         self._instruction = instruction
         try:
             with self._stopping():
-                self._set_up(job, spec, seed, course)
+                self._set_up(job, spec, seed, result)
                 with contextlib.ExitStack() as stack:
-                    dead_man = None
-                    # A policy in this process may keep the interpreter busy, and only on the twin.
-                    if self.robot.clock.is_real and not self._shares_scene:
-                        dead_man = LoopWatchdog(self.robot.stop, self.limits.dead_man_s)
-                        stack.enter_context(dead_man)
-                    self._run(job, course, dead_man)
+                    watchdog = None
+                    # A privileged policy in this process may block the interpreter; it runs on the
+                    # twin only.
+                    if self.robot.clock.is_real and not self.worker.shares_scene:
+                        watchdog = LoopWatchdog(self.robot.stop, self.limits.watchdog_timeout_s)
+                        stack.enter_context(watchdog)
+                    self._run(job, result, watchdog)
             if isinstance(self.robot, JudgingRobot):
                 with attribute_errors("environment"):
-                    self.robot.judge(course)
-            course.usage = self._request("close") or {}
-        except EpisodeError as fault:
+                    self.robot.judge(result)
+            result.usage = self._request("close") or {}
+        except EpisodeError as error:
             if isinstance(self.robot, JudgingRobot) and self._is_prepared:
-                with contextlib.suppress(Exception):  # what happened before is an extra
-                    self.robot.judge(course)
-            course.fail(fault.kind, fault.cause, fault.details)
-        return course
+                with contextlib.suppress(Exception):  # the events before the error are optional
+                    self.robot.judge(result)
+            result.record_error(error.kind, error.cause, error.details)
+        return result
 
     @contextlib.contextmanager
     def _stopping(self) -> Iterator[None]:
-        """Stop the arm at the end, above all after a fault; a stop that fails is one."""
+        """Stop the arm at the end, also after an error; a failure to stop is an error too."""
         try:
             yield
         except BaseException:  # Ctrl-C too
-            with contextlib.suppress(Exception):  # what happened first is what is told
+            with contextlib.suppress(Exception):  # the first error is the one to report
                 self.robot.stop()
             raise
         with attribute_errors("environment"):
             self.robot.stop()
 
-    def _set_up(self, job: Job, spec: str, seed: int, course: RolloutResult) -> None:
-        """Everything before the arm may move."""
+    def _set_up(self, job: Job, spec: str, seed: int, result: RolloutResult) -> None:
+        """Load the policy, prepare the robot and reset the policy; the arm does not move."""
         self._request("make", spec, seed)
         with attribute_errors("environment"):
             self.robot.prepare(job, self.cameras)
-            sensed = self.robot.observe()
+            reading = self.robot.observe()
         self._is_prepared = True
         env = getattr(self.robot, "env", None)
-        if env is not None and self._shares_scene:
+        if env is not None and self.worker.shares_scene:
             self._request("attach", env, getattr(self.robot, "lock"))  # noqa: B009
-        # No video comes before a real trial.
-        nothing = {
+        # Real trials have no demonstration video.
+        no_frames = {
             name: np.zeros((0, *np.shape(value)), np.asarray(value).dtype)
-            for name, value in sensed.fields.items()
+            for name, value in reading.fields.items()
         }
-        course.policy_metadata = self._request("reset", self._instruction, nothing)
-        self._last = sensed.joints
+        result.policy_metadata = self._request("reset", self._instruction, no_frames)
+        self._last = reading.joints
 
-    @property
-    def _shares_scene(self) -> bool:
-        return bool(getattr(self.host, "shares_scene", False))
-
-    def _run(self, job: Job, course: RolloutResult, dead_man: LoopWatchdog | None) -> None:
+    def _run(self, job: Job, result: RolloutResult, watchdog: LoopWatchdog | None) -> None:
         clock, period = self.robot.clock, 1.0 / self.robot.rate
-        due = clock.now()
-        for tick in range(job.max_steps):
-            if dead_man is not None:
-                if dead_man.tripped_after is not None:
-                    silence = f"{dead_man.tripped_after:.3f} s"
-                    raise EpisodeError(
-                        "infrastructure", f"the control loop stood still for {silence}", ""
-                    )
-                dead_man.feed()
-            self._tick(period)
-            course.steps = tick + 1
-            due += period
-            if clock.now() > due:
-                # Between two commands lies a period, even if one came late: none are made up for.
+        deadline = clock.now()
+        for step in range(job.max_steps):
+            if watchdog is not None:
+                if watchdog.tripped_after is not None:
+                    silence = f"{watchdog.tripped_after:.3f} s"
+                    raise EpisodeError("infrastructure", f"the control loop hung for {silence}", "")
+                watchdog.feed()
+            self._step(period)
+            result.steps = step + 1
+            deadline += period
+            if clock.now() > deadline:
+                # A late command delays the next ones: two commands are always a period apart.
                 self.overruns += 1
-                due = clock.now()
-            clock.wait_until(due)
+                deadline = clock.now()
+            clock.wait_until(deadline)
             if isinstance(self.robot, JudgingRobot) and self.robot.is_over():
                 return
-            if self.ended():
+            if self.stop_requested():
                 return
 
-    def _tick(self, period: float) -> None:
-        """One control period: one command, or the position held."""
+    def _step(self, period: float) -> None:
+        """Run one control period: send one command, or hold the position."""
         with attribute_errors("environment"):
-            sensed = self.robot.observe()
-        self._check_cameras(sensed)
-        death = self.host.death()
-        if death is not None:
-            raise EpisodeError("policy", death, "")
-        self._listen(sensed, period)
-        if not self._rows:
+            reading = self.robot.observe()
+        self._check_cameras(reading)
+        exit_reason = self.worker.exit_reason()
+        if exit_reason is not None:
+            raise EpisodeError("policy", exit_reason, "")
+        self._update_actions(reading, period)
+        if not self._actions:
             with attribute_errors("environment"):
                 self.robot.stop()
             self.held += 1
-            self._last = sensed.joints
-            self._check_patience()
+            self._last = reading.joints
+            self._check_policy_timeout()
             return
-        command = self._rows.popleft()
+        command = self._actions.popleft()
         with attribute_errors("policy"):
-            self.limits.check(command, self._last, sensed.joints, period)
+            self.limits.check(command, self._last, reading.joints, period)
         with attribute_errors("environment"):
             self.robot.command(command)
         self._last = command[:ARM_JOINTS]
 
-    def _check_cameras(self, sensed: SensorReading) -> None:
+    def _check_cameras(self, reading: SensorReading) -> None:
         now = self.robot.clock.now()
         for camera in self.cameras:
-            age = now - sensed.taken.get(camera, float("-inf"))
+            age = now - reading.taken.get(camera, float("-inf"))
             if age > self.limits.picture_age_s + _SLACK:
-                words = f"no new picture from the {camera} camera for {age:.3f} s"
-                raise EpisodeError("environment", words, "")
+                message = f"no new picture from the {camera} camera for {age:.3f} s"
+                raise EpisodeError("environment", message, "")
 
-    def _listen(self, sensed: SensorReading, period: float) -> None:
-        """Ask for a chunk when there is none left, and take it when it is there."""
+    def _update_actions(self, reading: SensorReading, period: float) -> None:
+        """Request a chunk when the last one is used up, and take it when it has arrived."""
         clock = self.robot.clock
-        if self._rows:
+        if self._actions:
             return
-        if self._asked is None:
+        if self._requested_at is None:
             with attribute_errors("environment"):
-                seen = {**sensed.fields, "instruction": self._instruction}
-            self._asked, self._reply = clock.now(), None
-            self.host.ask("act", seen)
+                observation = {**reading.fields, "instruction": self._instruction}
+            self._requested_at, self._reply = clock.now(), None
+            self.worker.send("act", observation)
         if self._reply is None:
-            # Virtual time stands still while a policy thinks, and a policy says how long it took.
-            patience = ANSWER_SHARE * period if clock.is_real else self._real_patience()
-            self._reply = self.host.answer(patience)
+            # Virtual time stands still while a policy computes; the reply holds its latency.
+            timeout = REPLY_WAIT_SHARE * period if clock.is_real else self._virtual_timeout()
+            self._reply = self.worker.receive(timeout)
         if self._reply is None:
             return
-        thought = clock.now() - self._asked
-        if not clock.is_real and thought < self._reply.latency_s - _SLACK:
+        waited = clock.now() - self._requested_at
+        if not clock.is_real and waited < self._reply.latency_s - _SLACK:
             return
-        rows = self._reply.checked()
+        rows = self._reply.result()
         with attribute_errors("policy"):
-            self._rows.extend(check_chunk(rows)[:HORIZON])
-        self._asked = self._reply = None
+            self._actions.extend(check_chunk(rows)[:HORIZON])
+        self._requested_at = self._reply = None
 
-    def _real_patience(self) -> float:
-        """Real seconds to wait for an answer where time stands still: all of them, but once."""
-        is_first = self._asked is not None and self.robot.clock.now() - self._asked <= _SLACK
+    def _virtual_timeout(self) -> float:
+        """Return the real seconds to wait in virtual time: the whole time limit, but only once."""
+        is_first = (
+            self._requested_at is not None and self.robot.clock.now() - self._requested_at <= _SLACK
+        )
         return self.limits.policy_timeout_s if is_first else 0.0
 
-    def _check_patience(self) -> None:
-        if self._asked is None:
+    def _check_policy_timeout(self) -> None:
+        if self._requested_at is None:
             return
-        thought = self.robot.clock.now() - self._asked
-        if thought > self.limits.policy_timeout_s + _SLACK:
+        waited = self.robot.clock.now() - self._requested_at
+        if waited > self.limits.policy_timeout_s + _SLACK:
             limit = f"{self.limits.policy_timeout_s:g} s"
             raise EpisodeError("timeout", f"policy's act() took longer than {limit}", "")
 
-    def _request(self, what: str, *args: Any) -> Any:  # noqa: ANN401
-        """Have the policy do something while the arm is at rest."""
-        self.host.ask(what, *args)
-        reply = self.host.answer(SETUP_TIMEOUT_S)
+    def _request(self, method: str, *args: Any) -> Any:  # noqa: ANN401
+        """Call a method of the policy while the arm is at rest, and return its result."""
+        self.worker.send(method, *args)
+        reply = self.worker.receive(SETUP_TIMEOUT_S)
         if reply is None:
             stack = "".join(traceback.format_stack(limit=3))
             raise EpisodeError(
-                "timeout", f"policy's {what} took longer than {SETUP_TIMEOUT_S:g} s", stack
+                "timeout", f"policy's {method} took longer than {SETUP_TIMEOUT_S:g} s", stack
             )
-        return reply.checked()
+        return reply.result()

@@ -1,13 +1,12 @@
-"""An adapter for robots with LeRobot's interface (`lerobot.robots.Robot`), an example of hardware.
+"""Adapter for robots with LeRobot's interface (`lerobot.robots.Robot`).
 
-The robot comes from a function of the lab's own, named ``lerobot:package.module:function``, which
-configures it and returns it, not yet connected. Used are `connect`, `get_observation`,
-`send_action`, `disconnect`, `is_connected`, `observation_features` and `action_features`. LeRobot
-itself is not imported here.
+A function of the lab, named ``lerobot:package.module:function``, configures the robot and returns
+it, not yet connected. The adapter uses `connect`, `get_observation`, `send_action`, `disconnect`,
+`is_connected`, `observation_features` and `action_features`. It does not import LeRobot.
 
-`get_observation` may wait for a camera, so it is called over and over in a thread of its own, and
-the control loop gets the newest. What is taken for the time of a picture is when the observation
-with it arrived; a picture that is the same as the one before, byte by byte, is not a new one.
+`get_observation` may wait for a camera, so a thread calls it repeatedly, and the control loop gets
+the newest observation. The time of a picture is when its observation arrived; a picture that equals
+the last one byte by byte is not new.
 """
 
 from __future__ import annotations
@@ -29,24 +28,24 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from roboirg.core.actions import ARM_JOINTS
 from roboirg.core.errors import InvalidValueError
 from roboirg.real.control.clock import Clock, RealClock
-from roboirg.real.control.kinematics import end_effector
+from roboirg.real.control.kinematics import end_effector_pose
 from roboirg.real.control.robot import COMMAND_RATE, Command, SensorReading
 from roboirg.records.record import Job
 
 PREFIX = "lerobot:"
 SIZE = 256
-"""Width and height of the pictures that policies see, pixels."""
+"""Width and height of the pictures in observations, pixels."""
 FINGER_RANGE = 0.04
-"""Of each finger, m."""
-FIRST_OBSERVATION_S = 10.0
+"""Largest opening of each finger, m."""
+FIRST_OBSERVATION_TIMEOUT_S = 10.0
 METHODS = ("connect", "disconnect", "get_observation", "send_action")
 
 
 class LeRobotArmOptions(BaseModel):
-    """Names and units of a robot, after ``?`` in its spec.
+    """Names and units of a robot's features, after ``?`` in its spec.
 
     Attributes:
-        joint: name of a joint's position in observations and actions; ``{}`` is its number, 1 to 7.
+        joint: name of a joint's position in observations and actions; ``{}`` is 1 to 7.
         gripper: name of the gripper's position.
         gripper_closed: its value when closed.
         gripper_open: its value when open.
@@ -76,12 +75,12 @@ class LeRobotArmOptions(BaseModel):
 
     @property
     def unit(self) -> float:
-        """A radian in the robot's unit."""
+        """One radian in the robot's unit."""
         return math.degrees(1.0) if self.degrees else 1.0
 
 
 class LeRobotArm:
-    """A robot with LeRobot's interface, as the control loop wants it.
+    """A robot with LeRobot's interface behind the interface of the control loop.
 
     Args:
         robot: not connected yet.
@@ -89,7 +88,7 @@ class LeRobotArm:
         arrange: called before a trial; returns when the table is arranged and the arm at home.
 
     Raises:
-        InvalidValueError: it lacks a method, an observation or an action.
+        InvalidValueError: the robot lacks a method, an observation or an action.
     """
 
     name = "lerobot"
@@ -100,67 +99,69 @@ class LeRobotArm:
         options: LeRobotArmOptions,
         arrange: Callable[[Job], None],
     ) -> None:
-        lacking = [name for name in METHODS if not callable(getattr(robot, name, None))]
-        if lacking:
+        missing = [name for name in METHODS if not callable(getattr(robot, name, None))]
+        if missing:
             raise InvalidValueError(
-                f"{type(robot).__name__} is no LeRobot robot; it lacks {', '.join(lacking)}."
+                f"{type(robot).__name__} is not a LeRobot robot; it has no {', '.join(missing)}."
             )
         self.clock: Clock = RealClock()
         self.rate = options.rate
         self._robot, self._options, self._arrange = robot, options, arrange
         self._check_features()
-        self._reader: _Reader | None = None
+        self._reader: _ObservationThread | None = None
         self._cameras: tuple[str, ...] = ()
         self._gripper = options.gripper_open
         self._hold: dict[str, float] | None = None
         self._sending = threading.Lock()
 
     def connect(self) -> None:
-        """Connect and begin to observe."""
+        """Connect and start observing."""
         if not getattr(self._robot, "is_connected", False):
             self._robot.connect()
         pictures = (self._options.front, self._options.wrist)
-        self._reader = _Reader(self._robot.get_observation, pictures)
+        self._reader = _ObservationThread(self._robot.get_observation, pictures)
 
     def prepare(self, job: Job, cameras: Sequence[str]) -> None:
-        """Have the table arranged; complain if the robot does not observe any more."""
+        """Have the table arranged, and check that observations arrive."""
         self._cameras = tuple(cameras)
         self._arrange(job)
         self._hold = None
-        self._reading().newest(FIRST_OBSERVATION_S)
+        self._require_reader().newest(FIRST_OBSERVATION_TIMEOUT_S)
 
     def observe(self) -> SensorReading:
-        """The newest observation."""
-        raw, taken = self._reading().newest(0.0)
+        """Return the newest observation."""
+        raw, taken = self._require_reader().newest(0.0)
         options = self._options
         joints = np.array([float(raw[name]) for name in options.joints]) / options.unit
         span = options.gripper_open - options.gripper_closed
-        share = (float(raw[options.gripper]) - options.gripper_closed) / span
+        opening = (float(raw[options.gripper]) - options.gripper_closed) / span
         fields: dict[str, Any] = {}
         for camera in self._cameras:
-            fields[f"{camera}_rgb"] = squared(np.asarray(raw[getattr(options, camera)], np.uint8))
+            fields[f"{camera}_rgb"] = center_square(
+                np.asarray(raw[getattr(options, camera)], np.uint8)
+            )
         if options.depth and "front" in self._cameras:
             depth = np.asarray(raw[options.depth]).reshape(*np.shape(raw[options.depth])[:2])
-            fields["front_depth"] = squared(depth, smooth=False)[..., None].astype(np.int16)
+            fields["front_depth"] = center_square(depth, smooth=False)[..., None].astype(np.int16)
         fields["joint_positions"] = joints.astype(np.float32)
-        fields["gripper"] = np.full(2, share * FINGER_RANGE, np.float32)
-        fields["end_effector"] = end_effector(joints)
+        fields["gripper"] = np.full(2, opening * FINGER_RANGE, np.float32)
+        fields["end_effector"] = end_effector_pose(joints)
         names = {"front": options.front, "wrist": options.wrist}
         return SensorReading(fields, {camera: taken[names[camera]] for camera in self._cameras})
 
     def command(self, command: Command) -> None:
         """Send joint targets and the gripper."""
         options = self._options
-        share = (float(np.clip(command[ARM_JOINTS], -1.0, 1.0)) + 1.0) / 2.0
+        opening = (float(np.clip(command[ARM_JOINTS], -1.0, 1.0)) + 1.0) / 2.0
         with self._sending:
             self._hold = None
-            self._gripper = options.gripper_closed + share * (
+            self._gripper = options.gripper_closed + opening * (
                 options.gripper_open - options.gripper_closed
             )
             self._robot.send_action(self._action(command[:ARM_JOINTS] * options.unit))
 
     def stop(self) -> None:
-        """Send the joints where they were when the arm was first told to stop."""
+        """Send the joint angles of the first call since the last command as targets."""
         if self._reader is None:
             return
         with self._sending:
@@ -174,7 +175,7 @@ class LeRobotArm:
     def close(self) -> None:
         """Stop and disconnect."""
         if self._reader is not None:
-            with contextlib.suppress(Exception):  # a driver that fails; the end is the end
+            with contextlib.suppress(Exception):  # the driver may fail; disconnect anyway
                 self.stop()
             self._reader.close()
             self._reader = None
@@ -184,7 +185,7 @@ class LeRobotArm:
         action = dict(zip(self._options.joints, map(float, joints), strict=True))
         return {**action, self._options.gripper: self._gripper}
 
-    def _reading(self) -> _Reader:
+    def _require_reader(self) -> _ObservationThread:
         if self._reader is None:
             raise ConnectionError("the robot is not connected")
         return self._reader
@@ -193,39 +194,39 @@ class LeRobotArm:
         options = self._options
         state = (*options.joints, options.gripper)
         pictures = [name for name in (options.front, options.wrist, options.depth) if name]
-        for kind, wanted in (("observation", (*state, *pictures)), ("action", state)):
+        for kind, required in (("observation", (*state, *pictures)), ("action", state)):
             features: Mapping[str, Any] = getattr(self._robot, f"{kind}_features")
-            for name in wanted:
+            for name in required:
                 if name not in features:
                     raise InvalidValueError(
                         f"{type(self._robot).__name__} has no {kind} {name!r}; it has "
-                        f"{', '.join(features)}. Names are options of the robot's spec."
+                        f"{', '.join(features)}. The robot's spec can set other names."
                     )
 
 
-class _Reader:
-    """Calls `get_observation` over and over, in a thread."""
+class _ObservationThread:
+    """A thread that calls `get_observation` repeatedly."""
 
     def __init__(self, read: Callable[[], dict[str, Any]], pictures: Sequence[str]) -> None:
         self._read, self._pictures = read, pictures
         self._newest: dict[str, Any] | None = None
         self._taken: dict[str, float] = {}
         self._error: str | None = None
-        self._arrived, self._over = threading.Event(), threading.Event()
-        self._thread = threading.Thread(target=self._work, name="observations", daemon=True)
+        self._arrived, self._closed = threading.Event(), threading.Event()
+        self._thread = threading.Thread(target=self._run, name="observations", daemon=True)
         self._thread.start()
 
     def newest(
         self, timeout_s: float, *, strict: bool = True
     ) -> tuple[dict[str, Any], dict[str, float]]:
-        """The newest observation, and when each of its pictures arrived.
+        """Return the newest observation and the arrival time of each of its pictures.
 
         Args:
-            timeout_s: to wait for the first one.
-            strict: complain if observing has failed since.
+            timeout_s: for the first observation.
+            strict: raise if observing has failed since.
 
         Raises:
-            ConnectionError: there is none.
+            ConnectionError: there is no observation.
         """
         self._arrived.wait(timeout_s)
         if self._error is not None and strict:
@@ -235,12 +236,12 @@ class _Reader:
         return self._newest, self._taken
 
     def close(self) -> None:
-        """No more observations."""
-        self._over.set()
-        self._thread.join(FIRST_OBSERVATION_S)
+        """Stop observing."""
+        self._closed.set()
+        self._thread.join(FIRST_OBSERVATION_TIMEOUT_S)
 
-    def _work(self) -> None:
-        while not self._over.is_set():
+    def _run(self) -> None:
+        while not self._closed.is_set():
             try:
                 raw = self._read()
             except Exception as error:  # noqa: BLE001 - the boundary: drivers raise anything
@@ -257,35 +258,35 @@ class _Reader:
             self._arrived.set()
 
 
-def squared(picture: NDArray[Any], *, smooth: bool = True) -> NDArray[Any]:
-    """The middle of a picture as a square of 256 by 256 pixels."""
+def center_square(picture: NDArray[Any], *, smooth: bool = True) -> NDArray[Any]:
+    """Crop a picture to its central square and scale it to 256 x 256 pixels."""
     import cv2
 
     height, width = picture.shape[:2]
     side = min(height, width)
     top, left = (height - side) // 2, (width - side) // 2
     square = picture[top : top + side, left : left + side]
-    how = cv2.INTER_AREA if smooth else cv2.INTER_NEAREST
-    return np.asarray(cv2.resize(square, (SIZE, SIZE), interpolation=how))
+    method = cv2.INTER_AREA if smooth else cv2.INTER_NEAREST
+    return np.asarray(cv2.resize(square, (SIZE, SIZE), interpolation=method))
 
 
 def make_arm(spec: str, arrange: Callable[[Job], None]) -> LeRobotArm:
-    """The robot of a spec such as ``lerobot:my_lab.arm:make?degrees=true``.
+    """Return the robot of a spec such as ``lerobot:my_lab.arm:make?degrees=true``.
 
     Raises:
-        InvalidValueError: the spec is malformed, the function cannot be imported, or what it makes
-            is no such robot.
+        InvalidValueError: the spec is malformed, the function cannot be imported, or it returns
+            something else.
     """
-    place, _, query = spec.removeprefix(PREFIX).partition("?")
-    module_name, _, name = place.partition(":")
+    address, _, query = spec.removeprefix(PREFIX).partition("?")
+    module_name, _, name = address.partition(":")
     try:
         given = dict(parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query)))
         options = LeRobotArmOptions.model_validate(given)
         make = getattr(importlib.import_module(module_name), name)
     except ValidationError as error:
         first = error.errors()[0]
-        words = f"option {first['loc'][0]}: {first['msg']}"
-        raise InvalidValueError(f"Robot {spec!r}: {words}.") from error
+        message = f"option {first['loc'][0]}: {first['msg']}"
+        raise InvalidValueError(f"Robot {spec!r}: {message}.") from error
     except (ValueError, ImportError, AttributeError) as error:
         raise InvalidValueError(
             f"Robot {spec!r}: {error}; write lerobot:package.module:function?option=value."

@@ -1,4 +1,4 @@
-"""What the arm may be told to do: checked before a command is sent."""
+"""Limits of commands, checked before a command is sent."""
 
 from __future__ import annotations
 
@@ -10,30 +10,30 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from roboirg.core.actions import ARM_JOINTS, JOINT_HIGH, JOINT_LOW
 from roboirg.core.errors import InvalidActionError, InvalidValueError
-from roboirg.real.control.kinematics import tool_in_base
+from roboirg.real.control.kinematics import tool_pose
 from roboirg.real.control.robot import Command
 
 FR3_LOW = np.array([-2.7437, -1.7837, -2.9007, -3.0421, -2.8065, 0.5445, -3.0159])
 FR3_HIGH = np.array([2.7437, 1.7837, 2.9007, -0.1518, 2.8065, 4.5169, 3.0159])
 """Joint limits of the Franka Research 3, rad (its maker's data sheet)."""
 LOW, HIGH = np.maximum(JOINT_LOW, FR3_LOW), np.minimum(JOINT_HIGH, FR3_HIGH)
-"""What both the Panda and the Research 3 reach, rad."""
+"""Joint limits that hold for both the Panda and the Research 3, rad."""
 
 SLACK = 1e-9
 _AXES = ("x", "y", "z")
 
 
 class Limits(BaseModel):
-    """Limits of commands.
+    """Limits of commands and times.
 
     Attributes:
-        joint_speed: rad/s of every joint. Below the slowest joint of the Panda (2.175) and of the
-            Research 3 (2.62); the benchmark's demonstrations stay below 0.9.
-        workspace_low: least x, y, z of the tool center, robot base frame, m.
-        workspace_high: greatest.
-        picture_age_s: of the newest picture of each camera; one and a half of its periods.
-        policy_timeout_s: that a policy may think; the arm holds its position meanwhile.
-        dead_man_s: without a sign of life of the control loop, after which the arm is stopped.
+        joint_speed: largest of every joint, rad/s. Below the slowest joint of the Panda (2.175) and
+            of the Research 3 (2.62); the benchmark's demonstrations stay below 0.9.
+        workspace_low: smallest x, y, z of the tool center, robot base frame, m.
+        workspace_high: largest x, y, z.
+        picture_age_s: largest of each camera's newest picture; one and a half camera periods.
+        policy_timeout_s: longest time for a chunk; the arm holds its position meanwhile.
+        watchdog_timeout_s: how long the control loop may hang before the arm is stopped.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -43,7 +43,7 @@ class Limits(BaseModel):
     workspace_high: tuple[float, float, float] = (0.9, 0.5, 0.8)
     picture_age_s: float = Field(default=0.05, gt=0)
     policy_timeout_s: float = Field(default=2.0, gt=0)
-    dead_man_s: float = Field(default=0.1, gt=0)
+    watchdog_timeout_s: float = Field(default=0.1, gt=0)
 
     def check(
         self,
@@ -52,19 +52,19 @@ class Limits(BaseModel):
         joints: NDArray[np.float64],
         period_s: float,
     ) -> None:
-        """Complain of a command that must not be sent.
+        """Refuse a command outside the limits.
 
-        Speeds are measured from the nearer of where a joint was told to be and where it is: an arm
-        lags behind its targets, and a policy that goes by what it sees starts from there.
+        A joint's speed is measured from its last target or its present angle, whichever is nearer:
+        an arm lags behind its targets, and a policy may start from the observed angles.
 
         Args:
             command: joint targets and gripper.
-            last: the joint targets before, (7), rad.
-            joints: where the joints are, (7), rad.
-            period_s: from one command to the next.
+            last: previous joint targets (7), rad.
+            joints: present joint angles (7), rad.
+            period_s: time between two commands.
 
         Raises:
-            InvalidActionError: it is outside the limits; nothing has moved.
+            InvalidActionError: the command is outside the limits and must not be sent.
         """
         target = command[:ARM_JOINTS]
         outside = np.flatnonzero((target < LOW - SLACK) | (target > HIGH + SLACK))
@@ -82,7 +82,7 @@ class Limits(BaseModel):
                 f"joint {fastest + 1} would move at {speeds[fastest]:.2f} rad/s; at most "
                 f"{self.joint_speed:g}."
             )
-        self._check_tool(tool_in_base(target)[:3, 3])
+        self._check_tool(tool_pose(target)[:3, 3])
 
     def _check_tool(self, tool: NDArray[np.float64]) -> None:
         for axis, low, at, high in zip(
@@ -96,10 +96,13 @@ class Limits(BaseModel):
 
 
 def read_limits(path: Path | None) -> Limits:
-    """Limits from a JSON file of some of the fields; the usual ones without a file.
+    """Read limits from a JSON file; fields that it leaves out have their defaults.
+
+    Args:
+        path: None for all defaults.
 
     Raises:
-        InvalidValueError: the file cannot be read, or says something else.
+        InvalidValueError: the file cannot be read or is malformed.
     """
     if path is None:
         return Limits()

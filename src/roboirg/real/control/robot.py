@@ -1,4 +1,4 @@
-"""What a robot has to be able to do for `roboirg real run`: a small interface, and errors of it.
+"""The interface of robots for `roboirg real run`.
 
 Frames and units are those of the benchmark's observations. The world frame lies `ROBOT_BASE` in
 front of the robot's base, with the same axes: x forward, y to the robot's left, z up.
@@ -26,18 +26,18 @@ chunk of 20 is one second in both. Slower than the cameras: in every control per
 has a new picture.
 """
 HORIZON = 20
-"""Actions of a chunk that are executed before the policy looks again (paper)."""
+"""Actions of a chunk that are executed before the policy gets a new observation (paper)."""
 
 Command = NDArray[np.float64]
 """(8,): absolute joint targets, rad, and the gripper, +1 open to -1 closed."""
 
 
 class SensorReading(NamedTuple):
-    """What a robot senses.
+    """The newest sensor values of a robot.
 
     Attributes:
         fields: as in a policy's observation, without the instruction.
-        taken: of each camera, when its newest picture was taken, seconds on the robot's clock.
+        taken: time of each camera's newest picture, seconds on the robot's clock.
     """
 
     fields: Mapping[str, Any]
@@ -52,12 +52,12 @@ class SensorReading(NamedTuple):
 class Robot(Protocol):
     """An arm with seven joints and a gripper, a front and a wrist camera.
 
-    No call may take longer than a control period, but for `connect`, `prepare` and `close`.
+    No call may take longer than a control period, except `connect`, `prepare` and `close`.
 
     Attributes:
         name: for records.
         rate: commands per second.
-        clock: whose seconds `SensorReading.taken` are.
+        clock: gives the times in `SensorReading.taken`.
     """
 
     name: str
@@ -65,35 +65,35 @@ class Robot(Protocol):
     clock: Clock
 
     def connect(self) -> None:
-        """Establish the connection; the arm does not move."""
+        """Connect; the arm does not move."""
 
     def prepare(self, job: Job, cameras: Sequence[str]) -> None:
-        """Be ready for a trial: everything in its place, the arm at home and at rest.
+        """Prepare a trial: return with the table arranged and the arm at home and at rest.
 
         Args:
             job: the trial.
-            cameras: whose pictures are wanted.
+            cameras: names of the cameras that the policy uses.
         """
 
     def observe(self) -> SensorReading:
-        """The newest that is known; never waits for a camera."""
+        """Return the newest sensor values, without waiting for a camera."""
 
     def command(self, command: Command) -> None:
-        """Move towards joint targets, for one control period."""
+        """Move toward joint targets for one control period."""
 
     def stop(self) -> None:
-        """Hold the position where the arm is, with the gripper as it is. May be called again."""
+        """Hold the position and the gripper as they are. May be called again."""
 
     def close(self) -> None:
-        """Stop and end the connection."""
+        """Stop and disconnect."""
 
 
 @runtime_checkable
 class JudgingRobot(Protocol):
-    """A robot that knows by itself how a trial ended: the twin."""
+    """A robot that judges trials itself: the twin."""
 
     def is_over(self) -> bool:
-        """Whether there is a verdict."""
+        """Return whether there is a verdict."""
 
-    def judge(self, course: RolloutResult) -> None:
-        """Fill in the verdict and all that happened."""
+    def judge(self, result: RolloutResult) -> None:
+        """Fill in the verdict and the events of the trial."""

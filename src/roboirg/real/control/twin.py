@@ -1,4 +1,4 @@
-"""The twin: the robot's interface on the simulator, in virtual or in real time."""
+"""The twin: the robot interface on the simulator, in virtual or real time."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from roboirg.records.record import Job
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
-NOTHING_DRAWN = "none"
+NO_RENDER_DEVICE = "none"
 _NEVER = 2**62
 
 
 class Twin:
-    """The simulated robot. It knows how a trial ended.
+    """A simulated robot that judges its trials.
 
-    Its cameras take pictures 30 times a second; what they show is drawn when it is read. While a
-    policy thinks in virtual time the world stands still, unless the policy says how long it took.
+    Its cameras take pictures 30 times a second; a picture is rendered when it is read. While a
+    policy computes in virtual time the world stands still, unless the policy reports its latency.
 
     Args:
         clock: virtual by default: as fast as possible, and exact.
@@ -40,104 +40,106 @@ class Twin:
     def __init__(self, clock: Clock | None = None) -> None:
         self.clock: Clock = VirtualClock() if clock is None else clock
         self.env: RoboIRGEnv | None = None
-        self._began = 0.0
-        self._feeling: dict[str, Any] = {}
+        self._started_at = 0.0
+        self._proprioception: dict[str, Any] = {}
         self._infos: list[dict[str, Any]] = []
         self._hold: Command | None = None
         self._gripper = 1.0
         self.cameras: tuple[str, ...] = ()
-        # The dead-man's thread may stop the arm while the loop does something else.
+        # The watchdog's thread may stop the arm while the loop steps the environment.
         self.lock = threading.RLock()
 
     def connect(self) -> None:
-        """Nothing is to be done."""
+        """Do nothing."""
 
     def prepare(self, job: Job, cameras: Sequence[str]) -> None:
         """Build the scene of the trial."""
         self.cameras = tuple(cameras)
         env = make_env(job, EnvRequirements((), JOINT_ANGLE))
         if cameras:
-            # Pictures are to be had, but only those that are read are drawn.
-            env.set_frame_hook(_look_away, every=_NEVER)
-        # Of its own for every trial: a policy that was given up may still have the last one.
+            # With a frame hook the environment can render; only pictures that are read are.
+            env.set_frame_hook(_draw_nothing, every=_NEVER)
+        # A new lock for every trial: an abandoned policy may still hold the last one.
         self.lock = threading.RLock()
-        self._feeling, info = env.reset()
+        self._proprioception, info = env.reset()
         self._infos = [info]
         self.env, self._hold, self._gripper = env, None, 1.0
-        self._began = self.clock.now()
+        self._started_at = self.clock.now()
 
     def observe(self) -> SensorReading:
-        """Joints and fingers now, and pictures that are drawn when they are read."""
-        felt = {name: value for name, value in self._feeling.items() if name != "instruction"}
+        """Return the joints and fingers now, and pictures that are rendered when they are read."""
+        fields = {name: one for name, one in self._proprioception.items() if name != "instruction"}
         taken = {camera: self.taken(camera) for camera in self.cameras}
-        return SensorReading(_Fields(felt, self._playing(), self.cameras), taken)
+        return SensorReading(_LazyObservation(fields, self._require_env(), self.cameras), taken)
 
-    def taken(self, camera: str) -> float:  # noqa: ARG002 - of both cameras alike
-        """When a camera's newest picture was taken, s."""
-        count = math.floor((self.clock.now() - self._began) * CAMERA_RATE + 1e-6)
-        return self._began + count / CAMERA_RATE
+    def taken(self, camera: str) -> float:  # noqa: ARG002 - the same for both cameras
+        """Return the time of a camera's newest picture, s."""
+        count = math.floor((self.clock.now() - self._started_at) * CAMERA_RATE + 1e-6)
+        return self._started_at + count / CAMERA_RATE
 
     def command(self, command: Command) -> None:
-        """One control step."""
+        """Take one control step."""
         with self.lock:
             self._hold, self._gripper = None, float(command[ARM_JOINTS])
             self._step(command)
 
     def stop(self) -> None:
-        """One control step on the spot."""
+        """Take one control step in place."""
         if not self.lock.acquire(blocking=False):
-            return  # a policy plans in this scene: it stands still meanwhile
+            return  # a policy plans in this scene, which stands still meanwhile
         try:
             if self.env is None or self.is_over():
                 return
             if self._hold is None:
-                joints = np.asarray(self._feeling["joint_positions"], dtype=np.float64)
+                joints = np.asarray(self._proprioception["joint_positions"], dtype=np.float64)
                 self._hold = np.append(joints, self._gripper)
             self._step(self._hold)
         finally:
             self.lock.release()
 
     def close(self) -> None:
-        """Forget the scene."""
+        """Drop the scene."""
         self.env = None
 
     def is_over(self) -> bool:
-        """Whether the judge has a verdict, or time is up."""
-        return self._playing().status != "ongoing"
+        """Return whether the judge has a verdict, or time is up."""
+        return self._require_env().status != "ongoing"
 
-    def judge(self, course: RolloutResult) -> None:
-        """Fill in what happened and, if the trial is over, the judge's verdict."""
+    def judge(self, result: RolloutResult) -> None:
+        """Fill in the events and, if the trial is over, the judge's verdict."""
         first, *later = self._infos
-        device = str(self._playing().render_device)
-        course.render_device = None if device == NOTHING_DRAWN else device
-        course.turn = int(first["elapsed_steps"])
+        device = str(self._require_env().render_device)
+        result.render_device = None if device == NO_RENDER_DEVICE else device
+        result.policy_start_step = int(first["elapsed_steps"])
         for info in (first, *later):
-            course.note(info)
+            result.add_events(info)
         last = self._infos[-1]
-        course.settle(last["status"], last.get("cause"), last["steps"])
+        result.record_status(last["status"], last.get("cause"), last["steps"])
 
     def _step(self, command: Command) -> None:
-        self._feeling, *_, info = self._playing().step(command)
+        self._proprioception, *_, info = self._require_env().step(command)
         self._infos.append(info)
 
-    def _playing(self) -> RoboIRGEnv:
+    def _require_env(self) -> RoboIRGEnv:
         if self.env is None:
             raise RuntimeError("the twin has not been prepared for a trial")
         return self.env
 
 
-class _Fields(Mapping[str, Any]):
-    """An observation whose pictures are drawn when they are read."""
+class _LazyObservation(Mapping[str, Any]):
+    """An observation whose pictures are rendered when they are read."""
 
-    def __init__(self, felt: dict[str, Any], env: RoboIRGEnv, cameras: Sequence[str]) -> None:
-        self._felt, self._env = felt, env
+    def __init__(
+        self, proprioception: dict[str, Any], env: RoboIRGEnv, cameras: Sequence[str]
+    ) -> None:
+        self._proprioception, self._env = proprioception, env
         pictures = [f"{camera}_rgb" for camera in cameras]
         depth = ["front_depth"] if "front" in cameras else []
-        self._names = (*pictures, *depth, *felt)
+        self._names = (*pictures, *depth, *proprioception)
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        if name in self._felt:
-            found: NDArray[Any] = self._felt[name]
+        if name in self._proprioception:
+            found: NDArray[Any] = self._proprioception[name]
             return found
         if name not in self._names:
             raise KeyError(name)
@@ -153,5 +155,5 @@ class _Fields(Mapping[str, Any]):
         return len(self._names)
 
 
-def _look_away(_env: RoboIRGEnv, _is_demonstration: bool) -> None:
+def _draw_nothing(_env: RoboIRGEnv, _is_demonstration: bool) -> None:
     pass

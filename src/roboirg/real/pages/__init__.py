@@ -1,1 +1,1 @@
-"""What operators read: the score page, printed sheets and figures."""
+"""Pages for operators and readers: the score page, printed sheets and figures."""

@@ -1,4 +1,4 @@
-"""The operator at the terminal: told what to arrange and what happened, and may end a trial."""
+"""The operator's terminal: asks for arrangements, reports trials and can end one."""
 
 from __future__ import annotations
 
@@ -7,40 +7,43 @@ import sys
 
 from roboirg.real.study.study_plan import PlannedTrial, StudyPlan
 from roboirg.real.study.trial_log import UNSCORED
-from roboirg.real.study.trial_text import places_of, turns_of
+from roboirg.real.study.trial_text import describe_positions, spoken_turns
 from roboirg.records.record import Job, Record
 
 
 class OperatorConsole:
-    """Talks to whoever sits at the terminal.
+    """Prints to the operator's terminal and reads the Enter key.
 
     Args:
         plan: of the study.
 
     Attributes:
-        faulty: the errors so far, in words.
+        errors: a line for each trial that ended in an error.
     """
 
     def __init__(self, plan: StudyPlan) -> None:
         self._trials = {trial.identity: trial for trial in plan.trials}
-        self._total, self._count = len(plan.trials), 0
-        self.faulty: list[str] = []
+        self._count = 0
+        self.errors: list[str] = []
 
-    def arrange(self, job: Job) -> None:
-        """Say what is to be arranged, and wait for Enter.
+    def request_arrangement(self, job: Job) -> None:
+        """Print what to arrange and say, and wait for Enter.
 
         Raises:
-            EOFError: nobody is there.
+            EOFError: standard input is closed.
         """
         trial = self._trials[job.model_copy(update={"spec": None})]
-        print(f"\n{trial.name}: arrange")  # noqa: T201 - it is a conversation
-        for line in (*places_of(trial), "say:", *turns_of(trial)):
+        print(f"\n{trial.name}: arrange")  # noqa: T201 - this class is a terminal
+        for line in (*describe_positions(trial), "say:", *spoken_turns(trial)):
             print(f"  {line}")  # noqa: T201
-        input("The arm is at home, everything in its place, nobody within reach? Enter starts. ")
-        print("Enter ends the trial; the emergency stop is the robot's own.")  # noqa: T201
+        input(
+            "Is the arm at home, everything in its place and every person out of reach? "
+            "Press Enter to start. "
+        )
+        print("Press Enter to end the trial; in an emergency use the robot's own stop.")  # noqa: T201
 
-    def ended(self) -> bool:
-        """Whether Enter has been pressed."""
+    def stop_requested(self) -> bool:
+        """Return whether Enter has been pressed."""
         if not sys.stdin.isatty():
             return False
         ready, _, _ = select.select([sys.stdin], [], [], 0.0)
@@ -48,11 +51,11 @@ class OperatorConsole:
             sys.stdin.readline()
         return bool(ready)
 
-    def tell(self, trial: PlannedTrial, record: Record) -> None:
-        """Say how a trial ended."""
+    def report(self, trial: PlannedTrial, record: Record) -> None:
+        """Print how a trial ended."""
         self._count += 1
         outcome = "played" if record.cause == UNSCORED else record.outcome
-        words = "" if outcome in ("success", "played") else f": {record.cause}"
-        print(f"{self._count}. {trial.name} {outcome}, {record.steps} steps{words}", flush=True)  # noqa: T201
+        cause = "" if outcome in ("success", "played") else f": {record.cause}"
+        print(f"{self._count}. {trial.name} {outcome}, {record.steps} steps{cause}", flush=True)  # noqa: T201
         if outcome == "error":
-            self.faulty.append(f"{trial.name}: {record.cause}")
+            self.errors.append(f"{trial.name}: {record.cause}")

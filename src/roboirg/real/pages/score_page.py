@@ -1,4 +1,4 @@
-"""The operator's page as text: one trial at a time, a form with a button for every verdict."""
+"""Render the operator's page: one trial with a button for every verdict."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ import functools
 from collections import Counter
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
+from urllib.parse import urlencode
 
 from roboirg.core.errors import MissingDependencyError
 from roboirg.real.pages.arrangement_svg import draw_svg
 from roboirg.real.study.failure_choices import failure_choices
 from roboirg.real.study.study_plan import PlannedTrial
-from roboirg.real.study.trial_log import SUCCESS, VOID_CHOICE, TrialLog, said_of
-from roboirg.real.study.trial_text import meant_by, places_of, turns_of
+from roboirg.real.study.trial_log import SUCCESS, VOID_CHOICE, TrialLog, trial_metadata
+from roboirg.real.study.trial_text import describe_positions, explicit_command, spoken_turns
 from roboirg.records.record import Record
 
 if TYPE_CHECKING:
@@ -22,92 +23,100 @@ TEMPLATE = "score.html.j2"
 SUCCESS_KEY, VOID_KEY = "s", "v"
 
 
-class Button(NamedTuple):
-    """A verdict that can be given.
+class VerdictButton(NamedTuple):
+    """The button of a verdict.
 
     Attributes:
-        value: as `TrialLog.score` takes it.
+        value: choice for `TrialLog.score`.
         key: of the keyboard.
-        words: what it says.
+        label: text of the button.
         group: success, grounding, execution or void.
-        chosen: whether it is the verdict that counts now.
+        chosen: whether this is the trial's present verdict.
     """
 
     value: str
     key: str
-    words: str
+    label: str
     group: str
     chosen: bool
 
 
-def render(ledger: TrialLog, trial: PlannedTrial, *, token: str, message: str = "") -> str:
-    """The page of a trial.
+def render_trial(
+    trial_log: TrialLog, trial: PlannedTrial, *, token: str, nonce: str, message: str = ""
+) -> str:
+    """Render the page of a trial.
 
     Args:
-        ledger: what is known of all trials.
-        trial: the one to show.
-        token: which only pages of this server know.
-        message: what came of the last click.
+        trial_log: with the records of the study.
+        trial: to show.
+        token: secret that only pages of this server know.
+        nonce: allows the page's own style and script.
+        message: result of the last click.
 
     Raises:
         MissingDependencyError: Jinja is not installed.
     """
-    names = [one.name for one in ledger.plan.trials]
-    place = names.index(trial.name)
-    record = ledger.newest(trial.name)
-    states = Counter(ledger.state(name) for name in names)
-    said = said_of(record) if record else {}
+    names = [one.name for one in trial_log.plan.trials]
+    index = names.index(trial.name)
+    record = trial_log.newest(trial.name)
+    states = Counter(trial_log.state(name) for name in names)
+    metadata = trial_metadata(record) if record else {}
     return _template().render(
         trial=trial.name,
         block=trial.block,
-        position=place + 1,
+        position=index + 1,
         total=len(names),
         scored=states["scored"] + states["void"],
         waiting=states["waiting"],
-        previous=names[place - 1] if place else "",
-        following=names[place + 1] if place + 1 < len(names) else "",
-        turns=turns_of(trial),
-        meant=meant_by(trial),
-        places=places_of(trial),
+        previous=names[index - 1] if index else "",
+        following=names[index + 1] if index + 1 < len(names) else "",
+        turns=spoken_turns(trial),
+        meaning=explicit_command(trial),
+        positions=describe_positions(trial),
         drawing=draw_svg(trial.episode.scene),
-        buttons=buttons_of(trial, record, ledger.state(trial.name)),
-        state=ledger.state(trial.name),
+        buttons=verdict_buttons(trial, record, trial_log.state(trial.name)),
+        state=trial_log.state(trial.name),
         cause=record.cause if record and record.outcome == "error" else "",
-        note=said.get("note", ""),
+        note=metadata.get("note", ""),
         video=(record.video or "") if record else "",
-        seen=ledger.count(trial.name),
-        undo=ledger.last_scored or "",
+        revision=trial_log.revision(trial.name),
+        undo=trial_log.last_scored or "",
         token=token,
+        nonce=nonce,
         message=message,
     )
 
 
-def buttons_of(trial: PlannedTrial, record: Record | None, state: str) -> tuple[Button, ...]:
-    """Every verdict of a trial, with the key that gives it."""
+def verdict_buttons(
+    trial: PlannedTrial, record: Record | None, state: str
+) -> tuple[VerdictButton, ...]:
+    """Return a button for every verdict of a trial, with its key."""
     choices = failure_choices(trial.episode)
-    chosen = _chosen(trial, record, state)
+    chosen = _present_choice(trial, record, state)
     failures = (
-        Button(
+        VerdictButton(
             one.key,
             str(number),
-            f"it {one.words}",
+            f"the robot {one.words}",
             "grounding" if one.is_grounding else "execution",
             one.key == chosen,
         )
         for number, one in enumerate(choices, 1)
     )
     return (
-        Button(SUCCESS, SUCCESS_KEY, "it did what was meant", SUCCESS, chosen == SUCCESS),
+        VerdictButton(
+            SUCCESS, SUCCESS_KEY, "the robot did what was meant", SUCCESS, chosen == SUCCESS
+        ),
         *failures,
-        Button(
-            VOID_CHOICE, VOID_KEY, "void: it says nothing about the policy, try again",
+        VerdictButton(
+            VOID_CHOICE, VOID_KEY, "void: says nothing about the policy; play the trial again",
             VOID_CHOICE, chosen == VOID_CHOICE,
         ),
     )  # fmt: skip
 
 
-def _chosen(trial: PlannedTrial, record: Record | None, state: str) -> str:
-    """The verdict that counts now; empty if there is none."""
+def _present_choice(trial: PlannedTrial, record: Record | None, state: str) -> str:
+    """Return the choice of the present verdict; empty if there is none."""
     if record is None or state not in ("scored", "void"):
         return ""
     if state == "void":
@@ -122,7 +131,7 @@ def _chosen(trial: PlannedTrial, record: Record | None, state: str) -> str:
 
 
 def check_page_support() -> None:
-    """Complain now if the page cannot be made.
+    """Check that the page can be rendered.
 
     Raises:
         MissingDependencyError: Jinja is not installed.
@@ -143,7 +152,7 @@ def _template() -> jinja2.Template:
     from markupsafe import Markup
 
     def svg(text: str) -> Markup:
-        return Markup(text)  # noqa: S704 - drawn here, of the plan's own names
+        return Markup(text)  # noqa: S704 - drawn by this package, with the plan's names
 
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("roboirg.real.pages"),
@@ -156,8 +165,6 @@ def _template() -> jinja2.Template:
     return environment.get_template(TEMPLATE)
 
 
-def redirect_of(query: Mapping[str, str]) -> str:
-    """The address of a trial's page."""
-    from urllib.parse import urlencode
-
+def page_address(query: Mapping[str, str]) -> str:
+    """Return the address of a trial's page."""
     return "/?" + urlencode(query)

@@ -1,4 +1,4 @@
-"""The real-world figure: success by setting, a study beside the paper's own."""
+"""Draw success rates by setting, of a study beside the paper's."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from roboirg.analysis.published import TRIALS
+from roboirg.analysis.stats.cells import Cells
 from roboirg.analysis.stats.intervals import wilson_interval
-from roboirg.analysis.stats.samples import Samples
-from roboirg.analysis.stats.success_rates import SETTING_ORDER
+from roboirg.analysis.stats.option_labels import setting_sort_key
 from roboirg.analysis.tables.paper_tables import make_table
 from roboirg.analysis.tables.table import Row, Table
 from roboirg.core.errors import InvalidValueError
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 FORMATS = ("png", "svg")
 NAME = "real"
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-"""Of Okabe and Ito, told apart by color-blind people too."""
+"""Palette of Okabe and Ito, safe for color-blind readers."""
 PUBLISHED_COLORS = ("#777777", "#aaaaaa")
 HATCH = "//"
 PANEL_INCHES = (5.2, 3.4)
@@ -33,9 +33,9 @@ class Bar(NamedTuple):
     """One bar.
 
     Attributes:
-        percent: its height.
-        low: of the 95 % interval, percent.
-        high: of the same.
+        percent: success rate.
+        low: lower end of its 95 % interval, percent.
+        high: upper end.
     """
 
     percent: float
@@ -48,8 +48,8 @@ class Series(NamedTuple):
 
     Attributes:
         name: of the policy.
-        published: whether they are the paper's.
-        bars: by task and setting; what is missing has none.
+        published: whether the values are the paper's.
+        bars: by task and setting; cells without a value have none.
     """
 
     name: str
@@ -57,10 +57,10 @@ class Series(NamedTuple):
     bars: dict[tuple[str, str], Bar]
 
 
-def series_of(table: Table) -> tuple[Series, ...]:
-    """The bars of the real-world table, a series for each policy in the order of its rows.
+def bar_series(table: Table) -> tuple[Series, ...]:
+    """Return a series of bars for each policy of the real-world table, in its order.
 
-    Intervals are Wilson's: of ours as the table has them, of the paper's from its ten trials.
+    Intervals are Wilson's: our own from the table, the paper's from its ten trials.
     """
     found: dict[tuple[str, bool], Series] = {}
     for row in table.rows:
@@ -73,19 +73,19 @@ def series_of(table: Table) -> tuple[Series, ...]:
     return tuple(sorted(found.values(), key=lambda one: one.published))
 
 
-def write_figure(samples: Samples, folder: Path, *, published: bool = True) -> tuple[Path, ...]:
+def write_figure(samples: Cells, folder: Path, *, published: bool = True) -> tuple[Path, ...]:
     """Draw success by setting, a panel for each task, as PNG and SVG.
 
     Args:
         samples: of the studies.
-        folder: made if it is missing.
-        published: whether the paper's own stand beside them.
+        folder: created if it is missing.
+        published: whether to draw the paper's values beside them.
 
     Returns:
-        The files.
+        The paths of the files.
 
     Raises:
-        InvalidValueError: there is nothing to draw.
+        InvalidValueError: no trial has a verdict.
         MissingDependencyError: matplotlib is not installed.
         StoreError: the files cannot be written.
     """
@@ -94,9 +94,9 @@ def write_figure(samples: Samples, folder: Path, *, published: bool = True) -> t
     from matplotlib.figure import Figure
 
     table = make_table("real", samples, published=published)
-    series = series_of(table)
+    series = bar_series(table)
     if not any(one.bars for one in series):
-        raise InvalidValueError("The runs hold no trial of a real robot's task with a verdict.")
+        raise InvalidValueError("The runs have no trial of a real-robot task with a verdict.")
     tasks = [column.name for column in table.columns if not column.averages]
     figure = Figure(figsize=(PANEL_INCHES[0] * len(tasks), PANEL_INCHES[1]), layout="constrained")
     for number, task in enumerate(tasks, 1):
@@ -108,7 +108,7 @@ def write_figure(samples: Samples, folder: Path, *, published: bool = True) -> t
         folder.mkdir(parents=True, exist_ok=True)
         with mpl.rc_context({"svg.hashsalt": NAME}):
             for path in paths:
-                # No date in it: the same records give the same file.
+                # Without the date, so that the same records give the same file.
                 metadata = {"Date": None} if path.suffix == ".svg" else {}
                 figure.savefig(path, dpi=DOTS_PER_INCH, metadata=metadata)
     except OSError as error:
@@ -135,15 +135,16 @@ def _bars(table: Table, row: Row, *, published: bool) -> list[tuple[str, Bar]]:
 
 
 def _draw(axes: Axes, task: str, series: Sequence[Series]) -> None:
-    settings = [one for one in SETTING_ORDER if any((task, one) in each.bars for each in series)]
+    found = {setting for each in series for name, setting in each.bars if name == task}
+    settings = sorted(found, key=setting_sort_key)
     width = 0.8 / len(series)
     colors = {True: iter(PUBLISHED_COLORS * len(series)), False: iter(COLORS * len(series))}
     for number, one in enumerate(series):
-        shown = [place for place, setting in enumerate(settings) if (task, setting) in one.bars]
-        bars = [one.bars[task, settings[place]] for place in shown]
-        places = [place - 0.4 + (number + 0.5) * width for place in shown]
+        shown = [index for index, setting in enumerate(settings) if (task, setting) in one.bars]
+        bars = [one.bars[task, settings[index]] for index in shown]
+        positions = [index - 0.4 + (number + 0.5) * width for index in shown]
         axes.bar(
-            places,
+            positions,
             [bar.percent for bar in bars],
             width,
             color=next(colors[one.published]),

@@ -1,4 +1,4 @@
-"""The printable sheet: a page for each block of trials, six demonstrations on a page."""
+"""Draw the printable sheet: one block of trials or six demonstrations per page."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from roboirg.core.errors import MissingDependencyError
-from roboirg.real.pages.arrangement_drawing import (
+from roboirg.real.study.arrangement_shapes import (
     FARTHEST,
     HALF_WIDTH,
     INK,
     NEAREST,
     Shape,
-    corners,
-    shapes_of,
+    scene_shapes,
+    square_corners,
 )
 from roboirg.real.study.failure_choices import failure_choices
 from roboirg.real.study.study_plan import PlannedDemonstration, PlannedTrial, StudyPlan
-from roboirg.real.study.trial_text import meant_by, places_of, turns_of
-from roboirg.records.store import StoreError
+from roboirg.real.study.trial_text import describe_positions, explicit_command, spoken_turns
+from roboirg.util.atomic_write import replacing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,16 +35,17 @@ SIDE, TOP = 0.06, 0.955
 LINE = 0.0135
 """Height of a line of text, as a share of the page."""
 COLUMNS = 100
-"""Characters that fit beside each other in the text size of trials."""
+"""Characters per line in the text size of trials."""
 SMALL, PLAIN, LARGE = 7.5, 8.5, 13.0
 """Points."""
 BOX = "☐"
 LOWEST = 0.05
+"""Lower end of the text, as a share of the page."""
 DEMONSTRATIONS_PER_PAGE = 6
 
 
 def check_sheet_support() -> None:
-    """See before the work starts that the sheet can be drawn.
+    """Check that the sheet can be drawn.
 
     Raises:
         MissingDependencyError: matplotlib is not installed.
@@ -58,28 +59,23 @@ def check_sheet_support() -> None:
 
 
 def write_sheet(plan: StudyPlan, path: Path) -> int:
-    """Draw the sheet; returns the number of its pages.
+    """Draw the sheet as PDF; returns its number of pages.
 
     Raises:
         MissingDependencyError: matplotlib is not installed.
-        StoreError: the file cannot be written.
+        InvalidValueError: the file cannot be written.
     """
     check_sheet_support()
     from matplotlib.backends.backend_pdf import PdfPages
 
-    partial = path.with_name(f".{path.name}.part")
-    try:
-        # No date in it: the same plan gives the same file.
-        with PdfPages(partial, metadata={"CreationDate": None, "Title": "Trials"}) as pages:
-            for number, page in enumerate(_pages(plan), 1):
-                page.text(0.5, 0.02, f"plan {plan.fingerprint}, page {number}", fontsize=SMALL,
-                          ha="center", color="#666666")  # fmt: skip
-                pages.savefig(page)
-            count = int(pages.get_pagecount())
-        partial.replace(path)
-    except OSError as error:
-        raise StoreError(f"Cannot write {path}: {error.strerror}.") from error
-    return count
+    # Without the date, so that the same plan gives the same file.
+    metadata = {"CreationDate": None, "Title": "Trials"}
+    with replacing(path) as partial, PdfPages(partial, metadata=metadata) as pages:
+        for number, page in enumerate(_pages(plan), 1):
+            page.text(0.5, 0.02, f"plan {plan.fingerprint}, page {number}", fontsize=SMALL,
+                      ha="center", color="#666666")  # fmt: skip
+            pages.savefig(page)
+        return int(pages.get_pagecount())
 
 
 def _pages(plan: StudyPlan) -> Iterator[Figure]:
@@ -103,16 +99,16 @@ def _block_pages(
     page = _page()
     first = trials[0]
     page.text(SIDE, TOP, f"Block {block}: {first.job.task}", fontsize=LARGE, weight="bold")
-    draw_arrangement(page.add_axes((SIDE, 0.735, 0.38, 0.205)), shapes_of(first.episode.scene))
+    draw_arrangement(page.add_axes((SIDE, 0.735, 0.38, 0.205)), scene_shapes(first.episode.scene))
     facts = (
-        "Arrange, from the middle of the robot's base:",
-        *(f"   {place}" for place in places_of(first)),
+        "Arrange, measured from the center of the robot's base:",
+        *(f"   {line}" for line in describe_positions(first)),
         "",
-        "Meant in all trials of this block:",
-        *(f"   {line}" for line in textwrap.wrap(meant_by(first), 48)),
+        "Meaning of all instructions of this block:",
+        *(f"   {line}" for line in textwrap.wrap(explicit_command(first), 48)),
         "",
-        "Arrange it anew before each trial. Say the",
-        "instruction as it stands, all of it, then start.",
+        "Arrange the table again before each trial. Say the",
+        "whole instruction as printed, then start.",
     )
     for number, line in enumerate(facts):
         page.text(0.48, TOP - 0.03 - number * 1.15 * LINE, line, fontsize=PLAIN)
@@ -133,7 +129,7 @@ def _block_pages(
 def _trial_lines(trial: PlannedTrial) -> list[str]:
     return [
         line
-        for turn in turns_of(trial)
+        for turn in spoken_turns(trial)
         for line in textwrap.wrap(f"“{turn}”", COLUMNS, subsequent_indent="  ")
     ]
 
@@ -155,30 +151,30 @@ def _draw_trial(
 
 
 def _verdicts(trial: PlannedTrial) -> list[str]:
-    """What can be ticked; the things of a failure are named where there are several."""
+    """Return the labels to tick; a failure that occurs several times names its object."""
     choices = failure_choices(trial.episode)
     names = [one.failure for one in choices]
-    told = [one.failure if names.count(one.failure) == 1 else one.key for one in choices]
-    return ["success", *(word.replace("_", " ").replace(":", ": ") for word in told), "void"]
+    labels = [one.failure if names.count(one.failure) == 1 else one.key for one in choices]
+    return ["success", *(word.replace("_", " ").replace(":", ": ") for word in labels), "void"]
 
 
 def _demonstration_page(planned: Sequence[tuple[int, PlannedDemonstration]]) -> Figure:
     page = _page()
     page.text(SIDE, TOP, "Demonstrations", fontsize=LARGE, weight="bold")
-    for place, (number, one) in enumerate(planned):
-        left, bottom = SIDE + 0.46 * (place % 2), 0.70 - 0.305 * (place // 2)
-        draw_arrangement(page.add_axes((left, bottom + 0.04, 0.42, 0.165)), shapes_of(
+    for index, (number, one) in enumerate(planned):
+        left, bottom = SIDE + 0.46 * (index % 2), 0.70 - 0.305 * (index // 2)
+        draw_arrangement(page.add_axes((left, bottom + 0.04, 0.42, 0.165)), scene_shapes(
             one.episode.scene))  # fmt: skip
         page.text(left, bottom + 0.218, f"{number}.  {one.name}", fontsize=PLAIN, weight="bold")
-        said = textwrap.wrap(" ".join(f"“{turn}”" for turn in turns_of(one)), 52)
-        lines = (*said, *places_of(one), f"{BOX} recorded   {BOX} discarded")
+        instruction = textwrap.wrap(" ".join(f"“{turn}”" for turn in spoken_turns(one)), 52)
+        lines = (*instruction, *describe_positions(one), f"{BOX} recorded   {BOX} discarded")
         for row, line in enumerate(lines):
             page.text(left, bottom + 0.011 - row * 0.9 * LINE, line, fontsize=SMALL)
     return page
 
 
 def draw_arrangement(axes: Axes, shapes: Sequence[Shape]) -> None:
-    """Draw the table from above, the robot at the bottom: its left is on the left."""
+    """Draw the table from above, the robot at the bottom, so its left is on the left."""
     from matplotlib.patches import Circle, Polygon
 
     axes.set_xlim(HALF_WIDTH, -HALF_WIDTH)
@@ -190,7 +186,7 @@ def draw_arrangement(axes: Axes, shapes: Sequence[Shape]) -> None:
     for shape in shapes:
         if shape.form == "square":
             for half, shade in ((shape.half, 1.0), (shape.hole, 0.25)):
-                points = [(y, x) for x, y in corners(shape, half)]
+                points = [(y, x) for x, y in square_corners(shape, half)]
                 axes.add_patch(Polygon(points, facecolor="white"))
                 axes.add_patch(
                     Polygon(points, facecolor=(shape.fill, shade), edgecolor=INK, linewidth=0.7)

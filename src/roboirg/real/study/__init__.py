@@ -1,1 +1,1 @@
-"""Planning and running a study, and the log of its trials."""
+"""Plan and run a study, and log its trials."""

@@ -1,12 +1,11 @@
-"""Which arrangements a study has, so that no color, side or number is more frequent than others.
+"""Choose the arrangements of a study so that colors, sides and numbers are equally frequent.
 
-What is chosen depends on the tasks and the split alone, never on a seed.
+The choice depends on the tasks and the split only, not on a seed.
 """
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections import defaultdict
 from itertools import product
 from typing import NamedTuple
 
@@ -21,12 +20,12 @@ KINDS: dict[str, ObjectKind] = {"box": "box", "tape": "tape"}
 
 
 class Arrangement(NamedTuple):
-    """What differs between the arrangements of a task, places aside.
+    """The factors in which the arrangements of a task differ, apart from positions.
 
     Attributes:
         color: of the target.
-        left: color of the thing on the robot's left.
-        repeats: how often the target is to be handled; None where the task has no number.
+        left: color of the object on the robot's left.
+        repeats: number of times to handle the target; None where the task has no number.
     """
 
     color: Color
@@ -35,51 +34,50 @@ class Arrangement(NamedTuple):
 
     @property
     def side(self) -> str:
-        """On which side of the robot the target is."""
+        """Side of the robot on which the target lies."""
         return "left" if self.color == self.left else "right"
 
 
-def kind_of(task: str) -> ObjectKind:
-    """What the task's target is: a box or a tape.
+def target_kind(task: str) -> ObjectKind:
+    """Return the kind of a task's target: box or tape.
 
     Raises:
         UnknownNameError: there is no such task.
-        InvalidValueError: it is none of the real robot's.
+        InvalidValueError: the task is not for a real robot.
     """
     found = get_task(task)
     if found.suite != REAL_SUITE:
         raise InvalidValueError(
-            f"{found.name} is no task of the real robot; those are of the suite {REAL_SUITE!r}."
+            f"{found.name} is not a task for a real robot; those are in the suite {REAL_SUITE!r}."
         )
     return KINDS[found.commands.thing]
 
 
-def arrangement_of(episode: Episode) -> Arrangement:
-    """What an episode of a real robot's task has where others differ."""
+def read_arrangement(episode: Episode) -> Arrangement:
+    """Return the factors of an episode of a real robot's task."""
     goal = episode.goal.as_mapping()
-    left, _ = left_to_right(episode.scene, kind_of(episode.task))
-    repeats = goal.get("repeats")
+    left, _ = left_to_right(episode.scene, target_kind(episode.task))
     target = next(one.color for one in episode.scene.objects if one.color == goal["color"])
-    if target is None:  # the task's goals are colors of its things
-        raise InvalidValueError(f"{episode.key} has no thing of the color {goal['color']!r}.")
-    return Arrangement(target, left, repeats if isinstance(repeats, int) else None)
+    if target is None:  # the goals of a task are colors of its objects
+        raise InvalidValueError(f"{episode.key} has no object of the color {goal['color']!r}.")
+    return _arrangement(target, left, goal.get("repeats"))
 
 
-def balanced_order(task: str) -> tuple[Arrangement, ...]:
-    """Every arrangement of a task once, in the order in which a study of any size takes them.
+def counterbalanced_order(task: str) -> tuple[Arrangement, ...]:
+    """Return every arrangement of a task once, in the order in which studies use them.
 
-    Each and the next but one that follows it are opposites in all respects. So, whatever the
-    number of trials, each respect is as even as can be: target colors, left colors and numbers
-    differ by at most one, arrangements too, and the target's sides by at most two. (Color and
-    left color decide the side: of ten trials only two of the three can be even.)
+    Pairs of neighbors are opposites in all factors. So, for any number of trials, each factor is as
+    even as possible: target colors, left colors, numbers and arrangements differ by at most one,
+    and the target's sides by at most two. (Color and left color decide the side: of ten trials,
+    only two of the three can be even.)
     """
     episode = get_episode(task, "train", 0)
-    colors = left_to_right(episode.scene, kind_of(task))
+    colors = left_to_right(episode.scene, target_kind(task))
     first, second = sorted(colors)
     goals = get_task(task).goals(episode.scene)
     numbers = sorted({goal.as_mapping().get("repeats") for goal in goals}, key=str)
     ordered: list[Arrangement] = []
-    # A number opposes another only where there are two.
+    # A number has an opposite only where there are two.
     for number, left in product(range(len(numbers)), (first, second)):
         opposite = numbers[len(numbers) - 1 - number]
         ordered.append(_arrangement(first, left, numbers[number]))
@@ -87,36 +85,29 @@ def balanced_order(task: str) -> tuple[Arrangement, ...]:
     return tuple(ordered)
 
 
-def balanced_episodes(task: str, split: str, count: int) -> tuple[int, ...]:
-    """So many episodes of a split, with arrangements as even as can be, the first that fit.
+def counterbalanced_episodes(task: str, split: str, count: int) -> tuple[int, ...]:
+    """Return the first episodes of a split whose arrangements are as even as possible.
+
+    Args:
+        task: a task for a real robot.
+        split: of the episodes.
+        count: number of episodes.
 
     Raises:
-        InvalidValueError: the split has too few of an arrangement.
+        InvalidValueError: the split has too few episodes of an arrangement.
     """
-    wanted = balanced_order(task)
-    found = _by_arrangement(task, split)
+    order = counterbalanced_order(task)
+    available = _by_arrangement(task, split)
     chosen: list[int] = []
     for number in range(count):
-        arrangement, turn = wanted[number % len(wanted)], number // len(wanted)
-        if turn >= len(found[arrangement]):
+        arrangement, repetition = order[number % len(order)], number // len(order)
+        if repetition >= len(available[arrangement]):
             raise InvalidValueError(
                 f"{count} balanced arrangements of {task} are too many for the split {split!r}; at "
                 f"most {len(chosen)}."
             )
-        chosen.append(found[arrangement][turn])
+        chosen.append(available[arrangement][repetition])
     return tuple(chosen)
-
-
-def arrangement_counts(episodes: Sequence[Episode]) -> dict[str, Counter[object]]:
-    """How often each color, side and number occurs, and each arrangement."""
-    kinds = [arrangement_of(episode) for episode in episodes]
-    return {
-        "arrangement": Counter(kinds),
-        "color": Counter(one.color for one in kinds),
-        "left": Counter(one.left for one in kinds),
-        "repeats": Counter(one.repeats for one in kinds),
-        "side": Counter(one.side for one in kinds),
-    }
 
 
 def _arrangement(color: Color, left: Color, repeats: object) -> Arrangement:
@@ -124,7 +115,8 @@ def _arrangement(color: Color, left: Color, repeats: object) -> Arrangement:
 
 
 def _by_arrangement(task: str, split: str) -> dict[Arrangement, list[int]]:
+    """Return the episodes of a split with each arrangement, in order."""
     found: dict[Arrangement, list[int]] = defaultdict(list)
     for index in range(SIZES[check_split(split)]):
-        found[arrangement_of(get_episode(task, split, index))].append(index)
+        found[read_arrangement(get_episode(task, split, index))].append(index)
     return found

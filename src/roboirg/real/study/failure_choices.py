@@ -1,4 +1,4 @@
-"""How a trial can fail, as an operator chooses it: the failures of docs/attribution.md."""
+"""The failures of a trial among which an operator chooses (docs/attribution.md)."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from roboirg.judging.failure_attribution import FailureAttribution, FailureName
 from roboirg.records.record import Attribution
 
 EXECUTION_WORDS: tuple[tuple[FailureName, str], ...] = (
-    ("nothing_reached", "never came near what it should handle"),
-    ("missed_grasp", "did not get the right thing up"),
-    ("dropped", "dropped the right thing in the air"),
-    ("misplaced", "set the right thing down beside its place"),
-    ("out_of_time", "was not done in time, or stopped half-way"),
+    ("nothing_reached", "never reached the right object"),
+    ("missed_grasp", "reached the right object but did not lift it"),
+    ("dropped", "dropped the right object"),
+    ("misplaced", "put the right object down beside its place"),
+    ("out_of_time", "ran out of time, or stopped half-way"),
 )
 
 
@@ -22,10 +22,10 @@ class FailureChoice(NamedTuple):
     """One way to fail.
 
     Attributes:
-        key: unique among a trial's, for example ``"wrong_place:box_green"``.
+        key: unique in a trial, for example ``"wrong_place:box_green"``.
         failure: its name.
         subject: name of the object that it is about, if there is one.
-        words: what happened, to be read after "the robot".
+        words: verb and object, to follow "the robot".
     """
 
     key: str
@@ -35,14 +35,14 @@ class FailureChoice(NamedTuple):
 
     @property
     def is_grounding(self) -> bool:
-        """Whether something else was done than what was meant."""
+        """Whether the policy did something else than the instruction means."""
         return self.attribution(0).kind == "grounding"
 
     def attribution(self, step: int, note: str = "") -> Attribution:
-        """What the record says.
+        """Return the attribution for the record.
 
         Args:
-            step: how long the trial was, control periods.
+            step: length of the trial, control periods.
             note: the operator's own words.
         """
         words = f"the robot {self.words}" + (f" ({note})" if note else "")
@@ -52,14 +52,14 @@ class FailureChoice(NamedTuple):
 
 
 def failure_choices(episode: Episode) -> tuple[FailureChoice, ...]:
-    """Every way in which a trial can fail: wrong referents by the task's rules, then execution."""
+    """Return the failures of a trial: grounding failures by the task's rules, then execution."""
     rules = dict.fromkeys(
         rule for stage in episode.stages for rule in stage.forbids if isinstance(rule, Rule)
     )
     grounding = []
     for rule in rules:
         if rule.failure is not None:
-            # As in simulation: the subject is what was handled, and the words say where it went.
+            # As in simulation: the subject is the object that was handled, and the words its place.
             fact = facts_of(rule)[0]
             key = f"{rule.failure}:{fact.place or fact.subject}"
             grounding.append(FailureChoice(key, rule.failure, fact.subject, rule.cause))

@@ -1,4 +1,4 @@
-"""The plan as CSV: for spreadsheets, and for labs with a control stack of their own."""
+"""Write a plan as CSV, for spreadsheets and for labs with their own control software."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import csv
 import io
 from collections.abc import Iterable, Mapping
 
-from roboirg.real.study.counterbalancing import arrangement_of
+from roboirg.real.study.counterbalancing import read_arrangement
 from roboirg.real.study.study_plan import PlannedDemonstration, PlannedTrial, StudyPlan
-from roboirg.real.study.trial_text import places_of, turns_of
+from roboirg.real.study.trial_text import describe_positions, spoken_turns
 
 TRIALS_FILE, DEMONSTRATIONS_FILE = "trials.csv", "demonstrations.csv"
 _ARRANGEMENT = ("target_color", "target_side", "left_color", "repeats")
 
 
 def trials_csv(plan: StudyPlan) -> str:
-    """A line for each trial, in order. It names the policies, which the sheet does not."""
-    return _text(
+    """Return a row for each trial, in order. The rows name the policies, unlike the sheet."""
+    return _csv_text(
         {
             "position": number,
             "trial": trial.name,
@@ -26,42 +26,42 @@ def trials_csv(plan: StudyPlan) -> str:
             "setting": trial.job.setting,
             "split": trial.job.split,
             "episode": trial.job.episode,
-            **_common(trial),
+            **_common_columns(trial),
         }
         for number, trial in enumerate(plan.trials, 1)
     )
 
 
 def demonstrations_csv(plan: StudyPlan) -> str:
-    """A line for each demonstration, in order."""
-    return _text(
+    """Return a row for each demonstration, in order."""
+    return _csv_text(
         {
             "position": number,
             "demonstration": one.name,
             "task": one.task,
             "split": one.episode.split,
             "episode": one.number,
-            **_common(one),
+            **_common_columns(one),
         }
         for number, one in enumerate(plan.demonstrations, 1)
     )
 
 
-def _common(planned: PlannedTrial | PlannedDemonstration) -> dict[str, object]:
-    arrangement = arrangement_of(planned.episode)
-    told = (arrangement.color, arrangement.side, arrangement.left, arrangement.repeats or "")
+def _common_columns(planned: PlannedTrial | PlannedDemonstration) -> dict[str, object]:
+    arrangement = read_arrangement(planned.episode)
+    factors = (arrangement.color, arrangement.side, arrangement.left, arrangement.repeats or "")
     return {
-        **dict(zip(_ARRANGEMENT, told, strict=True)),
-        "places": "; ".join(places_of(planned)),
-        "instruction": " ".join(turns_of(planned)),
+        **dict(zip(_ARRANGEMENT, factors, strict=True)),
+        "places": "; ".join(describe_positions(planned)),
+        "instruction": " ".join(spoken_turns(planned)),
     }
 
 
-def _text(rows: Iterable[Mapping[str, object]]) -> str:
-    lines = list(rows)
+def _csv_text(rows: Iterable[Mapping[str, object]]) -> str:
+    table = list(rows)
     out = io.StringIO()
-    if lines:
-        writer = csv.DictWriter(out, list(lines[0]), lineterminator="\n")
+    if table:
+        writer = csv.DictWriter(out, list(table[0]), lineterminator="\n")
         writer.writeheader()
-        writer.writerows(lines)
+        writer.writerows(table)
     return out.getvalue()

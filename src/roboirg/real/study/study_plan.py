@@ -1,13 +1,12 @@
-"""The plan of a study: every trial and demonstration, in the order in which they are done.
+"""The plan of a study: all trials and demonstrations in order.
 
-A block is one arrangement; in it every condition (a policy, told in one setting) is tried once, in
-a random order. So whatever drifts (light, grip, the operator) is the same for all conditions, and
-comparisons are between neighbors. The seed decides the orders and nothing else.
+A block is one arrangement. It has one trial of every condition (a policy and a setting), in a
+random order. So drift (light, grip, the operator) affects all conditions equally, and comparisons
+are between neighbors. The seed decides the orders and nothing else.
 """
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from pathlib import Path
@@ -19,24 +18,22 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.plan_parsing import split_name
+from roboirg.evaluation.plan_parsing import name_and_spec
 from roboirg.language.settings import setting_names, settings_of
-from roboirg.real.study.counterbalancing import balanced_episodes, kind_of
+from roboirg.real.study.counterbalancing import counterbalanced_episodes, target_kind
 from roboirg.records.record import DEFAULT_MAX_STEPS, Job
-from roboirg.records.store import write_atomically
 from roboirg.tasks import get_task
+from roboirg.util.atomic_write import write_atomically
+from roboirg.util.short_hash import short_hash
 
 PLAN_FILE = "plan.json"
-FINGERPRINT_LENGTH = 12
-"""Hexadecimal digits."""
-
 TRIAL_SPLIT = "val"
-"""Arrangements of trials: of the three splits the smallest that has all of PickByCount's eight."""
+"""The smallest of the three splits with all eight arrangements of PickByCount."""
 DEMONSTRATION_SPLIT = "train"
 DEFAULT_TRIALS = 10
-"""Per task, setting and policy (paper)."""
+"""Trials per task, setting and policy (paper)."""
 DEFAULT_DEMONSTRATIONS = 50
-"""Per task, explicit instructions only (paper)."""
+"""Demonstrations per task, with explicit instructions only (paper)."""
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
 
@@ -48,10 +45,10 @@ class PlannedTrial(_StudyModel):
     """One trial.
 
     Attributes:
-        name: unique in the plan, and the same whatever the seed. It does not tell the policy's
-            name but its letter, so that who sets up and judges need not know it.
+        name: unique in the plan and independent of the seed. It holds the policy's letter instead
+            of its name, so that the operator can be blind to the policy.
         block: number of its block, from 1.
-        job: what is played: the identity of its record.
+        job: to play; it identifies the trial's record.
     """
 
     name: str
@@ -60,22 +57,22 @@ class PlannedTrial(_StudyModel):
 
     @property
     def identity(self) -> Job:
-        """The job, whatever makes the policy."""
+        """The job without the policy's spec."""
         return self.job.model_copy(update={"spec": None})
 
     @property
     def episode(self) -> Episode:
-        """The arrangement and what is meant."""
+        """The arrangement and the goal."""
         return get_episode(self.job.task, self.job.split, self.job.episode)
 
 
 class PlannedDemonstration(_StudyModel):
-    """One demonstration for fine-tuning, told in the explicit setting.
+    """One demonstration for fine-tuning, in the explicit setting.
 
     Attributes:
         name: unique in the plan.
-        task: its name.
-        number: of the episode in the split for demonstrations.
+        task: name of the task.
+        number: of the episode in the split of demonstrations.
     """
 
     name: str
@@ -84,17 +81,17 @@ class PlannedDemonstration(_StudyModel):
 
     @property
     def episode(self) -> Episode:
-        """The arrangement and what is meant."""
+        """The arrangement and the goal."""
         return get_episode(self.task, DEMONSTRATION_SPLIT, self.number)
 
 
 class StudyPlan(_StudyModel):
-    """All that is to be done, in order.
+    """All trials and demonstrations of a study, in order.
 
     Attributes:
-        version: of this table of fields.
+        version: of the format.
         seed: of the orders.
-        policies: names by letter, A first.
+        policies: names in the order of their letters, A first.
         trials: in order.
         demonstrations: in order.
     """
@@ -108,14 +105,14 @@ class StudyPlan(_StudyModel):
 
     @property
     def fingerprint(self) -> str:
-        """Tells this plan from every other."""
-        return hashlib.sha256(self.model_dump_json().encode()).hexdigest()[:FINGERPRINT_LENGTH]
+        """Digest that identifies the plan."""
+        return short_hash(self.model_dump_json())
 
     def trial(self, name: str) -> PlannedTrial:
-        """The trial of that name.
+        """Return the trial of that name.
 
         Raises:
-            UnknownNameError: there is none.
+            UnknownNameError: the plan has no such trial.
         """
         for trial in self.trials:
             if trial.name == name:
@@ -134,28 +131,28 @@ def make_study(
     split: str = TRIAL_SPLIT,
     max_steps: int = DEFAULT_MAX_STEPS,
 ) -> StudyPlan:
-    """A balanced plan in a random order.
+    """Return a balanced plan in a random order.
 
     Args:
-        policies: specs, ``NAME=SPEC``, or labels of what is not run by `roboirg real run`.
-        tasks: of the real robot.
-        settings: in which each arrangement is told; by default all.
-        trials: arrangements per task; each policy is tried on each in every setting.
+        policies: specs, ``NAME=SPEC``, or labels of policies that other software runs.
+        tasks: for a real robot.
+        settings: of the instructions; None for all settings that the tasks share.
+        trials: arrangements per task; each policy meets each of them in every setting.
         demonstrations: per task.
         seed: of the orders.
-        split: whose episodes the trials are.
-        max_steps: control periods of a trial.
+        split: of the episodes of the trials.
+        max_steps: largest number of control periods of a trial.
 
     Raises:
         UnknownNameError: a task, setting or split does not exist.
         InvalidValueError: a number is out of range, or a name is given twice.
     """
-    named = [split_name(policy) for policy in policies]
+    named = [name_and_spec(policy) for policy in policies]
     names = [name for name, _ in named]
-    settings = setting_names() if settings is None else settings
+    settings = _shared_settings(tasks) if settings is None else settings
     _check(names, tasks, settings, trials, demonstrations, seed, max_steps)
     rng = np.random.default_rng(seed)
-    chosen = {task: balanced_episodes(task, split, trials) for task in tasks}
+    chosen = {task: counterbalanced_episodes(task, split, trials) for task in tasks}
     conditions = list(product(settings, range(len(named))))
     planned: list[PlannedTrial] = []
     for block, (task, episode) in enumerate(_blocks(chosen, rng), 1):
@@ -171,8 +168,8 @@ def make_study(
                 setting=setting,
                 max_steps=max_steps,
             )
-            title = f"{task}-{episode:02d}-{setting}-{LETTERS[policy]}"
-            planned.append(PlannedTrial(name=title, block=block, job=job))
+            trial_name = f"{task}-{episode:02d}-{setting}-{LETTERS[policy]}"
+            planned.append(PlannedTrial(name=trial_name, block=block, job=job))
     return StudyPlan(
         seed=seed,
         policies=tuple(names),
@@ -182,11 +179,11 @@ def make_study(
 
 
 def write_study(plan: StudyPlan, folder: Path) -> Path:
-    """Write ``plan.json``, whole or not at all.
+    """Write ``plan.json`` atomically; returns its path.
 
     Raises:
-        InvalidValueError: the folder has another plan already.
-        StoreError: it cannot be written.
+        InvalidValueError: the folder holds another plan.
+        StoreError: the file cannot be written.
     """
     path = folder / PLAN_FILE
     try:
@@ -195,17 +192,17 @@ def write_study(plan: StudyPlan, folder: Path) -> Path:
         raise InvalidValueError(f"Cannot write to {folder}: {error.strerror}.") from error
     if path.exists() and read_study(folder) != plan:
         raise InvalidValueError(
-            f"{folder} holds another plan; give the options it was made with, or another --out."
+            f"{folder} holds another plan; repeat its options, or choose another --out."
         )
     write_atomically(path, plan.model_dump_json(indent=1) + "\n")
     return path
 
 
 def read_study(folder: Path) -> StudyPlan:
-    """The plan of a folder.
+    """Read the plan of a folder.
 
     Raises:
-        InvalidValueError: there is none, or it is no plan of a study with a real robot.
+        InvalidValueError: the folder has no plan, or the plan is not for a real robot.
     """
     path = folder / PLAN_FILE
     try:
@@ -216,37 +213,40 @@ def read_study(folder: Path) -> StudyPlan:
         ) from error
     except (ValidationError, RoboIRGError) as error:
         raise InvalidValueError(
-            f"{path} is no plan of a study with a real robot; make one with roboirg real plan."
+            f"{path} is not the plan of a real-robot study; make one with roboirg real plan."
         ) from error
 
 
 def _blocks(
     chosen: Mapping[str, Sequence[int]], rng: np.random.Generator
 ) -> Iterator[tuple[str, int]]:
-    """Task and episode of each block: tasks take turns, each with its episodes in random order."""
+    """Yield the task and episode of each block: tasks alternate, their episodes in random order."""
     tasks = list(chosen)
     drawn = {task: rng.permutation(chosen[task]) for task in tasks}
-    for turn in range(len(drawn[tasks[0]])):
+    for position in range(len(drawn[tasks[0]])):
         for index in rng.permutation(len(tasks)):
-            yield tasks[index], int(drawn[tasks[index]][turn])
+            yield tasks[index], int(drawn[tasks[index]][position])
 
 
 def _demonstrations(
     tasks: Sequence[str], count: int, rng: np.random.Generator
 ) -> tuple[PlannedDemonstration, ...]:
-    """Tasks take turns, each with its arrangements in a random order."""
+    """Return the demonstrations: tasks alternate, their episodes in random order."""
     drawn = {
-        task: rng.permutation(balanced_episodes(task, DEMONSTRATION_SPLIT, count)) for task in tasks
-    }
-    return tuple(
-        PlannedDemonstration(
-            name=f"demo-{task}-{int(drawn[task][turn]):02d}",
-            task=task,
-            number=int(drawn[task][turn]),
-        )
-        for turn in range(count)
+        task: rng.permutation(counterbalanced_episodes(task, DEMONSTRATION_SPLIT, count))
         for task in tasks
+    }
+    numbered = [(task, int(drawn[task][index])) for index in range(count) for task in tasks]
+    return tuple(
+        PlannedDemonstration(name=f"demo-{task}-{number:02d}", task=task, number=number)
+        for task, number in numbered
     )
+
+
+def _shared_settings(tasks: Sequence[str]) -> tuple[str, ...]:
+    """Return the settings that all tasks have, in the registry's order."""
+    available = [settings_of(get_task(task)) for task in tasks]
+    return tuple(name for name in setting_names() if all(name in names for names in available))
 
 
 def _check(
@@ -261,22 +261,22 @@ def _check(
     for kind, names in (("policy", policies), ("task", tasks), ("setting", settings)):
         if not names:
             raise InvalidValueError(f"No {kind} was given.")
-        twice = [name for name in names if list(names).count(name) > 1]
-        if twice:
-            raise InvalidValueError(f"The {kind} {twice[0]!r} is given twice.")
+        repeated = [name for name in names if list(names).count(name) > 1]
+        if repeated:
+            raise InvalidValueError(f"The {kind} {repeated[0]!r} is given twice.")
     if len(policies) > len(LETTERS):
         raise InvalidValueError(f"{len(policies)} policies are too many; at most {len(LETTERS)}.")
-    for name, value, least in (
+    for name, value, minimum in (
         ("trials", trials, 1),
         ("demonstrations", demonstrations, 0),
         ("seed", seed, 0),
         ("max_steps", max_steps, 1),
     ):
-        if value < least:
-            raise InvalidValueError(f"{name} is {value}; it must be at least {least}.")
+        if value < minimum:
+            raise InvalidValueError(f"{name} is {value}; it must be at least {minimum}.")
     for task in tasks:
-        kind_of(task)
+        target_kind(task)
         for setting in settings:
-            has = settings_of(get_task(task))
-            if setting not in has:
-                raise UnknownNameError(f"setting of {task}", setting, has)
+            available = settings_of(get_task(task))
+            if setting not in available:
+                raise UnknownNameError(f"setting of {task}", setting, available)

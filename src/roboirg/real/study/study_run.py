@@ -1,4 +1,4 @@
-"""A study on a robot: every trial of the plan that is not done yet, in order."""
+"""Run a study on a robot: all open trials of the plan, in order."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -17,18 +17,14 @@ from roboirg.core.actions import JOINT_ANGLE
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.plan import instruct_job
-from roboirg.evaluation.plan_parsing import split_name
+from roboirg.evaluation.plan_parsing import name_and_spec
 from roboirg.evaluation.rollout_result import make_record, utc_now
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.policies.loading import is_privileged, load_policy_class, policy_version
-from roboirg.policies.requirements import (
-    wanted_actions,
-    wanted_cameras,
-    wanted_history,
-)
+from roboirg.policies.requirements import wanted_actions, wanted_cameras, wanted_history
 from roboirg.real.control.control_loop import ControlLoop
 from roboirg.real.control.limits import Limits
-from roboirg.real.control.policy_process import PolicyHost, ProcessHost, ThreadHost
+from roboirg.real.control.policy_workers import PolicyProcess, PolicyThread, PolicyWorker
 from roboirg.real.control.robot import JudgingRobot, Robot
 from roboirg.real.study.study_plan import PlannedTrial, StudyPlan
 from roboirg.real.study.trial_log import UNSCORED, TrialLog
@@ -45,16 +41,16 @@ def _never() -> bool:
 
 @dataclass
 class Study:
-    """Plays a plan.
+    """Plays the trials of a plan.
 
     Attributes:
-        plan: what.
+        plan: of the study.
         folder: of the records.
-        robot: on which; it is connected and closed here.
+        robot: connected and closed here.
         limits: of commands and times.
         scorer: the robot's own judge, or an operator on the page.
-        ended: whether the operator has ended the present trial.
-        told: called with every record.
+        stop_requested: returns whether the operator has ended the present trial.
+        on_record: called with every trial and its record.
     """
 
     plan: StudyPlan
@@ -62,161 +58,191 @@ class Study:
     robot: Robot
     limits: Limits = field(default_factory=Limits)
     scorer: Scorer = "operator"
-    ended: Callable[[], bool] = _never
-    told: Callable[[PlannedTrial, Record], None] = lambda _trial, _record: None
-    _hosts: dict[str, PolicyHost] = field(default_factory=dict)
+    stop_requested: Callable[[], bool] = _never
+    on_record: Callable[[PlannedTrial, Record], None] = lambda _trial, _record: None
+    _workers: dict[str, PolicyWorker] = field(default_factory=dict)
 
     def run(self, policies: Sequence[str] = (), *, retry_errors: bool = True) -> tuple[Record, ...]:
-        """Play what is not done; a trial that ends in an error does not end the study.
+        """Play the open trials; an error ends its own trial only.
 
         Args:
-            policies: only theirs, by their names in the plan, or ``NAME=SPEC`` if it is made in
-                another way today; all of the plan's if it is empty.
-            retry_errors: play again what ended in an error or was declared void.
+            policies: names in the plan of the policies to play, or ``NAME=SPEC`` for another spec
+                than the plan's; empty for all.
+            retry_errors: whether to play trials again that ended in an error or are void.
 
         Returns:
             The records of the trials that were played.
 
         Raises:
-            InvalidValueError: a policy is not in the plan, or cannot act on this robot.
+            UnknownNameError: a policy is not in the plan.
+            InvalidValueError: a policy cannot act on this robot, or another process uses it.
             StoreError: records cannot be read or written.
         """
-        wanted = self._wanted(policies)
-        cameras = {name: self._cameras_of(spec or name) for name, spec in wanted.items()}
-        ledger = TrialLog.read(self.plan, self.folder)
-        _check_versions(ledger, wanted)
-        undone = ("open", "error", "void") if retry_errors else ("open",)
-        todo = [
+        specs = self._selected_specs(policies)
+        cameras = {name: self._check_policy(spec or name) for name, spec in specs.items()}
+        trial_log = TrialLog.read(self.plan, self.folder)
+        _check_versions(trial_log, specs)
+        to_play = ("open", "error", "void") if retry_errors else ("open",)
+        trials = [
             trial.model_copy(
-                update={"job": trial.job.model_copy(update={"spec": wanted[trial.job.policy]})}
+                update={"job": trial.job.model_copy(update={"spec": specs[trial.job.policy]})}
             )
             for trial in self.plan.trials
-            if trial.job.policy in wanted and ledger.state(trial.name) in undone
+            if trial.job.policy in specs and trial_log.state(trial.name) in to_play
         ]
-        with alone_with_robot(self.folder):
+        with lock_robot(self.folder):
             try:
                 self.robot.connect()
-                return tuple(self._trial(trial, cameras, ledger) for trial in todo)
+                return tuple(self._play(trial, cameras, trial_log) for trial in trials)
             finally:
-                for host in self._hosts.values():
-                    host.close()
-                self._hosts.clear()
+                for worker in self._workers.values():
+                    worker.close()
+                self._workers.clear()
                 self.robot.close()
 
-    def _trial(
-        self, trial: PlannedTrial, cameras: Mapping[str, tuple[str, ...]], ledger: TrialLog
+    def _play(
+        self, trial: PlannedTrial, cameras: Mapping[str, tuple[str, ...]], trial_log: TrialLog
     ) -> Record:
+        """Play one trial and store its record."""
         job, started_at, start = trial.job, utc_now(), time.monotonic()
-        host = self._host(job)
-        loop = ControlLoop(self.robot, host, self.limits, cameras[job.policy], self.ended)
-        course = loop.play(job, job.policy_spec, policy_seed(trial), instruct_job(job).text)
-        if course.error is not None:
-            # It may still be busy, or dead: the next trial gets another.
-            host.close()
-            del self._hosts[job.policy]
-        said: dict[str, object] = {
+        worker = self._worker(job)
+        loop = ControlLoop(
+            self.robot, worker, self.limits, cameras[job.policy], self.stop_requested
+        )
+        result = loop.play(job, job.policy_spec, policy_seed(trial), instruct_job(job).text)
+        if result.error is not None:
+            # The worker may be dead or still busy: the next trial gets a new one.
+            worker.close()
+            del self._workers[job.policy]
+        metadata: dict[str, object] = {
             "robot": self.robot.name, "held": loop.held, "overruns": loop.overruns,
             "rate": self.robot.rate,
         }  # fmt: skip
         record = make_record(
-            job, course, started_at=started_at, duration_s=round(time.monotonic() - start, 3)
+            job, result, started_at=started_at, duration_s=round(time.monotonic() - start, 3)
         )
-        if course.error is None and self.scorer == "operator":
+        if result.error is None and self.scorer == "operator":
             if isinstance(self.robot, JudgingRobot):
                 found = record.attribution
-                said["judge"] = {
+                metadata["judge"] = {
                     "outcome": record.outcome,
                     "failure": None if found is None else found.failure,
                 }
-            record = _left_open(record)
-        stored = ledger.add(trial, record, said)
-        self.told(trial, stored)
+            record = _without_verdict(record)
+        stored = trial_log.add(trial, record, metadata)
+        self.on_record(trial, stored)
         return stored
 
-    def _host(self, job: Job) -> PolicyHost:
-        if job.policy not in self._hosts:
-            apart = not is_privileged(job.policy_spec)
-            self._hosts[job.policy] = ProcessHost() if apart else ThreadHost()
-        return self._hosts[job.policy]
+    def _worker(self, job: Job) -> PolicyWorker:
+        if job.policy not in self._workers:
+            privileged = is_privileged(job.policy_spec)
+            self._workers[job.policy] = PolicyThread() if privileged else PolicyProcess()
+        return self._workers[job.policy]
 
-    def _wanted(self, policies: Sequence[str]) -> dict[str, str | None]:
-        """The spec of each policy that is to be played, where it is not its name."""
+    def _selected_specs(self, policies: Sequence[str]) -> dict[str, str | None]:
+        """Return the spec of each policy to play by its name; None where the name is the spec."""
         planned = {trial.job.policy: trial.job.spec for trial in self.plan.trials}
-        wanted: dict[str, str | None] = {}
-        for name, spec in map(split_name, policies or self.plan.policies):
+        specs: dict[str, str | None] = {}
+        for name, spec in map(name_and_spec, policies or self.plan.policies):
             if name not in planned:
                 raise UnknownNameError("policy in the plan", name, planned)
-            wanted[name] = planned[name] if spec == name else spec
-        return wanted
+            specs[name] = planned[name] if spec == name else spec
+        return specs
 
-    def _cameras_of(self, spec: str) -> tuple[str, ...]:
-        """The cameras that a policy wants, if it can act here."""
+    def _check_policy(self, spec: str) -> tuple[str, ...]:
+        """Check that a policy can act on this robot, and return the cameras that it uses."""
         found = load_policy_class(spec)
         if wanted_actions(found) != JOINT_ANGLE:
             raise InvalidValueError(
-                f"Policy {spec!r} acts in {wanted_actions(found).name!r}; the control loop takes "
-                f"{JOINT_ANGLE.name!r} alone."
+                f"Policy {spec!r} acts in {wanted_actions(found).name!r}; the control loop "
+                f"supports {JOINT_ANGLE.name!r} only."
             )
         if wanted_history(found) is not None:
             raise InvalidValueError(
-                f"Policy {spec!r} wants observe_every={wanted_history(found)}; the control loop "
-                "has an observation for each chunk."
+                f"Policy {spec!r} requires observe_every={wanted_history(found)}; the control loop "
+                "gives one observation for each chunk."
             )
         if is_privileged(spec) and not isinstance(self.robot, JudgingRobot):
             raise InvalidValueError(
-                f"Policy {spec!r} looks behind the scenes, which only the twin has; play it with "
-                "--robot twin."
+                f"Policy {spec!r} reads the simulator's state, which only the twin has; play it "
+                "with --robot twin."
             )
         return wanted_cameras(found)
 
 
+def select_scorer(name: str, robot: Robot) -> Scorer:
+    """Return who scores the trials on a robot.
+
+    Args:
+        name: judge or operator; empty for the robot's judge if it has one.
+        robot: of the study.
+
+    Raises:
+        UnknownNameError: the name is neither judge nor operator.
+        InvalidValueError: the robot has no judge.
+    """
+    has_judge = isinstance(robot, JudgingRobot)
+    if not name:
+        return "judge" if has_judge else "operator"
+    for scorer in get_args(Scorer):
+        if name == scorer:
+            if scorer == "judge" and not has_judge:
+                raise InvalidValueError(
+                    f"The robot {robot.name!r} cannot judge; score its trials with "
+                    "roboirg real score."
+                )
+            found: Scorer = scorer
+            return found
+    raise UnknownNameError("scorer", name, get_args(Scorer))
+
+
 def policy_seed(trial: PlannedTrial) -> int:
-    """The policy's seed in a trial: the same as in simulation."""
+    """Return the policy's seed in a trial, the same as in simulation."""
     seeds = np.random.SeedSequence((trial.job.policy_seed, trial.episode.seed))
     return int(seeds.generate_state(1)[0])
 
 
-def _check_versions(ledger: TrialLog, policies: Mapping[str, str | None]) -> None:
-    """Refuse to mix words, worlds or policies of two versions."""
+def _check_versions(trial_log: TrialLog, policies: Mapping[str, str | None]) -> None:
+    """Refuse to mix two versions of a policy, the language or the environment."""
     now = {name: policy_version(spec or name) for name, spec in policies.items()}
-    for trial in ledger.plan.trials:
-        record = ledger.newest(trial.name)
+    for trial in trial_log.plan.trials:
+        record = trial_log.newest(trial.name)
         if record is None or record.policy not in now:
             continue
-        for what, theirs, ours in (
+        for name, stored, current in (
             ("the policy", record.policy_version, now[record.policy]),
             ("the language", record.language_version, str(LANGUAGE_VERSION)),
             ("the environment", record.environment_version, ENVIRONMENT_VERSION),
         ):
-            if theirs != ours:
+            if stored != current:
                 raise InvalidValueError(
-                    f"{ledger.folder} holds {trial.name} with {what} in version {theirs}, which "
-                    f"is {ours} now; make a plan in another folder."
+                    f"{trial_log.folder} holds {trial.name} with {name} in version {stored}, which "
+                    f"is {current} now; make a plan in another folder."
                 )
 
 
 @contextmanager
-def alone_with_robot(folder: Path) -> Iterator[None]:
-    """Only one process at a time may command the robot of a study.
+def lock_robot(folder: Path) -> Iterator[None]:
+    """Lock the robot of a study, which only one process at a time may command.
 
     Raises:
-        InvalidValueError: another does.
+        InvalidValueError: another process holds the lock.
     """
-    lock = os.open(folder / ROBOT_LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+    descriptor = os.open(folder / ROBOT_LOCK, os.O_RDWR | os.O_CREAT, 0o644)
     try:
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise InvalidValueError(
                 f"Another process plays the study in {folder}; wait for it or stop it."
             ) from None
         yield
     finally:
-        os.close(lock)
+        os.close(descriptor)
 
 
-def _left_open(record: Record) -> Record:
-    """Played to its end, without a verdict yet: what a judge saw is not for the operator."""
+def _without_verdict(record: Record) -> Record:
+    """Return a record that waits for the operator's verdict, without what the judge saw."""
     return record.model_copy(
         update={
             "outcome": "error",

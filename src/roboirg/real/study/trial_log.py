@@ -1,8 +1,8 @@
-"""What is known of every trial: read from the records alone, so that nothing is lost by a kill.
+"""The state of every trial, read from the records alone, so that a killed process loses nothing.
 
-A trial that was played on a robot and waits for its operator, and one whose score was taken back,
-have a record too: an error, which is in no rate. Records are only ever added. The newest of a trial
-counts, for the tables as for this.
+A played trial that waits for the operator, and one whose score was undone, have a record too: an
+error, which counts in no rate. Records are only appended. The newest record of a trial counts, in
+the tables too.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ from roboirg.records.record import Record
 from roboirg.records.store import RECORDS_FILE, RecordStore, StoreError, read_contents
 
 METADATA = "real_trial"
-"""Under which a record's ``policy_metadata`` hold what is said of a real trial."""
-UNSCORED = format_cause("infrastructure", "played, and waiting for the operator's verdict")
-WITHDRAWN = format_cause("infrastructure", "the operator took the score back")
+"""Key of a real trial's metadata in a record's ``policy_metadata``."""
+UNSCORED = format_cause("infrastructure", "played; waiting for the operator's verdict")
+WITHDRAWN = format_cause("infrastructure", "the operator undid the score")
 VOID = format_cause("infrastructure", "the operator declared the trial void")
 
 State = Literal["open", "waiting", "scored", "void", "error"]
-"""Not played or scored; played but not scored; with a verdict; declared void; ended in an error."""
+"""Not played; played but not scored; scored; declared void; ended in an error."""
 
-LOCK_PATIENCE_S = 10.0
-LOCK_PAUSE_S = 0.02
+LOCK_TIMEOUT_S = 10.0
+LOCK_RETRY_S = 0.02
 
 SUCCESS, VOID_CHOICE = "success", "void"
 
 
 @dataclass
 class TrialLog:
-    """The trials of a plan and their records.
+    """The trials of a plan with their records.
 
     Attributes:
         plan: of the study.
@@ -53,22 +53,23 @@ class TrialLog:
 
     @classmethod
     def read(cls, plan: StudyPlan, folder: Path) -> TrialLog:
-        """What the folder says now.
+        """Read the records of a folder.
 
         Raises:
             StoreError: the records cannot be read.
         """
-        ledger = cls(plan, folder)
+        trial_log = cls(plan, folder)
         names = {trial.identity: trial.name for trial in plan.trials}
         for record in read_contents(folder / RECORDS_FILE).records:
             name = names.get(record.identity)
             if name is not None:
-                ledger._take(name, record)
-        return ledger
+                trial_log._apply(name, record)
+        return trial_log
 
-    def _take(self, name: str, record: Record) -> None:
+    def _apply(self, name: str, record: Record) -> None:
+        """Update the history of a trial by its next record."""
         history = self._history.setdefault(name, [])
-        action = said_of(record).get("action")
+        action = trial_metadata(record).get("action")
         if action == "undo":
             if history:
                 history.pop()
@@ -81,131 +82,145 @@ class TrialLog:
             self._scored.append(name)
 
     def newest(self, name: str) -> Record | None:
-        """The record of a trial that counts; None while there is none."""
+        """Return the record of a trial that counts; None if there is none."""
         history = self._history.get(name)
         return history[-1] if history else None
 
-    def count(self, name: str) -> int:
-        """A number that changes whenever a trial's record does."""
+    def revision(self, name: str) -> int:
+        """Return a number that changes with the record of a trial."""
         return len(self._history.get(name, ()))
 
     def state(self, name: str) -> State:
-        """How a trial stands."""
+        """Return the state of a trial."""
         record = self.newest(name)
         if record is None:
             return "open"
         if record.outcome != "error":
             return "scored"
-        said = str(record.cause)
-        if said == UNSCORED:
+        cause = str(record.cause)
+        if cause == UNSCORED:
             return "waiting"
-        if said == WITHDRAWN:
+        if cause == WITHDRAWN:
             return "open"
-        return "void" if said.startswith(VOID) else "error"
+        return "void" if cause.startswith(VOID) else "error"
 
-    def to_score(self) -> PlannedTrial | None:
-        """The first trial without a verdict: of those that were played, else of all."""
-        for states in (("waiting",), ("open",)):
+    def next_to_score(self) -> PlannedTrial | None:
+        """Return the first played trial that waits for a verdict, else the first open one."""
+        for state in ("waiting", "open"):
             for trial in self.plan.trials:
-                if self.state(trial.name) in states:
+                if self.state(trial.name) == state:
                     return trial
         return None
 
     @property
     def last_scored(self) -> str | None:
-        """The trial whose score would be taken back."""
+        """Name of the trial whose score `undo` withdraws."""
         return self._scored[-1] if self._scored else None
 
     def score(
         self, trial: PlannedTrial, choice: str, *, operator: str, note: str = "", video: str = ""
     ) -> Record:
-        """Store an operator's verdict; when this returns, it is on the disk.
+        """Store an operator's verdict and return its record, which is then on the disk.
 
         Args:
-            trial: which.
+            trial: to score.
             choice: ``success``, ``void``, or the key of one of the trial's failures.
-            operator: who judges.
-            note: in free words.
-            video: path of the film, relative to the folder.
+            operator: name of the operator.
+            note: free text.
+            video: path of a video, relative to the folder.
 
         Raises:
-            InvalidValueError: the trial cannot fail so.
-            StoreError: it cannot be written.
+            InvalidValueError: the trial has no such failure.
+            StoreError: the record cannot be written.
         """
-        said = {"action": "score", "operator": operator, "note": note}
+        metadata = {"action": "score", "operator": operator, "note": note}
         base = self.newest(trial.name) or make_record(
             trial.job, RolloutResult(), started_at=utc_now()
         )
         changes: dict[str, Any] = {
-            "outcome": "success", "error": None, "format_cause": None, "attribution": None,
+            "outcome": "success", "error": None, "cause": None, "attribution": None,
             "video": video or base.video, "details": None,
         }  # fmt: skip
         if choice == VOID_CHOICE:
-            words = f"{VOID}; {note}" if note else VOID
-            changes |= {"outcome": "error", "error": "infrastructure", "format_cause": words}
+            cause = f"{VOID}; {note}" if note else VOID
+            changes |= {"outcome": "error", "error": "infrastructure", "cause": cause}
         elif choice != SUCCESS:
             choices = {one.key: one for one in failure_choices(trial.episode)}
             if choice not in choices:
                 raise InvalidValueError(
-                    f"A trial of {trial.job.task} cannot fail by {choice!r}; known: "
+                    f"A trial of {trial.job.task} cannot fail by {choice!r}; its failures are "
                     f"{', '.join(choices)}."
                 )
             found = choices[choice].attribution(base.steps, note)
-            changes |= {"outcome": "failure", "format_cause": found.sentence, "attribution": found}
-        return self._append(trial, base.model_copy(update=changes), said)
+            changes |= {"outcome": "failure", "cause": found.sentence, "attribution": found}
+        return self._append(trial, base.model_copy(update=changes), metadata)
 
     def undo(self, *, operator: str) -> str:
-        """Take back the newest score: what was before it counts again. Returns the trial's name.
+        """Withdraw the newest score, so that the record before it counts again.
+
+        Args:
+            operator: name of the operator.
+
+        Returns:
+            The trial's name.
 
         Raises:
-            InvalidValueError: there is none, or the trial has been played again since.
-            StoreError: it cannot be written.
+            InvalidValueError: there is no score, or the trial has been played again since.
+            StoreError: the record cannot be written.
         """
         name = self.last_scored
         if name is None:
-            raise InvalidValueError("There is no score to take back.")
+            raise InvalidValueError("There is no score to undo.")
         history = self._history[name]
-        if said_of(history[-1]).get("action") != "score":
+        if trial_metadata(history[-1]).get("action") != "score":
             raise InvalidValueError(f"{name} has been played again since it was scored.")
-        before = history[-2] if len(history) > 1 else _withdrawn(history[-1])
-        said = {**said_of(before), "action": "undo", "operator": operator}
-        self._append(self.plan.trial(name), before, said)
+        previous = history[-2] if len(history) > 1 else _withdrawn(history[-1])
+        metadata = {**trial_metadata(previous), "action": "undo", "operator": operator}
+        self._append(self.plan.trial(name), previous, metadata)
         return name
 
-    def add(self, trial: PlannedTrial, record: Record, said: dict[str, Any]) -> Record:
-        """Store what came of playing a trial.
+    def add(self, trial: PlannedTrial, record: Record, metadata: dict[str, Any]) -> Record:
+        """Store the record of a trial that was played.
+
+        Args:
+            trial: that was played.
+            record: without metadata of the real trial.
+            metadata: to add to the record.
 
         Raises:
-            StoreError: it cannot be written.
+            StoreError: the record cannot be written.
         """
-        return self._append(trial, record, {"action": "play", **said})
+        return self._append(trial, record, {"action": "play", **metadata})
 
-    def _append(self, trial: PlannedTrial, record: Record, said: dict[str, Any]) -> Record:
-        words: dict[str, JsonValue] = {
-            **said_of(record), **said, "trial": trial.name, "plan": self.plan.fingerprint,
+    def _append(self, trial: PlannedTrial, record: Record, metadata: dict[str, Any]) -> Record:
+        merged: dict[str, JsonValue] = {
+            **trial_metadata(record), **metadata,
+            "trial": trial.name, "plan": self.plan.fingerprint,
         }  # fmt: skip
-        metadata = {**record.policy_metadata, METADATA: words}
-        whole = record.model_copy(
-            update={"policy_metadata": metadata, "plan": self.plan.fingerprint}
+        complete = record.model_copy(
+            update={
+                "policy_metadata": {**record.policy_metadata, METADATA: merged},
+                "plan": self.plan.fingerprint,
+            }
         )
-        append(self.folder, whole)
-        self._take(trial.name, whole)
-        return whole
+        _append_record(self.folder, complete)
+        self._apply(trial.name, complete)
+        return complete
 
 
-def said_of(record: Record) -> dict[str, JsonValue]:
-    """What a record says of a real trial; empty if it is of none."""
-    said = record.policy_metadata.get(METADATA)
-    return dict(said) if isinstance(said, dict) else {}
+def trial_metadata(record: Record) -> dict[str, JsonValue]:
+    """Return the metadata of a real trial in its record; empty for other records."""
+    metadata = record.policy_metadata.get(METADATA)
+    return dict(metadata) if isinstance(metadata, dict) else {}
 
 
-def append(folder: Path, record: Record) -> None:
-    """Add a record, waiting for others that write: the robot's loop and the page may both be open.
+def _append_record(folder: Path, record: Record) -> None:
+    """Append a record; wait while another process writes, such as the robot's loop or the page.
 
     Raises:
-        StoreError: it cannot be written.
+        StoreError: the record cannot be written.
     """
-    deadline = time.monotonic() + LOCK_PATIENCE_S
+    deadline = time.monotonic() + LOCK_TIMEOUT_S
     while True:
         try:
             with RecordStore(folder) as store:
@@ -213,15 +228,16 @@ def append(folder: Path, record: Record) -> None:
         except StoreError:
             if time.monotonic() > deadline:
                 raise
-            time.sleep(LOCK_PAUSE_S)
+            time.sleep(LOCK_RETRY_S)
         else:
             return
 
 
 def _withdrawn(record: Record) -> Record:
+    """Return the record of a trial whose only score was undone."""
     return record.model_copy(
         update={
-            "outcome": "error", "error": "infrastructure", "format_cause": WITHDRAWN,
+            "outcome": "error", "error": "infrastructure", "cause": WITHDRAWN,
             "attribution": None, "video": None,
         }
     )  # fmt: skip

@@ -1,25 +1,26 @@
-"""What is said in a trial or demonstration, and what the arrangement is, in words."""
+"""The texts of a trial or demonstration for the operator."""
 
 from __future__ import annotations
 
 from roboirg import language
 from roboirg.evaluation.plan import instruct_job
-from roboirg.real.pages.arrangement_drawing import shapes_of, where
+from roboirg.language.settings import EXPLICIT
+from roboirg.real.study.arrangement_shapes import describe_position, scene_shapes
 from roboirg.real.study.study_plan import PlannedDemonstration, PlannedTrial
 
 
-def turns_of(planned: PlannedTrial | PlannedDemonstration) -> tuple[str, ...]:
-    """The utterances, in the order in which they are spoken."""
+def spoken_turns(planned: PlannedTrial | PlannedDemonstration) -> tuple[str, ...]:
+    """Return the utterances in the order in which they are spoken."""
     if isinstance(planned, PlannedTrial):
         return instruct_job(planned.job).turns
-    return language.instruct(planned.episode, "explicit").turns
+    return language.instruct(planned.episode, EXPLICIT).turns
 
 
-def meant_by(planned: PlannedTrial | PlannedDemonstration) -> str:
-    """What the robot is to do, for who judges: the same in plain words."""
-    return language.instruct(planned.episode, "explicit").command
+def explicit_command(planned: PlannedTrial | PlannedDemonstration) -> str:
+    """Return the command in explicit words, for the operator who judges the trial."""
+    return language.instruct(planned.episode, EXPLICIT).command
 
 
-def places_of(planned: PlannedTrial | PlannedDemonstration) -> tuple[str, ...]:
-    """Where everything lies, a line for each thing."""
-    return tuple(where(shape) for shape in shapes_of(planned.episode.scene))
+def describe_positions(planned: PlannedTrial | PlannedDemonstration) -> tuple[str, ...]:
+    """Return the position of each object, a line for each."""
+    return tuple(describe_position(shape) for shape in scene_shapes(planned.episode.scene))

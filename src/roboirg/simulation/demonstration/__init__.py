@@ -1,1 +1,1 @@
-"""Demonstrations: planned once and replayed; pictures of them are drawn when they are read."""
+"""Demonstrations: planned once, then replayed; their pictures are drawn when they are read."""

@@ -1,7 +1,7 @@
-"""Demonstrations are planned once; after that their actions are replayed.
+"""Cache of demonstrations: each is planned once, then its actions are replayed.
 
-A replay gives the same bits as the planned demonstration: same world, same actions. That is
-checked by a hash of the state at its end, so that nothing can depend on what is in the cache.
+A replay of the same actions in the same world gives the same bits. A hash of the final state
+verifies this, so results never depend on the cache.
 """
 
 from __future__ import annotations
@@ -14,14 +14,13 @@ import platform
 from collections.abc import Callable
 from pathlib import Path
 
-import roboirg
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import MotionPlanningError
 from roboirg.simulation.demonstration.recording import Recording
 from roboirg.util.cache import open_cache
 
-Attempt = Callable[[Recording | None], Recording]
-"""Begins the episode, plays its demonstration, replayed or else planned, and says what was done."""
+PlayDemonstration = Callable[[Recording | None], Recording]
+"""Starts the episode and plays its demonstration: replays the given recording, or plans if None."""
 
 _SOURCES = (
     "simulation",
@@ -29,66 +28,66 @@ _SOURCES = (
     "tasks",
     "core",
 )
-"""What in this package determines a demonstration; the hash of the model files is among it."""
+"""Parts of this package that determine a demonstration, the hash of the model files included."""
 _PACKAGES = ("sapien", "numpy", "scipy", "toppra")
 
 _log = logging.getLogger(__name__)
 
 
-def replay_or_plan(episode: Episode, attempt: Attempt, *, watched: bool) -> Recording:
-    """Have a demonstration played: replayed if it is known, else planned and kept.
+def replay_or_plan(episode: Episode, play: PlayDemonstration, *, watched: bool) -> Recording:
+    """Play a demonstration: replay it if it is cached, otherwise plan it and cache it.
 
     Args:
-        episode: whose demonstration.
-        attempt: called once; a second time if the replay ended differently.
-        watched: somebody looks on, who must see the right demonstration and nothing else, so that
-            it is planned: whether a replay was true is known only at its end.
+        episode: the episode.
+        play: plays the demonstration; called again if a replay ends in another state.
+        watched: whether a frame hook observes the steps. If so, the demonstration is planned,
+            because a wrong replay would be noticed only at its end.
 
     Raises:
-        MotionPlanningError: the demonstration cannot be done; the scene cannot be used.
+        MotionPlanningError: the demonstration cannot be executed; the scene cannot be used.
     """
     if not episode.demonstration:
-        return attempt(None)
+        return play(None)
     cache, key = open_cache("actions"), recording_key(episode)
     content = None if watched else cache.read(key)
     if content is not None:
-        known = Recording.decoded(content)
-        if _repeats(known, attempt):
-            return known
+        cached = Recording.from_bytes(content)
+        if _replays_exactly(cached, play):
+            return cached
         _log.warning(
-            "The cache entry %s (%s) did not replay to the same end; it is planned anew.",
+            "The cache entry %s (%s) did not replay to the same state; planning it again.",
             key,
             episode.key,
         )
-    made = attempt(None)
-    cache.write(key, made.encoded())
-    return made
+    planned = play(None)
+    cache.write(key, planned.to_bytes())
+    return planned
 
 
 def recording_key(episode: Episode) -> str:
-    """A hash, in hexadecimal, of everything that determines a demonstration."""
-    return hashlib.sha256(f"{_ground()}\n{episode!r}".encode()).hexdigest()
+    """Return a hash, in hexadecimal, of everything that determines a demonstration."""
+    return hashlib.sha256(f"{_platform_fingerprint()}\n{episode!r}".encode()).hexdigest()
 
 
-def _repeats(known: Recording, attempt: Attempt) -> bool:
+def _replays_exactly(recording: Recording, play: PlayDemonstration) -> bool:
     try:
-        return attempt(known).end == known.end
+        return play(recording).end == recording.end
     except MotionPlanningError:
         return False
 
 
 @functools.cache
-def _ground() -> str:
-    """All but the episode: this package's code, the libraries, and what computes the last bits."""
+def _platform_fingerprint() -> str:
+    """Return everything but the episode: code, libraries, and the hardware that affects bits."""
     versions = [f"{package} {importlib.metadata.version(package)}" for package in _PACKAGES]
     python = f"python {platform.python_version()}"
-    # The planner's sines and cosines depend on the processor and on the C library.
+    # The planner's sines and cosines depend on the processor and the C library.
     machine = (platform.machine(), *platform.libc_ver(), _processor())
     return "\n".join([str(ENVIRONMENT_VERSION), _SOURCE_HASH, python, *versions, *machine])
 
 
 def _source_hash() -> str:
-    root = Path(roboirg.__file__).parent
+    root = Path(__file__).parents[2]
     digest = hashlib.sha256()
     for name in _SOURCES:
         path = root / name
@@ -99,14 +98,14 @@ def _source_hash() -> str:
 
 
 _SOURCE_HASH = _source_hash()
-"""Taken now: files may be edited while the process goes on with the code that it has loaded."""
+"""Computed at import: files may change while the process runs the code it has loaded."""
 
 
 def _processor() -> str:
-    """The processor's name and abilities."""
+    """Return the processor's name and features."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
         return platform.processor()
-    found = {line.partition(":")[0].strip(): line for line in reversed(lines)}
-    return "\n".join(found.get(field, "") for field in ("model name", "flags", "Features"))
+    fields = {line.partition(":")[0].strip(): line for line in reversed(lines)}
+    return "\n".join(fields.get(field, "") for field in ("model name", "flags", "Features"))

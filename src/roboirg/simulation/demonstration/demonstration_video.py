@@ -1,4 +1,4 @@
-"""What a policy is shown before its turn: arrays; pictures among them are drawn when read."""
+"""The demonstration shown to a policy: arrays, with pictures drawn when they are read."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 from numpy.typing import NDArray
 
 from roboirg.core.episode import Episode
-from roboirg.simulation.demonstration.demonstration_frames import (
-    DemonstrationFramesArray,
+from roboirg.simulation.demonstration.frame_sequence import (
+    FrameSequence,
     read_frames,
 )
 from roboirg.simulation.demonstration.recording import Recording
@@ -23,13 +23,13 @@ from roboirg.simulation.observation_builder import (
 class DemonstrationVideo(Mapping[str, NDArray[Any]]):
     """A demonstration as a mapping from an observation's fields to arrays.
 
-    Pictures are drawn when they are read for the first time, at any later moment, and then kept.
-    Who wants more than one field of them calls `draw` first, which takes less time. A pickle
-    holds all of them as a plain dictionary.
+    Pictures are drawn when they are first read, at any later time, and then stored. To read
+    several picture fields, call `draw` first, which is faster. Pickling draws all pictures and
+    gives a plain dictionary.
 
     Args:
-        felt: the fields that are not drawn, with a leading axis T.
-        frames: the fields that are drawn.
+        proprioception: the fields that are not drawn, with a leading axis T.
+        sequences: the fields that are drawn.
         length: control steps in the video, T.
 
     Attributes:
@@ -38,69 +38,71 @@ class DemonstrationVideo(Mapping[str, NDArray[Any]]):
 
     def __init__(
         self,
-        felt: Mapping[str, NDArray[Any]],
-        frames: Mapping[str, DemonstrationFramesArray],
+        proprioception: Mapping[str, NDArray[Any]],
+        sequences: Mapping[str, FrameSequence],
         length: int,
     ) -> None:
         self.length = length
-        self._arrays = dict(felt)
-        self._frames = dict(frames)
+        self._arrays = dict(proprioception)
+        self._sequences = dict(sequences)
 
     def __getitem__(self, field: str) -> NDArray[Any]:
-        """All of a field; KeyError if observations have no such field."""
+        """Return a field for all steps; raises KeyError if it does not exist."""
         if field not in self._arrays:
             self._read((field,))
         return self._arrays[field]
 
     def draw(self) -> None:
-        """Draw all pictures that have not been read yet, in one replay for all cameras."""
-        self._read([field for field in self._frames if field not in self._arrays])
+        """Draw all pictures that have not been drawn, in one replay for all cameras."""
+        self._read([field for field in self._sequences if field not in self._arrays])
 
     def _read(self, fields: Sequence[str]) -> None:
-        arrays = read_frames([self._frames[field] for field in fields])
+        arrays = read_frames([self._sequences[field] for field in fields])
         self._arrays.update(zip(fields, arrays, strict=True))
 
     def __iter__(self) -> Iterator[str]:
-        yield from self._frames
-        yield from (field for field in self._arrays if field not in self._frames)
+        yield from self._sequences
+        yield from (field for field in self._arrays if field not in self._sequences)
 
     def __len__(self) -> int:
-        """The number of fields, as of any mapping; of control steps: `length`."""
+        """Return the number of fields; `length` is the number of control steps."""
         return sum(1 for _ in self)
 
     def __contains__(self, field: object) -> bool:
-        return field in self._frames or field in self._arrays
+        return field in self._sequences or field in self._arrays
 
     def __reduce__(self) -> tuple[type[dict[str, Any]], tuple[dict[str, Any]]]:
         self.draw()
         return dict, (dict(self),)
 
     def __repr__(self) -> str:
-        drawn = [
-            f"{field} ({'' if field in self._arrays else 'not '}drawn)" for field in self._frames
+        fields = [
+            f"{field} ({'' if field in self._arrays else 'not '}drawn)" for field in self._sequences
         ]
-        return f"<Video of {self.length} steps: {', '.join([*drawn, *self._felt()])}>"
-
-    def _felt(self) -> list[str]:
-        return [field for field in self._arrays if field not in self._frames]
+        fields += (field for field in self._arrays if field not in self._sequences)
+        return f"<Video of {self.length} steps: {', '.join(fields)}>"
 
 
 def make_video(
-    episode: Episode, recording: Recording, wishes: ObservationSpec, felt: Sequence[dict[str, Any]]
+    episode: Episode,
+    recording: Recording,
+    spec: ObservationSpec,
+    proprioception: Sequence[dict[str, Any]],
 ) -> DemonstrationVideo:
-    """The video of a demonstration that has been played.
+    """Return the video of a demonstration that has been played.
 
     Args:
-        episode: whose demonstration.
-        recording: what was done in it.
-        wishes: which fields it has, and which pictures.
-        felt: what was felt at each of its steps.
+        episode: the episode.
+        recording: the recorded demonstration.
+        spec: fields and pictures to include.
+        proprioception: the robot's proprioception at each step.
     """
-    wish = wishes.demonstration_frames
-    every = wish if isinstance(wish, int) else 1
-    frames = {
-        field: DemonstrationFramesArray(episode, recording, field, space, every, wishes.rendering)
-        for field, space in picture_space(wishes).items()
-        if wish != "none"
+    selection = spec.demonstration_frames
+    every = selection if isinstance(selection, int) else 1
+    sequences = {
+        field: FrameSequence(episode, recording, field, space, every, spec.rendering)
+        for field, space in picture_space(spec).items()
+        if selection != "none"
     }
-    return DemonstrationVideo(stack_proprioception(felt, wishes), frames, len(felt))
+    arrays = stack_proprioception(proprioception, spec)
+    return DemonstrationVideo(arrays, sequences, len(proprioception))

@@ -1,4 +1,4 @@
-"""What the oracle did in a demonstration, as plain data that replays to the same bits."""
+"""Recordings of demonstrations: plain data that replays exactly, bit for bit."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from roboirg.core.episode import Episode
 
 
-class Move(NamedTuple):
+class RecordedStep(NamedTuple):
     """One control step of a demonstration.
 
     Attributes:
-        stage: index of the demonstration's stage that the hands were doing.
+        stage: index of the demonstration's stage being executed.
         action: (8,) joint targets (rad) and the gripper.
     """
 
@@ -27,12 +27,12 @@ class Move(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A demonstration that has been played.
+    """The recorded actions of a demonstration.
 
     Attributes:
-        actions: (n, 8) joint targets (rad) and the gripper; the step at home that follows every
-            demonstration is not among them.
-        stages: (n,) index of the demonstration's stage that each belongs to.
+        actions: (n, 8) joint targets (rad) and the gripper, without the step at home that follows
+            every demonstration.
+        stages: (n,) index of each action's stage in the demonstration.
         end: hash of the state after the step at home, in hexadecimal.
     """
 
@@ -41,29 +41,29 @@ class Recording:
     end: str
 
     @classmethod
-    def of(cls, moves: list[Move], end: str) -> Recording:
-        """From what was done, step by step."""
-        actions = np.array([move.action for move in moves], dtype=np.float64).reshape(-1, 8)
-        return cls(actions, np.array([move.stage for move in moves], dtype=np.uint8), end)
+    def from_steps(cls, steps: list[RecordedStep], end: str) -> Recording:
+        """Create a recording from its steps and the state hash at the end."""
+        actions = np.array([step.action for step in steps], dtype=np.float64).reshape(-1, 8)
+        return cls(actions, np.array([step.stage for step in steps], dtype=np.uint8), end)
 
-    def moves(self) -> Iterator[Move]:
-        """What was done, step by step."""
+    def steps(self) -> Iterator[RecordedStep]:
+        """Yield the recorded steps."""
         for stage, action in zip(self.stages, self.actions, strict=True):
-            yield Move(int(stage), action)
+            yield RecordedStep(int(stage), action)
 
-    def length_of_video(self, episode: Episode) -> int:
-        """How many of the steps are in the episode's video."""
+    def video_length(self, episode: Episode) -> int:
+        """Return the number of steps in the episode's video."""
         recorded = np.array([stage.recorded for stage in episode.demonstration], dtype=bool)
         return int(np.count_nonzero(recorded[self.stages])) if len(recorded) else 0
 
-    def encoded(self) -> bytes:
-        """As bytes; no bit is lost."""
+    def to_bytes(self) -> bytes:
+        """Serialize without loss."""
         file = io.BytesIO()
         np.savez_compressed(file, actions=self.actions, stages=self.stages, end=np.array(self.end))
         return file.getvalue()
 
     @classmethod
-    def decoded(cls, content: bytes | memoryview) -> Recording:
-        """From what `encoded` gave."""
+    def from_bytes(cls, content: bytes | memoryview) -> Recording:
+        """Deserialize the output of `to_bytes`."""
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
             return cls(arrays["actions"], arrays["stages"], str(arrays["end"]))

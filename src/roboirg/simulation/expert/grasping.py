@@ -1,7 +1,7 @@
-"""How the oracle takes hold of a thing: fingers down, closing along one of its sides.
+"""Grasp selection of the scripted expert: fingers down, closing along one of the object's sides.
 
-The side nearest to the present closing axis makes the shortest turn. Where other things are in the
-way of the open fingers, another side is better.
+The side nearest to the current closing axis needs the shortest turn. If other objects block the
+open fingers there, another side is better.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ FINGER_HALF = (0.008, 0.011)
 
 
 def grasp_rotations(name: str, bodies: Mapping[str, Body], tool: Rotation) -> list[Rotation]:
-    """Tool rotations in which an object can be grasped, the best first.
+    """Return tool rotations for grasping an object, best first.
 
     Args:
-        name: of the object.
+        name: name of the object.
         bodies: all objects by name.
-        tool: the tool's present rotation.
+        tool: current rotation of the tool.
     """
     matrix = bodies[name].entity.pose.to_transformation_matrix()[:3, :3]
     flat = [axis[:2] for axis in matrix.T if abs(axis[2]) < math.sqrt(0.5)]
@@ -65,7 +65,7 @@ def _fingers(x: float, y: float, side: NDArray[np.float64]) -> list[Rectangle]:
 
 
 def _footprints(body: Body) -> Iterator[Footprint]:
-    """The areas near the table in which an object is in the way; its hidden insides are not."""
+    """Yield the areas near the table that an object blocks."""
     x, y, _ = body.position
     yaw = math.atan2(*body.entity.pose.to_transformation_matrix()[1::-1, 0])
     match body.item.kind:
@@ -85,7 +85,7 @@ def _footprints(body: Body) -> Iterator[Footprint]:
 
 
 def _rotation(closing: NDArray[np.float64]) -> Rotation:
-    """Fingers down, closing along a horizontal direction (2)."""
+    """Return the rotation with fingers down, closing along a horizontal direction (2)."""
     along = np.array([*closing, 0.0])
     approach = np.array([0.0, 0.0, -1.0])
     return Rotation.from_matrix(np.stack([np.cross(along, approach), along, approach], axis=1))

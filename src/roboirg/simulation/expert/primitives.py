@@ -1,8 +1,8 @@
-"""The oracle's hands: motion primitives as sequences of straight moves and gripper actions.
+"""Motion primitives of the scripted expert: sequences of straight moves and gripper actions.
 
-Each primitive gives its actions piece by piece; the world has executed one piece before the next
-is planned, so every piece starts from where the robot and the objects then are. Way points and
-step counts are RoboMME's.
+Each primitive yields one trajectory at a time; the world executes it before the next is planned, so
+each starts from the current state of the robot and the objects. Waypoints and step counts are
+RoboMME's.
 """
 
 from __future__ import annotations
@@ -19,42 +19,39 @@ from roboirg.core.errors import MotionPlanningError
 from roboirg.core.motions import Point
 from roboirg.simulation.expert.grasping import grasp_rotations
 from roboirg.simulation.expert.motion_planning import MotionPlanner, ToolPose
-from roboirg.simulation.panda import rotation_of
+from roboirg.simulation.panda import JointTrajectory, rotation_of
 from roboirg.simulation.physics_settings import CLOSED, GRIPPER_STEPS, HOME_ACTION, OPEN
 from roboirg.simulation.world import World
 
 CUBE_HOVER = 0.15
 CONTAINER_HOVER = 0.2
 CONTAINER_GRASP = 0.01
-"""Tool height above a container's origin, so that the fingers are around the knob."""
+"""Tool height above a container's origin at which the fingers enclose the knob."""
 TARGET_RELEASE = 0.005
 SITE_RELEASE = 0.01
 BIN_RELEASE = 0.2
 BOX_RELEASE = 0.065
-"""Tool height at which the open fingers stay above the walls of a box."""
+"""Tool height that keeps the open fingers above the walls of a box."""
 BIN_RETREAT = 0.1
-"""How far the hand goes back towards the robot after letting go over the bin."""
+"""Meters by which the hand moves back towards the robot after releasing over the bin."""
 OVER_TARGET = 0.1
 BUTTON_PRESS = 0.0075
 BUTTON_CONTACT = 0.037
 """Tool height at which closed fingers have pressed a button."""
 ARM_LAG = 3
-"""Control steps by which the arm is behind its targets."""
+"""Control steps by which the arm lags behind its targets."""
 ASIDE = Point(0.0, 0.0, 0.2)
 HOMING_STEPS = 30
 
 STRAIGHT_DOWN = Rotation.from_quat([1.0, 0.0, 0.0, 0.0])
 """Fingers down, closing along world y (the rotation at home)."""
 
-Piece = NDArray[np.float64]
-"""Actions (n, 8): joint targets and the gripper."""
-
 
 class MotionPrimitives:
     """Executes primitives in one world.
 
     Args:
-        world: whose robot and objects they are.
+        world: the world to act in.
     """
 
     def __init__(self, world: World) -> None:
@@ -62,54 +59,54 @@ class MotionPrimitives:
         self._planner = MotionPlanner(world.robot)
         self._gripper = OPEN
 
-    def perform(self, primitive: Primitive) -> Iterator[Piece]:
-        """The pieces of a primitive; take the next one when the last has been executed.
+    def execute(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+        """Yield the trajectories of a primitive; take the next after executing the last.
 
         Raises:
-            MotionPlanningError: a way point cannot be reached.
+            MotionPlanningError: a waypoint cannot be reached.
         """
         return _ROUTINES[primitive.kind](self, primitive)
 
-    def _pick_cube(self, primitive: Primitive) -> Iterator[Piece]:
+    def _pick_cube(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         yield self._grip(OPEN)
         cube = self._position(primitive.subject)
-        way, rotation = self._approach(primitive.subject, CUBE_HOVER)
-        yield way
+        approach, rotation = self._approach(primitive.subject, CUBE_HOVER)
+        yield approach
         yield self._grip(OPEN)
         yield self._move(self._position(primitive.subject), rotation)
         yield self._grip(CLOSED)
         yield self._move(_above(cube, CUBE_HOVER), rotation)
 
-    def _place_on(self, primitive: Primitive) -> Iterator[Piece]:
+    def _place_on(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         place, rotation = self._place(primitive), self._rotation()
-        seen = self._world.bodies[str(primitive.place)].item.kind != "site"
+        is_site = self._world.bodies[str(primitive.place)].item.kind == "site"
         yield self._move(_above(place, CUBE_HOVER), rotation)
-        yield self._move(_above(place, TARGET_RELEASE if seen else SITE_RELEASE), rotation)
+        yield self._move(_above(place, SITE_RELEASE if is_site else TARGET_RELEASE), rotation)
         yield self._grip(OPEN)
         yield self._move(_above(place, CUBE_HOVER), rotation)
 
-    def _drop_into(self, primitive: Primitive) -> Iterator[Piece]:
+    def _drop_into(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         place, rotation = self._place(primitive), self._rotation()
         yield self._move(_above(place, BIN_RELEASE), rotation)
         yield self._grip(OPEN)
         back = place._replace(x=place.x - BIN_RETREAT)
         yield self._move(_above(back, BIN_RELEASE), rotation)
 
-    def _put_into(self, primitive: Primitive) -> Iterator[Piece]:
+    def _put_into(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         place, rotation = self._place(primitive), self._rotation()
         yield self._move(_above(place, CUBE_HOVER), rotation)
         yield self._move(_above(place, BOX_RELEASE), rotation)
         yield self._grip(OPEN)
         yield self._move(_above(place, CUBE_HOVER), rotation)
 
-    def _move_over(self, primitive: Primitive) -> Iterator[Piece]:
+    def _move_over(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         yield self._move(_above(self._place(primitive), OVER_TARGET), self._rotation())
 
-    def _press(self, primitive: Primitive) -> Iterator[Piece]:
+    def _press(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         yield self._move(_above(self._position(primitive.subject), CUBE_HOVER), STRAIGHT_DOWN)
         yield from self._press_below(primitive)
 
-    def _press_below(self, primitive: Primitive) -> Iterator[Piece]:
+    def _press_below(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         button = self._position(primitive.subject)
         yield self._grip(CLOSED)
         down = self._move(_above(button, BUTTON_PRESS), STRAIGHT_DOWN)
@@ -119,73 +116,75 @@ class MotionPrimitives:
         yield down
         yield self._move(_above(button, CUBE_HOVER), STRAIGHT_DOWN)
 
-    def _steps_to_press(self, down: Piece) -> int:
-        """How many control steps of a way down pass until the button is pressed."""
-        heights = [self._planner.forward(arm).position[2] for arm in down[:, :ARM_JOINTS]]
+    def _steps_to_press(self, down: JointTrajectory) -> int:
+        """Return the number of control steps of a descent until the button is pressed."""
+        heights = [
+            self._planner.forward_kinematics(arm).position[2] for arm in down[:, :ARM_JOINTS]
+        ]
         return int(np.count_nonzero(np.array(heights) > BUTTON_CONTACT)) + ARM_LAG
 
-    def _hover(self, primitive: Primitive) -> Iterator[Piece]:
+    def _hover(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         yield self._move(_above(self._position(primitive.subject), CUBE_HOVER), STRAIGHT_DOWN)
         yield self._grip(CLOSED)
 
-    def _pick_container(self, primitive: Primitive) -> Iterator[Piece]:
+    def _pick_container(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         yield self._grip(OPEN)
         container = self._position(primitive.subject)
         grasp = _above(container, container.z + CONTAINER_GRASP)
-        way, rotation = self._approach(primitive.subject, CONTAINER_HOVER)
-        yield way
+        approach, rotation = self._approach(primitive.subject, CONTAINER_HOVER)
+        yield approach
         yield self._grip(OPEN)
         yield self._move(grasp, rotation)
         yield self._grip(CLOSED)
         yield self._move(_above(container, CONTAINER_HOVER), rotation)
 
-    def _put_down(self, primitive: Primitive) -> Iterator[Piece]:
+    def _put_down(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         here = self._position(primitive.subject)
         rotation = self._rotation()
         yield self._move(_above(here, primitive.height), rotation)
         yield self._grip(OPEN)
         yield self._move(_above(here, CUBE_HOVER), rotation)
 
-    def _hold(self, primitive: Primitive) -> Iterator[Piece]:
+    def _hold(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         for _ in range(0, primitive.steps, GRIPPER_STEPS):
             yield self._grip(OPEN)
 
-    def _hold_until(self, primitive: Primitive) -> Iterator[Piece]:
+    def _hold_until(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         while (left := primitive.steps - self._world.elapsed) > 0:
             yield self._grip(CLOSED)[:left]
 
-    def _retreat(self, primitive: Primitive) -> Iterator[Piece]:
+    def _retreat(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         yield self._move(ASIDE, self._rotation())
         yield self._grip(OPEN)
         yield from self._hold(primitive)
 
-    def _go_home(self, primitive: Primitive) -> Iterator[Piece]:
+    def _go_home(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         del primitive
         yield self._grip(OPEN)
         yield np.tile(HOME_ACTION, (HOMING_STEPS, 1))
 
-    def _grip(self, gripper: float) -> Piece:
-        """Stay where the robot is while the gripper opens or closes."""
+    def _grip(self, gripper: float) -> JointTrajectory:
+        """Hold the arm still while the gripper opens or closes."""
         self._gripper = gripper
         return self._with_gripper(np.tile(self._world.robot.arm_positions, (GRIPPER_STEPS, 1)))
 
-    def _approach(self, name: str, height: float) -> tuple[Piece, Rotation]:
-        """The way to above an object, and the rotation in which to grasp it there."""
+    def _approach(self, name: str, height: float) -> tuple[JointTrajectory, Rotation]:
+        """Plan a move to above an object; returns it with the grasp rotation."""
         goal = _above(self._position(name), height)
         rotations = grasp_rotations(name, self._world.bodies, self._rotation())
         for rotation in rotations[:-1]:
             try:
                 return self._move(goal, rotation), rotation
             except MotionPlanningError:
-                continue  # a limit of the wrist; from another side it may do
+                continue  # a wrist limit; another side may work
         return self._move(goal, rotations[-1]), rotations[-1]
 
-    def _move(self, position: Point, rotation: Rotation) -> Piece:
-        """Straight to a pose; by way of home where the straight line is not feasible."""
+    def _move(self, position: Point, rotation: Rotation) -> JointTrajectory:
+        """Plan a straight move to a pose, via home if the straight line is not feasible."""
         goal = ToolPose(np.asarray(position, dtype=np.float64), rotation)
-        return self._with_gripper(self._planner.travel(self._world.robot.arm_positions, goal))
+        return self._with_gripper(self._planner.plan_move(self._world.robot.arm_positions, goal))
 
-    def _with_gripper(self, joints: NDArray[np.float64]) -> Piece:
+    def _with_gripper(self, joints: NDArray[np.float64]) -> JointTrajectory:
         return np.column_stack([joints, np.full(len(joints), self._gripper)])
 
     def _position(self, name: str) -> Point:
@@ -195,13 +194,13 @@ class MotionPrimitives:
         return self._position(str(primitive.place))
 
     def _rotation(self) -> Rotation:
-        """The tool's present rotation."""
+        """Return the tool's current rotation."""
         return rotation_of(self._world.robot.tool_pose)
 
 
-# The table belongs to the class.
+# The table is part of the class.
 # ruff: noqa: SLF001
-_ROUTINES: dict[str, Callable[[MotionPrimitives, Primitive], Iterator[Piece]]] = {
+_ROUTINES: dict[str, Callable[[MotionPrimitives, Primitive], Iterator[JointTrajectory]]] = {
     "pick_cube": MotionPrimitives._pick_cube,
     "place_on": MotionPrimitives._place_on,
     "drop_into": MotionPrimitives._drop_into,

@@ -1,10 +1,10 @@
-"""When the joints are where: a path through way points gets its timing, at the control rate.
+"""Time-parameterize a joint path (TOPP-RA) at the control rate.
 
-As in RoboMME's planner (mplib) the path is a spline through joint positions a fixed distance apart,
-run through as fast as speed and acceleration limits allow (TOPP-RA), with the spline's parameter
-growing equally from each way point to the next. The last two are nearer to each other, so that
-the spline bends there and the move takes 5 to 10 % longer than it would have to: these are the
-lengths that policies trained on RoboMME's data have seen.
+As in RoboMME's planner (mplib), the path is a spline through joint positions a fixed distance
+apart, traversed as fast as speed and acceleration limits allow, with the same increase of the
+spline parameter between all neighboring waypoints. The last two are closer together, so the spline
+bends there and the move takes 5 to 10 % longer than necessary: policies trained on RoboMME's data
+have seen these durations.
 """
 
 from __future__ import annotations
@@ -24,25 +24,25 @@ JOINT_SPEED_LIMIT = 0.9
 JOINT_ACCELERATION_LIMIT = 0.9
 """rad/s^2, every arm joint."""
 WAYPOINT_SPACING = 0.1
-"""Radians between way points, as the norm over all joints."""
+"""Radians between waypoints, as the norm over all joints."""
 SMALLEST_JOINT_STEP = 1e-6
 GRID_INTERVALS = 10
-"""Into which the way between two way points is divided."""
+"""Grid intervals between two waypoints."""
 
 
 def time_parameterize(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The fastest motion through way points within the joint limits, at the control rate.
+    """Return the fastest motion through waypoints within the joint limits, at the control rate.
 
     Args:
         points: (n, 7) joint positions, rad, close together.
 
     Returns:
-        (m, 7) joint positions, one per control step, first and last way point included.
+        (m, 7) joint positions, one per control step, first and last waypoint included.
 
     Raises:
         MotionPlanningError: no timing was found.
     """
-    points = _spaced(points)
+    points = _resample(points)
     if len(points) == 1:
         return points
     toppra = _toppra()
@@ -52,7 +52,7 @@ def time_parameterize(points: NDArray[np.float64]) -> NDArray[np.float64]:
         toppra.constraint.JointVelocityConstraint(limits * JOINT_SPEED_LIMIT),
         toppra.constraint.JointAccelerationConstraint(limits * JOINT_ACCELERATION_LIMIT),
     ]
-    # Limits hold where the timing is computed: at every way point and nine places in between.
+    # Limits hold at the grid points: every waypoint and nine points in between.
     grid = np.linspace(0.0, 1.0, GRID_INTERVALS * (len(points) - 1) + 1)
     solver = toppra.algorithm.TOPPRA(
         constraints, path, gridpoints=grid, parametrizer="ParametrizeConstAccel"
@@ -66,7 +66,7 @@ def time_parameterize(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @functools.cache
 def _toppra() -> ModuleType:
-    """The library, which takes half a second to import: it brings a plotting library."""
+    """Import toppra, which takes half a second because it loads a plotting library."""
     import toppra
     import toppra.algorithm
     import toppra.constraint
@@ -76,8 +76,8 @@ def _toppra() -> ModuleType:
     return module
 
 
-def _spaced(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points on the same path, a fixed distance apart; the last is nearer to the one before it."""
+def _resample(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Resample a path at a fixed distance; the last point is closer to the one before it."""
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     path = np.concatenate([[0.0], np.cumsum(lengths)])
     marks = np.arange(0.0, path[-1] - SMALLEST_JOINT_STEP, WAYPOINT_SPACING)

@@ -1,1 +1,1 @@
-"""Cameras, culling, shaders and meshes: how pictures are drawn."""
+"""Rendering: cameras, culling, shaders and meshes."""

@@ -1,10 +1,10 @@
-"""The wrist camera's mesh without the triangles that nobody can ever see.
+"""The wrist camera's mesh without triangles that are never visible.
 
 The installed model of the camera is a full CAD model with lenses, threads and screws inside:
-425,160 triangles, three quarters of all that a picture of the arm would draw. Which of them can be
-seen from outside is shipped as a bit mask over the installed file's triangles; the mesh itself is
-read from where it is installed (`roboirg.simulation.model_files` checks that it is the right one).
-The mask is made by ``scripts/visible-triangles``.
+425,160 triangles, three quarters of all triangles in a picture of the arm. A shipped bit mask over
+the installed file's triangles selects those visible from outside; the mesh itself is read from its
+installed location (`roboirg.simulation.model_files` verifies it). ``scripts/visible-triangles``
+creates the mask.
 """
 
 from __future__ import annotations
@@ -25,25 +25,25 @@ STL_TRIANGLE = np.dtype(
 
 
 def read_stl(path: Path) -> NDArray[np.void]:
-    """The triangles of a binary STL file: records with a normal and three corners, meters."""
+    """Read a binary STL file as records with a normal and three corners, meters."""
     data = path.read_bytes()
     count = int.from_bytes(data[STL_HEADER : STL_HEADER + 4], "little")
     return np.frombuffer(data, STL_TRIANGLE, count, offset=STL_HEADER + 4)
 
 
 def packed_mask() -> bytes:
-    """The bit mask as it is shipped."""
+    """Return the compressed bit mask."""
     return resources.files("roboirg.simulation.rendering").joinpath(MASK_FILE).read_bytes()
 
 
 def visible_mask(count: int) -> NDArray[np.bool_]:
-    """For each of the file's triangles whether it can be seen from outside."""
+    """Return for each of the file's triangles whether it is visible from outside."""
     packed = zlib.decompress(packed_mask())
     return np.unpackbits(np.frombuffer(packed, np.uint8), count=count).astype(bool)
 
 
 def visible_triangles(stl: Path) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Corners (n, 3, 3) and normals (n, 3) of the triangles that can be seen."""
+    """Return corners (n, 3, 3) and normals (n, 3) of the visible triangles."""
     triangles = read_stl(stl)
-    seen = triangles[visible_mask(len(triangles))]
-    return np.ascontiguousarray(seen["corners"]), np.ascontiguousarray(seen["normal"])
+    visible = triangles[visible_mask(len(triangles))]
+    return np.ascontiguousarray(visible["corners"]), np.ascontiguousarray(visible["normal"])

@@ -1,7 +1,7 @@
 """The front and the wrist camera: pictures, depth and segmentation, drawn on request.
 
-Drawing is most of the cost of a step on a CPU, so only what a camera can see is drawn
-(`roboirg.simulation.rendering.culling`), and nothing twice.
+Drawing is most of the cost of a step on a CPU, so a camera draws only what it can see
+(`roboirg.simulation.rendering.culling`), and never draws the same picture twice.
 """
 
 from __future__ import annotations
@@ -20,8 +20,13 @@ from numpy.typing import NDArray
 from roboirg.core.observations import CAMERAS, FRONT, WRIST
 from roboirg.simulation.panda import CAMERA_LINK, Panda
 from roboirg.simulation.rendering.culling import CullableBodies
-from roboirg.simulation.rendering.render_mode import FAITHFUL, Rendering
-from roboirg.simulation.rendering.shaders import COLOR, STOCK_COLOR, slim_shader, stand_in_table
+from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
+from roboirg.simulation.rendering.shaders import (
+    COLOR,
+    STOCK_COLOR,
+    placeholder_brdf_table,
+    slim_shader,
+)
 from roboirg.simulation.rendering.viewpoint import (
     FAR,
     FIELD_OF_VIEW,
@@ -33,18 +38,18 @@ from roboirg.simulation.rendering.viewpoint import (
 )
 
 GEOMETRY = "PositionSegmentation"
-"""What the shaders write besides the colors: x, y, z in mm in the camera's frame (x right, y up,
-z backward) with the id of the entity, int16."""
+"""The shaders' second output, int16: x, y, z in mm in the camera's frame (x right, y up, z
+backward) and the entity id."""
 
 
 @dataclass
-class _Drawn:
-    """What a camera draws.
+class _DrawnState:
+    """The inputs and fetched outputs of a drawing.
 
     Attributes:
-        state: all that determines the picture.
-        bodies: for each of the scene's whether it is drawn.
-        fetched: what has been fetched of what the shader wrote.
+        state: everything that determines the picture.
+        bodies: for each body of the scene, whether it is drawn.
+        fetched: shader outputs that have been fetched, by name.
     """
 
     state: bytes
@@ -55,40 +60,42 @@ class _Drawn:
 class Cameras:
     """The two cameras of a scene.
 
-    A camera's picture is not drawn again while nothing in its view has moved.
+    A camera draws again only if something in its view has moved.
 
     Args:
-        scene: with all its bodies built.
-        robot: carries the wrist camera.
-        rendering: how pictures are made.
+        scene: the scene, with all bodies built.
+        robot: the robot with the wrist camera.
+        rendering: how pictures are drawn.
     """
 
-    def __init__(self, scene: sapien.Scene, robot: Panda, rendering: Rendering = FAITHFUL) -> None:
+    def __init__(
+        self, scene: sapien.Scene, robot: Panda, rendering: RenderSettings = FAITHFUL
+    ) -> None:
         self._scene = scene
         shader = slim_shader() if rendering.slim_shader else None
         fixed = sapien.Entity()
         fixed.name = "front_camera"
         self._color = STOCK_COLOR if shader is None else COLOR
-        self._components = {name: _component(name, shader or "") for name in CAMERAS}
+        self._components = {name: _make_camera(name, shader or "") for name in CAMERAS}
         fixed.add_component(self._components[FRONT])
         fixed.set_pose(look_at(FRONT_EYE, FRONT_TARGET))
         scene.add_entity(fixed)
         robot.links[CAMERA_LINK].entity.add_component(self._components[WRIST])
         for component in self._components.values() if rendering.quick_start else ():
-            component.set_texture("BRDFLUT", stand_in_table())
-        self._bodies = CullableBodies(scene, robot.drawables)
+            component.set_texture("BRDFLUT", placeholder_brdf_table())
+        self._bodies = CullableBodies(scene, robot.cullable_bodies)
         self._culling = rendering.culling
-        self._last: dict[str, _Drawn] = {}
-        # The poses of everything, the wrist camera too, when a camera's last picture was right.
-        self._moments: dict[str, bytes] = {}
-        self._looks_back = False
+        self._last: dict[str, _DrawnState] = {}
+        # All poses, the wrist camera's included, for which each camera's last picture is valid.
+        self._last_poses: dict[str, bytes] = {}
+        self._frozen = False
 
     def picture(self, camera: str) -> NDArray[np.uint8]:
-        """What the camera sees now, RGB, shape (256, 256, 3)."""
+        """Return the current picture, RGB, shape (256, 256, 3)."""
         return self.pictures((camera,))[camera]
 
     def pictures(self, cameras: Sequence[str]) -> dict[str, NDArray[np.uint8]]:
-        """What several cameras see now; quicker than one after the other."""
+        """Return the current pictures of several cameras; faster than one at a time."""
         self.draw(cameras)
         return {
             camera: np.asarray(cv2.cvtColor(self._fetch(camera, self._color), cv2.COLOR_RGBA2RGB))
@@ -96,47 +103,47 @@ class Cameras:
         }
 
     def depth(self, camera: str) -> NDArray[np.int16]:
-        """How far in front of the camera things are, mm, shape (256, 256, 1); 0 for nothing."""
-        return np.asarray(-self._look(camera, GEOMETRY)[..., 2:3], dtype=np.int16)
+        """Return the depth in mm, shape (256, 256, 1); 0 where nothing is visible."""
+        return np.asarray(-self._draw_and_fetch(camera, GEOMETRY)[..., 2:3], dtype=np.int16)
 
     def segmentation(self, camera: str) -> NDArray[np.int16]:
-        """Which entity each pixel shows, by ``entity.per_scene_id``, shape (256, 256)."""
-        return np.asarray(self._look(camera, GEOMETRY)[..., 3], dtype=np.int16).copy()
+        """Return the ``entity.per_scene_id`` at each pixel, shape (256, 256)."""
+        return np.asarray(self._draw_and_fetch(camera, GEOMETRY)[..., 3], dtype=np.int16).copy()
 
     def extrinsic(self, camera: str) -> NDArray[np.float32]:
-        """From the world's frame to the camera's, (3, 4): x right, y down, z forward (OpenCV)."""
+        """Return the world-to-camera matrix (3, 4): x right, y down, z forward (OpenCV)."""
         matrix = self._components[camera].get_extrinsic_matrix()
         return np.asarray(matrix, dtype=np.float32)[:3].copy()
 
     def intrinsic(self, camera: str) -> NDArray[np.float32]:
-        """From the camera's frame to pixels, (3, 3), OpenCV."""
+        """Return the camera-to-pixels matrix (3, 3), OpenCV."""
         return np.array(self._components[camera].get_intrinsic_matrix(), dtype=np.float32)
 
     def draw(self, cameras: Sequence[str]) -> None:
-        """Have cameras begin to draw what they see now, as far as something in view has moved.
+        """Start drawing the current view of cameras in which something has moved.
 
-        It is drawn in the background. What is read later is of now if nothing has moved by then,
-        or within `looking_back`.
+        Drawing runs in the background. A later read returns these pictures if nothing has moved
+        since, or within `frozen`.
         """
-        if self._looks_back:
+        if self._frozen:
             return
         poses = self._bodies.poses()
-        moment = poses.tobytes()
-        unsure = [camera for camera in cameras if self._moments.get(camera) != moment]
-        now = {camera: self._seen_by(camera, poses) for camera in unsure}
-        due = [camera for camera in unsure if self._is_new(camera, now[camera])]
+        state = poses.tobytes()
+        stale = [camera for camera in cameras if self._last_poses.get(camera) != state]
+        now = {camera: self._view_of(camera, poses) for camera in stale}
+        due = [camera for camera in stale if self._is_new(camera, now[camera])]
         if due:
             self._scene.update_render()
         for camera in due:
             if self._culling:
-                self._bodies.take(self._components[camera], now[camera].bodies)
+                self._bodies.take_picture(self._components[camera], now[camera].bodies)
             else:
                 self._components[camera].take_picture()
             self._last[camera] = now[camera]
-        self._moments.update(dict.fromkeys(unsure, moment))
+        self._last_poses.update(dict.fromkeys(stale, state))
 
-    def _seen_by(self, camera: str, poses: NDArray[np.float64]) -> _Drawn:
-        """What a camera would draw now."""
+    def _view_of(self, camera: str, poses: NDArray[np.float64]) -> _DrawnState:
+        """Return what a camera would draw now."""
         component = self._components[camera]
         view = np.asarray(component.get_extrinsic_matrix(), dtype=np.float64)[:3]
         bodies = np.ones(len(poses), dtype=bool)
@@ -144,34 +151,34 @@ class Cameras:
             bodies = self._bodies.visible(camera, poses, view)
         eye = component.entity.pose
         state = b"".join(it.tobytes() for it in (eye.p, eye.q, bodies, poses[bodies]))
-        return _Drawn(state, bodies)
+        return _DrawnState(state, bodies)
 
-    def _is_new(self, camera: str, drawn: _Drawn) -> bool:
+    def _is_new(self, camera: str, drawn: _DrawnState) -> bool:
         last = self._last.get(camera)
         return last is None or last.state != drawn.state
 
     @contextmanager
-    def looking_back(self) -> Iterator[None]:
-        """Within it, what is read is what was last drawn, whatever has moved since."""
-        self._looks_back = True
+    def frozen(self) -> Iterator[None]:
+        """Context in which reads return the last drawn pictures, even if bodies have moved."""
+        self._frozen = True
         try:
             yield
         finally:
-            self._looks_back = False
+            self._frozen = False
 
-    def _look(self, camera: str, what: str) -> NDArray[np.integer[Any]]:
+    def _draw_and_fetch(self, camera: str, output: str) -> NDArray[np.integer[Any]]:
         self.draw((camera,))
-        return self._fetch(camera, what)
+        return self._fetch(camera, output)
 
-    def _fetch(self, camera: str, what: str) -> NDArray[np.integer[Any]]:
-        """What the camera's shader wrote last."""
+    def _fetch(self, camera: str, output: str) -> NDArray[np.integer[Any]]:
+        """Return an output of the camera's last drawing."""
         fetched = self._last[camera].fetched
-        if what not in fetched:
-            fetched[what] = np.asarray(self._components[camera].get_picture(what))
-        return fetched[what]
+        if output not in fetched:
+            fetched[output] = np.asarray(self._components[camera].get_picture(output))
+        return fetched[output]
 
 
-def _component(name: str, shader: str) -> sapien.render.RenderCameraComponent:
+def _make_camera(name: str, shader: str) -> sapien.render.RenderCameraComponent:
     component = sapien.render.RenderCameraComponent(SIZE, SIZE, shader)
     component.set_fovy(FIELD_OF_VIEW, compute_x=True)
     component.near, component.far = NEAR, FAR

@@ -1,12 +1,13 @@
 """View-frustum culling: a camera draws only the bodies that reach into its view.
 
-They are tested by their bounding boxes, and those of the robot by their convex hulls.
+Bodies are tested by their bounding boxes, the robot's links also by their convex hulls. Without
+shadows, culling changes no pixel.
 
-Without shadows that cannot change a pixel. SAPIEN records what a camera draws once, and again only
-when the scene has changed since; bodies whose shading mode it does not know are left out of the
-record, and a change of the mode alone makes no camera record again. So each camera keeps the
-record of its own bodies until they become others. Where SAPIEN does not behave so
-(`keeps_records`), bodies are made invisible for one picture at a time, which is slower.
+SAPIEN records a camera's command buffer once, and again only if the scene has changed. It leaves
+out bodies with an unknown shading mode, and a change of the mode alone does not trigger a new
+recording. So each camera keeps the command buffer of its visible bodies until that set changes. If
+SAPIEN behaves differently (`keeps_command_buffers`), bodies are hidden for one picture at a time,
+which is slower.
 """
 
 from __future__ import annotations
@@ -23,26 +24,31 @@ from numpy.typing import NDArray
 
 from roboirg.core.observations import CAMERAS
 from roboirg.simulation.rendering.render_device import render_system
-from roboirg.simulation.rendering.shaders import COLOR, STOCK_COLOR, slim_shader, stand_in_table
+from roboirg.simulation.rendering.shaders import (
+    COLOR,
+    STOCK_COLOR,
+    placeholder_brdf_table,
+    slim_shader,
+)
 from roboirg.simulation.rendering.viewpoint import NEAR
 
 MARGIN = 0.002
-"""Meters by which boxes are grown before the test."""
+"""Meters by which boxes grow before the test."""
 HULL_MARGIN = 1e-4
-"""Meters by which convex hulls are; the renderer's numbers are good for 1/100 of that. The hand
-stays 1 mm outside the wrist camera's view, so that a larger margin would have it drawn."""
+"""Meters by which convex hulls grow; the renderer is 100 times as precise. The hand stays 1 mm
+outside the wrist camera's view, so a larger margin would draw it."""
 
 _DRAWN, _LEFT_OUT = 0, 99
-"""Shading modes; the latter is unknown to SAPIEN."""
+"""Shading modes; SAPIEN does not know the second."""
 
 
 @dataclass(frozen=True)
 class CullableBody:
-    """What is known of a body that can be drawn.
+    """Culling data of a body.
 
     Attributes:
         hull: vertices (n, 3) of its convex hull in the frame of its entity, m.
-        cameras: that draw it if it reaches into their views.
+        cameras: cameras that draw it if it reaches into their views.
     """
 
     hull: NDArray[np.float64]
@@ -50,17 +56,17 @@ class CullableBody:
 
 
 class CullableBodies:
-    """All that can be drawn in a scene.
+    """All render bodies of a scene.
 
     Args:
-        scene: with all its bodies built.
-        drawables: what is known of some of them; for the others boxes do.
+        scene: the scene, with all bodies built.
+        cullable_bodies: culling data of some bodies; the others are tested by boxes.
     """
 
     def __init__(
         self,
         scene: sapien.Scene,
-        drawables: Mapping[sapien.render.RenderBodyComponent, CullableBody],
+        cullable_bodies: Mapping[sapien.render.RenderBodyComponent, CullableBody],
     ) -> None:
         self._bodies = [
             component
@@ -68,7 +74,7 @@ class CullableBodies:
             for component in entity.components
             if isinstance(component, sapien.render.RenderBodyComponent)
         ]
-        known = [drawables.get(body) for body in self._bodies]
+        known = [cullable_bodies.get(body) for body in self._bodies]
         self._hulls = [None if one is None else one.hull for one in known]
         self._boxes = np.stack(
             [
@@ -80,21 +86,21 @@ class CullableBodies:
             camera: np.array([one is None or camera in one.cameras for one in known])
             for camera in CAMERAS
         }
-        self._set = np.ones(len(self._bodies), dtype=bool)
+        self._drawn = np.ones(len(self._bodies), dtype=bool)
         self._recorded: dict[sapien.render.RenderCameraComponent, NDArray[np.bool_]] = {}
 
     def poses(self) -> NDArray[np.float64]:
-        """Where the bodies are now, (n, 4, 4)."""
+        """Return the current poses of the bodies, (n, 4, 4)."""
         return np.stack([body.entity.pose.to_transformation_matrix() for body in self._bodies])
 
     def visible(
         self, camera: str, poses: NDArray[np.float64], view: NDArray[np.float64]
     ) -> NDArray[np.bool_]:
-        """For each body whether a camera is to draw it.
+        """Return for each body whether a camera draws it.
 
         Args:
-            camera: its name.
-            poses: of the bodies, (n, 4, 4).
+            camera: name of the camera.
+            poses: poses of the bodies, (n, 4, 4).
             view: extrinsic matrix of the camera (3, 4).
         """
         outside = _outside(np.einsum("bij,bkj->bki", poses, self._boxes) @ view.T)
@@ -107,56 +113,58 @@ class CullableBodies:
                 seen[number] = not _outside(points, HULL_MARGIN).all(axis=-1).any()
         return np.asarray(seen)
 
-    def take(self, camera: sapien.render.RenderCameraComponent, visible: NDArray[np.bool_]) -> None:
-        """Have a camera draw these bodies; the picture is fetched later."""
-        if not keeps_records():
-            self._take_at_once(camera, visible)
+    def take_picture(
+        self, camera: sapien.render.RenderCameraComponent, visible: NDArray[np.bool_]
+    ) -> None:
+        """Start drawing these bodies with a camera; the picture is fetched later."""
+        if not keeps_command_buffers():
+            self._take_with_visibility(camera, visible)
             return
-        # The modes are written even if the record stands: others may have made it outdated.
-        for number in np.flatnonzero(visible != self._set):
+        # Set the modes even if the command buffer is kept: another change may invalidate it.
+        for number in np.flatnonzero(visible != self._drawn):
             self._bodies[number].shading_mode = _DRAWN if visible[number] else _LEFT_OUT
-        self._set = visible
+        self._drawn = visible
         recorded = self._recorded.get(camera)
         if recorded is None or not np.array_equal(recorded, visible):
-            outdate_records(self._bodies[0])
+            invalidate_command_buffers(self._bodies[0])
             self._recorded[camera] = visible
         camera.take_picture()
 
-    def _take_at_once(
+    def _take_with_visibility(
         self, camera: sapien.render.RenderCameraComponent, visible: NDArray[np.bool_]
     ) -> None:
         hidden = [body for body, seen in zip(self._bodies, visible, strict=True) if not seen]
         for body in hidden:
             body.visibility = 0.0
         camera.take_picture()
-        camera.get_picture("PositionSegmentation")  # waits until it is drawn
+        camera.get_picture("PositionSegmentation")  # waits for the drawing
         for body in hidden:
             body.visibility = 1.0
 
 
 def _outside(points: NDArray[np.float64], margin: float = 0.0) -> NDArray[np.bool_]:
-    """For each plane of a view's frustum, (5, ...), which points are outside of it.
+    """Return for each plane of a view's frustum, (5, ...), which points are outside.
 
-    The half view is 45 degrees, so the planes are z = NEAR, |x| = z and |y| = z.
+    The half angle of view is 45 degrees, so the planes are z = NEAR, |x| = z and |y| = z.
 
     Args:
         points: (..., 3), m, in the camera's frame: x right, y down, z forward (OpenCV).
-        margin: meters by which they have to be.
+        margin: distance outside, m, that counts.
     """
     x, y, z = np.moveaxis(points, -1, 0)
     slack = math.sqrt(2.0) * margin
     return np.stack([z < NEAR - margin, *(side > z + slack for side in (x, -x, y, -y))])
 
 
-def outdate_records(body: sapien.render.RenderBodyComponent) -> None:
-    """Have every camera of a body's scene record anew before its next picture."""
+def invalidate_command_buffers(body: sapien.render.RenderBodyComponent) -> None:
+    """Make every camera of a body's scene record a new command buffer before its next picture."""
     body.visibility = 0.0
     body.visibility = 1.0
 
 
 @functools.cache
-def keeps_records() -> bool:
-    """Whether SAPIEN records as described above: tried out once in a process, in a tiny scene."""
+def keeps_command_buffers() -> bool:
+    """Return whether SAPIEN records as described above; tested once per process in a tiny scene."""
     scene = sapien.Scene([render_system()])
     body = sapien.render.RenderBodyComponent()
     body.attach(
@@ -164,16 +172,16 @@ def keeps_records() -> bool:
             [0.4, 0.4, 0.4], sapien.render.RenderMaterial(emission=[1.0, 1.0, 1.0, 1.0])
         )
     )
-    thing, eye = sapien.Entity(), sapien.Entity()
-    thing.add_component(body)
-    thing.set_pose(sapien.Pose([1.0, 0.0, 0.0]))
-    # With the usual shader, which then need not be compiled again.
+    target, eye = sapien.Entity(), sapien.Entity()
+    target.add_component(body)
+    target.set_pose(sapien.Pose([1.0, 0.0, 0.0]))
+    # With the usual shader, to avoid compiling another.
     shader = slim_shader()
     camera = sapien.render.RenderCameraComponent(2, 2, shader or "")
     eye.add_component(camera)
-    for entity in (thing, eye):
+    for entity in (target, eye):
         scene.add_entity(entity)
-    camera.set_texture("BRDFLUT", stand_in_table())
+    camera.set_texture("BRDFLUT", placeholder_brdf_table())
 
     def shows() -> bool:
         scene.update_render()
@@ -184,7 +192,7 @@ def keeps_records() -> bool:
     for mode in (_LEFT_OUT, _DRAWN):
         body.shading_mode = mode
         seen.append(shows())
-        outdate_records(body)
+        invalidate_command_buffers(body)
         seen.append(shows())
     return seen == [True, True, False, False, True]
 
@@ -193,20 +201,20 @@ _boxes_of_files: dict[tuple[object, ...], NDArray[np.float64]] = {}
 
 
 def _box(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Homogeneous corners (8, 4) of the box around points (n, 3), with the margin."""
+    """Return homogeneous corners (8, 4) of the box around points (n, 3), with the margin."""
     low, high = points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
     grid = np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1)
     return np.column_stack([grid.reshape(-1, 3), np.ones(8)])
 
 
 def _points(body: sapien.render.RenderBodyComponent) -> NDArray[np.float64]:
-    """Corners (n, 3) of the boxes of a body's shapes in its entity's frame."""
+    """Return corners (n, 3) of the boxes of a body's shapes in its entity's frame."""
     corners: list[NDArray[np.float64]] = [_shape_corners(shape) for shape in body.render_shapes]
     return np.concatenate(corners)
 
 
 def _shape_corners(shape: sapien.render.RenderShape) -> NDArray[np.float64]:
-    """Corners of a shape's box in its entity's frame, (8, 3)."""
+    """Return corners of a shape's box in its entity's frame, (8, 3)."""
     low, high = _shape_bounds(shape)
     grid = np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1)
     matrix = shape.local_pose.to_transformation_matrix()
@@ -216,7 +224,7 @@ def _shape_corners(shape: sapien.render.RenderShape) -> NDArray[np.float64]:
 def _shape_bounds(
     shape: sapien.render.RenderShape,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lowest and highest coordinates in the shape's own frame."""
+    """Return lowest and highest coordinates in the shape's own frame."""
     if isinstance(shape, sapien.render.RenderShapeBox):
         half = np.asarray(shape.half_size, dtype=np.float64)
         return -half, half

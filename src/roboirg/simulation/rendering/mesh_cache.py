@@ -1,4 +1,4 @@
-"""Where what is derived from installed files is kept between processes."""
+"""Cache between processes for arrays derived from installed files."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import functools
 import hashlib
 import json
 import math
-import secrets
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,64 +17,53 @@ from roboirg.util.cache import open_cache
 Arrays = dict[str, NDArray[np.generic]]
 
 _WORD = 8
-"""Bytes; arrays and what is told of them begin at multiples of it."""
+"""Alignment of the header and of each array, bytes."""
 
 
 def cached_arrays(name: str, sources: bytes, make: Callable[[], Arrays]) -> Arrays:
-    """Arrays that were derived before, or are now.
+    """Return arrays from the cache, or make and cache them.
 
     Args:
-        name: what they are.
-        sources: all that determines them.
-        make: derives them.
+        name: name of the entry.
+        sources: everything that determines the arrays.
+        make: makes the arrays.
     """
     cache = open_cache("meshes")
     key = f"{name}-{hashlib.sha256(source_code('mesh_cache') + sources).hexdigest()[:24]}"
     content = cache.read(key)
     if content is not None:
-        return unpacked(content)
+        return unpack_arrays(content)
     arrays = make()
-    cache.write(key, packed(arrays))
+    cache.write(key, pack_arrays(arrays))
     return arrays
 
 
-def packed(arrays: Arrays) -> bytes:
-    """Arrays one after the other; before them what they are, as JSON, and its length.
+def pack_arrays(arrays: Arrays) -> bytes:
+    """Pack arrays after a JSON header with its length.
 
-    NumPy's own files take several times as long to read, because they are copied.
+    NumPy's own format takes several times as long to read, because it copies.
     """
-    told = json.dumps({name: (array.dtype.str, array.shape) for name, array in arrays.items()})
-    parts = [len(told).to_bytes(_WORD, "little"), told.encode()]
+    header = json.dumps({name: (array.dtype.str, array.shape) for name, array in arrays.items()})
+    parts = [len(header).to_bytes(_WORD, "little"), header.encode()]
     parts += [np.ascontiguousarray(array).tobytes() for array in arrays.values()]
     return b"".join(part + bytes(-len(part) % _WORD) for part in parts)
 
 
-def unpacked(content: memoryview) -> Arrays:
-    """What was `packed`: views of the content, which cannot be written to."""
+def unpack_arrays(content: memoryview) -> Arrays:
+    """Unpack the output of `pack_arrays` as read-only views of the content."""
     size = int.from_bytes(content[:_WORD], "little")
-    told = json.loads(bytes(content[_WORD : _WORD + size]))
-    place = _WORD + size
+    header = json.loads(bytes(content[_WORD : _WORD + size]))
+    offset = _WORD + size
     arrays: Arrays = {}
-    for name, (kind, shape) in told.items():
-        place += -place % _WORD
+    for name, (kind, shape) in header.items():
+        offset += -offset % _WORD
         count = math.prod(shape)
-        arrays[name] = np.frombuffer(content, kind, count, place).reshape(shape)
-        place += arrays[name].nbytes
+        arrays[name] = np.frombuffer(content, kind, count, offset).reshape(shape)
+        offset += arrays[name].nbytes
     return arrays
 
 
 @functools.cache
 def source_code(*modules: str) -> bytes:
-    """The text of modules in this folder: what they derive changes with it."""
+    """Return the source code of modules in this folder, as part of cache keys."""
     return b"".join((Path(__file__).parent / f"{name}.py").read_bytes() for name in modules)
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file so that nobody ever sees a part of it."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
-    try:
-        part.write_bytes(content)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)

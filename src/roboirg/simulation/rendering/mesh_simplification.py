@@ -1,4 +1,4 @@
-"""Meshes with fewer triangles, for pictures that may differ a little from the faithful ones."""
+"""Mesh simplification, for pictures that may differ slightly from the faithful ones."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from roboirg.core.errors import MissingDependencyError
 
 LINK_SHARE = 0.1
 CAMERA_SHARE = 0.05
-"""Of the triangles, which are kept; those of the camera are of its visible ones."""
-SMALL = 500
-"""Triangles of parts too small to be lightened."""
+"""Shares of triangles to keep; for the camera, of its visible triangles."""
+MIN_TRIANGLES = 500
+"""Parts with fewer triangles are not simplified."""
 
 
-def lighten(
+def simplify(
     corners: NDArray[np.float32], *, share: float
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Fewer triangles in nearly the same shape.
+    """Return nearly the same shape with fewer triangles.
 
     Args:
-        corners: of the triangles, (n, 3, 3), meters.
-        share: of the triangles, to be kept.
+        corners: corners of the triangles, (n, 3, 3), meters.
+        share: share of triangles to keep.
 
     Returns:
         Corners (m, 3, 3) and normals (m, 3).

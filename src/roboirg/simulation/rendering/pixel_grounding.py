@@ -1,4 +1,4 @@
-"""Grounded subgoals: a stage in words with the pixel at which the front camera sees its object."""
+"""Grounded subgoals: a stage in words with the pixel of its object in the front picture."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ CAMERA = "front"
 
 
 class PixelGrounding:
-    """Follows the stages of one episode; draws only until it has seen a stage's object.
+    """Follows the stages of one episode; draws only until a stage's object is visible.
 
     Args:
         bodies: the scene's objects by name.
-        cameras: of the same world.
+        cameras: cameras of the same world.
 
     Attributes:
-        text: the present subgoal, with ``at <y, x>`` (row and column in the front picture) from
-            the first frame on in which the stage is due and its object visible.
+        text: the current subgoal, with ``at <y, x>`` (row and column in the front picture) from
+            the first frame in which the stage is due and its object visible.
     """
 
     def __init__(self, bodies: Mapping[str, Body], cameras: Cameras) -> None:
@@ -34,10 +34,10 @@ class PixelGrounding:
         self.text = ""
 
     def update(self, stage: Stage | None) -> None:
-        """To be called after every control step.
+        """Update the text; call after every control step.
 
         Args:
-            stage: whose label is current; None, once all are completed, keeps the last.
+            stage: the published stage; None, after the last one, keeps the text.
         """
         if stage is None:
             return
@@ -53,9 +53,9 @@ class PixelGrounding:
             self._settled = True
 
     def _pixel(self, name: str) -> tuple[int, int] | None:
-        """Row and column of the middle of what is seen of an object; None if it is not seen."""
+        """Return the mean row and column of an object's visible pixels; None if it has none."""
         body = self._bodies[name]
-        # Of a button only the cap counts (RoboMME).
+        # For a button, only the cap counts (RoboMME).
         entity = body.entity if body.button is None else body.button.links[1].entity
         seen = self._cameras.segmentation(CAMERA) == entity.per_scene_id
         rows, columns = np.nonzero(seen)

@@ -1,6 +1,6 @@
-"""Which device draws the pictures: a GPU where one can, otherwise Mesa's lavapipe.
+"""Choice of the render device: a GPU if one can render, otherwise Mesa's lavapipe.
 
-The environment variable ``ROBOIRG_RENDER_DEVICE`` overrides the choice with SAPIEN's name of a
+The environment variable ``ROBOIRG_RENDER_DEVICE`` overrides the choice with SAPIEN's name for a
 device: ``cuda:0``, ``pci:0000:01:00.0`` or ``pci:1`` (the number of the PCI bus, hexadecimal).
 """
 
@@ -27,23 +27,23 @@ REMEDY = (
     "or the Vulkan driver of your GPU"
 )
 
-# Lavapipe has no place on the PCI bus and reports this one; "cpu" is SAPIEN's name of the
+# Lavapipe is not on the PCI bus and reports this address; "cpu" is SAPIEN's name for the
 # processor as a physics device and cannot render.
 _SOFTWARE_ALIAS = "pci:0000:00:00.0"
 _SOFTWARE_NAMES = ("llvmpipe", "lavapipe", "swiftshader")
 _PCI_DEVICES = Path("/sys/bus/pci/devices")
 _DISPLAY_CLASS = "0x03"
-_MOST_CUDA_DEVICES = 64
+_MAX_CUDA_DEVICES = 64
 
 
 @dataclass(frozen=True)
 class RenderDevice:
-    """What to tell a person about a render device.
+    """Description of a render device.
 
     Attributes:
         name: the driver's name of the device, such as ``"llvmpipe (LLVM 15.0.6, 256 bits)"``.
-        alias: SAPIEN's name of the device, good for ``ROBOIRG_RENDER_DEVICE``.
-        is_software: the pictures are drawn by the processor.
+        alias: SAPIEN's name of the device, valid for ``ROBOIRG_RENDER_DEVICE``.
+        is_software: whether the processor draws the pictures.
     """
 
     name: str
@@ -51,7 +51,7 @@ class RenderDevice:
     is_software: bool
 
 
-def describe(device: sapien.Device) -> RenderDevice:
+def describe_device(device: sapien.Device) -> RenderDevice:
     """Return the description of a SAPIEN device."""
     alias = f"cuda:{device.cuda_id}" if device.cuda_id >= 0 else f"pci:{device.pci_string}"
     name = str(device.name)
@@ -62,8 +62,8 @@ def find_render_device(name: str | None = None) -> sapien.Device:
     """Return the device that draws the pictures.
 
     Args:
-        name: SAPIEN's name of a device; by default ``ROBOIRG_RENDER_DEVICE``, and without that
-            the first GPU that can render, else lavapipe.
+        name: SAPIEN's name of a device; by default ``ROBOIRG_RENDER_DEVICE``, and if that is not
+            set the first GPU that can render, else lavapipe.
 
     Raises:
         MissingDependencyError: SAPIEN is not installed.
@@ -77,7 +77,7 @@ def find_render_device(name: str | None = None) -> sapien.Device:
         device = _device(alias)
         if device is None or not device.can_render():
             continue
-        if not describe(device).is_software:
+        if not describe_device(device).is_software:
             return device
         software = software or device
     if software is None:
@@ -86,12 +86,14 @@ def find_render_device(name: str | None = None) -> sapien.Device:
 
 
 def render_system(*, keep_engine: bool = True) -> sapien.render.RenderSystem:
-    """Return a new render system, for one scene: scenes that share one spoil each other's pictures.
+    """Return a new render system for one scene.
 
-    SAPIEN frees its whole render engine (shaders, meshes, tables) when the last system goes, and
-    making it again takes seconds; so the first call also makes one that lives as long as the
-    process and keeps the engine, unless that is not wanted. SAPIEN renders on one device per
-    process, so ``ROBOIRG_RENDER_DEVICE`` is read once.
+    Scenes that share a render system corrupt each other's pictures.
+
+    SAPIEN frees its whole render engine (shaders, meshes, tables) with the last system, and
+    creating it again takes seconds. With `keep_engine`, the first call therefore also creates a
+    system that lives as long as the process. SAPIEN renders on one device per process, so
+    ``ROBOIRG_RENDER_DEVICE`` is read once.
 
     Raises:
         MissingDependencyError: SAPIEN is not installed.
@@ -116,7 +118,7 @@ def _new_system(device: sapien.Device) -> sapien.render.RenderSystem:
     try:
         return _sapien().render.RenderSystem(device)
     except RuntimeError as error:
-        found = describe(device)
+        found = describe_device(device)
         raise RenderDeviceError(
             f"SAPIEN cannot render on {found.alias} ({found.name}): {error}; {REMEDY}."
         ) from error
@@ -125,14 +127,14 @@ def _new_system(device: sapien.Device) -> sapien.render.RenderSystem:
 @functools.cache
 def _sapien() -> ModuleType:
     try:
-        # By name, so that this module loads where SAPIEN is not installed.
+        # By name, so that this module loads without SAPIEN.
         sapien = importlib.import_module("sapien")
     except ImportError as error:
         raise MissingDependencyError(
             f"The simulator is not installed ({error}); "
             "run: pip install 'roboirgbench[sim]' (in a checkout: make setup)"
         ) from error
-    # Below "error" SAPIEN speaks of extensions that only its own viewer window needs.
+    # Below "error", SAPIEN reports missing extensions that only its viewer window needs.
     sapien.set_log_level("error")
     sapien.render.set_log_level("error")
     return sapien
@@ -142,7 +144,7 @@ def _device(alias: str) -> sapien.Device | None:
     try:
         return _sapien().Device(alias)
     except (RuntimeError, ValueError, IndexError):
-        # RuntimeError: no such device; the others: SAPIEN could not read the number in the name.
+        # RuntimeError: no such device; the others: SAPIEN could not parse the number in the name.
         return None
 
 
@@ -151,7 +153,7 @@ def _named_device(name: str) -> sapien.Device:
     if device is not None and device.can_render():
         return device
     known = [found for found in map(_device, _aliases()) if found is not None]
-    names = [describe(found).alias for found in known if found.can_render()]
+    names = [describe_device(found).alias for found in known if found.can_render()]
     if not names:
         raise RenderDeviceError(f"The render device {name!r} cannot be used; {REMEDY}.")
     fault = "does not exist" if device is None else "cannot render"
@@ -162,8 +164,8 @@ def _named_device(name: str) -> sapien.Device:
 
 
 def _aliases() -> Iterator[str]:
-    """SAPIEN has no list of devices, so the places where one can be are tried, GPUs first."""
-    for number in range(_MOST_CUDA_DEVICES):
+    """Yield possible devices, GPUs first, because SAPIEN has no list of devices."""
+    for number in range(_MAX_CUDA_DEVICES):
         if _device(f"cuda:{number}") is None:
             break
         yield f"cuda:{number}"

@@ -1,7 +1,7 @@
-"""The robot's meshes in a form that is quick to draw, derived from the installed files.
+"""The robot's meshes in a form that is fast to draw, derived from the installed files.
 
-The installed meshes are shaded flat, with three corners of its own for each triangle; ours share
-them. What is derived is kept between processes.
+The installed meshes are flat-shaded, with three vertices for each triangle; the derived ones share
+vertices and are cached between processes.
 """
 
 from __future__ import annotations
@@ -22,28 +22,33 @@ from roboirg.simulation.rendering.mesh_cache import Arrays, cached_arrays, sourc
 from roboirg.simulation.rendering.mesh_simplification import (
     CAMERA_SHARE,
     LINK_SHARE,
-    SMALL,
-    lighten,
+    MIN_TRIANGLES,
+    simplify,
 )
-from roboirg.simulation.rendering.occlusion import shown_triangles
-from roboirg.simulation.rendering.render_mode import Rendering
-from roboirg.simulation.rendering.triangles import Shared, Triangles, share_corners, unshare_corners
+from roboirg.simulation.rendering.occlusion import unoccluded_triangles
+from roboirg.simulation.rendering.render_settings import RenderSettings
+from roboirg.simulation.rendering.triangles import (
+    IndexedTriangles,
+    Triangles,
+    duplicate_vertices,
+    index_triangles,
+)
 from roboirg.simulation.rendering.viewpoint import to_front_camera
 
 FINGER = "finger.glb"
-"""Seen from so near by the wrist camera that it is never lightened."""
+"""Never simplified, because the wrist camera sees it from very near."""
 
 
-class _Place(NamedTuple):
-    """A pose in the world, by which shapes can be remembered."""
+class _PoseKey(NamedTuple):
+    """A hashable pose in the world frame."""
 
     position: tuple[float, ...]
     quaternion: tuple[float, ...]
 
 
 @dataclass(frozen=True)
-class _Look:
-    """What there is to say of a material without textures."""
+class _MaterialKey:
+    """A hashable material without textures."""
 
     emission: tuple[float, ...]
     base_color: tuple[float, ...]
@@ -55,7 +60,7 @@ class _Look:
     transmission_roughness: float
 
     @classmethod
-    def of(cls, material: sapien.render.RenderMaterial) -> _Look:
+    def from_sapien(cls, material: sapien.render.RenderMaterial) -> _MaterialKey:
         return cls(
             tuple(material.emission),
             tuple(material.base_color),
@@ -71,7 +76,7 @@ class _Look:
         return np.array(np.hstack([*astuple(self)]), np.float32)
 
     @classmethod
-    def unpacked(cls, numbers: NDArray[np.float32]) -> _Look:
+    def unpacked(cls, numbers: NDArray[np.float32]) -> _MaterialKey:
         values = [float(number) for number in numbers]
         return cls(tuple(values[:4]), tuple(values[4:8]), *values[8:])
 
@@ -83,54 +88,63 @@ class _Look:
 def link_shapes(
     path: Path,
     material: sapien.render.RenderMaterial | None,
-    rendering: Rendering,
-    seen_at: sapien.Pose | None = None,
+    rendering: RenderSettings,
+    fixed_at: sapien.Pose | None = None,
 ) -> list[sapien.render.RenderShapeTriangleMesh]:
-    """A link's shapes, to be attached to a body and placed.
+    """Return a link's shapes, to be attached to a body and posed.
 
     Args:
         path: the installed mesh.
-        material: for files that have none.
+        material: material for files without one.
         rendering: faithful or light.
-        seen_at: where the mesh is for ever, world frame, if only what the front camera can see
-            of it there is wanted.
+        fixed_at: fixed pose of the mesh in the world frame; keeps only the part that the front
+            camera sees there.
     """
-    look = None if material is None else _Look.of(material)
-    place = None
-    if seen_at is not None:
-        place = _Place(*(tuple(map(float, numbers)) for numbers in (seen_at.p, seen_at.q)))
-    return [shape.clone() for shape in _shapes(path, look, rendering, place)]
+    material_key = None if material is None else _MaterialKey.from_sapien(material)
+    pose_key = None
+    if fixed_at is not None:
+        pose_key = _PoseKey(*(tuple(map(float, numbers)) for numbers in (fixed_at.p, fixed_at.q)))
+    return [shape.clone() for shape in _shapes(path, material_key, rendering, pose_key)]
 
 
 @functools.cache
-def link_hull(path: Path, rendering: Rendering) -> NDArray[np.float64]:
-    """Vertices (n, 3) of a link's convex hull, meters in the mesh's frame."""
-    return np.asarray(_derived(path, rendering)["hull"], np.float64)
+def link_hull(path: Path, rendering: RenderSettings) -> NDArray[np.float64]:
+    """Return vertices (n, 3) of a link's convex hull, meters in the mesh's frame."""
+    return np.asarray(_mesh_arrays(path, rendering)["hull"], np.float64)
 
 
-def finish(body: sapien.render.RenderBodyComponent, rendering: Rendering) -> None:
-    """Have a body of `link_shapes` that is in a scene shaded as they want it."""
-    if _flat(rendering):
-        shaders.mark(body)
+def apply_shading(body: sapien.render.RenderBodyComponent, rendering: RenderSettings) -> None:
+    """Set the shading of a body with `link_shapes`, once it is in a scene."""
+    if _uses_flat_shading(rendering):
+        shaders.enable_flat_shading(body)
 
 
-def _flat(rendering: Rendering) -> bool:
+def _uses_flat_shading(rendering: RenderSettings) -> bool:
     return rendering.slim_shader and shaders.slim_shader() is not None
 
 
 @functools.cache
 def _shapes(
-    path: Path, look: _Look | None, rendering: Rendering, place: _Place | None
+    path: Path,
+    default_material: _MaterialKey | None,
+    rendering: RenderSettings,
+    fixed_at: _PoseKey | None,
 ) -> Sequence[sapien.render.RenderShapeTriangleMesh]:
-    arrays = _derived(path, rendering)
-    drawn = arrays if place is None else _derived_for_front(path, rendering, place)
+    arrays = _mesh_arrays(path, rendering)
+    drawn = arrays if fixed_at is None else _front_mesh_arrays(path, rendering, fixed_at)
     shapes = []
     for number, part in enumerate(_parts(drawn)):
         if not len(part.triangles):
             continue
-        numbers = arrays[f"look{number}"]
-        vertices, normals, triangles = part if _flat(rendering) else unshare_corners(part)
-        own = _Look.unpacked(np.asarray(numbers, np.float32)) if len(numbers) else look
+        numbers = arrays[f"material{number}"]
+        vertices, normals, triangles = (
+            part if _uses_flat_shading(rendering) else duplicate_vertices(part)
+        )
+        own = (
+            _MaterialKey.unpacked(np.asarray(numbers, np.float32))
+            if len(numbers)
+            else default_material
+        )
         shapes.append(
             sapien.render.RenderShapeTriangleMesh(
                 vertices=vertices,
@@ -143,84 +157,85 @@ def _shapes(
     return shapes
 
 
-def _parts(arrays: Arrays) -> list[Shared]:
-    """The triangles of each part of a mesh, of what has been derived."""
+def _parts(arrays: Arrays) -> list[IndexedTriangles]:
+    """Return the triangles of each part of a mesh."""
     count = sum(name.startswith("triangles") for name in arrays)
     return [
-        Shared._make(arrays[f"{field}{part}"] for field in Shared._fields) for part in range(count)
+        IndexedTriangles._make(arrays[f"{field}{part}"] for field in IndexedTriangles._fields)
+        for part in range(count)
     ]
 
 
-def _derived(path: Path, rendering: Rendering) -> Arrays:
-    """For each part of a mesh the fields of `Shared` and the look, each with the part's number.
+def _mesh_arrays(path: Path, rendering: RenderSettings) -> Arrays:
+    """Return the fields of `IndexedTriangles` and the material of each part, suffixed by its index.
 
-    Besides them the convex hull of all parts together.
+    The entry ``hull`` is the convex hull of all parts.
     """
     light = _is_light(path, rendering)
 
     def derive() -> Arrays:
         arrays: Arrays = {}
-        for part, (flat, look) in enumerate(_installed(path)):
+        for part, (flat, material) in enumerate(_read_installed_mesh(path)):
             share = CAMERA_SHARE if path.suffix == ".stl" else LINK_SHARE
-            lighter = light and len(flat.corners) > SMALL
-            drawn = Triangles(*lighten(flat.corners, share=share)) if lighter else flat
-            arrays |= _numbered(share_corners(drawn), part)
-            arrays[f"look{part}"] = np.zeros(0) if look is None else look.packed()
+            lighter = light and len(flat.corners) > MIN_TRIANGLES
+            drawn = Triangles(*simplify(flat.corners, share=share)) if lighter else flat
+            arrays |= _numbered(index_triangles(drawn), part)
+            arrays[f"material{part}"] = np.zeros(0) if material is None else material.packed()
         points = np.concatenate([part.vertices for part in _parts(arrays)])
-        # SciPy takes a quarter of a second to import, and this is needed once.
+        # Importing SciPy takes a quarter of a second, and cached arrays do not need it.
         from scipy.spatial import ConvexHull
 
         arrays["hull"] = points[ConvexHull(points).vertices]
         return arrays
 
-    return cached_arrays(_name(path, rendering), _sources(), derive)
+    return cached_arrays(_cache_name(path, rendering), _source_bytes(), derive)
 
 
-def _derived_for_front(path: Path, rendering: Rendering, place: _Place) -> Arrays:
-    """The fields of `Shared` with the numbers of the parts, of what the front camera can see.
+def _front_mesh_arrays(path: Path, rendering: RenderSettings, fixed_at: _PoseKey) -> Arrays:
+    """Return the fields of `IndexedTriangles` of each part, only what the front camera can see.
 
-    The mesh is opaque and in one place for ever.
+    The mesh is opaque and never moves.
     """
 
     def derive() -> Arrays:
-        to_camera = to_front_camera(sapien.Pose(place.position, place.quaternion))
-        parts = [part.flattened() for part in _parts(_derived(path, rendering))]
+        to_camera = to_front_camera(sapien.Pose(fixed_at.position, fixed_at.quaternion))
+        parts = [part.to_triangles() for part in _parts(_mesh_arrays(path, rendering))]
         corners = np.concatenate([part.corners for part in parts])
-        shown = shown_triangles(corners @ to_camera[:3, :3].T + to_camera[:3, 3])
+        shown = unoccluded_triangles(corners @ to_camera[:3, :3].T + to_camera[:3, 3])
         ends = np.cumsum([len(part.corners) for part in parts])[:-1]
         arrays: Arrays = {}
         for number, (part, mask) in enumerate(zip(parts, np.split(shown, ends), strict=True)):
             seen = Triangles(part.corners[mask], part.normals[mask])
-            arrays |= _numbered(share_corners(seen), number)
+            arrays |= _numbered(index_triangles(seen), number)
         return arrays
 
-    sources = _sources() + source_code("occlusion", "viewpoint") + repr(place).encode()
-    return cached_arrays(f"{_name(path, rendering)}-front", sources, derive)
+    sources = _source_bytes() + source_code("occlusion", "viewpoint") + repr(fixed_at).encode()
+    return cached_arrays(f"{_cache_name(path, rendering)}-front", sources, derive)
 
 
-def _is_light(path: Path, rendering: Rendering) -> bool:
+def _is_light(path: Path, rendering: RenderSettings) -> bool:
     return rendering.meshes == "light" and path.name != FINGER
 
 
-def _name(path: Path, rendering: Rendering) -> str:
-    """Of what is kept of a mesh."""
+def _cache_name(path: Path, rendering: RenderSettings) -> str:
+    """Return the name of a mesh's cache entry."""
     return f"{path.stem}-{'light' if _is_light(path, rendering) else 'faithful'}"
 
 
-def _sources() -> bytes:
-    """What determines derived meshes; the installed files' contents are known and checked."""
+def _source_bytes() -> bytes:
+    """Return what determines derived meshes; the installed files are verified separately."""
     return (
         source_code("robot_meshes", "triangles", "camera_mesh", "mesh_simplification")
         + camera_mesh.packed_mask()
     )
 
 
-def _numbered(part: Shared, number: int) -> Arrays:
+def _numbered(part: IndexedTriangles, number: int) -> Arrays:
     return {f"{field}{number}": array for field, array in part._asdict().items()}
 
 
-def _installed(path: Path) -> list[tuple[Triangles, _Look | None]]:
-    """The parts of an installed mesh that can be seen, with their own looks."""
+def _read_installed_mesh(path: Path) -> list[tuple[Triangles, _MaterialKey | None]]:
+    """Return the visible parts of an installed mesh with their materials."""
     if path.suffix == ".stl":
         return [(Triangles(*camera_mesh.visible_triangles(path)), None)]
     return [
@@ -228,7 +243,7 @@ def _installed(path: Path) -> list[tuple[Triangles, _Look | None]]:
             Triangles(
                 part.vertices[part.triangles], part.get_vertex_normal()[part.triangles[:, 0]]
             ),
-            _Look.of(part.material),
+            _MaterialKey.from_sapien(part.material),
         )
         for part in sapien.render.RenderShapeTriangleMesh(str(path)).parts
     ]

@@ -1,11 +1,10 @@
-"""SAPIEN's shader without what adds nothing to our pictures, derived from the installed one.
+"""Patch SAPIEN's shader to skip unused passes.
 
-Our scenes have no environment map, so all light from it is exactly zero and is left out, and with
-it the pass that draws it behind everything; nothing is transparent either. Bodies
-can be marked (`mark`) as shaded by one normal for each triangle, that of its first corner; their
-corners can then be shared between triangles, and the graphics driver has fewer of them to compute.
-Nothing of SAPIEN's text is kept here: the installed text is edited when it is used, and if it is
-not the one for which the edits were written, it is used as it is.
+The scenes have no environment map, so image-based light and the background pass contribute nothing
+and are removed; nothing is transparent either. Bodies can be shaded by one normal per triangle,
+that of its first vertex (`enable_flat_shading`); triangles can then share vertices, and the driver
+has fewer to compute. No text of SAPIEN is stored here: the installed shader is patched when it is
+used, and if its version is unknown, it is used unpatched.
 """
 
 from __future__ import annotations
@@ -22,23 +21,24 @@ import numpy as np
 import sapien
 import sapien.render
 
-from roboirg.simulation.rendering.mesh_cache import write_whole
+from roboirg.core.errors import InvalidValueError
+from roboirg.util.atomic_write import write_atomically
 from roboirg.util.cache import cache_folder
 
 STOCK_SHADER = "minimal"
 STOCK_COLOR, COLOR = "Color", "ColorRaw"
-"""The pictures that hold RGBA: the stock shader completes its own in a second pass."""
+"""Names of the RGBA output; the stock shader completes its own in a second pass."""
 _COMMON = "common"
 _BACKGROUND = ("composite.vert", "composite0.frag")
-"""The pass that puts the environment behind everything."""
+"""The pass that draws the environment map in the background."""
 _STOCK_SHA256 = "ea4f9d94a72ef2d55096e5348704842f287c45164626a0dfde9d022ad4f23b78"
 
 SHADING, FIRST_CORNER = "shadeFlat", 2
-"""A number that SAPIEN's shader has for each body (0: normals at the corners, 1: normals by the
-screen), and a value that the derived shader knows besides."""
+"""A per-body value of SAPIEN's shader (0: vertex normals, 1: screen-space normals), and the value
+that the patched shader adds."""
 
 _NEVER_NEEDED = (
-    # file, from, up to, what comes instead
+    # file, start, end, replacement
     ("gbuffer.frag", "layout(set = 3, binding = 7)", "vec4 world2camera", ""),
     ("gbuffer.frag", "vec3 getBackgroundColor", "layout(location = 0) in vec4", ""),
     ("gbuffer.frag", "  vec3 wnormal", "  color += sceneBuffer", ""),
@@ -95,38 +95,38 @@ _log = logging.getLogger(__name__)
 
 @functools.cache
 def slim_shader() -> str | None:
-    """The folder of the derived shader; None if SAPIEN's is not the one that is known."""
-    texts = _installed()
+    """Return the folder of the patched shader; None if SAPIEN's shader is of an unknown version."""
+    texts = _read_installed_shader()
     digest = _digest(texts)
     if digest != _STOCK_SHA256:
-        _log.warning("SAPIEN's shader is not the one that is known; it is used as it is.")
+        _log.warning("SAPIEN's shader is of an unknown version; it is used unpatched.")
         return None
-    for name, start, end, instead in (*_NEVER_NEEDED, *_INTERFACE, *_SHADING):
+    for name, start, end, replacement in (*_NEVER_NEEDED, *_INTERFACE, *_SHADING):
         key = f"{STOCK_SHADER}/{name}"
-        texts[key] = _edit(texts[key], start, end, instead)
+        texts[key] = _replace_span(texts[key], start, end, replacement)
     for name in _BACKGROUND:
         del texts[f"{STOCK_SHADER}/{name}"]
     return str(_write(texts) / STOCK_SHADER)
 
 
-def mark(body: sapien.render.RenderBodyComponent) -> None:
-    """Have the derived shader give each of a body's triangles the normal of its first corner."""
+def enable_flat_shading(body: sapien.render.RenderBodyComponent) -> None:
+    """Shade each triangle of a body by the normal of its first vertex."""
     body.set_property(SHADING, FIRST_CORNER)
 
 
 @functools.cache
-def stand_in_table() -> sapien.render.RenderTexture:
-    """A tiny texture in the place of a table that the cameras' shaders never need.
+def placeholder_brdf_table() -> sapien.render.RenderTexture:
+    """Return a tiny texture to replace the BRDF table, which cameras' shaders never need.
 
-    The shader samples the table only for an environment map, which is black here; without a
-    stand-in SAPIEN computes it for three seconds before the first picture. It is kept for the
-    life of the process, because cameras do not keep their textures alive.
+    The shader samples the table only for an environment map, which is black here; otherwise SAPIEN
+    computes it for three seconds before the first picture. The texture is cached for the life of
+    the process, because cameras do not keep their textures alive.
     """
     return sapien.render.RenderTexture(np.zeros((2, 2, 4), np.uint8), 2, "r8g8b8a8unorm")
 
 
-def _installed() -> dict[str, str]:
-    """The texts of SAPIEN's shader and of what it includes, by folder and name."""
+def _read_installed_shader() -> dict[str, str]:
+    """Return the files of SAPIEN's shader and its includes, by folder and name."""
     root = Path(sapien.__file__).parent / "vulkan_shader"
     paths = sorted(path for part in (_COMMON, STOCK_SHADER) for path in (root / part).iterdir())
     return {f"{path.parent.name}/{path.name}": path.read_text() for path in paths}
@@ -139,28 +139,29 @@ def _digest(texts: dict[str, str]) -> str:
     return digest.hexdigest()
 
 
-def _edit(text: str, start: str, end: str, instead: str) -> str:
-    """The text with what begins with `start` and ends before the next `end` replaced."""
+def _replace_span(text: str, start: str, end: str, replacement: str) -> str:
+    """Replace the text from `start` up to the next `end`."""
     first = text.index(start)
-    return text[:first] + instead + text[text.index(end, first + len(start)) :]
+    return text[:first] + replacement + text[text.index(end, first + len(start)) :]
 
 
 def _write(texts: dict[str, str]) -> Path:
-    """Put the texts into a folder; what is there already is checked."""
+    """Write the files to a folder, verifying existing ones; returns the folder."""
     folder = cache_folder()
     if folder is not None:
         try:
             return _fill(folder / "shaders" / _digest(texts)[:16], texts)
-        except OSError as error:
+        except (OSError, InvalidValueError) as error:
             _log.warning("The cache cannot be used for shaders (%s).", error)
-    passing = Path(tempfile.mkdtemp(prefix="roboirg-shaders-"))
-    atexit.register(shutil.rmtree, passing, ignore_errors=True)
-    return _fill(passing, texts)
+    temporary = Path(tempfile.mkdtemp(prefix="roboirg-shaders-"))
+    atexit.register(shutil.rmtree, temporary, ignore_errors=True)
+    return _fill(temporary, texts)
 
 
 def _fill(folder: Path, texts: dict[str, str]) -> Path:
     for name, text in texts.items():
         path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
         if not path.is_file() or path.read_bytes() != text.encode():
-            write_whole(path, text.encode())
+            write_atomically(path, text.encode())
     return folder

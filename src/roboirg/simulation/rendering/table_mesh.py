@@ -1,8 +1,8 @@
-"""The table's mesh, with its textures as they are drawn.
+"""The table's mesh, with decoded textures.
 
-Decoding them takes a tenth of a second, so what they decode to is kept with other derived meshes,
-and so is the installed file without its pictures: SAPIEN reads the mesh from that, because only
-for meshes from files does it compute the tangents that the table's normal map needs.
+Decoding takes a tenth of a second, so the decoded textures are cached with other derived meshes, as
+is the installed file without its textures. SAPIEN reads the mesh from this file, because it
+computes the tangents for the normal map only for meshes from files.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ from roboirg.simulation.model_files import find_model_files
 from roboirg.simulation.rendering.mesh_cache import Arrays, cached_arrays, source_code
 
 METALLIC = 1.0
-"""What the table's texture of that says everywhere."""
+"""The constant value of the table's metallic texture."""
 
 _HEADER, _CHUNK = struct.Struct("<4sII"), struct.Struct("<I4s")
-"""Of a binary glTF file: magic, version, size; of its JSON and of its data: size, kind."""
+"""Headers of a binary glTF file (magic, version, size) and of its chunks (size, kind)."""
 _WORD = 4
 _MESH = "mesh"
 
 
 class _Texture(NamedTuple):
-    """How a texture of the material is made of an array.
+    """A texture of the material and the array it is made from.
 
     Attributes:
-        field: of the material.
-        channels: of the installed texture, which are kept.
-        format: of such arrays.
-        srgb: whether colors are stored as screens want them.
+        field: field of the material.
+        channels: channels of the installed texture to keep.
+        format: pixel format of the array.
+        srgb: whether colors are sRGB-encoded.
     """
 
     field: Literal["base_color_texture", "normal_texture", "roughness_texture"]
@@ -56,72 +56,72 @@ _TEXTURES = (
 
 @functools.cache
 def table_shape() -> sapien.render.RenderShapeTriangleMesh:
-    """The table's shape, unscaled, to be cloned; a number replaces the texture of its metal."""
-    arrays = cached_arrays("table", source_code("table_mesh"), _derive)
-    shape = _loaded(arrays[_MESH].tobytes())
+    """Return the table's unscaled shape, to be cloned; a constant replaces the metallic texture."""
+    arrays = cached_arrays("table", source_code("table_mesh"), _make_table_arrays)
+    shape = _load_shape(arrays[_MESH].tobytes())
     material = shape.parts[0].material
     for texture in _TEXTURES:
-        made = sapien.render.RenderTexture2D(
+        decoded = sapien.render.RenderTexture2D(
             np.asarray(arrays[texture.field]), texture.format, srgb=texture.srgb
         )
-        setattr(material, texture.field, made)
+        setattr(material, texture.field, decoded)
     material.metallic = METALLIC
     return shape
 
 
-def _derive() -> Arrays:
+def _make_table_arrays() -> Arrays:
     path = find_model_files().table
     material = sapien.render.RenderShapeTriangleMesh(str(path)).parts[0].material
-    arrays: Arrays = {_MESH: np.frombuffer(without_pictures(path.read_bytes()), np.uint8)}
+    arrays: Arrays = {_MESH: np.frombuffer(strip_textures(path.read_bytes()), np.uint8)}
     for texture in _TEXTURES:
         pixels: NDArray[Any] = getattr(material, texture.field).download()
         arrays[texture.field] = np.ascontiguousarray(pixels[..., texture.channels])
     return arrays
 
 
-def _loaded(content: bytes) -> sapien.render.RenderShapeTriangleMesh:
-    """A shape of a file with such a content."""
+def _load_shape(content: bytes) -> sapien.render.RenderShapeTriangleMesh:
+    """Load a shape from the content of a file."""
     with tempfile.TemporaryDirectory(prefix="roboirg-") as folder:
         path = Path(folder) / "table.glb"
         path.write_bytes(content)
         shape = sapien.render.RenderShapeTriangleMesh(str(path))
-        # SAPIEN reads the file when its parts are looked at.
+        # Accessing the parts makes SAPIEN read the file.
         assert shape.parts  # noqa: S101
         return shape
 
 
-def without_pictures(content: bytes) -> bytes:
-    """A binary glTF file without its textures."""
+def strip_textures(content: bytes) -> bytes:
+    """Return a binary glTF file without its textures."""
     size, _ = _CHUNK.unpack_from(content, _HEADER.size)
     start = _HEADER.size + _CHUNK.size
-    told = json.loads(content[start : start + size])
+    gltf = json.loads(content[start : start + size])
     data = content[start + size + _CHUNK.size :]
-    pictures = {image["bufferView"] for image in told["images"]}
-    kept = [number for number in range(len(told["bufferViews"])) if number not in pictures]
-    views, place = [], 0
+    images = {image["bufferView"] for image in gltf["images"]}
+    buffer_views = [number for number in range(len(gltf["bufferViews"])) if number not in images]
+    views, offset = [], 0
     parts = []
-    for number in kept:
-        view = told["bufferViews"][number]
+    for number in buffer_views:
+        view = gltf["bufferViews"][number]
         first, length = view["byteOffset"], view["byteLength"]
         parts.append(data[first : first + length])
-        views.append({**view, "byteOffset": place})
-        place += length
-    for accessor in told["accessors"]:
-        accessor["bufferView"] = kept.index(accessor["bufferView"])
-    for material in told["materials"]:
+        views.append({**view, "byteOffset": offset})
+        offset += length
+    for accessor in gltf["accessors"]:
+        accessor["bufferView"] = buffer_views.index(accessor["bufferView"])
+    for material in gltf["materials"]:
         material.pop("normalTexture", None)
         for field in ("baseColorTexture", "metallicRoughnessTexture"):
             material["pbrMetallicRoughness"].pop(field, None)
     for field in ("images", "textures", "samplers"):
-        del told[field]
-    told["bufferViews"], told["buffers"] = views, [{"byteLength": place}]
-    return _glb(json.dumps(told).encode(), b"".join(parts))
+        del gltf[field]
+    gltf["bufferViews"], gltf["buffers"] = views, [{"byteLength": offset}]
+    return _write_glb(json.dumps(gltf).encode(), b"".join(parts))
 
 
-def _glb(told: bytes, data: bytes) -> bytes:
-    """A binary glTF file of its JSON and its data, which fills whole words."""
-    told += b" " * (-len(told) % _WORD)
+def _write_glb(gltf: bytes, data: bytes) -> bytes:
+    """Assemble a binary glTF file from its JSON and its word-aligned data."""
+    gltf += b" " * (-len(gltf) % _WORD)
     chunks = b"".join(
-        _CHUNK.pack(len(chunk), kind) + chunk for kind, chunk in ((b"JSON", told), (b"BIN\0", data))
+        _CHUNK.pack(len(chunk), kind) + chunk for kind, chunk in ((b"JSON", gltf), (b"BIN\0", data))
     )
     return _HEADER.pack(b"glTF", 2, _HEADER.size + len(chunks)) + chunks

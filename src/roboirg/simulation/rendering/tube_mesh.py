@@ -1,4 +1,4 @@
-"""A ring as a mesh: what a roll of tape looks like. SAPIEN's own shapes have no holes."""
+"""The mesh of a tube, which draws a roll of tape; SAPIEN's own shapes have no holes."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ SEGMENTS = 48
 def tube(
     outer: float, inner: float, half: float, rgba: Rgba
 ) -> sapien.render.RenderShapeTriangleMesh:
-    """An upright ring about the origin, to be attached to a body.
+    """Return an upright tube centered at the origin, to be attached to a body.
 
     Args:
-        outer: radius, m.
+        outer: outer radius, m.
         inner: radius of the hole, m.
-        half: half its height, m.
+        half: half the height, m.
         rgba: color, 0 to 1 each.
     """
-    return _ring(outer, inner, half, rgba).clone()
+    return _tube_mesh(outer, inner, half, rgba).clone()
 
 
 @functools.cache
-def _ring(
+def _tube_mesh(
     outer: float, inner: float, half: float, rgba: Rgba
 ) -> sapien.render.RenderShapeTriangleMesh:
-    # Four bands, each between two circles: outside, top, inside, bottom; edges are sharp.
+    # Four bands between two circles each: outside, top, inside, bottom; edges are sharp.
     circles = [(outer, -half), (outer, half), (inner, half), (inner, -half)]
     slopes = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)]
     angles = 2.0 * np.pi * np.arange(SEGMENTS) / SEGMENTS
     cos, sin = np.cos(angles), np.sin(angles)
     vertices, normals, triangles = [], [], []
-    here, there = np.arange(SEGMENTS), np.roll(np.arange(SEGMENTS), -1)
+    start, end = np.arange(SEGMENTS), np.roll(np.arange(SEGMENTS), -1)
     for band, (away, up) in enumerate(slopes):
         for radius, height in (circles[band], circles[(band + 1) % 4]):
             vertices.append(np.stack([radius * cos, radius * sin, np.full(SEGMENTS, height)], 1))
@@ -45,8 +45,8 @@ def _ring(
         low = 2 * band * SEGMENTS
         high = low + SEGMENTS
         triangles += [
-            np.stack([low + here, low + there, high + here], 1),
-            np.stack([low + there, high + there, high + here], 1),
+            np.stack([low + start, low + end, high + start], 1),
+            np.stack([low + end, high + end, high + start], 1),
         ]
     return sapien.render.RenderShapeTriangleMesh(
         vertices=np.concatenate(vertices).astype(np.float32),

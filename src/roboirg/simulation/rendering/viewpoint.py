@@ -1,4 +1,4 @@
-"""What the cameras' pictures are like, and where the front camera stands."""
+"""Picture size, field of view, and the front camera's pose."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ FIELD_OF_VIEW = math.pi / 2
 FOCAL_LENGTH = SIZE / 2 / math.tan(FIELD_OF_VIEW / 2)
 """Pixels."""
 NEAR, FAR = 0.01, 100.0
-"""Meters from the eye between which things are drawn."""
+"""Near and far plane, m."""
 
 FRONT_EYE = (0.3, 0.0, 0.4)
 FRONT_TARGET = (0.0, 0.0, -0.2)
 
 
 def look_at(eye: tuple[float, float, float], target: tuple[float, float, float]) -> sapien.Pose:
-    """Pose of a camera (x forward, z up, as SAPIEN has it) that looks at a target."""
+    """Return the pose of a camera (x forward, z up, as in SAPIEN) that looks at a target."""
     forward = np.subtract(target, eye)
     forward /= np.linalg.norm(forward)
     left = np.cross([0.0, 0.0, 1.0], forward)
@@ -33,7 +33,7 @@ def look_at(eye: tuple[float, float, float], target: tuple[float, float, float])
 
 
 def to_front_camera(pose: sapien.Pose) -> NDArray[np.float64]:
-    """(4, 4): from the frame with this pose in the world to the front camera's, OpenCV."""
+    """Return the transform (4, 4) from a frame in the world to the front camera (OpenCV)."""
     frame = look_at(FRONT_EYE, FRONT_TARGET).inv() * pose
     # x right, y down, z forward of x forward, y left, z up
     axes = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]], dtype=np.float64)

@@ -1,1 +1,1 @@
-"""What several tasks share: fixtures, placement, layouts, stages of videos."""
+"""Shared by several tasks: fixtures, placement, layouts, stages of videos."""

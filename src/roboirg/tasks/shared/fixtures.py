@@ -1,4 +1,4 @@
-"""Things that several tasks place in the same way: the button, cubes, target discs, the bin."""
+"""Draw the objects of several tasks: buttons, cubes, target discs, bins."""
 
 from __future__ import annotations
 
@@ -16,35 +16,35 @@ from roboirg.tasks.shared.placement import Circle, Footprint, Rectangle, Region,
 ORDINALS = ("first", "second", "third", "fourth", "fifth")
 
 BIN_YAW = math.radians(20.0)
-"""The bin is turned by at most so much to either side."""
+"""Largest rotation of the bin to either side."""
 
 
 def draw_number(rng: np.random.Generator, bounds: tuple[int, int]) -> int:
-    """A whole number from the first bound to the second, both included; each is as likely."""
+    """Draw a whole number between two bounds, both included, uniformly."""
     low, high = bounds
     return int(rng.integers(low, high + 1))
 
 
 def draw_button(rng: np.random.Generator, region: Region, name: str = "button") -> SceneObject:
-    """A button anywhere in the region; it is placed first and needs no clearance."""
+    """Draw a button anywhere in the region; it is placed first and needs no clearance."""
     x, y = region.draw(rng)
     return SceneObject(name, "button", Point(x, y, object_sizes.BUTTON_HEIGHT))
 
 
 def button_keep_out(button: SceneObject) -> Rectangle:
-    """The axis-aligned square around a button that stays free."""
+    """Return the axis-aligned square around a button that stays free."""
     half = object_sizes.BUTTON_KEEP_OUT_HALF
     return Rectangle(button.position.x, button.position.y, half, half)
 
 
 def button_footprint(button: SceneObject) -> Rectangle:
-    """The square that the base of a button covers."""
+    """Return the square that the base of a button covers."""
     half_x, half_y, _ = object_sizes.BUTTON_BASE_HALF
     return Rectangle(button.position.x, button.position.y, half_x, half_y, button.yaw)
 
 
 def cube_footprint(cube: SceneObject) -> Rectangle:
-    """The square that a cube covers."""
+    """Return the square that a cube covers."""
     half = object_sizes.CUBE_HALF
     return Rectangle(cube.position.x, cube.position.y, half, half, cube.yaw)
 
@@ -57,10 +57,10 @@ def draw_cube(
     gap: float,
     obstacles: Sequence[Footprint],
 ) -> SceneObject:
-    """A cube with any yaw, at least `gap` meters from all obstacles.
+    """Draw a cube with any yaw, at least `gap` meters from all obstacles.
 
     Raises:
-        SceneRejectedError: no free place was found.
+        SceneRejectedError: there is no free place.
     """
 
     def draw() -> SceneObject:
@@ -78,10 +78,10 @@ def draw_colored_cubes(
     gap: float,
     obstacles: Sequence[Footprint],
 ) -> tuple[SceneObject, ...]:
-    """So many cubes of different colors, ``cube_red`` and so on, the colors in random order.
+    """Draw `count` cubes of different colors, ``cube_red`` and so on, in random order.
 
     Raises:
-        SceneRejectedError: a cube found no free place.
+        SceneRejectedError: there is no free place for a cube.
     """
     taken = list(obstacles)
     cubes: list[SceneObject] = []
@@ -102,10 +102,10 @@ def draw_target(
     obstacles: Sequence[Footprint],
     rgb: tuple[float, float, float] | None = None,
 ) -> SceneObject:
-    """A target disc of `radius` meters, at least `gap` meters from all obstacles.
+    """Draw a target disc of `radius` meters, at least `gap` meters from all obstacles.
 
     Raises:
-        SceneRejectedError: no free place was found.
+        SceneRejectedError: there is no free place.
     """
 
     def draw() -> SceneObject:
@@ -120,7 +120,7 @@ def draw_target(
 
 
 def marker_over(target: SceneObject, name: str) -> SceneObject:
-    """The disc that lights up over a target: a little wider, and high enough to cover it."""
+    """Return the disc that lights up over a target: a little wider, and high enough to cover it."""
     x, y, z = target.position
     radius = object_sizes.MARKER_RADIUS_SHARE * float(target.radius or 0.0)
     return SceneObject(name, "marker", Point(x, y, z - object_sizes.MARKER_DEPTH), radius=radius)
@@ -129,10 +129,10 @@ def marker_over(target: SceneObject, name: str) -> SceneObject:
 def draw_bin(
     rng: np.random.Generator, region: Region, obstacles: Sequence[Footprint], name: str = "bin"
 ) -> SceneObject:
-    """A bin whose center is anywhere in the region and whose walls touch no obstacle.
+    """Draw a bin whose center is in the region and whose walls touch no obstacle.
 
     Raises:
-        SceneRejectedError: no free place was found.
+        SceneRejectedError: there is no free place.
     """
 
     def draw() -> SceneObject:
@@ -144,7 +144,7 @@ def draw_bin(
 
 
 def bin_footprint(item: SceneObject) -> Rectangle:
-    """The square that a bin covers, its hole included."""
+    """Return the square that a bin covers, its hole included."""
     half = object_sizes.BIN_HALF
     return Rectangle(item.position.x, item.position.y, half, half, item.yaw)
 
@@ -155,10 +155,16 @@ def placed(
     clearance: Callable[[SceneObject], Footprint],
     obstacles: Sequence[Footprint],
 ) -> SceneObject:
-    """An object where its clearance is free of obstacles.
+    """Draw an object until its clearance is free of obstacles.
+
+    Args:
+        name: of the object, for the error.
+        draw: returns a candidate.
+        clearance: returns the area that a candidate needs.
+        obstacles: areas that are occupied.
 
     Raises:
-        SceneRejectedError: no free place was found.
+        SceneRejectedError: there is no free place.
     """
     item = place(draw, clearance, obstacles)
     if item is None:

@@ -1,4 +1,4 @@
-"""Patterns of three or four points about the origin, near which things are placed.
+"""Patterns of three or four points around the origin, near which objects are placed.
 
 Figures: RoboMME.
 """
@@ -17,14 +17,14 @@ TRIANGLE: tuple[PlanePoint, ...] = ((-0.05, -0.1), (-0.05, 0.1), (0.1, 0.0))
 LINE: tuple[PlanePoint, ...] = ((0.0, -0.15), (0.0, 0.15), (0.0, 0.0))
 
 PATTERNS: dict[int, tuple[tuple[PlanePoint, ...], ...]] = {3: (TRIANGLE, LINE), 4: (FOUR,)}
-"""By number of points; equally likely where there are several."""
+"""Patterns by number of points; those of three are equally likely."""
 
 
 def layout_points(rng: np.random.Generator, count: int) -> tuple[PlanePoint, ...]:
-    """Three or four points, turned together about the origin by any angle of the full circle.
+    """Draw a pattern of `count` points, turned about the origin by any angle of the full circle.
 
     Raises:
-        KeyError: there is no pattern of so many points.
+        KeyError: there is no pattern of that number of points.
     """
     patterns = PATTERNS[count]
     pattern = patterns[int(rng.integers(len(patterns)))]

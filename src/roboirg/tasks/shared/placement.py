@@ -1,8 +1,8 @@
-"""Where things may stand: exact clearance tests in the plane, and rejection sampling.
+"""Place objects by rejection sampling, with exact clearance tests in the plane.
 
 Shapes are footprints on the table: rectangles for cubes, containers and buttons, circles for
-target discs. A placement is drawn uniformly and accepted at the first draw with enough clearance
-(256 draws at most, as in RoboMME); unlike there, obstacles are true rectangles.
+target discs. The first of at most 256 uniform draws with enough clearance is accepted, as in
+RoboMME; unlike there, obstacles are true rectangles.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ class Rectangle:
     yaw: float = 0.0
 
     def grown(self, by: float) -> Rectangle:
-        """The rectangle with every side moved outwards by `by` meters."""
+        """Return the rectangle with every side moved outwards by `by` meters."""
         return Rectangle(self.x, self.y, self.half_x + by, self.half_y + by, self.yaw)
 
     def to_local(self, x: float, y: float) -> tuple[float, float]:
-        """A world point in the rectangle's own frame."""
+        """Return a world point in the rectangle's frame."""
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)
         dx, dy = x - self.x, y - self.y
         return cos * dx + sin * dy, cos * dy - sin * dx
@@ -61,7 +61,7 @@ class Region(NamedTuple):
     half_y: float
 
     def draw(self, rng: np.random.Generator, inset: float = 0.0) -> tuple[float, float]:
-        """A uniform point of the region shrunk by `inset` on each side."""
+        """Draw a uniform point of the region, shrunk by `inset` on each side."""
         u, v = rng.random(2).tolist()
         return (
             self.x + (2.0 * u - 1.0) * (self.half_x - inset),
@@ -70,7 +70,7 @@ class Region(NamedTuple):
 
 
 def overlap(first: Footprint, second: Footprint) -> bool:
-    """Whether two footprints touch or overlap."""
+    """Return whether two footprints touch or overlap."""
     if isinstance(first, Rectangle) and isinstance(second, Rectangle):
         return not (_axis_separates(first, second) or _axis_separates(second, first))
     if isinstance(first, Circle) and isinstance(second, Circle):
@@ -81,7 +81,7 @@ def overlap(first: Footprint, second: Footprint) -> bool:
 
 
 def distance_to(rectangle: Rectangle, x: float, y: float) -> float:
-    """Euclidean distance from a point to a rectangle, meters; 0 inside."""
+    """Return the Euclidean distance from a point to a rectangle, meters; 0 inside."""
     local_x, local_y = rectangle.to_local(x, y)
     return math.hypot(
         max(abs(local_x) - rectangle.half_x, 0.0), max(abs(local_y) - rectangle.half_y, 0.0)
@@ -89,7 +89,7 @@ def distance_to(rectangle: Rectangle, x: float, y: float) -> float:
 
 
 def _axis_separates(first: Rectangle, second: Rectangle) -> bool:
-    """Whether an axis of `first` separates the two (separating-axis test)."""
+    """Return whether an axis of `first` separates the two (separating-axis test)."""
     center_x, center_y = first.to_local(second.x, second.y)
     cos, sin = abs(math.cos(second.yaw - first.yaw)), abs(math.sin(second.yaw - first.yaw))
     reach_x = cos * second.half_x + sin * second.half_y
@@ -102,15 +102,15 @@ def place(
     clearance: Callable[[Placement], Footprint],
     obstacles: Sequence[Footprint],
 ) -> Placement | None:
-    """The first of at most 256 draws whose clearance shape is free of all obstacles.
+    """Return the first of at most 256 draws whose clearance is free of all obstacles.
 
     Args:
-        draw: gives a candidate placement.
-        clearance: the area that the candidate needs for itself.
-        obstacles: areas that are taken.
+        draw: returns a candidate.
+        clearance: returns the area that a candidate needs.
+        obstacles: areas that are occupied.
 
     Returns:
-        The accepted placement, or None when every draw hit something.
+        The accepted placement, or None if every draw hits an obstacle.
     """
     for _ in range(MAX_DRAWS):
         candidate = draw()

@@ -1,4 +1,4 @@
-"""Objects that change places two by two, one exchange after the other."""
+"""Plan swaps: objects that change places two at a time, one swap after the other."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from roboirg.core.episode import SceneObject
 from roboirg.core.motions import Motion, Point, Swap
 
 SWAP_STEPS = 50
-"""Control steps of one exchange (RoboMME)."""
+"""Control steps of one swap (RoboMME)."""
 
 
 def plan_swaps(
@@ -20,12 +20,12 @@ def plan_swaps(
     lane: float,
     stage: int | None = None,
 ) -> tuple[Swap, ...]:
-    """Each initiator in turn changes places with the object that is then nearest to it.
+    """Plan that each initiator in turn changes places with the object then nearest to it.
 
     Args:
-        objects: all that may be partners; those that do not move are pinned meanwhile.
-        initiators: names of the objects that begin an exchange, in order.
-        start: step of the first exchange; the others follow back to back.
+        objects: all possible partners; those that do not move are pinned meanwhile.
+        initiators: names of the objects that start a swap, in order.
+        start: step of the first swap; the others follow without a pause.
         lane: sideways swing, m.
         stage: index of the demonstration's stage from which `start` counts; None: from reset.
     """
@@ -41,12 +41,12 @@ def plan_swaps(
 
 
 def last_step(motions: Iterable[Motion]) -> int:
-    """The step at which the last exchange is complete; 0 if there is none."""
+    """Return the step at which the last swap is complete; 0 if there is none."""
     return max((one.start + one.steps for one in motions if isinstance(one, Swap)), default=0)
 
 
 def nearest(places: dict[str, Point], name: str) -> str:
-    """The object nearest to a named one in the plane."""
+    """Return the object nearest to a named one in the plane."""
     here = places[name]
 
     def distance(other: str) -> float:

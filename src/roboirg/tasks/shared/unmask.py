@@ -1,4 +1,4 @@
-"""What the Unmask tasks share: containers that appear over cubes and have to be lifted."""
+"""Shared by the Unmask tasks: containers that appear over cubes and are to be lifted."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from roboirg.tasks.shared.placement import Circle, Footprint, Rectangle, Region,
 from roboirg.tasks.task import Commands, Wording
 
 APPEAR_STEP = 32
-"""Containers are away until this step, then stand over the cubes at once."""
+"""The step at which all containers appear over the cubes at once."""
 
 
 def container_footprint(container: SceneObject) -> Rectangle:
-    """The square that a container covers."""
+    """Return the square that a container covers."""
     half = object_sizes.CONTAINER_FOOTPRINT_HALF
     return Rectangle(container.position.x, container.position.y, half, half, container.yaw)
 
@@ -42,7 +42,7 @@ def draw_containers(
     gap: float,
     obstacles: Sequence[Footprint] = (),
 ) -> list[SceneObject]:
-    """Up to `count` containers in one region; see `draw_containers_in`."""
+    """Draw up to `count` containers in one region; see `draw_containers_in`."""
     return draw_containers_in(rng, [region] * count, gap, obstacles)
 
 
@@ -52,9 +52,10 @@ def draw_containers_in(
     gap: float,
     obstacles: Sequence[Footprint] = (),
 ) -> list[SceneObject]:
-    """A container in each region, `gap` meters free around it; ends at the first that fits nowhere.
+    """Draw a container in each region, until one has no free place.
 
-    As in RoboMME the gap counts on both sides: around the new container and around those placed.
+    As in RoboMME, the gap in meters counts twice: around the new container and around each placed
+    one.
     """
     radius = object_sizes.CONTAINER_HALF + gap
     taken = list(obstacles)
@@ -78,7 +79,7 @@ def draw_containers_in(
 def hide_cubes(
     rng: np.random.Generator, containers: Sequence[SceneObject]
 ) -> tuple[SceneObject, ...]:
-    """A red, a green and a blue cube, in random order under the first three containers.
+    """Draw a red, a green and a blue cube, in random order under the first three containers.
 
     Raises:
         SceneRejectedError: there are fewer than three containers.
@@ -99,7 +100,7 @@ def _hidden_cube(color: Color, container: SceneObject) -> SceneObject:
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
-    """Any hidden cube, or any two of them in order."""
+    """Return a goal for every hidden cube, and for every two of them in order."""
     hidden = [str(cube.color) for cube in scene.of_kind("hidden_cube")]
     single = [(color,) for color in hidden]
     pairs = list(itertools.permutations(hidden, 2))
@@ -107,7 +108,7 @@ def goals(scene: Scene) -> tuple[Goal, ...]:
 
 
 def pick_stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Lift the container over each named cube in turn, putting it down in between."""
+    """Return the stages: lift the container over each goal cube in turn, put it down in between."""
     covers = {cube.color: cube.inside for cube in scene.of_kind("hidden_cube")}
     containers = tuple(item.name for item in scene.of_kind("container"))
     plan: list[Stage] = []
@@ -137,17 +138,17 @@ def _put_down(held: str, containers: Sequence[str]) -> Stage:
 
 
 def appearing(containers: Sequence[SceneObject]) -> tuple[Away, ...]:
-    """Every container is away for the first 32 steps and then stands at its place."""
+    """Return the motions by which every container appears at its place after 32 steps."""
     return tuple(Away(container.name, 0, APPEAR_STEP) for container in containers)
 
 
 def press_stage(expects: Condition, button: str, which: str = "button") -> Stage:
-    """A button is pressed; nothing that happens meanwhile is held against the policy.
+    """Return the stage of a press, which forbids nothing.
 
     Args:
         expects: the condition that completes the stage.
         button: name of the one that the oracle presses.
-        which: what the subgoal calls it.
+        which: its name in the subgoal.
     """
     return Stage(
         expects=expects,
@@ -159,7 +160,7 @@ def press_stage(expects: Condition, button: str, which: str = "button") -> Stage
 
 
 def commands(*wordings: Wording) -> Commands:
-    """The commands of an Unmask task: what its sentences tell is the container over a cube."""
+    """Return the commands of an Unmask task, which refer to the container over a cube."""
     return Commands(
         thing="container",
         by_color="the container that hides {cube}",

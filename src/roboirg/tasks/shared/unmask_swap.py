@@ -1,4 +1,4 @@
-"""What the two tasks share in which containers change places over their cubes."""
+"""Shared by the Unmask tasks in which containers change places with their cubes."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from roboirg.tasks.shared.unmask import appearing, draw_containers_in, hide_cube
 CONTAINERS: dict[Difficulty, int] = {"easy": 3, "medium": 4, "hard": 4}
 SWAPS: dict[Difficulty, tuple[int, int]] = {"easy": (1, 2), "medium": (1, 2), "hard": (2, 3)}
 PICKS: dict[Difficulty, tuple[int, int]] = {"easy": (1, 2), "medium": (1, 1), "hard": (2, 2)}
-"""Fewest and most, in the two tasks in which containers change places; each is uniform."""
+"""Fewest and most swaps and picks; both numbers are uniform."""
 START = 64
 LANE = 0.07
 SPOT_HALF = 0.07
-"""Half side of the square about a layout point in which a container has to stand, m."""
+"""Half side of the square around a layout point in which a container stands, m."""
 SPOT_GAP = 0.02
 
 
@@ -29,7 +29,7 @@ def draw_containers_about(
     points: Iterable[tuple[float, float]],
     obstacles: Sequence[Footprint] = (),
 ) -> list[SceneObject]:
-    """Containers near the points of a layout, one for each; see `draw_containers_in`."""
+    """Draw a container near each point of a layout; see `draw_containers_in`."""
     regions = [Region(x, y, SPOT_HALF, SPOT_HALF) for x, y in points]
     return draw_containers_in(rng, regions, SPOT_GAP, obstacles)
 
@@ -40,10 +40,10 @@ def sample(
     containers: Sequence[SceneObject],
     buttons: Sequence[SceneObject] = (),
 ) -> tuple[Scene, Goal]:
-    """Scene and goal of a task in which containers change places, once all have been placed.
+    """Draw hidden cubes, swaps and goal for containers that have been placed.
 
-    The cubes are out of the world while the containers move, and come back under their own ones.
-    That the exchanges may cancel out is RoboMME's rule.
+    The cubes are out of the world while the containers move, and return under their own ones. As in
+    RoboMME, two swaps may cancel out.
 
     Raises:
         SceneRejectedError: there are fewer than three containers.
@@ -68,7 +68,7 @@ def sample(
 def _initiators(
     rng: np.random.Generator, difficulty: Difficulty, containers: Sequence[SceneObject]
 ) -> tuple[str, ...]:
-    """Who begins an exchange: first two different ones with a cube, then any other container."""
+    """Draw the containers that start a swap: two with a cube, then any other one."""
     number = draw_number(rng, SWAPS[difficulty])
     names = [container.name for container in containers]
     first, second = (names[index] for index in rng.permutation(len(COLORS))[:2])

@@ -1,9 +1,9 @@
-"""What the two Place tasks share: their table, their video, and the placing that it asks for.
+"""Shared by the VideoPlace tasks: their table, their video and their stages.
 
-In the video of a Place task one cube is put on several discs, with a press of the button in
-between, and at last put back on a site that nobody sees; then two discs may change places. The
-policy puts a cube on one of those discs. Unlike in RoboMME the site stays free of other things, so
-that the cube is never put back on another one. Facts: RoboMME.
+In the video, one cube is placed on several discs, with a press of the button in between, and then
+put back on an invisible site; at the end two discs may change places. The policy places a cube on
+one of those discs. Unlike in RoboMME, the site stays free of other objects, so that the cube is
+never put back on another one. Facts: RoboMME.
 """
 
 from __future__ import annotations
@@ -42,34 +42,34 @@ HOLD_STEPS = 60
 def draw_table(
     rng: np.random.Generator, cubes: int, discs: int, site_radius: float
 ) -> tuple[SceneObject, ...]:
-    """Site, button, cubes of different colors and target discs.
+    """Draw site, button, cubes of different colors and target discs.
 
     Args:
         rng: of the episode.
-        cubes: how many, one of a color.
-        discs: how many, ``target_0`` first.
+        cubes: number of cubes.
+        discs: number of discs, ``target_0`` first.
         site_radius: of the round place for the cube at the end of the video, m.
 
     Raises:
-        SceneRejectedError: no free place was found for one of them.
+        SceneRejectedError: there is no free place for one of them.
     """
     x, y = SITE_REGION.draw(rng, inset=site_radius)
-    # A site is as high as a disc: the height at which a hand lets go follows from it.
+    # A site is as high as a disc: the release height of the hand follows from it.
     site = SceneObject("site", "site", Point(x, y, object_sizes.TARGET_HEIGHT), radius=site_radius)
     button = draw_button(rng, BUTTON_REGION)
     obstacles: list[Footprint] = [Circle(x, y, site_radius), button_keep_out(button)]
     colored = draw_colored_cubes(rng, cubes, WORK_REGION, GAP, obstacles)
     obstacles += [cube_footprint(cube) for cube in colored]
-    things: list[SceneObject] = [site, button, *colored]
+    objects: list[SceneObject] = [site, button, *colored]
     for number in range(discs):
         disc = draw_target(rng, f"target_{number}", TARGET_RADIUS, WORK_REGION, GAP, obstacles)
-        things.append(disc)
+        objects.append(disc)
         obstacles.append(Circle(disc.position.x, disc.position.y, TARGET_RADIUS))
-    return tuple(things)
+    return tuple(objects)
 
 
 def draw_swap(rng: np.random.Generator, discs: Sequence[SceneObject], past: Sequence[Fact]) -> Swap:
-    """Any two of the discs change places once the robot holds still after all it has shown."""
+    """Draw two discs that change places when the robot holds still at the end of the video."""
     first, second, *others = (discs[index].name for index in rng.permutation(len(discs)))
     kinds = [stage.primitive.kind for stage in _demonstration_of(past)]
     hold = kinds.index("hold")
@@ -77,12 +77,12 @@ def draw_swap(rng: np.random.Generator, discs: Sequence[SceneObject], past: Sequ
 
 
 def visited(scene: Scene) -> tuple[str, ...]:
-    """Names of the discs on which the video shows the cube being placed, in order."""
+    """Return the names of the discs on which the video shows the cube placed, in order."""
     return tuple(str(fact.place) for fact in scene.past if fact.kind == "placed")
 
 
 def demonstration(scene: Scene) -> tuple[Stage, ...]:
-    """All that the video shows, then the cube is put back and the robot waits and goes home."""
+    """Return the video's stages: all past acts, then put back the cube, wait and go home."""
     return _demonstration_of(scene.past)
 
 
@@ -130,7 +130,7 @@ def _show_press(pressed: Fact) -> Stage:
 
 
 def place_stages(scene: Scene, color: str, answer: str) -> tuple[Stage, ...]:
-    """Pick the cube of a color and place it on one disc, and on no other."""
+    """Return the stages: pick the cube of a color, and place it on the right disc only."""
     cube = f"cube_{color}"
     cubes = (item.name for item in scene.of_kind("cube"))
     discs = (item.name for item in scene.of_kind("target"))
@@ -152,5 +152,5 @@ def place_stages(scene: Scene, color: str, answer: str) -> tuple[Stage, ...]:
 
 
 def colors_of(scene: Scene) -> tuple[str, ...]:
-    """The colors of the cubes on the table."""
+    """Return the colors of the cubes on the table."""
     return tuple(str(cube.color) for cube in scene.of_kind("cube"))

@@ -1,4 +1,4 @@
-"""Stages that the videos of several tasks show."""
+"""Stages in the videos of several tasks."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import Primitive, Stage
 
 RETREAT_STEPS = 20
-"""How long the hand waits where it is in nobody's way, control steps (RoboMME)."""
+"""Control steps for which the hand waits away from the objects (RoboMME)."""
 
 
 def show_pick(cube: str) -> Stage:
-    """In the video the cube is picked up."""
+    """Return the stage in which the video shows a cube picked up."""
     return Stage(
         expects=Fact("picked", cube),
         forbids=(),
@@ -21,12 +21,12 @@ def show_pick(cube: str) -> Stage:
 
 
 def retreat() -> Stage:
-    """In the video the hand leaves the table's things and waits there."""
+    """Return the stage in which the hand moves away from the objects and waits there."""
     return _static(Primitive("retreat", "robot", steps=RETREAT_STEPS))
 
 
 def hold_still(steps: int) -> Stage:
-    """In the video the robot stays where it is for so many control steps."""
+    """Return the stage in which the robot holds still for a number of control steps."""
     return _static(Primitive("hold", "robot", steps=steps))
 
 
@@ -41,7 +41,7 @@ def _static(primitive: Primitive) -> Stage:
 
 
 def go_home() -> Stage:
-    """After the video, unseen, the robot goes where the policy takes over."""
+    """Return the stage after the video in which the robot goes to the policy's start pose."""
     return Stage(
         expects=Fact("home", "robot"),
         forbids=(),

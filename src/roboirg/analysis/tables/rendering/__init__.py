@@ -1,4 +1,4 @@
-"""One table, drawn for the terminal, Markdown, LaTeX or other programs."""
+"""Rendering of tables for the terminal, Markdown, LaTeX and other programs."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ __all__ = ["FORMATS", "Format", "get_format"]
 
 
 class Format(NamedTuple):
-    """A way to draw a table.
+    """An output format.
 
     Attributes:
-        suffix: of its files.
-        draw: the whole text, ending in a newline.
+        suffix: of files in the format.
+        draw: returns a table as text that ends in a newline.
     """
 
     suffix: str
@@ -36,10 +36,10 @@ FORMATS: Mapping[str, Format] = {
 
 
 def get_format(name: str) -> Format:
-    """The format of that name.
+    """Return the format of that name.
 
     Raises:
-        UnknownNameError: there is none.
+        UnknownNameError: the format does not exist.
     """
     if name not in FORMATS:
         raise UnknownNameError("format", name, FORMATS)

@@ -1,4 +1,4 @@
-"""A table for other programs: comma-separated values, one line for each entry."""
+"""Tables as comma-separated values, one line for each entry."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ HEAD = (
     "low_percent",
     "high_percent",
 )
-"""The columns. What is not known is empty; notes are not in it."""
+"""The columns. Unknown values are empty; notes are left out."""
 
 _MARK_NAMES = {ERROR_MARK: "errors", MISSING_MARK: "missing", PARTIAL_MARK: "partial"}
 
 
 def csv_text(table: Table) -> str:
-    """Every entry of a table with its counts and the interval of its rate."""
+    """Return every entry of a table with its counts and the interval of its rate."""
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(HEAD)

@@ -1,4 +1,4 @@
-"""A table in LaTeX; the document needs the package booktabs."""
+"""Tables in LaTeX; the document needs the package booktabs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _SPECIAL = {
 
 
 def latex(table: Table) -> str:
-    """A table environment: groups of columns under rules, groups of rows between them."""
+    """Return a table environment with rules between groups of columns and of rows."""
     columns = "ll" + "r" * len(table.columns)
     lines = [
         "% needs \\usepackage{booktabs}",

@@ -1,4 +1,4 @@
-"""A table in Markdown, as GitHub reads it."""
+"""Tables in GitHub's Markdown."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ _SPECIAL = str.maketrans({sign: f"\\{sign}" for sign in "\\|*_`<[]"})
 
 
 def markdown(table: Table) -> str:
-    """Title, table and notes; the group is said in the first of its rows."""
+    """Return title, table and notes; only the first row of a group names the group."""
     heads = [*table.heads, *(column.name for column in table.columns)]
     lines = [f"### {_escaped(table.title)}", "", _line([_escaped(head) for head in heads])]
     lines.append(_line(["---"] * len(table.heads) + ["---:"] * len(table.columns)))

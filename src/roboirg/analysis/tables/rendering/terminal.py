@@ -1,4 +1,4 @@
-"""A table on the terminal; one that is too wide is drawn in parts, a group of columns each."""
+"""Tables on the terminal; a table that is too wide is split into groups of columns."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table as Grid
 from rich.text import Text
 
+from roboirg.analysis.stats.run_summary import ALL_TASKS
 from roboirg.analysis.tables.table import Entry, Row, Table
 from roboirg.analysis.tables.table_notes import ARROWS
 
 PLAIN_WIDTH = 120
-"""Columns of a text file."""
+"""Characters in a line of a text file."""
 _NARROWEST = 9
-"""Columns of a rate with its arrow and mark."""
+"""Characters of a rate with its arrow and mark."""
 _BORDERS = 3
-"""Columns of a line and two blanks."""
-_NO_GROUP = "all tasks"
+"""Characters of a line and two blanks."""
 
 
 def renderable(table: Table, console: Console) -> RenderableType:
-    """The table in as many parts as the console's width demands, with its notes."""
+    """Return the table with its notes, split to fit the console's width."""
     parts = _parts(table, console.width)
     grids = [
         part
@@ -36,7 +36,7 @@ def renderable(table: Table, console: Console) -> RenderableType:
 
 
 def plain(table: Table) -> str:
-    """The table as plain text of at most `PLAIN_WIDTH` columns."""
+    """Return the table as plain text of at most `PLAIN_WIDTH` characters a line."""
     console = Console(file=io.StringIO(), width=PLAIN_WIDTH, color_system=None)
     with console.capture() as captured:
         console.print(renderable(table, console))
@@ -44,7 +44,7 @@ def plain(table: Table) -> str:
 
 
 def _parts(table: Table, width: int) -> list[list[int]]:
-    """Which columns stand side by side: whole groups where they fit, at least one column."""
+    """Return the columns of each part: whole groups if they fit, at least one column."""
     heads = sum(
         max(map(len, (head, *words))) + _BORDERS
         for head, words in zip(
@@ -67,7 +67,7 @@ def _parts(table: Table, width: int) -> list[list[int]]:
 
 
 def _title(table: Table, indices: Sequence[int]) -> str:
-    groups = dict.fromkeys(table.columns[index].group or _NO_GROUP for index in indices)
+    groups = dict.fromkeys(table.columns[index].group or ALL_TASKS for index in indices)
     return f"{table.title}: {', '.join(groups)}"
 
 

@@ -8,11 +8,11 @@ __all__ = ["Model", "ModelOptions", "ModelQuery", "ModelReply", "make_model"]
 
 
 def make_model(options: ModelOptions) -> Model:
-    """A connection to a model; nothing is sent before the first question.
+    """Return a connection to a model; nothing is sent before the first query.
 
     Raises:
-        MissingDependencyError: the provider's client library is not installed, or the variable
-            that is to hold the key is not set.
+        MissingDependencyError: the provider's client library is not installed, or the environment
+            variable with the key is not set.
     """
     if options.provider == "google":
         from roboirg.policies.planning.models.google import GoogleModel

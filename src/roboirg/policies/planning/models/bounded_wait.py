@@ -1,4 +1,4 @@
-"""A bounded wait for a call that itself may last for ever, such as one to a dripping server."""
+"""A time limit for a call that may never return, such as one to a server that drips bytes."""
 
 from __future__ import annotations
 
@@ -12,32 +12,32 @@ from roboirg.core.errors import PolicyTimeoutError
 Value = TypeVar("Value")
 
 
-def within(seconds: float, call: Callable[[], Value], what: str) -> Value:
-    """What a call returns, if it does so in time.
+def call_with_timeout(seconds: float, call: Callable[[], Value], what: str) -> Value:
+    """Return the result of a call, if it comes in time.
 
-    The limits of HTTP clients are for one read each; this one is for the whole answer. A call that
-    takes longer is left to itself in a thread that does not keep the process alive.
+    The limits of HTTP clients apply to single reads; this one applies to the whole reply. A call
+    that takes longer continues in a daemon thread.
 
     Raises:
-        PolicyTimeoutError: it did not; the sentence names `what`.
+        PolicyTimeoutError: it does not; the message names `what`.
     """
     future: Future[Value] = Future()
 
     def work() -> None:
         try:
             future.set_result(call())
-        except BaseException as error:  # noqa: BLE001 - raised again where it is waited for
+        except BaseException as error:  # noqa: BLE001 - raised again in the waiting thread
             future.set_exception(error)
 
-    threading.Thread(target=work, daemon=True, name=f"asking {what}").start()
+    threading.Thread(target=work, daemon=True, name=f"query of {what}").start()
     try:
         return future.result(timeout=seconds)
     except TimeoutError:
-        if future.done():  # the call's own
+        if future.done():  # raised by the call
             raise
-        raise timed_out(what, seconds) from None
+        raise timeout_error(what, seconds) from None
 
 
-def timed_out(what: str, seconds: float) -> PolicyTimeoutError:
-    """The error for an answer that took too long."""
+def timeout_error(what: str, seconds: float) -> PolicyTimeoutError:
+    """Return the error for a reply that took too long."""
     return PolicyTimeoutError(f"{what} did not answer within {seconds:g} s.")

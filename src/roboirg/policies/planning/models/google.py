@@ -1,4 +1,4 @@
-"""Google's models through Google's own client library."""
+"""Google's models, through Google's client library."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from roboirg.core.errors import (
     PolicyReplyError,
     RoboIRGError,
 )
-from roboirg.policies.planning.model_content import Part, Picture, png
-from roboirg.policies.planning.models.bounded_wait import timed_out, within
+from roboirg.policies.planning.model_content import Part, Picture, encode_png
+from roboirg.policies.planning.models.bounded_wait import call_with_timeout, timeout_error
 from roboirg.policies.planning.models.model import ModelOptions, ModelQuery, ModelReply
 
 if TYPE_CHECKING:
     from google.genai import types
 
 BUSY = (408, 429, 502, 503, 504)
-"""HTTP statuses of a service that is there but cannot answer now."""
-LONGEST_WORDS = 300
+"""HTTP statuses of a service that is up but cannot answer now."""
+MAX_ERROR_LENGTH = 300
 
 
 class GoogleModel:
-    """Asks through ``google-genai``; pictures and clips travel inside the request.
+    """Sends queries through ``google-genai``, with pictures and clips inside the request.
 
-    Nothing is uploaded to the file service, so nothing is left there when an episode breaks off.
+    Nothing is uploaded to the file service, so nothing remains there when an episode ends early.
     """
 
     def __init__(self, options: ModelOptions) -> None:
@@ -40,7 +40,7 @@ class GoogleModel:
         self._options = options
         self._key = options.key()
         self._errors = errors
-        self._what = f"Model {options.model!r} at {options.address()}"
+        self._name = f"Model {options.model!r} at {options.address()}"
         http = types.HttpOptions(
             base_url=options.base_url,
             timeout=int(1000 * options.timeout_s),
@@ -51,7 +51,7 @@ class GoogleModel:
         self._client = genai.Client(vertexai=False, api_key=self._key, http_options=http)
 
     def answer(self, query: ModelQuery) -> ModelReply:
-        """Ask; see `Model`."""
+        """Send a query; see `Model`."""
         contents = self._contents(query)
         config = self._config(query)
 
@@ -61,15 +61,15 @@ class GoogleModel:
             )
 
         try:
-            return _read(within(self._options.timeout_s, send, self._what))
+            return _read(call_with_timeout(self._options.timeout_s, send, self._name))
         except RoboIRGError:
             raise
-        except Exception as error:  # noqa: BLE001 - the library lets through those of its HTTP client
-            # Not chained: what the service says may hold the key, and tracebacks are recorded.
-            raise self._explained(error) from None
+        except Exception as error:  # noqa: BLE001 - errors of its HTTP client pass through the library
+            # Not chained: the service's message may hold the key, and tracebacks are recorded.
+            raise self._convert_error(error) from None
 
     def close(self) -> None:
-        """Let go of the connection."""
+        """Close the connection."""
         self._client.close()
 
     def _contents(self, query: ModelQuery) -> list[Any]:
@@ -86,7 +86,7 @@ class GoogleModel:
         if isinstance(part, str):
             return types.Part(text=part)
         if isinstance(part, Picture):
-            return types.Part(inline_data=types.Blob(data=png(part), mime_type="image/png"))
+            return types.Part(inline_data=types.Blob(data=encode_png(part), mime_type="image/png"))
         fps = self._options.sampling_fps
         return types.Part(
             inline_data=types.Blob(data=part.file, mime_type="video/mp4"),
@@ -106,24 +106,24 @@ class GoogleModel:
             response_json_schema=query.schema if structured else None,
         )
 
-    def _explained(self, error: Exception) -> RoboIRGError:
+    def _convert_error(self, error: Exception) -> RoboIRGError:
         kind = type(error).__name__
-        words = " ".join(str(error).replace(self._key, "…").split())[:LONGEST_WORDS]
+        words = " ".join(str(error).replace(self._key, "…").split())[:MAX_ERROR_LENGTH]
         if "Timeout" in kind and "Connect" not in kind:
-            return timed_out(self._what, self._options.timeout_s)
+            return timeout_error(self._name, self._options.timeout_s)
         if isinstance(error, self._errors.APIError):
             if error.code in BUSY:
-                return PolicyConnectionError(f"{self._what} is not available: {words}")
-            return PolicyReplyError(f"{self._what} refused or failed: {words}")
+                return PolicyConnectionError(f"{self._name} is not available: {words}")
+            return PolicyReplyError(f"{self._name} refused or failed: {words}")
         if type(error).__module__.startswith(("httpx", "httpcore", "requests", "builtins")) and (
             isinstance(error, OSError) or "Connect" in kind or "Protocol" in kind or "Read" in kind
         ):
-            return PolicyConnectionError(f"{self._what} cannot be reached ({kind}: {words}).")
-        return PolicyReplyError(f"{self._what} answered with something else ({kind}: {words}).")
+            return PolicyConnectionError(f"{self._name} cannot be reached ({kind}: {words}).")
+        return PolicyReplyError(f"{self._name} replied with something else ({kind}: {words}).")
 
 
 def _read(response: types.GenerateContentResponse) -> ModelReply:
-    """The words of the first candidate, thoughts left out but counted as output."""
+    """Return the text of the first candidate; thoughts are left out but counted as output."""
     candidates = response.candidates or []
     content = candidates[0].content if candidates else None
     parts = (content.parts or []) if content is not None else []

@@ -1,4 +1,4 @@
-"""What every model is: a question goes in, a reply with what it cost comes out."""
+"""The contract of models: options, queries, and replies with their cost."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ from roboirg.policies.planning.model_content import ChatTurn
 Provider = Literal["openai", "google"]
 
 KEY_VARIABLES: Mapping[Provider, str] = {"openai": "OPENAI_API_KEY", "google": "GOOGLE_API_KEY"}
-"""Where the key of a provider's own service is, unless the options name another variable."""
+"""Environment variables with the keys of the providers' own services, by default."""
 NO_KEY = "none"
-"""What is sent as the key to a server that wants none."""
+"""Sent as the key to a server that needs none."""
 
 
 class ModelOptions(BaseModel):
-    """Which model is asked, and how.
+    """A model and the options of its queries.
 
     Attributes:
-        provider: ``openai`` for every endpoint that speaks its dialect, or ``google``.
+        provider: ``openai`` for every endpoint with its API, or ``google``.
         model: its name at the provider.
-        base_url: of the endpoint; None is the provider's own.
-        api_key_env: the environment variable with the key. By default the provider's usual one
-            for the provider's own service, and none for any other address: a key is never sent
-            where nobody asked for it to go.
-        timeout_s: seconds for one answer, retries of the connection included.
-        retries: how often the client library tries again when the service is busy or away.
+        base_url: of the endpoint; None for the provider's own.
+        api_key_env: environment variable with the key. By default it is the provider's usual one
+            for the provider's own service, and none for any other address, so that a key is sent
+            only where it belongs.
+        timeout_s: seconds for one reply, retries of the connection included.
+        retries: retries of the client library when the service is busy or unreachable.
         temperature: None leaves it to the provider.
         max_output_tokens: None leaves it to the provider.
-        input_price, output_price: US dollars per million tokens; without them no cost is told.
-        video: clips as ``mp4`` files, or as single pictures (``frames``). Google takes files.
-        clip_frames: pictures that stand for a clip at most, where it is not a file.
-        structured: whether the service is given the JSON schema of the answer to keep to.
-        sampling_fps: frames per second at which Google looks at a clip; None is its default, 1.
+        input_price, output_price: US dollars per million tokens; without them no cost is reported.
+        video: send clips as ``mp4`` files, or as pictures (``frames``). Google takes files.
+        clip_frames: maximum of pictures per clip, where it is not a file.
+        structured: whether to send the JSON schema of the answer.
+        sampling_fps: frames per second at which Google samples a clip; None for its default, 1.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -60,23 +60,23 @@ class ModelOptions(BaseModel):
 
     @field_validator("base_url")
     @classmethod
-    def _holds_no_secret(cls, url: str | None) -> str | None:
+    def _has_no_secret(cls, url: str | None) -> str | None:
         parts = urlsplit(url or "http://provider")
         if parts.scheme not in ("http", "https") or not parts.hostname:
-            raise ValueError("an address begins with http:// or https:// and names a host")
+            raise ValueError("an address must begin with http:// or https:// and name a host")
         if "@" in parts.netloc or parts.query:
             raise ValueError(
-                "an address ends up in records, so it holds no user, password or query; put a key "
-                "into an environment variable and name that in api_key_env"
+                "addresses are recorded, so they must not hold a user, password or query; put a "
+                "key into an environment variable and name that in api_key_env"
             )
         return url
 
     def key(self) -> str:
-        """The key, or `NO_KEY` if none is needed.
+        """Return the key, or `NO_KEY` if none is needed.
 
         Raises:
-            MissingDependencyError: the variable that is to hold it is not set, so that no episode
-                can be played; a run stops.
+            MissingDependencyError: the environment variable is not set; a run stops, as it could
+                play no episode.
         """
         variable = self.api_key_env
         if variable is None:
@@ -92,22 +92,22 @@ class ModelOptions(BaseModel):
         return key
 
     def address(self) -> str:
-        """Where the model is; the provider's name for its own service."""
+        """Return the URL of the endpoint; the provider's name for its own service."""
         return self.base_url or self.provider
 
     def about(self) -> dict[str, str | float | int | bool | None]:
-        """What records say: all that may change an answer, and where it came from; never a key."""
-        silent = {"base_url", "api_key_env", "timeout_s", "retries", "input_price", "output_price"}
-        return {**self.model_dump(mode="json", exclude=silent), "address": self.address()}
+        """Return, for records, the address and all that may change a reply; never a key."""
+        omitted = {"base_url", "api_key_env", "timeout_s", "retries", "input_price", "output_price"}
+        return {**self.model_dump(mode="json", exclude=omitted), "address": self.address()}
 
 
 class ModelQuery(NamedTuple):
-    """A question to a model.
+    """A query to a model.
 
     Attributes:
-        system: who it is and what it is to do.
-        turns: the conversation so far; the last one is the user's.
-        schema: JSON schema of the answer, or None for words.
+        system: the system prompt.
+        turns: the conversation so far; the last turn is the user's.
+        schema: JSON schema of the reply, or None for free text.
     """
 
     system: str
@@ -116,7 +116,7 @@ class ModelQuery(NamedTuple):
 
 
 class ModelReply(NamedTuple):
-    """What a model answered; empty if it said nothing."""
+    """A model's reply, possibly empty, and its tokens."""
 
     text: str
     input_tokens: int = 0
@@ -124,16 +124,16 @@ class ModelReply(NamedTuple):
 
 
 class Model(Protocol):
-    """Anything that answers questions."""
+    """A connection to a model."""
 
     def answer(self, query: ModelQuery) -> ModelReply:
-        """Ask.
+        """Send a query and return the reply.
 
         Raises:
             PolicyConnectionError: the service cannot be reached or is overloaded.
-            PolicyTimeoutError: there was no answer in time.
-            PolicyReplyError: the service answered with an error or with something else.
+            PolicyTimeoutError: there was no reply in time.
+            PolicyReplyError: the service replied with an error or with something else.
         """
 
     def close(self) -> None:
-        """Let go of the connection."""
+        """Close the connection."""

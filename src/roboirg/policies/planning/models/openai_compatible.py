@@ -1,4 +1,4 @@
-"""Any endpoint that speaks OpenAI's dialect: OpenAI itself, vLLM, and many others."""
+"""Endpoints with OpenAI's API: OpenAI itself, vLLM, and many others."""
 
 from __future__ import annotations
 
@@ -12,18 +12,25 @@ from roboirg.core.errors import (
     PolicyReplyError,
     RoboIRGError,
 )
-from roboirg.policies.planning.model_content import ChatTurn, Clip, Part, Picture, evenly, png
-from roboirg.policies.planning.models.bounded_wait import timed_out, within
+from roboirg.policies.planning.model_content import (
+    ChatTurn,
+    Clip,
+    Part,
+    Picture,
+    encode_png,
+    sample_evenly,
+)
+from roboirg.policies.planning.models.bounded_wait import call_with_timeout, timeout_error
 from roboirg.policies.planning.models.model import ModelOptions, ModelQuery, ModelReply
 
 OPENAI = "https://api.openai.com/v1"
 BUSY = frozenset({408, 409, 429, 502, 503, 504})
-"""HTTP statuses of a service that is there but cannot answer now."""
-LONGEST_WORDS = 300
+"""HTTP statuses of a service that is up but cannot answer now."""
+MAX_ERROR_LENGTH = 300
 
 
 class OpenAIModel:
-    """Asks through the ``openai`` library's chat completions."""
+    """Sends queries through the ``openai`` library's chat completions."""
 
     def __init__(self, options: ModelOptions) -> None:
         try:
@@ -36,7 +43,7 @@ class OpenAIModel:
         self._openai = openai
         self._options = options
         self._key = options.key()
-        self._what = f"Model {options.model!r} at {options.address()}"
+        self._name = f"Model {options.model!r} at {options.address()}"
         self._client = openai.OpenAI(
             api_key=self._key,
             base_url=options.base_url or OPENAI,
@@ -45,21 +52,21 @@ class OpenAIModel:
         )
 
     def answer(self, query: ModelQuery) -> ModelReply:
-        """Ask; see `Model`."""
+        """Send a query; see `Model`."""
         request = self._request(query)
 
-        def send() -> Any:  # noqa: ANN401 - what the library makes of whatever arrives
+        def send() -> Any:  # noqa: ANN401 - depends on what the server sends
             return self._client.chat.completions.create(**request)
 
         try:
-            return self._read(within(self._options.timeout_s, send, self._what))
+            return self._read(call_with_timeout(self._options.timeout_s, send, self._name))
         except (self._openai.OpenAIError, ValueError) as error:
-            # The library lets a broken JSON through as it is.
-            # Not chained: what the service says may hold the key, and tracebacks are recorded.
-            raise self._explained(error) from None
+            # The library passes errors of malformed JSON through.
+            # Not chained: the service's message may hold the key, and tracebacks are recorded.
+            raise self._convert_error(error) from None
 
     def close(self) -> None:
-        """Let go of the connection."""
+        """Close the connection."""
         self._client.close()
 
     def _request(self, query: ModelQuery) -> dict[str, Any]:
@@ -96,7 +103,7 @@ class OpenAIModel:
         else:
             yield from map(_image, _pictures(part, self._options.clip_frames))
 
-    def _read(self, completion: Any) -> ModelReply:  # noqa: ANN401 - anything may have arrived
+    def _read(self, completion: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server sends
         try:
             text = completion.choices[0].message.content or ""
             usage = completion.usage
@@ -105,33 +112,33 @@ class OpenAIModel:
             return ModelReply(str(text), int(usage.prompt_tokens), int(usage.completion_tokens))
         except (AttributeError, IndexError, TypeError, ValueError) as error:
             raise PolicyReplyError(
-                f"{self._what} answered with something that is no chat completion "
+                f"{self._name} replied with something other than a chat completion "
                 f"({type(error).__name__}: {error})."
             ) from None
 
-    def _explained(self, error: Exception) -> RoboIRGError:
+    def _convert_error(self, error: Exception) -> RoboIRGError:
         openai = self._openai
         if isinstance(error, openai.APITimeoutError):
-            return timed_out(self._what, self._options.timeout_s)
-        words = " ".join(str(error).replace(self._key, "…").split())[:LONGEST_WORDS]
+            return timeout_error(self._name, self._options.timeout_s)
+        words = " ".join(str(error).replace(self._key, "…").split())[:MAX_ERROR_LENGTH]
         if isinstance(error, openai.APIConnectionError):
             reason = error.__cause__ or error
             return PolicyConnectionError(
-                f"{self._what} cannot be reached ({type(reason).__name__}: {words})."
+                f"{self._name} cannot be reached ({type(reason).__name__}: {words})."
             )
         if isinstance(error, openai.APIStatusError) and error.status_code in BUSY:
-            return PolicyConnectionError(f"{self._what} is not available: {words}")
+            return PolicyConnectionError(f"{self._name} is not available: {words}")
         if isinstance(error, openai.APIStatusError):
-            return PolicyReplyError(f"{self._what} refused or failed: {words}")
-        return PolicyReplyError(f"{self._what} answered with something else ({words}).")
+            return PolicyReplyError(f"{self._name} refused or failed: {words}")
+        return PolicyReplyError(f"{self._name} replied with something else ({words}).")
 
 
 def _pictures(clip: Clip, most: int) -> list[Picture]:
-    return [Picture(pixels) for pixels in evenly(clip.frames, most)]
+    return [Picture(pixels) for pixels in sample_evenly(clip.frames, most)]
 
 
 def _image(picture: Picture) -> dict[str, Any]:
-    return {"type": "image_url", "image_url": {"url": _data_url("image/png", png(picture))}}
+    return {"type": "image_url", "image_url": {"url": _data_url("image/png", encode_png(picture))}}
 
 
 def _data_url(kind: str, content: bytes) -> str:

@@ -1,15 +1,15 @@
-"""Planners, one file each, and how a configuration becomes one."""
+"""Planners, one file each, made from a kind and options."""
 
 from __future__ import annotations
 
-import importlib
+import pkgutil
 from collections.abc import Mapping
 from typing import Any
 
 from pydantic import BaseModel
 
 from roboirg.core.errors import UnknownNameError
-from roboirg.policies.planning.option_checking import check_options
+from roboirg.policies.option_checking import check_options
 from roboirg.policies.planning.planner import Planner
 
 PLANNERS: Mapping[str, str] = {
@@ -18,25 +18,24 @@ PLANNERS: Mapping[str, str] = {
     "gemini": "roboirg.policies.planning.planners.gemini:GeminiPlanner",
     "memer": "roboirg.policies.planning.planners.memer:MemerPlanner",
 }
-"""Classes with ``options_type``, made with such options."""
+"""Import paths of the classes, whose attribute ``options_type`` is the type of their options."""
 
 
 def make_planner(kind: str, options: Mapping[str, Any], origin: str) -> Planner:
-    """A planner.
+    """Make a planner.
 
     Args:
         kind: one of `PLANNERS`.
         options: of that kind.
-        origin: where they are from, for complaints.
+        origin: of the options, for error messages.
 
     Raises:
         UnknownNameError: there is no such planner, or it has no such option.
-        InvalidValueError: an option has a value that it cannot have.
+        InvalidValueError: an option has an invalid value.
     """
     if kind not in PLANNERS:
         raise UnknownNameError("planner", kind, PLANNERS)
-    module, _, name = PLANNERS[kind].partition(":")
-    planner_class = getattr(importlib.import_module(module), name)
+    planner_class = pkgutil.resolve_name(PLANNERS[kind])
     options_type: type[BaseModel] = planner_class.options_type
     planner: Planner = planner_class(check_options(options_type, options, origin))
     return planner

@@ -1,4 +1,4 @@
-"""Gemini-style planning: a conversation, clips of what happened, a call now and then."""
+"""Gemini-style planning: one conversation with clips of the recent past, at long intervals."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from roboirg.policies.planning.models import ModelQuery
 from roboirg.policies.planning.planners.vlm_planner import (
     VLMPlanner,
     VLMPlannerOptions,
-    seen,
-    shown,
+    demonstration_pictures,
+    front_picture,
 )
-from roboirg.policies.planning.points import from_points, says_finished
-from roboirg.policies.planning.vlm_query import UnparsableReply, json_object, text_of
+from roboirg.policies.planning.points import parse_points, says_finished
+from roboirg.policies.planning.vlm_query import UnparsableReplyError, json_object, text_of
 
 PERIOD = 48
 """Control steps between calls."""
 FIRST_PAUSE = 75
 """Control steps before which there is no second call."""
-FEWEST_FRAMES = 4
-"""Of fewer frames only the last is shown, as a picture."""
+MIN_CLIP_FRAMES = 4
+"""With fewer frames only the last is sent, as a picture."""
 
 
 class GeminiOptions(VLMPlannerOptions):
@@ -44,7 +44,7 @@ class GeminiOptions(VLMPlannerOptions):
         first_pause: control steps before which there is no second call. MME-VLA has it for the
             tasks with a long first action (eight of ours, all but StopCube, VideoUnmask and
             VideoUnmaskSwap); a policy does not know its task, so it holds for all. 0 is none.
-        observe_every: control steps between the frames of a clip; clips last as long either way.
+        observe_every: control steps between the frames of a clip; its duration stays the same.
     """
 
     period: int = Field(default=PERIOD, ge=1)
@@ -53,10 +53,10 @@ class GeminiOptions(VLMPlannerOptions):
 
 
 class GeminiPlanner(VLMPlanner):
-    """Shows what happened since the last call and asks for the subgoal to pursue.
+    """Sends the frames since the last call and asks for the next subgoal.
 
-    What is said stays in the conversation; a question without a usable answer leaves it, and its
-    frames are shown with the next one.
+    Turns stay in the conversation, except for queries without a usable reply, whose frames are
+    sent with the next query.
     """
 
     kind = "gemini"
@@ -69,91 +69,91 @@ class GeminiPlanner(VLMPlanner):
         self.demonstration_frames = "all" if options.observe_every == 1 else options.observe_every
         self._demonstration: Pixels | None = None
         self._frames: list[Pixels] = []
-        self._said: list[ChatTurn] = []
-        self._passed = 0
+        self._turns: list[ChatTurn] = []
+        self._periods = 0
 
     def begin(self, demonstration: Demonstration) -> None:
-        """A new conversation; no frame of the last episode is left in it."""
-        self._demonstration = shown(demonstration)
-        self._frames, self._said, self._passed = [], [], 0
+        """Begin a new conversation, without frames of the last episode."""
+        self._demonstration = demonstration_pictures(demonstration)
+        self._frames, self._turns, self._periods = [], [], 0
 
     def watch(self, observation: Observation, step: int) -> None:
         """Keep the frames since the last call."""
-        looks = [look["front_rgb"].copy() for look in observation.get("history", ())]
-        # Where the chunk's end was not a moment to look at, now is seen besides.
-        if not looks or step % self.options.observe_every:
-            looks.append(seen(observation))
-        self._frames += looks
+        frames = [front_picture(earlier) for earlier in observation.get("history", ())]
+        # The last picture is in the history only if the chunk ends at a multiple of the period.
+        if not frames or step % self.options.observe_every:
+            frames.append(front_picture(observation))
+        self._frames += frames
 
     def due(self, step: int) -> bool:
-        """At the first chunk, and at the first one of each further period after the pause."""
+        """Return True at the first chunk, and at the first of each period after the pause."""
         periods = step // self.options.period
-        fresh = periods > self._passed
-        self._passed = periods
-        if not self._said:
+        new_period = periods > self._periods
+        self._periods = periods
+        if not self._turns:
             return True
-        return fresh and step >= self.options.first_pause
+        return new_period and step >= self.options.first_pause
 
     def ask(self, observation: Observation, step: int) -> str | None:  # noqa: ARG002
-        """What the model says, with pixels; the last subgoal if it says that all is done."""
-        first = not self._said
-        turn = ChatTurn("user", tuple(self._first() if first else self._next()))
+        """Return the model's subgoal with pixels; the last one if it says the task is complete."""
+        first = not self._turns
+        turn = ChatTurn("user", tuple(self._first_query() if first else self._next_query()))
         system = self.prompts.fill("system", forms=self.forms(), places=self.places())
         fields = ("subgoal_sequence", "subgoal") if first else ("description", "subgoal")
-        query = ModelQuery(system, (*self._said, turn), _schema(fields))
-        answer = self._asker.ask(query, _reader(self._subgoal))
+        query = ModelQuery(system, (*self._turns, turn), _schema(fields))
+        answer = self._vlm.ask(query, _parser(self._subgoal))
         if answer is None:
             return None
         text, subgoal = answer
-        self._said += [turn, ChatTurn("model", (text,))]
+        self._turns += [turn, ChatTurn("model", (text,))]
         self._frames = []
         return subgoal
 
-    def _first(self) -> Iterator[Part]:
-        words = self.prompts
-        yield words.fill("goal", instruction=self._instruction)
+    def _first_query(self) -> Iterator[Part]:
+        prompts = self.prompts
+        yield prompts.fill("goal", instruction=self._instruction)
         if self._demonstration is None:
-            yield words.fill("first_picture")
+            yield prompts.fill("first_picture")
             yield Picture(self._frames[-1])
         else:
-            yield words.fill("first_video")
+            yield prompts.fill("first_video")
             yield self._clip([*self._demonstration, *self._frames])
-        yield words.fill("first_question")
+        yield prompts.fill("first_question")
 
-    def _next(self) -> Iterator[Part]:
-        words = self.prompts
-        if len(self._frames) < FEWEST_FRAMES:
-            yield words.fill("next_picture")
+    def _next_query(self) -> Iterator[Part]:
+        prompts = self.prompts
+        if len(self._frames) < MIN_CLIP_FRAMES:
+            yield prompts.fill("next_picture")
             yield Picture(self._frames[-1])
         else:
-            yield words.fill("next_clip")
+            yield prompts.fill("next_clip")
             yield self._clip(self._frames)
-        yield words.fill("next_question")
+        yield prompts.fill("next_question")
 
     def _clip(self, frames: list[Pixels]) -> Clip:
         return Clip(np.stack(frames), Fraction(VIDEO_RATE, self.options.observe_every))
 
 
 def _schema(fields: tuple[str, ...]) -> dict[str, Any]:
-    words: dict[str, Any] = {"type": "string"}
-    several = {"type": "array", "items": words}
+    text: dict[str, Any] = {"type": "string"}
+    texts = {"type": "array", "items": text}
     return {
         "type": "object",
-        "properties": {name: several if name.endswith("sequence") else words for name in fields},
+        "properties": {name: texts if name.endswith("sequence") else text for name in fields},
         "required": list(fields),
         "additionalProperties": False,
     }
 
 
-def _reader(last: str | None) -> Callable[[str], tuple[str, str]]:
-    """What reads a reply: its text, for the conversation, and the subgoal."""
+def _parser(last: str | None) -> Callable[[str], tuple[str, str]]:
+    """Return a function that parses a reply into its text and the subgoal."""
 
-    def read(text: str) -> tuple[str, str]:
-        subgoal = from_points(text_of(json_object(text), "subgoal"))
+    def parse(text: str) -> tuple[str, str]:
+        subgoal = parse_points(text_of(json_object(text), "subgoal"))
         if not says_finished(subgoal):
             return text, subgoal
         if last is None:
-            raise UnparsableReply("Nothing has been done yet.")
+            raise UnparsableReplyError("Nothing has been done yet.")
         return text, last
 
-    return read
+    return parse

@@ -1,4 +1,4 @@
-"""MemER-style planning: the model chooses which frames it will be shown again."""
+"""MemER-style planning: the model chooses the frames to keep in its memory."""
 
 from __future__ import annotations
 
@@ -8,18 +8,25 @@ from typing import Any, ClassVar, NamedTuple
 from pydantic import BaseModel, Field
 
 from roboirg.core.observations import Demonstration, Observation
-from roboirg.policies.planning.keyframes import NEAR, merged
-from roboirg.policies.planning.model_content import ChatTurn, Clip, Part, Picture, Pixels, summary
+from roboirg.policies.planning.keyframes import MAX_GAP, merge_keyframes
+from roboirg.policies.planning.model_content import (
+    ChatTurn,
+    Clip,
+    Part,
+    Picture,
+    Pixels,
+    summary_clip,
+)
 from roboirg.policies.planning.models import ModelQuery
 from roboirg.policies.planning.planners.qwen import VIDEO_FRAMES
 from roboirg.policies.planning.planners.vlm_planner import (
     VLMPlanner,
     VLMPlannerOptions,
-    seen,
-    shown,
+    demonstration_pictures,
+    front_picture,
 )
-from roboirg.policies.planning.points import from_boxes
-from roboirg.policies.planning.vlm_query import UnparsableReply, json_object, text_of
+from roboirg.policies.planning.points import parse_boxes
+from roboirg.policies.planning.vlm_query import UnparsableReplyError, json_object, text_of
 
 RECENT = 8
 STRIDE = 2
@@ -29,32 +36,32 @@ class MemerOptions(VLMPlannerOptions):
     """Options of the planner with a memory of key frames.
 
     Attributes:
-        recent: frames before now that are shown, the newest included.
+        recent: recent frames that are sent, the newest included.
         stride: control steps between them.
-        near: control steps by which frames of one event are apart at most.
-        most: key frames that are kept at most, the newest; None keeps all, as MME-VLA does.
-        video_frames: pictures of the demonstration at most.
+        near: largest gap between the key frames of one event, control steps.
+        most: maximum of key frames, the newest; None keeps all, like MME-VLA.
+        video_frames: maximum of demonstration frames.
     """
 
     recent: int = Field(default=RECENT, ge=1)
     stride: int = Field(default=STRIDE, ge=1)
-    near: int = Field(default=NEAR, ge=0)
+    near: int = Field(default=MAX_GAP, ge=0)
     most: int | None = Field(default=None, ge=1)
     video_frames: int = Field(default=VIDEO_FRAMES, ge=1)
 
 
 class KeyframeChoice(NamedTuple):
-    """What the model answered: a subgoal, and positions of recent frames, from 1."""
+    """The model's reply: a subgoal, and positions of recent frames, counted from 1."""
 
     subgoal: str
     positions: tuple[int, ...]
 
 
 class MemerPlanner(VLMPlanner):
-    """Asks at every chunk, with the key frames so far and the recent frames.
+    """Queries the model at every chunk, with its key frames and the recent frames.
 
     Attributes:
-        memory: key frames by the control step at which they were taken.
+        memory: key frames by control step.
     """
 
     kind = "memer"
@@ -67,63 +74,63 @@ class MemerPlanner(VLMPlanner):
         self.memory: dict[int, Pixels] = {}
         self._video: Clip | None = None
         self._recent: dict[int, Pixels] = {}
-        self._looked = 0
+        self._last_step = 0
 
     def begin(self, demonstration: Demonstration) -> None:
-        """An empty memory."""
-        frames = shown(demonstration)
+        """Clear the memory, and choose the frames of the demonstration to send."""
+        frames = demonstration_pictures(demonstration)
         self._video = None
         if frames is not None:
-            self._video = summary(frames, self.options.video_frames, len(frames))
-        self.memory, self._recent, self._looked = {}, {}, 0
+            self._video = summary_clip(frames, self.options.video_frames, len(frames))
+        self.memory, self._recent, self._last_step = {}, {}, 0
 
     def watch(self, observation: Observation, step: int) -> None:
-        """Keep the frames that may be shown: the newest, and those at the stride before it."""
-        for look in observation.get("history", ()):
-            self._looked += self.options.stride
-            self._recent[self._looked] = look["front_rgb"].copy()
-        self._recent[step] = seen(observation)
-        newest = [step - back * self.options.stride for back in range(self.options.recent)]
-        # At an odd step the frames just before are not at the stride; the nearest ones are.
-        kept = {near for one in newest if (near := self._at(one)) is not None}
+        """Keep the frames to send: the newest, and those at multiples of the stride before it."""
+        for earlier in observation.get("history", ()):
+            self._last_step += self.options.stride
+            self._recent[self._last_step] = front_picture(earlier)
+        self._recent[step] = front_picture(observation)
+        wanted = [step - back * self.options.stride for back in range(self.options.recent)]
+        # The history has no frames at odd distances from the newest; the nearest before serve.
+        kept = {at for one in wanted if (at := self._latest_before(one)) is not None}
         self._recent = {at: self._recent[at] for at in sorted(kept)}
 
     def ask(self, observation: Observation, step: int) -> str | None:  # noqa: ARG002
-        """The subgoal in the model's words, with pixels; the memory grows by what it chose."""
+        """Return the model's subgoal with pixels, and add the frames it chose to the memory."""
         steps = tuple(self._recent)
         query = ModelQuery(
             self.prompts.fill("system"),
             (ChatTurn("user", tuple(self._parts())),),
             _schema(len(steps)),
         )
-        choice = self._asker.ask(query, _reader(len(steps)))
+        choice = self._vlm.ask(query, _parser(len(steps)))
         if choice is None:
             return None
         self._remember(steps[position - 1] for position in choice.positions)
         return choice.subgoal
 
-    def _at(self, step: int) -> int | None:
+    def _latest_before(self, step: int) -> int | None:
         return max((at for at in self._recent if at <= step), default=None)
 
     def _remember(self, chosen: Iterator[int]) -> None:
         frames = self.memory | {step: self._recent[step] for step in chosen}
-        steps: Sequence[int] = merged(frames, self.options.near)
+        steps: Sequence[int] = merge_keyframes(frames, self.options.near)
         if self.options.most is not None:
             steps = steps[-self.options.most :]
         self.memory = {step: frames[step] for step in steps}
 
     def _parts(self) -> Iterator[Part]:
-        words = self.prompts
+        prompts = self.prompts
         if self._video is not None:
-            yield words.fill("video")
+            yield prompts.fill("video")
             yield self._video
-        yield words.fill("goal", instruction=self._instruction)
+        yield prompts.fill("goal", instruction=self._instruction)
         for name, frames in (("remembered", self.memory), ("recent", self._recent)):
-            yield words.fill(f"{name}_begin")
+            yield prompts.fill(f"{name}_begin")
             yield from (Picture(frame) for frame in frames.values())
-            yield words.fill(f"{name}_end")
+            yield prompts.fill(f"{name}_end")
         count = str(len(self._recent))
-        yield words.fill("question", count=count, forms=self.forms(), places=self.places())
+        yield prompts.fill("question", count=count, forms=self.forms(), places=self.places())
 
 
 def _schema(count: int) -> dict[str, Any]:
@@ -139,17 +146,19 @@ def _schema(count: int) -> dict[str, Any]:
     }
 
 
-def _reader(count: int) -> Callable[[str], KeyframeChoice]:
-    """What reads a reply to a question with so many recent frames."""
+def _parser(count: int) -> Callable[[str], KeyframeChoice]:
+    """Return a function that parses the reply to a query with `count` recent frames."""
 
-    def read(text: str) -> KeyframeChoice:
+    def parse(text: str) -> KeyframeChoice:
         reply = json_object(text)
-        subgoal = from_boxes(text_of(reply, "current_subtask"))
+        subgoal = parse_boxes(text_of(reply, "current_subtask"))
         positions = reply.get("keyframe_positions")
         if not isinstance(positions, list):
-            raise UnparsableReply("The field 'keyframe_positions' has to be a list of numbers.")
+            raise UnparsableReplyError(
+                "The field 'keyframe_positions' has to be a list of numbers."
+            )
         if any(type(one) is not int or not 1 <= one <= count for one in positions):
-            raise UnparsableReply(f"Positions of frames are whole numbers from 1 to {count}.")
+            raise UnparsableReplyError(f"Positions of frames are whole numbers from 1 to {count}.")
         return KeyframeChoice(subgoal, tuple(positions))
 
-    return read
+    return parse

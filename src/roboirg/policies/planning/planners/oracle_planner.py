@@ -1,4 +1,4 @@
-"""The oracle among planners: the environment's own subgoals."""
+"""The oracle planner: the environment's own subgoals."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ Subgoals = Literal["grounded", "simple"]
 
 
 class OracleOptions(BaseModel):
-    """How the oracle speaks.
+    """Options of the oracle planner.
 
     Attributes:
-        subgoals: ``grounded``, with the pixels of what is meant, or ``simple``.
+        subgoals: ``grounded``, with pixels of the objects, or ``simple``.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -28,7 +28,7 @@ class OracleOptions(BaseModel):
 
 
 class OraclePlanner:
-    """Says what is to be done now, as the judge sees it. Privileged."""
+    """Returns the judge's current stage as a subgoal. Privileged."""
 
     options_type: ClassVar[type[BaseModel]] = OracleOptions
     version = "built-in"
@@ -44,23 +44,23 @@ class OraclePlanner:
         return {"kind": "oracle", **self.options.model_dump(mode="json")}
 
     def attach(self, env: RoboIRGEnv) -> None:
-        """Get hold of the environment.
+        """Receive the environment.
 
         Raises:
-            InvalidValueError: it does not name pixels, and grounded subgoals are wanted.
+            InvalidValueError: it does not provide pixels, which grounded subgoals need.
         """
         if self.grounded and not env.grounded:
             raise InvalidValueError(
-                "The oracle planner names pixels, but the environment does not know them; make "
-                "it with grounded=True, or have subgoals=simple."
+                "The oracle planner needs pixels, which the environment does not provide; make it "
+                "with grounded=True, or set subgoals=simple."
             )
         self._env = env
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Nothing is to be remembered."""
+        """Do nothing: there is no state."""
 
     def plan(self, observation: Observation, step: int) -> str:  # noqa: ARG002
-        """The stage that is due, in words."""
+        """Return the current stage in words."""
         if self._env is None:
             raise RuntimeError("OraclePlanner needs attach(env) before plan().")
         return self._env.subgoal

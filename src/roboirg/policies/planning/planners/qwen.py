@@ -1,4 +1,4 @@
-"""QwenVL-style planning: one question per chunk, with the history of subgoals and one picture."""
+"""QwenVL-style planning: one query per chunk, with the past subgoals and one picture."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from typing import ClassVar
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from roboirg.core.observations import Demonstration, Observation
-from roboirg.policies.planning.model_content import ChatTurn, Clip, Part, Picture, summary
+from roboirg.policies.planning.model_content import ChatTurn, Clip, Part, Picture, summary_clip
 from roboirg.policies.planning.models import ModelQuery
 from roboirg.policies.planning.planners.vlm_planner import (
     VLMPlanner,
     VLMPlannerOptions,
-    seen,
-    shown,
+    demonstration_pictures,
+    front_picture,
 )
-from roboirg.policies.planning.points import from_boxes, tidied, without_places
+from roboirg.policies.planning.points import normalize_subgoal, parse_boxes, strip_points
 
 VIDEO_FRAMES = 10
-"""Frames of the demonstration at most."""
+"""Maximum of demonstration frames."""
 
 
 class SubgoalHold(BaseModel):
-    """A subgoal that is kept for a while, because the model believes in it too early.
+    """A rule that keeps a subgoal which the model tends to consider reached too early.
 
     Attributes:
-        says: regular expression for the whole subgoal, places left out.
-        until: control step up to which it is kept.
+        says: regular expression for the whole subgoal without points.
+        until: last control step at which it is kept.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -42,7 +42,7 @@ class SubgoalHold(BaseModel):
         try:
             re.compile(says)
         except re.error as error:
-            raise ValueError(f"{says!r} is no regular expression ({error})") from error
+            raise ValueError(f"{says!r} is not a regular expression ({error})") from error
         return says
 
 
@@ -51,16 +51,16 @@ HOLDS = (
     SubgoalHold(says="press the first button", until=100),
     SubgoalHold(says="press the second button", until=250),
 )
-"""MME-VLA's rules for ButtonUnmask and ButtonUnmaskSwap, by what is said: a policy does not know
-its task. Only subgoals of these tasks read so."""
+"""MME-VLA's rules for ButtonUnmask and ButtonUnmaskSwap, by the text of the subgoal, as a policy
+does not know its task. Only these tasks have such subgoals."""
 
 
 class QwenOptions(VLMPlannerOptions):
     """Options of the QwenVL-style planner.
 
     Attributes:
-        video_frames: pictures of the demonstration at most.
-        holds: subgoals that are kept for a while.
+        video_frames: maximum of demonstration frames.
+        holds: rules that keep a subgoal.
     """
 
     video_frames: int = Field(default=VIDEO_FRAMES, ge=1)
@@ -68,9 +68,9 @@ class QwenOptions(VLMPlannerOptions):
 
 
 class QwenPlanner(VLMPlanner):
-    """Asks at every chunk: demonstration, task, subgoals so far, and the newest picture.
+    """Queries the model at every chunk: demonstration, task, past subgoals, newest picture.
 
-    A single turn, made anew each time. Points come in box tokens.
+    Each query is a single turn. Points come in box tokens.
     """
 
     kind = "qwen"
@@ -83,53 +83,53 @@ class QwenPlanner(VLMPlanner):
         self._history: list[str] = []
 
     def begin(self, demonstration: Demonstration) -> None:
-        """Choose the frames of the demonstration that will be shown."""
-        frames = shown(demonstration)
+        """Choose the frames of the demonstration to send."""
+        frames = demonstration_pictures(demonstration)
         self._history = []
         self._video = None
         if frames is not None:
-            self._video = summary(frames, self.options.video_frames, len(frames))
+            self._video = summary_clip(frames, self.options.video_frames, len(frames))
 
     def due(self, step: int) -> bool:
-        """Whether no rule keeps the last subgoal."""
+        """Return whether no rule keeps the last subgoal."""
         if self._subgoal is None:
             return True
-        said = without_places(self._subgoal)
+        text = strip_points(self._subgoal)
         return not any(
-            step <= hold.until and re.fullmatch(hold.says, said) for hold in self.options.holds
+            step <= hold.until and re.fullmatch(hold.says, text) for hold in self.options.holds
         )
 
     def ask(self, observation: Observation, step: int) -> str | None:  # noqa: ARG002
-        """The next subgoal in the model's words, with pixels."""
+        """Return the model's subgoal with pixels."""
         query = ModelQuery(
             self.prompts.fill("system"), (ChatTurn("user", tuple(self._parts(observation))),)
         )
-        answer = self._asker.ask(query, _read)
+        answer = self._vlm.ask(query, _parse)
         if answer is None:
             return None
-        said, subgoal = answer
-        if not self._history or without_places(from_boxes(self._history[-1])) != without_places(
+        text, subgoal = answer
+        if not self._history or strip_points(parse_boxes(self._history[-1])) != strip_points(
             subgoal
         ):
-            self._history.append(said)
+            self._history.append(text)
         return subgoal
 
     def _parts(self, observation: Observation) -> Iterator[Part]:
-        words = self.prompts
+        prompts = self.prompts
         if self._video is not None:
-            yield words.fill("video")
+            yield prompts.fill("video")
             yield self._video
-        yield words.fill("goal", instruction=self._instruction)
+        yield prompts.fill("goal", instruction=self._instruction)
         if self._history:
-            told = "; ".join(f"{number}. {one}" for number, one in enumerate(self._history, 1))
-            yield words.fill("history", history=told)
+            history = "; ".join(f"{number}. {one}" for number, one in enumerate(self._history, 1))
+            yield prompts.fill("history", history=history)
         else:
-            yield words.fill("first")
-        yield words.fill("now")
-        yield Picture(seen(observation))
-        yield words.fill("question", forms=self.forms(), places=self.places())
+            yield prompts.fill("first")
+        yield prompts.fill("now")
+        yield Picture(front_picture(observation))
+        yield prompts.fill("question", forms=self.forms(), places=self.places())
 
 
-def _read(text: str) -> tuple[str, str]:
-    """The model's own words in one line, for the history, and the subgoal with pixels."""
-    return tidied(text), from_boxes(text)
+def _parse(text: str) -> tuple[str, str]:
+    """Return the model's text in one line, for the history, and the subgoal with pixels."""
+    return normalize_subgoal(text), parse_boxes(text)

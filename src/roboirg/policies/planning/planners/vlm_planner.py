@@ -1,4 +1,4 @@
-"""What planners that ask a vision-language model have in common."""
+"""Base class of planners that query a vision-language model."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from roboirg.core.observations import Demonstration, DemonstrationFrames, Observation
-from roboirg.policies.planning.config_fingerprint import fingerprint_of
+from roboirg.policies.planning.config_fingerprint import config_version
 from roboirg.policies.planning.model_content import Pixels
 from roboirg.policies.planning.models import ModelOptions
 from roboirg.policies.planning.prompts import SHARED, load_prompts
@@ -19,13 +19,13 @@ PLACE = "[at]"
 
 
 class VLMPlannerOptions(BaseModel):
-    """Options of all planners that ask a model.
+    """Options of all planners that query a model.
 
     Attributes:
-        model: which one, and how.
+        model: the model and its options.
         subgoals: ``grounded``, with pixels, or ``simple``.
-        keep: ask at every so many chunks only, and keep the subgoal in between.
-        prompts: a file with other words, or None for our own.
+        keep: chunks per query; the subgoal stays in between.
+        prompts: a file with other prompts, or None for our own.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -37,9 +37,9 @@ class VLMPlannerOptions(BaseModel):
 
 
 class VLMPlanner(ABC):
-    """Asks a model for subgoals; sees the front camera alone.
+    """Queries a model for subgoals, with pictures of the front camera only.
 
-    Where a model gives no usable subgoal even when asked again, the last one stays.
+    If the model gives no usable subgoal even at the second try, the last one stays.
 
     Raises:
         InvalidValueError: the prompts cannot be read.
@@ -54,24 +54,24 @@ class VLMPlanner(ABC):
         self.demonstration_frames: DemonstrationFrames = "all"
         self.prompts = load_prompts(self.kind, options.prompts)
         self._shared = load_prompts(SHARED)
-        self._asker = VLMQuery(options.model, self.prompts["again"])
+        self._vlm = VLMQuery(options.model, self.prompts["again"])
         self._instruction = ""
         self._chunks = 0
         self._subgoal: str | None = None
 
     @property
-    def grounds(self) -> bool:
-        """Whether subgoals name pixels."""
+    def is_grounded(self) -> bool:
+        """Whether subgoals contain pixels."""
         return self._common.subgoals == "grounded"
 
     @property
     def version(self) -> str:
-        """The model, and a fingerprint of the options and words that may change its answers."""
-        return fingerprint_of(self._common.model, self.metadata)
+        """The model, and a fingerprint of the options and prompts that may change its answers."""
+        return config_version(self._common.model, self.metadata)
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """Options and words; no key is in it."""
+        """Options and prompts; there is no key among them."""
         own = self._common.model_dump(mode="json", exclude={"model", "prompts"})
         return {
             "kind": self.kind,
@@ -81,17 +81,17 @@ class VLMPlanner(ABC):
         }
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Forget the last episode; look at what is shown."""
-        self._asker.start()
+        """Forget the last episode and begin another."""
+        self._vlm.start()
         self._instruction, self._chunks, self._subgoal = instruction, 0, None
         self.begin(demonstration)
 
     def plan(self, observation: Observation, step: int) -> str | None:
-        """The subgoal from now on: the model's, if it is to be asked now, or the last one."""
+        """Return the subgoal from now on: a new one if a query is due, else the last."""
         self.watch(observation, step)
-        due = self._chunks % self._common.keep == 0
+        is_turn = self._chunks % self._common.keep == 0
         self._chunks += 1
-        if due and self.due(step):
+        if is_turn and self.due(step):
             subgoal = self.ask(observation, step)
             if subgoal is not None:
                 self._subgoal = subgoal
@@ -99,47 +99,47 @@ class VLMPlanner(ABC):
 
     @abstractmethod
     def begin(self, demonstration: Demonstration) -> None:
-        """A new episode begins."""
+        """Begin an episode."""
 
     def watch(self, observation: Observation, step: int) -> None:  # noqa: B027 - optional
-        """Something is seen; called at every chunk, whether or not the model is asked."""
+        """Record an observation; called at every chunk, with or without a query."""
 
     def due(self, step: int) -> bool:  # noqa: ARG002
-        """Whether the model is to be asked now."""
+        """Return whether to query the model now."""
         return True
 
     @abstractmethod
     def ask(self, observation: Observation, step: int) -> str | None:
-        """What the model says; None if it is of no use."""
+        """Query the model and return its subgoal; None if there is no usable one."""
 
     def usage(self) -> dict[str, float]:
-        """What the episode cost."""
-        return self._asker.usage()
+        """Return the cost of the episode."""
+        return self._vlm.usage()
 
     def close(self) -> None:
-        """Let go of the connection."""
-        self._asker.close()
+        """Close the connection."""
+        self._vlm.close()
 
     def forms(self) -> str:
-        """The forms of subgoals, one in each line."""
+        """Return the forms of subgoals, one per line."""
         lines = (f"- {form}" for form in self._shared.lines("forms"))
-        if self.grounds:
+        if self.is_grounded:
             return "\n".join(lines)
         return "\n".join(line.replace(f" {PLACE}", "") for line in lines)
 
     def places(self) -> str:
-        """How places are named, or that they are not."""
-        return self.prompts.fill("grounded" if self.grounds else "simple")
+        """Return the prompt about points: their form, or that there are none."""
+        return self.prompts.fill("grounded" if self.is_grounded else "simple")
 
 
-def shown(demonstration: Demonstration) -> Pixels | None:
-    """The front camera's pictures of a video; None where nothing was shown."""
+def demonstration_pictures(demonstration: Demonstration) -> Pixels | None:
+    """Return the front camera's pictures of a demonstration; None without a video."""
     if not len(demonstration.get("joint_positions", ())):
         return None
     pictures: Pixels = demonstration["front_rgb"]
     return pictures
 
 
-def seen(observation: Observation) -> Pixels:
-    """The front camera's picture, as it is now: who draws may use the array again."""
+def front_picture(observation: Observation) -> Pixels:
+    """Return a copy of the front camera's picture, as the renderer may reuse the array."""
     return observation["front_rgb"].copy()

@@ -4,17 +4,17 @@ const mediaOf = (row, details) => {
   const key = columns.key[row];
   const source = (kind, value) => (value === "#" ? byId(`${kind}-${key}`)?.textContent : value);
   if (!details.film) return null;
-  const name = `Film of ${titleOf(row)}, ${valueOf("policy", row)}, ${toldOf(row)}`;
+  const name = `Video of ${titleOf(row)}, ${valueOf("policy", row)}, ${optionsOfRow(row)}`;
   const film = h("video", {
     muted: true, playsinline: true, preload: "none", "aria-label": name,
     src: source("film", details.film), poster: source("poster", details.poster) ?? null,
   });
   film.muted = true;
-  // One plays at a time.
+  // Only one plays at a time.
   film.addEventListener("play", () => {
     for (const other of document.querySelectorAll("video")) if (other !== film) other.pause();
   });
-  // The last picture says how it ended; the browser's controls would hide half of it.
+  // The poster shows the end of the episode; the browser's controls would hide half of it.
   const button = h("button", {
     type: "button", class: "play", "aria-label": `Play: ${name}`,
     click: () => { button.remove(); film.controls = true; film.play(); film.focus(); },
@@ -38,15 +38,15 @@ const factsOf = (row, details) => {
       `${strings[kind]}: ${strings[failure].replaceAll("_", " ")}.`), ` ${strings[sentence]}`));
   }
   if (details.cause !== undefined && !details.attribution) facts.push(entry("verdict", strings[details.cause]));
-  if (details.lost !== undefined) facts.push(entry("film", `lost: ${strings[details.lost]}`));
+  if (details.lost !== undefined) facts.push(entry("video", `lost: ${strings[details.lost]}`));
   const before = details.shown ? `; before that a video of ${seconds(details.shown)} s` : "";
-  facts.push(entry("played", `${columns.steps[row]} steps, ${seconds(columns.steps[row])} s${before}`));
-  facts.push(entry("under", strings[details.rules]));
-  return h("dl", { class: "told" }, facts);
+  facts.push(entry("played", `${counted(columns.steps[row], "step")}, ${seconds(columns.steps[row])} s${before}`));
+  facts.push(entry("conditions", strings[details.conditions]));
+  return h("dl", { class: "episode-facts" }, facts);
 };
 
-/** The same scene told otherwise, or played by others. */
-const companyOf = (row) => {
+/** Other episodes in the same scene: other settings and policies. */
+const sceneMatesOf = (row) => {
   const byPolicy = new Map();
   for (let other = 0; other < total; other += 1) {
     if (columns.scene[other] !== columns.scene[row]) continue;
@@ -59,22 +59,22 @@ const companyOf = (row) => {
     others.map((other) => h("button", {
       type: "button", class: `chip ${valueOf("outcome", other)}`,
       "aria-current": other === row ? "true" : null, click: () => goTo(other),
-    }, sign(VERDICTS[valueOf("outcome", other)], `${valueOf("outcome", other)}: `), ` ${toldOf(other)}`,
+    }, sign(VERDICTS[valueOf("outcome", other)], `${valueOf("outcome", other)}: `), ` ${optionsOfRow(other)}`,
     seeded ? ` · seed ${valueOf("seed", other)}` : ""))));
-  return h("div", { class: "company" }, h("h4", {}, "The same scene"), h("ul", {}, lists));
+  return h("div", { class: "scene-mates" }, h("h4", {}, "The same scene"), h("ul", {}, lists));
 };
 
 const detailOf = (row) => {
   const details = detailsOf(row);
   const media = mediaOf(row, details);
-  const isSpatial = valueOf("setting", row).startsWith("spatial");
+  const hasFrame = data.framed.some((name) => valueOf("setting", row).split(" ")[0] === name);
   return h("div", { class: media ? "detail" : "detail unfilmed" },
     media?.shots,
-    h("div", { class: "said" }, turnsOf(details), factsOf(row, details),
-      isSpatial ? h("p", { class: "aside" }, "The front camera looks at the robot: the robot’s left is "
-        + "on the right of the picture.") : null),
+    h("div", { class: "instruction" }, turnsOf(details), factsOf(row, details),
+      hasFrame ? h("p", { class: "aside" }, "The front camera faces the robot: the robot’s left is "
+        + "on the right of the image.") : null),
     timelineOf(row, details, media?.film),
     details.traceback === undefined ? null
       : h("details", {}, h("summary", {}, "traceback"), h("pre", { tabindex: "0" }, strings[details.traceback])),
-    companyOf(row));
+    sceneMatesOf(row));
 };

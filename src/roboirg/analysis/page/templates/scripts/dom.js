@@ -15,20 +15,20 @@ const h = (name, attributes, ...children) => {
   return element;
 };
 
-/** A sign for the eye and a word for the ear. */
+/** A sign for sighted readers and its words for screen readers. */
 const sign = (mark, words) => [
   h("span", { "aria-hidden": "true" }, mark), h("span", { class: "unseen" }, words),
 ];
 
-/** A name that may be broken where a word in it begins. */
+/** A name that may break before each of its words. */
 const breakable = (name) => name.split(/(?<=[a-z])(?=[A-Z])/)
   .flatMap((part, place) => (place ? [document.createElement("wbr"), part] : [part]));
 
-const many = (number, word) => `${number.toLocaleString("en")} ${word}${number === 1 ? "" : "s"}`;
+const counted = (number, word) => `${number.toLocaleString("en")} ${word}${number === 1 ? "" : "s"}`;
 
 /**
- * Arrow keys move among the buttons of a grid, so that it is one stop of the tab key.
- * `lines` are arrays of buttons; null where a line has none.
+ * Let arrow keys move among the buttons of a grid, which is a single tab stop.
+ * `lines` are arrays of buttons, with null for gaps.
  */
 const roam = (lines) => {
   const places = new Map();

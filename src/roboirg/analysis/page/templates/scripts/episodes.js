@@ -2,7 +2,7 @@
 
 const opened = new Set();
 
-/** What is said last: the command. Behind the utterances come causes. */
+/** The last utterance, which is the command. */
 const commandOf = (row) => {
   const { turns } = detailsOf(row);
   return strings[turns.at(-1)[1]];
@@ -21,9 +21,9 @@ const drawEpisode = (row) => {
     },
   },
   h("span", { class: "name" }, valueOf("task", row), h("small", {}, ` ${columns.episode[row]}`)),
-  h("span", { class: "who" }, valueOf("policy", row),
+  h("span", { class: "policy" }, valueOf("policy", row),
     choices.seed.values.length > 1 ? h("small", {}, ` seed ${valueOf("seed", row)}`) : null),
-  h("span", { class: "tag" }, toldOf(row)), h("span", { class: "tag" }, valueOf("difficulty", row)),
+  h("span", { class: "tag" }, optionsOfRow(row)), h("span", { class: "tag" }, valueOf("difficulty", row)),
   verdict(row), h("span", { class: "preview" }, commandOf(row)));
   item.append(h("h3", {}, button), h("div", { class: "inside", id: `${id}-detail`, hidden: true }));
   if (opened.has(row)) open(item, row);
@@ -47,11 +47,11 @@ const shut = (item, row) => {
   item.querySelector("h3 button").setAttribute("aria-expanded", "false");
 };
 
-/** Open an episode wherever it is; filters that hide it are cleared. */
+/** Open an episode; clear the filters if they hide it. */
 const goTo = (row) => {
   opened.add(row);
-  if (stated().view === "pairs" || !pages.items.includes(row)) {
-    state({});
+  if (formValues().view === "pairs" || !pages.items.includes(row)) {
+    setForm({});
     apply();
   }
   showPage(Math.floor(pages.items.indexOf(row) / PAGE_SIZE));

@@ -1,10 +1,10 @@
-// The filters: a form made of the choices, and the episodes that fit it.
+// The filters: a form with the choices, and the episodes that match it.
 
 const form = byId("filters");
 const ANY = "any ";
 const HIDDEN_IN_PAIRS = ["policy", "outcome", "failure"];
 
-/** What a filter's value is called that stands for all of a group. */
+/** The value of a filter that stands for a whole group. */
 const anyOf = (name, group) => {
   const { groups, values } = choices[name];
   const members = values.filter((_, place) => groups[place] === group);
@@ -41,11 +41,11 @@ const makeFilters = () => {
   form.append(search, h("button", { type: "reset" }, "Clear"));
 };
 
-/** What the form says now: only what is chosen. */
-const stated = () => Object.fromEntries([...new FormData(form)].filter(([, value]) => value));
+/** The chosen values of the form. */
+const formValues = () => Object.fromEntries([...new FormData(form)].filter(([, value]) => value));
 
-/** Put values into the form; what is not named, or not offered, is cleared. */
-const state = (values) => {
+/** Set the values of the form; clear fields that are missing or unknown. */
+const setForm = (values) => {
   for (const element of form.elements) {
     if (!element.name) continue;
     if (element.type === "radio") {
@@ -58,14 +58,14 @@ const state = (values) => {
 };
 
 let lowered = null;
-/** For each text whether it contains the words; every text is looked at once. */
+/** For each text whether it contains the words; checks each text once. */
 const textsWith = (words) => {
   lowered ??= strings.map((text) => text.toLowerCase());
   const wanted = words.toLowerCase().replace(/\s+/g, " ").trim();
   return wanted ? lowered.map((text) => text.includes(wanted)) : null;
 };
 
-/** The test that a filter puts to an episode; null for none. */
+/** A function that tests whether an episode matches a filter. */
 const testOf = (name, value) => {
   const { values, groups } = choices[name];
   const fits = values.map((one, place) => one === value || (groups.length > 0 && ANY + groups[place] === value));
@@ -73,7 +73,7 @@ const testOf = (name, value) => {
   return (row) => fits[column[row]] === true;
 };
 
-/** The episodes that fit, in the order of the page. */
+/** The episodes that match, in the order of the page. */
 const matching = (values) => {
   const names = Object.keys(values).filter((name) => name in choices);
   const usable = values.view === "pairs" ? names.filter((name) => !HIDDEN_IN_PAIRS.includes(name)) : names;

@@ -1,10 +1,10 @@
-// What happens when something is chosen, and what the address says.
-// #?task=BinFill&outcome=failure filters, #?at=1f2e3d4c opens an episode, &page=3 turns pages.
+// Responses to input, and the page's address.
+// #?task=BinFill&outcome=failure filters, #?at=1f2e3d4c opens an episode, &page=3 shows a page.
 
 /** Filter and draw. */
 const apply = () => {
   const begun = performance.now();
-  const values = stated();
+  const values = formValues();
   const isPairs = values.view === "pairs";
   form.classList.toggle("pairs", isPairs);
   const rows = matching(values);
@@ -15,13 +15,13 @@ const apply = () => {
   if (isPairs) drawPairSummary(all, values);
   showPage(0);
   byId("shown").textContent = isPairs
-    ? `${pages.items.length.toLocaleString("en")} of ${many(all.length, "pair")} of episodes`
-    : `${rows.length.toLocaleString("en")} of ${many(total, "episode")}`;
+    ? `${pages.items.length.toLocaleString("en")} of ${counted(all.length, "pair")} of episodes`
+    : `${rows.length.toLocaleString("en")} of ${counted(total, "episode")}`;
   counters.filterMs = performance.now() - begun;
 };
 
 const remember = (key) => {
-  const values = { ...stated(), ...(pages.at ? { page: pages.at + 1 } : {}), ...(key ? { at: key } : {}) };
+  const values = { ...formValues(), ...(pages.at ? { page: pages.at + 1 } : {}), ...(key ? { at: key } : {}) };
   if (values.view !== "pairs") for (const name of ["left", "right", "change"]) delete values[name];
   const words = new URLSearchParams(values).toString();
   history.replaceState(null, "", words ? `#?${words}` : "#");
@@ -30,15 +30,15 @@ const remember = (key) => {
 const recall = () => {
   if (!location.hash.startsWith("#?")) return;
   const values = Object.fromEntries(new URLSearchParams(location.hash.slice(2)));
-  state(values);
+  setForm(values);
   apply();
   if (values.page) showPage(Number(values.page) - 1);
   if (rowOf.has(values.at)) goTo(rowOf.get(values.at));
 };
 
-/** From a figure to its episodes. */
+/** Show the episodes behind a cell or bar. */
 const showEpisodes = (aim) => {
-  state(aim);
+  setForm(aim);
   apply();
   remember();
   byId("episodes").scrollIntoView();
@@ -52,7 +52,7 @@ const drawLead = () => {
     counts[outcome] = (counts[outcome] ?? 0) + 1;
   }
   const words = { success: "succeeded", failure: "failed", error: "ended in an error" };
-  byId("lead").replaceChildren(`${many(total, "episode")}: `, ...Object.keys(words)
+  byId("lead").replaceChildren(`${counted(total, "episode")}: `, ...Object.keys(words)
     .filter((outcome) => counts[outcome] || outcome !== "error")
     .flatMap((outcome, place) => [place ? ", " : "",
       h("b", { class: outcome }, `${(counts[outcome] ?? 0).toLocaleString("en")} ${words[outcome]}`)]), ".");
@@ -65,7 +65,7 @@ drawBars();
 makeFilters();
 form.addEventListener("input", () => { apply(); remember(); });
 form.addEventListener("submit", (event) => event.preventDefault());
-form.addEventListener("reset", (event) => { event.preventDefault(); state({}); apply(); remember(); });
+form.addEventListener("reset", (event) => { event.preventDefault(); setForm({}); apply(); remember(); });
 addEventListener("hashchange", recall);
 apply();
 recall();

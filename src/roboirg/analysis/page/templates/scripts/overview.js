@@ -1,4 +1,4 @@
-// Heat maps of success, and bars of how episodes ended.
+// Heat maps of success, and bars of outcomes.
 
 const MEASURES = { rate: "success", gap: "gap to explicit" };
 const BARS = ["success", "grounding", "execution", "not attributed", "error"];
@@ -32,7 +32,7 @@ const heatMap = (policy, measure, cellAt) => {
       h("table", { class: "heat", role: "grid", "aria-labelledby": id }, heatHead(), h("tbody", {}, body))));
 };
 
-/** Settings above forms, where both forms were played. */
+/** Settings, with forms below if both were played. */
 const heatHead = () => {
   const forms = new Set(matrix.columns.map((column) => column.form));
   const settings = [...new Set(matrix.columns.map((column) => column.setting))];
@@ -41,7 +41,7 @@ const heatHead = () => {
     settings.map((setting) => h("th", { scope: "colgroup", colspan: width(setting) }, setting)));
   if (forms.size === 1) return h("thead", {}, first);
   return h("thead", {}, first, h("tr", { class: "forms" }, matrix.columns.map((column) =>
-    h("th", { scope: "col" }, column.setting === "explicit" ? "" : column.form))));
+    h("th", { scope: "col" }, column.setting === data.reference ? "" : column.form))));
 };
 
 const aimOf = (row) => ({ task: row.task ?? (row.suite ? `any ${row.suite}` : "") });
@@ -70,7 +70,7 @@ const heatButton = (cell, measure, aim) => {
   return withTip(button, cell.note);
 };
 
-/** Ends of episodes, counted from the columns: by policy, telling and kind of end. */
+/** Count episodes by policy, setting, form and kind of end. */
 const countEnds = () => {
   const counts = new Map();
   for (let row = 0; row < total; row += 1) {
@@ -109,7 +109,7 @@ const endBar = (policy, column, own) => {
   return h("div", { class: "bar" }, BARS.filter((kind) => own.has(kind)).map((kind) => {
     const number = own.get(kind);
     const share = (100 * number) / sum;
-    const note = [`${policy}, ${column.name}`, `${kind}: ${number} of ${many(sum, "episode")} (${share.toFixed(0)} %)`];
+    const note = [`${policy}, ${column.name}`, `${kind}: ${number} of ${counted(sum, "episode")} (${share.toFixed(0)} %)`];
     return withTip(h("button", {
       type: "button",
       class: `end ${kind.replace(" ", "-")}`,

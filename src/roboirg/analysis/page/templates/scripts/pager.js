@@ -1,4 +1,4 @@
-// A long list, a page at a time: what is not on the page is not in the document.
+// A long list, one page at a time; the document holds only the current page.
 
 const PAGE_SIZE = 40;
 const pages = { at: 0, items: [], draw: () => {} };

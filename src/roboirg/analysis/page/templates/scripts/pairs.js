@@ -34,7 +34,7 @@ const fitsChange = (pair, wanted) => {
     && columns.failure[pair[0]] !== columns.failure[pair[1]];
 };
 
-/** Pairs of rows: the same episode, told in the same way, with the same policy seed. */
+/** Pairs of rows: the same episode, instruction and policy seed. */
 const pairsOf = (rows, left, right) => {
   const [ours, theirs] = [left, right].map((name) => choices.policy.values.indexOf(name));
   const partner = new Map();
@@ -53,46 +53,46 @@ const drawPair = ([left, right]) => {
     click: () => {
       const opens = inside.hidden;
       inside.replaceChildren(...(opens ? [left, right].map((row) => h("section", {},
-        h("h4", { class: "who" }, valueOf("policy", row), " ", verdict(row)), detailOf(row))) : []));
+        h("h4", { class: "policy" }, valueOf("policy", row), " ", verdict(row)), detailOf(row))) : []));
       inside.hidden = !opens;
       button.setAttribute("aria-expanded", String(opens));
     },
   },
   h("span", { class: "name" }, valueOf("task", left), h("small", {}, ` ${columns.episode[left]}`),
     choices.seed.values.length > 1 ? h("small", {}, ` seed ${valueOf("seed", left)}`) : null),
-  h("span", { class: "tag" }, toldOf(left)), h("span", { class: "tag" }, valueOf("difficulty", left)),
+  h("span", { class: "tag" }, optionsOfRow(left)), h("span", { class: "tag" }, valueOf("difficulty", left)),
   verdict(left), h("span", { class: "arrow", "aria-hidden": "true" }, "→"), verdict(right),
   h("span", { class: "preview" }, commandOf(left)));
   return h("li", { class: `row pair ${changeOf([left, right])}`, id }, h("h3", {}, button), inside);
 };
 
-/** By telling, in how many episodes who succeeded; a number shows its episodes. */
+/** Count by setting which of the two succeeded; a number shows its episodes. */
 const drawPairSummary = (pairs, { left, right }) => {
   const kinds = ["both", "left", "right", "neither", "error"];
   const names = { both: "both", left: `only ${left}`, right: `only ${right}`, neither: "neither", error: "error" };
   const counts = new Map();
   for (const pair of pairs) {
-    const told = `${columns.setting[pair[0]]},${columns.form[pair[0]]}`;
-    const own = counts.get(told) ?? counts.set(told, {}).get(told);
+    const key = `${columns.setting[pair[0]]},${columns.form[pair[0]]}`;
+    const own = counts.get(key) ?? counts.set(key, {}).get(key);
     own[changeOf(pair)] = (own[changeOf(pair)] ?? 0) + 1;
   }
   const seen = kinds.filter((kind) => kind !== "error" || [...counts.values()].some((own) => own.error));
-  const rows = [...counts].map(([told, own]) => {
-    const [setting, formIndex] = told.split(",").map(Number);
+  const rows = [...counts].map(([key, own]) => {
+    const [setting, formIndex] = key.split(",").map(Number);
     const aim = { setting: choices.setting.values[setting], form: choices.form.values[formIndex] };
     return h("tr", {}, h("th", { scope: "row" }, aim.form === "implicit" ? aim.setting : `${aim.setting}, ${aim.form}`),
       seen.map((kind) => h("td", {}, own[kind] ? h("button", {
-        type: "button", class: `count ${kind}`, "aria-label": `${many(own[kind], "episode")}, ${names[kind]}. Show them.`,
-        click: () => { state({ ...stated(), ...aim, change: kind }); apply(); remember(); },
+        type: "button", class: `count ${kind}`, "aria-label": `${counted(own[kind], "episode")}, ${names[kind]}. Show them.`,
+        click: () => { setForm({ ...formValues(), ...aim, change: kind }); apply(); remember(); },
       }, own[kind]) : "0")));
   });
   const place = (name) => choices.policy.values.indexOf(name);
   const words = data.comparisons.find((one) => [one.left, one.right].sort().join()
     === [place(left), place(right)].sort().join());
   byId("pair-summary").replaceChildren(
-    h("div", { class: "scroll" }, h("table", { class: "counts", "aria-label": "Who succeeded, by setting" },
+    h("div", { class: "scroll" }, h("table", { class: "counts", "aria-label": "Successes by setting" },
       h("thead", {}, h("tr", {}, h("td", {}), seen.map((kind) => h("th", { scope: "col" }, names[kind])))),
       h("tbody", {}, rows))),
     ...(words ? [h("details", {}, h("summary", {}, "the comparison in words"),
-      words.said.map((line) => h("p", { class: "line" }, line)))] : []));
+      words.sentences.map((line) => h("p", { class: "line" }, line)))] : []));
 };

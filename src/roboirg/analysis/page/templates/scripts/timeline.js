@@ -1,4 +1,4 @@
-// What happened when. Choosing a moment shows it in the film.
+// The timeline of an episode. Selecting a moment shows it in the video.
 
 const TICKS = [1, 2, 5, 10, 20, 60, 120];
 const MOST_TICKS = 8;
@@ -18,7 +18,7 @@ const momentsOf = (details) => {
   return moments.sort((one, other) => one.step - other.step);
 };
 
-/** Where a moment is in the film, seconds. The film ends with its last picture, repeated. */
+/** The time of a moment in the video, seconds. The video ends with its last frame repeated. */
 const filmTime = (film, step, steps) => {
   const { every, rate, repeats } = data.film;
   const end = film.duration - repeats / rate;
@@ -100,6 +100,6 @@ const legend = (details, moments) => {
   const words = [];
   if (details.shown) words.push("striped: the video shown before");
   if (moments.some(({ kind }) => kind === "done")) words.push("numbers: a stage of the task was completed");
-  if (open) words.push(`${many(open, "stage")} never completed`);
+  if (open) words.push(`${counted(open, "stage")} never completed`);
   return words.length ? h("p", { class: "aside" }, `${words.join("; ")}.`) : null;
 };

@@ -1,4 +1,4 @@
-// One tool tip for the whole page: shown on hover and on focus, gone with Escape.
+// One tooltip for the whole page: shown on hover and focus, hidden by Escape.
 
 const tips = new WeakMap();
 const tipBox = byId("tip");
@@ -18,7 +18,7 @@ const showTip = (target) => {
   tipBox.style.top = `${above > 8 ? above : from.bottom + 6}px`;
 };
 const hideTip = () => { clearTimeout(tipTimer); tipBox.hidden = true; };
-// A moment's grace, so that the pointer can move onto the tip.
+// A short delay, so that the pointer can move onto the tip.
 const hideTipSoon = () => { clearTimeout(tipTimer); tipTimer = setTimeout(hideTip, 120); };
 
 const withTip = (element, tipLines) => {

@@ -1,8 +1,8 @@
-// The instruction with its referring expressions, each tied to what it stands for.
+// The instruction with its referring expressions, each linked to its referent.
 
 const HUES = 4;
 
-/** Numbers for what is referred to: the same for an expression and its antecedent. */
+/** Numbers of referents: the same for an expression and its antecedent. */
 const referents = (details) => {
   const slots = (details.goal ?? []).map(([slot]) => slot);
   const found = new Map();
@@ -20,7 +20,7 @@ const referents = (details) => {
   return found;
 };
 
-/** Spans of one utterance in their order; one span may stand for several values ("them"). */
+/** Spans of one utterance in order; one span may stand for several values ("them"). */
 const spansOf = (details, utterance) => {
   const spans = [];
   const own = (details.mentions ?? []).filter(([at]) => at === utterance);

@@ -1,0 +1,60 @@
+"""Names and order of instruction options in tables, figures and on the page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.language import STAGE_SETS
+from roboirg.language.settings import EXPLICIT, all_settings, setting_names
+from roboirg.util.plurals import counted
+
+REFERENCE = InstructionOptions(EXPLICIT)
+"""The options that every gap refers to."""
+
+_DEFAULTS = InstructionOptions()
+
+
+def options_label(options: InstructionOptions) -> str:
+    """Return the setting and, in brackets, the options that differ from the defaults."""
+    changed = []
+    if options.form != _DEFAULTS.form:
+        changed.append(options.form)
+    if options.stages != _DEFAULTS.stages:
+        changed.append("stages " + ",".join(map(str, options.stages)))
+    if options.distractor != _DEFAULTS.distractor:
+        changed.append(f"{options.distractor} distractor")
+    if options.distractors != _DEFAULTS.distractors:
+        changed.append(counted(options.distractors, "distractor"))
+    if options.frame != _DEFAULTS.frame:
+        changed.append(f"{options.frame} frame")
+    return f"{options.setting} ({', '.join(changed)})" if changed else options.setting
+
+
+def options_sort_key(options: InstructionOptions) -> tuple[object, ...]:
+    """Sort by setting; within a setting the implicit form first, then by label."""
+    is_implicit = options.form == _DEFAULTS.form
+    return (*setting_sort_key(options.setting), not is_implicit, options_label(options))
+
+
+def setting_sort_key(setting: str) -> tuple[int, str]:
+    """Sort settings in the order of the language; unknown settings of old records come last."""
+    known = setting_names()
+    return (known.index(setting) if setting in known else len(known), setting)
+
+
+def has_default_options(options: InstructionOptions) -> bool:
+    """Whether all options but the setting have their default values."""
+    return options == InstructionOptions(options.setting)
+
+
+def default_settings(found: Iterable[InstructionOptions]) -> list[str]:
+    """Return, in order, the settings that occur with default options."""
+    settings = {options.setting for options in found if has_default_options(options)}
+    return sorted(settings, key=setting_sort_key)
+
+
+def staged_options() -> tuple[InstructionOptions, ...]:
+    """Return the options of the setting with stages, one for each set of stages, shortest first."""
+    setting = next(name for name, one in all_settings().items() if "stages" in one.reads)
+    return tuple(InstructionOptions(setting, stages=stages) for stages in STAGE_SETS)

@@ -1,0 +1,256 @@
+"""What each kind of fact means: the one table that judging, detection and display read.
+
+Another package adds a kind with `register_fact_kind`, in the module of the task that uses it:
+
+    register_fact_kind("upright", FactTraits(..., detect=detect_upright))
+
+Thresholds are in meters, radians and seconds (RoboMME, evaluation mode). ``reached`` and ``held``
+are our own: no stage expects them, they show how something failed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from types import MappingProxyType
+from typing import Any, Literal
+
+from roboirg.core.errors import InvalidValueError
+
+FactKind = str
+"""A key of `FACT_TRAITS`."""
+
+Detector = Callable[[Any], Iterable[tuple[FactKind, str, str | None]]]
+"""Returns the facts of a kind (kind, subject and place) that hold now, given a
+`roboirg.simulation.fact_detection.DetectionContext`."""
+
+
+class FactRole(StrEnum):
+    """What a fact says about the hand and its object."""
+
+    APPROACH = "approach"
+    """The hand is above a place."""
+    TOUCH = "touch"
+    """The hand is at an object."""
+    GRIP = "grip"
+    """The fingers hold an object, at any height."""
+    RAISE = "raise"
+    """An object is in the hand and up."""
+    CARRY = "carry"
+    """An object is above a place."""
+    RELEASE = "release"
+    """An object rests anywhere, released."""
+    PLACING = "placing"
+    """An object rests at a place, released."""
+    PRESS = "press"
+    """A button is down. It often ends a task."""
+    STATE = "state"
+    """No act: how the robot or the world is."""
+
+
+@dataclass(frozen=True, slots=True)
+class FactTraits:
+    """The meaning of one kind of fact.
+
+    Attributes:
+        role: what it says about the hand and its object.
+        subjects: kinds of object it can be about, or ``"robot"``.
+        places: kinds of object its place can be; empty if it has no place.
+        holds_while: its definition.
+        past: the act in the past tense, for causes: ``"placed {subject} on {place}"``.
+        state: words between subject and place, for lists of facts: ``"placed on"``.
+        lasts: whether it never ceases to hold.
+        undone_by_release: whether letting the object go takes the act back. Looking under a
+            container cannot be taken back.
+        timeline: what a time line shows of it: nothing, its start, or start and end.
+        detect: finds the facts of this kind; None for the kinds of this package, which
+            `roboirg.simulation.fact_detection` finds.
+    """
+
+    role: FactRole
+    subjects: tuple[str, ...]
+    holds_while: str
+    past: str
+    state: str
+    places: tuple[str, ...] = ()
+    lasts: bool = False
+    undone_by_release: bool = True
+    timeline: Literal["nothing", "start", "both"] = "start"
+    detect: Detector | None = None
+
+    @property
+    def grips(self) -> bool:
+        """Whether the object is in the hand."""
+        return self.role in (FactRole.GRIP, FactRole.RAISE)
+
+    @property
+    def touches(self) -> bool:
+        """Whether the hand is at the object."""
+        return self.grips or self.role in (FactRole.TOUCH, FactRole.PRESS)
+
+
+_MOVABLE = ("cube", "tape")
+_GRASPABLE = (*_MOVABLE, "container")
+
+_TRAITS: dict[FactKind, FactTraits] = {
+    "picked": FactTraits(
+        role=FactRole.RAISE,
+        subjects=_MOVABLE,
+        holds_while="it is above z 0.05 and grasped",
+        past="picked up {subject}",
+        state="picked",
+        timeline="both",
+    ),
+    "lying": FactTraits(
+        role=FactRole.RELEASE,
+        subjects=_MOVABLE,
+        holds_while="it lies released, z <= 0.035",
+        past="let go of {subject}",
+        state="lying",
+        timeline="nothing",
+    ),
+    "placed": FactTraits(
+        role=FactRole.PLACING,
+        subjects=_MOVABLE,
+        places=("target", "site"),
+        holds_while="it lies released within 0.05 (xy) of the place",
+        past="placed {subject} on {place}",
+        state="placed on",
+        timeline="both",
+    ),
+    "over": FactTraits(
+        role=FactRole.CARRY,
+        subjects=_MOVABLE,
+        places=("target",),
+        holds_while="it came within 0.03 (xy) below z 0.12, until beyond 0.04 or z 0.3",
+        past="moved {subject} over {place}",
+        state="over",
+    ),
+    "binned": FactTraits(
+        role=FactRole.PLACING,
+        subjects=_MOVABLE,
+        places=("bin", "box"),
+        holds_while="from the step on at which it has fallen in: released within 0.05 (xy), "
+        "z <= 0.035, fingers more than 0.02 open, the hand more than 0.02 away",
+        past="put {subject} into {place}",
+        state="in",
+        lasts=True,
+    ),
+    "lifted": FactTraits(
+        role=FactRole.RAISE,
+        subjects=("container",),
+        holds_while="its origin is above z 0.15",
+        past="lifted {subject}",
+        state="lifted",
+        undone_by_release=False,
+        timeline="both",
+    ),
+    "put_down": FactTraits(
+        role=FactRole.RELEASE,
+        subjects=("container",),
+        holds_while="its origin is at z <= 0.07, released, the hand above z 0.05",
+        past="put {subject} down",
+        state="put down",
+    ),
+    "reached": FactTraits(
+        role=FactRole.TOUCH,
+        subjects=_GRASPABLE,
+        holds_while="the tool center is within 0.03 of its origin",
+        past="reached {subject}",
+        state="reached",
+    ),
+    "held": FactTraits(
+        role=FactRole.GRIP,
+        subjects=_GRASPABLE,
+        holds_while="both fingers grasp it, at any height",
+        past="took hold of {subject}",
+        state="held",
+        timeline="nothing",
+    ),
+    "pressed": FactTraits(
+        role=FactRole.PRESS,
+        subjects=("button",),
+        holds_while="its cap is more than 0.005 down",
+        past="pressed {subject}",
+        state="pressed",
+    ),
+    "hovering": FactTraits(
+        role=FactRole.APPROACH,
+        subjects=("robot",),
+        places=("button",),
+        holds_while="the hand is within 0.03 (xy) of the button and below z 0.2",
+        past="moved above {place}",
+        state="over",
+    ),
+    "near": FactTraits(
+        role=FactRole.STATE,
+        subjects=("shuttle",),
+        places=("target",),
+        holds_while="its center is within 0.06 (xy) of the target's",
+        past="let {subject} come near {place}",
+        state="near",
+    ),
+    "stopped": FactTraits(
+        role=FactRole.STATE,
+        subjects=("shuttle",),
+        places=("target",),
+        holds_while="it has been stopped for good and is near",
+        past="stopped {subject} on {place}",
+        state="stopped on",
+    ),
+    "still": FactTraits(
+        role=FactRole.STATE,
+        subjects=("robot",),
+        holds_while="no arm joint moves faster than 0.2 rad/s",
+        past="came to rest",
+        state="still",
+        timeline="nothing",
+    ),
+    "home": FactTraits(
+        role=FactRole.STATE,
+        subjects=("robot",),
+        holds_while="all nine joints are within 0.01 of the home position",
+        past="went home",
+        state="home",
+        timeline="nothing",
+    ),
+}
+
+FACT_TRAITS: Mapping[FactKind, FactTraits] = MappingProxyType(_TRAITS)
+"""Every kind of fact, those of other packages included."""
+
+
+def register_fact_kind(kind: FactKind, traits: FactTraits) -> None:
+    """Add a kind of fact. Adding the same one again changes nothing.
+
+    Raises:
+        InvalidValueError: the kind exists with other traits.
+    """
+    if _TRAITS.setdefault(kind, traits) != traits:
+        raise InvalidValueError(
+            f"There is already a kind of fact {kind!r} with other traits; choose another name."
+        )
+
+
+def fact_traits(kind: FactKind) -> FactTraits:
+    """Return the traits of a kind.
+
+    A kind that is not registered, as in a record of a task that is not installed, is a state
+    called by its name.
+    """
+    return FACT_TRAITS.get(kind) or FactTraits(
+        FactRole.STATE, (), "", f"{kind.replace('_', ' ')} {{subject}}", kind.replace("_", " ")
+    )
+
+
+def raised_kind(object_kind: str) -> FactKind | None:
+    """Return the kind of fact that says that an object of a kind is in the hand and up."""
+    return next(
+        (
+            kind
+            for kind, traits in FACT_TRAITS.items()
+            if traits.role is FactRole.RAISE and object_kind in traits.subjects
+        ),
+        None,
+    )

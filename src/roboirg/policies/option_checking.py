@@ -1,0 +1,59 @@
+"""Check options from files and command lines; errors are one sentence."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+
+Options = TypeVar("Options", bound=BaseModel)
+
+
+def check_options(kind: type[Options], values: Mapping[str, Any], origin: str) -> Options:
+    """Return checked options; texts are converted to numbers and booleans.
+
+    Args:
+        kind: model of the options.
+        values: by name, tables nested.
+        origin: of the values, for error messages.
+
+    Raises:
+        UnknownNameError: there is no such option; the message names the nearest.
+        InvalidValueError: an option is missing or has an invalid value.
+    """
+    try:
+        return kind.model_validate(dict(values))
+    except ValidationError as error:
+        first = error.errors()[0]
+        path = [str(part) for part in first["loc"]]
+        name = ".".join(path) or "options"
+        if first["type"] == "extra_forbidden":
+            raise UnknownNameError(f"option of {origin}", name, _names(kind)) from None
+        if first["type"] == "missing":
+            raise InvalidValueError(f"{origin}: option {name} is missing.") from None
+        message = first["msg"].removeprefix("Value error, ")
+        end = "" if message.endswith((".", "?")) else "."
+        raise InvalidValueError(
+            f"{origin}: option {name} is {_quoted(first['input'])}: {message}{end}"
+        ) from None
+
+
+def _quoted(value: object) -> str:
+    """Return the repr of a value, without the password of a URL."""
+    return re.sub(r"//[^/@]*@", "//…@", repr(value))
+
+
+def _names(kind: type[BaseModel], before: str = "") -> list[str]:
+    """Return the names of all options, those in tables with dots."""
+    names: list[str] = []
+    for name, field in kind.model_fields.items():
+        annotation = field.annotation
+        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+            names += _names(annotation, f"{before}{name}.")
+        else:
+            names.append(f"{before}{name}")
+    return names

@@ -1,0 +1,53 @@
+"""Files that appear whole or not at all, whatever is killed meanwhile."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+from collections.abc import Iterator
+from pathlib import Path
+
+from roboirg.core.errors import InvalidValueError
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Yield a path beside `path` to write to; the file replaces `path` when the block ends.
+
+    If the block raises, the partial file is removed and `path` stays as it was. Readers see the
+    old or the new content, never a part, and the content is on the disk before the name is.
+
+    Raises:
+        InvalidValueError: the file cannot be written.
+    """
+    part = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
+    try:
+        yield part
+        sync_to_disk(part)
+        part.replace(path)
+        sync_to_disk(path.parent)
+    except OSError as error:
+        raise InvalidValueError(f"Cannot write {path}: {error.strerror or error}.") from error
+    finally:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+def write_atomically(path: Path, content: str | bytes) -> None:
+    """Replace a file by a text (as UTF-8) or by bytes, as `replacing` does.
+
+    Raises:
+        InvalidValueError: the file cannot be written.
+    """
+    with replacing(path) as part:
+        part.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+def sync_to_disk(path: Path) -> None:
+    """Wait until a file, or the names in a folder, are on the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

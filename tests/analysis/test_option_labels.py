@@ -1,0 +1,48 @@
+"""Labels and order of instruction options."""
+
+from __future__ import annotations
+
+from roboirg.analysis.stats.cells import gather
+from roboirg.analysis.stats.option_labels import (
+    default_settings,
+    options_label,
+    options_sort_key,
+    staged_options,
+)
+from roboirg.analysis.tables.paper_tables import make_table
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.language import STAGE_SETS
+from roboirg.language.settings import setting_names
+
+
+def test_labels_name_what_differs_from_the_defaults() -> None:
+    options = InstructionOptions("contextual", "resolved", (1, 5), "competing", 3, "camera")
+    assert options_label(options) == (
+        "contextual (resolved, stages 1,5, competing distractor, 3 distractors, camera frame)"
+    )
+    assert options_label(InstructionOptions("direct")) == "direct"
+
+
+def test_settings_have_the_order_of_the_language_and_unknown_ones_are_last() -> None:
+    names = ["zeta", *reversed(setting_names()), "alpha"]
+    options = [
+        InstructionOptions(name, form) for name in names for form in ("resolved", "implicit")
+    ]
+    ordered = sorted(options, key=options_sort_key)
+    assert [one.setting for one in ordered[::2]] == [*setting_names(), "alpha", "zeta"]
+    assert {one.form for one in ordered[::2]} == {"implicit"}
+    assert default_settings(options) == [*setting_names(), "alpha", "zeta"]
+
+
+def test_staged_options_have_every_set_of_stages() -> None:
+    assert [one.stages for one in staged_options()] == list(STAGE_SETS)
+    assert {one.setting for one in staged_options()} == {"contextual"}
+
+
+def test_an_unknown_setting_of_old_records_has_rows_too(result) -> None:
+    results = [result(setting=name) for name in ("retired", "direct", "explicit")]
+    table = make_table("main", gather([("run", results)]), chance=True)
+    ours = [row.group for row in table.rows if row.source == "ours"]
+    assert ours == ["explicit", "direct", "retired"]
+    (row,) = [row for row in table.rows if (row.group, row.source) == ("retired", "ours")]
+    assert [entry.text for entry in row.entries if entry.text][:1] == ["100.00"]

@@ -1,0 +1,199 @@
+"""The page over real sockets: ranges, refusals, a run that goes on, Ctrl-C."""
+
+from __future__ import annotations
+
+import http.client
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roboirg.analysis.page.page_server import PageServer
+from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.plan import make_plan
+from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.records.record import Record
+from roboirg.records.store import RecordStore
+from roboirg.util.http_server import ByteRange, parse_range
+
+pytestmark = pytest.mark.usefixtures("patient_sockets")
+
+FILM = bytes(range(256)) * 1000
+
+
+def record(episode: int) -> Record:
+    plan = make_plan(("listener",), tasks="PickXtimes", settings="explicit", episodes="4")
+    job = plan.jobs()[episode]
+    return make_record(job, RolloutResult("success", cause=None, steps=9), started_at="now")
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    folder = tmp_path / "run"
+    (folder / "videos").mkdir(parents=True)
+    (folder / "videos" / "a b.mp4").write_bytes(FILM)
+    (tmp_path / "secret").write_text("secret")
+    (folder / "link").symlink_to(tmp_path / "secret")
+    (folder / "empty.mp4").write_bytes(b"")
+    with RecordStore(folder) as store:
+        store.append(record(0))
+    return folder
+
+
+@pytest.fixture
+def server(run: Path) -> Iterator[PageServer]:
+    made = iter(range(100))
+    with PageServer(run, lambda: f"<p>page {next(made)}</p>") as serving:
+        thread = threading.Thread(target=serving.serve_forever)
+        thread.start()
+        yield serving
+        serving.shutdown()
+        thread.join()
+
+
+def ask(
+    server: PageServer, path: str, method: str = "GET", **headers: str
+) -> tuple[http.client.HTTPResponse, bytes]:
+    connection = http.client.HTTPConnection("127.0.0.1", server.port)
+    connection.request(method, path, headers=headers)
+    response = connection.getresponse()
+    body = response.read()
+    connection.close()
+    return response, body
+
+
+@pytest.mark.parametrize(
+    ("header", "expected"),
+    [
+        ("bytes=0-99", slice(0, 100)),
+        ("bytes=100-", slice(100, None)),
+        ("bytes=-100", slice(-100, None)),
+        ("bytes=0-0", slice(0, 1)),
+        (f"bytes=1000-{10**9}", slice(1000, None)),
+        (f"bytes=-{10**9}", slice(0, None)),
+    ],
+)
+def test_ranges_are_answered(server: PageServer, header: str, expected: slice) -> None:
+    response, body = ask(server, "/videos/a%20b.mp4", Range=header)
+    first, last, _ = expected.indices(len(FILM))
+    assert response.status == 206
+    assert body == FILM[expected]
+    assert response.headers["Content-Range"] == f"bytes {first}-{last - 1}/{len(FILM)}"
+    assert response.headers["Content-Length"] == str(len(body))
+    assert response.headers["Content-Type"] == "video/mp4"
+
+
+@pytest.mark.parametrize("header", [None, "bytes=9-3", "lines=0-9", "bytes=", "bytes=0-1,4-5"])
+def test_what_is_no_single_range_is_answered_whole(server: PageServer, header: str | None) -> None:
+    headers = {} if header is None else {"Range": header}
+    response, body = ask(server, "/videos/a%20b.mp4", **headers)
+    assert (response.status, body) == (200, FILM)
+    assert response.headers["Accept-Ranges"] == "bytes"
+
+
+@pytest.mark.parametrize(
+    ("path", "header"),
+    [("/videos/a%20b.mp4", f"bytes={len(FILM)}-"), ("/videos/a%20b.mp4", "bytes=-0"),
+     ("/empty.mp4", "bytes=0-")],
+)  # fmt: skip
+def test_ranges_outside_are_refused(server: PageServer, path: str, header: str) -> None:
+    response, _ = ask(server, path, Range=header)
+    assert response.status == 416
+    assert response.headers["Content-Range"].startswith("bytes */")
+
+
+@given(
+    st.integers(0, 40),
+    st.one_of(st.none(), st.text(max_size=12), st.from_regex(r"bytes=\d{0,3}-\d{0,3}")),
+)
+def test_no_header_leads_outside_of_the_file(size: int, header: str | None) -> None:
+    try:
+        found = parse_range(header, size)
+    except ValueError:
+        return
+    assert found is None or 0 <= found.begin < found.end <= size
+    assert parse_range("bytes=2-5", 10) == ByteRange(2, 6)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/../secret", "/%2e%2e/secret", "/videos/../../secret", "/videos/%2e%2e/%2e%2e/secret",
+        "//etc/passwd", "/link", "/..%2fsecret", "/videos", "/nothing", "/%00", "/" + "a" * 5000,
+    ],
+)  # fmt: skip
+def test_nothing_outside_of_the_run_is_served(server: PageServer, path: str) -> None:
+    # A raw socket: clients would tidy up the path.
+    with socket.create_connection(("127.0.0.1", server.port)) as raw:
+        host = f"127.0.0.1:{server.port}"
+        raw.sendall(f"GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n".encode())
+        answer = b"".join(iter(lambda: raw.recv(65536), b""))
+    assert answer.startswith(b"HTTP/1.1 404 ")
+    assert b"secret" not in answer
+    assert b"root:" not in answer
+
+
+@pytest.mark.parametrize("host", ["evil.example", "127.0.0.1:1", "127.0.0.1.evil.example", ""])
+def test_other_names_of_this_machine_are_refused(server: PageServer, host: str) -> None:
+    assert ask(server, "/", Host=host)[0].status == 403
+    assert ask(server, "/", Host=f"localhost:{server.port}")[0].status == 200
+
+
+def test_only_reading_and_head_sends_no_body(server: PageServer) -> None:
+    response, body = ask(server, "/videos/a%20b.mp4", "HEAD")
+    assert (response.status, body) == (200, b"")
+    assert response.headers["Content-Length"] == str(len(FILM))
+    for method in ("POST", "PUT", "DELETE"):
+        assert ask(server, "/", method)[0].status == 501
+
+
+def test_the_page_is_made_anew_when_the_run_goes_on(server: PageServer, run: Path) -> None:
+    assert ask(server, "/")[1] == ask(server, "/report.html")[1] == b"<p>page 0</p>"
+    with RecordStore(run) as store:
+        store.append(record(1))
+    assert ask(server, "/")[1] == b"<p>page 1</p>"
+
+
+def test_a_client_that_hangs_up_disturbs_no_other(server: PageServer) -> None:
+    for _ in range(3):
+        raw = socket.create_connection(("127.0.0.1", server.port))
+        head = f"GET /videos/a%20b.mp4 HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n\r\n"
+        raw.sendall(head.encode())
+        raw.recv(10)
+        raw.close()
+    assert ask(server, "/")[0].status == 200
+
+
+def test_a_port_that_is_taken_or_is_none_is_one_sentence(server: PageServer, run: Path) -> None:
+    for port in (server.port, 70_000, -1):
+        with pytest.raises(InvalidValueError, match=f"Port {port} is not available"):
+            PageServer(run, str, port)
+
+
+def test_the_command_says_where_and_ends_with_ctrl_c(run: Path, wait_s: float) -> None:
+    pytest.importorskip("jinja2")
+    code = "import typer; from roboirg.cli.report_commands import view; typer.run(view)"
+    with subprocess.Popen(
+        [sys.executable, "-c", code, str(run)], stdout=subprocess.PIPE, text=True,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    ) as process:  # fmt: skip
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        found = re.match(r"http://127\.0\.0\.1:(\d+)/", line)
+        assert found is not None, line
+        connection = http.client.HTTPConnection("127.0.0.1", int(found[1]))
+        connection.request("GET", "/")
+        text = connection.getresponse().read().decode()
+        connection.close()
+        assert "<title>run – RoboIRGBench</title>" in text
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=wait_s) == 0

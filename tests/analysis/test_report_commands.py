@@ -1,0 +1,114 @@
+"""The commands `tables` and `compare` on real folders of records."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from roboirg.cli.report_commands import compare, tables
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.evaluation.plan import make_plan, write_plan
+from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.records.store import RecordStore, StoreError
+
+app = typer.Typer()
+app.command()(tables)
+app.command()(compare)
+
+
+def write_run(folder: Path, policies: tuple[str, ...], leave_out: int = 0) -> None:
+    """The listener succeeds always, others in explicit only; the last episodes are not played."""
+    plan = make_plan(
+        policies, tasks="PickXtimes,StopCube", settings="explicit,direct", episodes="8"
+    )
+    with RecordStore(folder) as store:
+        jobs = plan.jobs()
+        for job in jobs[: len(jobs) - leave_out]:
+            won = job.policy == "listener" or job.setting == "explicit"
+            course = RolloutResult("success" if won else "failure", cause=None if won else "wrong")
+            store.append(make_record(job, course, started_at="now"))
+    write_plan(plan, folder)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("runs") / "both"
+    write_run(folder, ("listener", "forgetful"))
+    return folder
+
+
+def call(*words: object) -> str:
+    outcome = CliRunner().invoke(app, [str(word) for word in words], catch_exceptions=False)
+    assert outcome.exit_code == 0, outcome.output
+    return outcome.output
+
+
+def test_tables_are_printed(run: Path) -> None:
+    output = call("tables", run)
+    assert "Success by task and setting: Counting" in output
+    assert "100.00 →" in output
+    assert "0.00 ↓" in output
+    assert "Stages of the contextual" not in output
+    assert "RoboIRGBench" in output
+
+
+@pytest.mark.parametrize(
+    ("name", "suffix"), [("terminal", "txt"), ("markdown", "md"), ("latex", "tex"), ("csv", "csv")]
+)
+def test_tables_are_written(run: Path, tmp_path: Path, name: str, suffix: str) -> None:
+    out = tmp_path / "new" / "tables"
+    printed = call("tables", run, "--format", name, "--out", out, "--published")
+    files = sorted(path.name for path in out.iterdir())
+    assert files == [
+        f"{key}.{suffix}" for key in ("context", "coverage", "main", "planner", "real")
+    ]
+    assert str(out / f"main.{suffix}") in printed
+    assert "29.11" in (out / f"context.{suffix}").read_text()
+
+
+def test_published_tables_need_no_run() -> None:
+    assert "51.34" in call("tables", "--which", "planner", "--published", "--format", "markdown")
+    assert call("tables", "--format", "csv").startswith("table,source")
+    with pytest.raises(InvalidValueError, match="The table 'main' needs a run"):
+        call("tables", "--which", "main")
+    with pytest.raises(UnknownNameError, match="Did you mean 'planner'"):
+        call("tables", "--which", "planer")
+    with pytest.raises(UnknownNameError, match="There is no format 'pdf'"):
+        call("tables", "--format", "pdf")
+
+
+def test_what_the_run_lacks_is_said(run: Path, tmp_path: Path) -> None:
+    write_run(tmp_path / "part", ("listener",), leave_out=3)
+    output = call("tables", tmp_path / "part", "--which", "main", "--format", "markdown")
+    assert "100.00 …" in output
+    assert "3 trials of the plan are still to be played" in output
+    with pytest.raises(InvalidValueError, match="no results for the table 'real'"):
+        call("tables", run, "--which", "real")
+    with pytest.raises(StoreError, match="no records in"):
+        call("tables", tmp_path)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StoreError, match="Cannot write to"):
+        call("tables", run, "--out", tmp_path / "file")
+
+
+def test_two_policies_of_a_run_are_compared(run: Path) -> None:
+    output = call("compare", f"{run}:listener", f"{run}:forgetful")
+    assert "direct: listener is better, +100.0 points" in output
+    assert "explicit: no clear difference" in output
+    assert call("compare", f"{run}:listener", f"{run}:forgetful") == output
+    with pytest.raises(UnknownNameError, match="Did you mean 'listener'"):
+        call("compare", f"{run}:listner", f"{run}:forgetful")
+    with pytest.raises(InvalidValueError, match="name one as RUN:listener"):
+        call("compare", run, f"{run}:forgetful")
+
+
+def test_two_runs_of_a_policy_are_told_apart_by_their_folders(run: Path, tmp_path: Path) -> None:
+    write_run(tmp_path / "again", ("listener",), leave_out=3)
+    output = call("compare", tmp_path / "again", f"{run}:listener")
+    assert f"listener ({tmp_path / 'again'}) against" in " ".join(output.split())
+    assert "Incomplete: 3 trials" in output
+    with pytest.raises(StoreError, match="no records in"):
+        call("compare", tmp_path / "nowhere", run)

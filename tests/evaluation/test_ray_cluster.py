@@ -1,0 +1,113 @@
+"""A real Ray cluster of several nodes on this machine."""
+
+from __future__ import annotations
+
+import importlib
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from evaluation_fakes import FakePlayer, comparable, small_plan
+
+from roboirg.core.errors import InvalidValueError, RenderDeviceError, RoboIRGError
+from roboirg.evaluation.executors.executor import InProcess, LocalProcesses
+from roboirg.evaluation.executors.ray_cluster import RayCluster
+from roboirg.evaluation.runner import run_plan
+from roboirg.records.store import RECORDS_FILE, read_records
+
+ray = pytest.importorskip("ray")
+
+PLAN = small_plan(10)
+
+
+def all_comparable(folder: Path) -> list[dict[str, object]]:
+    records = sorted(read_records(folder), key=lambda record: record.slug)
+    return [comparable(record) for record in records]
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, object]]:
+    folder = tmp_path_factory.mktemp("here")
+    run_plan(PLAN, folder, FakePlayer(folder), InProcess())
+    return all_comparable(folder)
+
+
+@pytest.fixture
+def cluster() -> Iterator[Any]:
+    from ray.cluster_utils import Cluster
+
+    nodes = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+    yield nodes
+    ray.shutdown()
+    nodes.shutdown()
+
+
+def lines(folder: Path) -> int:
+    path = folder / RECORDS_FILE
+    return path.read_bytes().count(b"\n") if path.exists() else 0
+
+
+def test_records_are_those_of_one_process_even_if_a_node_is_killed_half_way(
+    cluster: Any, tmp_path: Path, here: list[dict[str, object]]
+) -> None:
+    doomed = cluster.add_node(num_cpus=1)
+    cluster.add_node(num_cpus=1)
+    ray.init(address=cluster.address, log_to_driver=False)
+    killed = threading.Event()
+
+    def kill() -> None:
+        while lines(tmp_path) < 5:
+            time.sleep(0.05)
+        cluster.remove_node(doomed, allow_graceful=False)
+        killed.set()
+
+    killer = threading.Thread(target=kill, daemon=True)
+    killer.start()
+    summary = run_plan(
+        PLAN.model_copy(update={"tries": 3}), tmp_path, FakePlayer(tmp_path, 0.5), RayCluster()
+    )
+    killer.join(30)
+    assert killed.is_set()
+    assert (summary.errors, summary.missing) == ((), 0)
+    # The episode that it had in hand was tried again.
+    assert lines(tmp_path) > len(here)
+    assert all_comparable(tmp_path) == here
+    for record in read_records(tmp_path):
+        assert (tmp_path / str(record.video)).read_text() == record.slug
+
+    # What would end every episode ends the run, from far away too.
+    with pytest.raises(RenderDeviceError, match="No Vulkan device"):
+        run_plan(PLAN, tmp_path / "b", FakePlayer(tmp_path, fatal=0), RayCluster(1))
+
+
+class Homebound:
+    """Needs a module that no machine has."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return importlib.import_module, ("only_at_home",)
+
+
+def test_what_the_machines_do_not_have_is_told(tmp_path: Path) -> None:
+    with pytest.raises(
+        RoboIRGError, match=r"No worker of the Ray cluster can start \(.*only_at_home"
+    ):
+        run_plan(PLAN, tmp_path, Homebound(), RayCluster(1))  # type: ignore[arg-type]
+
+
+def test_four_workers_give_the_same_records(tmp_path: Path, here: list[dict[str, object]]) -> None:
+    run_plan(PLAN, tmp_path, FakePlayer(tmp_path), LocalProcesses(4))
+    assert all_comparable(tmp_path) == here
+
+
+def test_a_cluster_that_is_not_there_is_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(RoboIRGError, match=r"cluster '127\.0\.0\.1:1' cannot be joined") as caught:
+        run_plan(PLAN, tmp_path, FakePlayer(tmp_path), RayCluster(address="127.0.0.1:1"))
+    assert "\n" not in str(caught.value)
+
+
+def test_no_workers_is_one_sentence() -> None:
+    with pytest.raises(InvalidValueError, match="workers is 0"):
+        RayCluster(0)

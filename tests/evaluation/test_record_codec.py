@@ -1,0 +1,100 @@
+"""Lines of a records file: older schemas, damaged lines, and very many of them."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from evaluation_fakes import FakePlay, small_plan
+
+from roboirg.evaluation.executors.executor import InProcess
+from roboirg.evaluation.runner import run_plan
+from roboirg.records.record import Job, Result
+from roboirg.records.record_codec import identity_key
+from roboirg.records.store import (
+    RECORDS_FILE,
+    RecordStore,
+    StoreError,
+    read_contents,
+    read_index,
+    read_records,
+    read_results,
+)
+
+
+def write(folder: Path, *lines: bytes) -> Path:
+    (folder / RECORDS_FILE).write_bytes(b"".join(lines))
+    return folder
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_records_of_older_schemas_are_refused(tmp_path: Path, version: int) -> None:
+    record = FakePlay()(small_plan().jobs()[0])
+    line = {**record.model_dump(mode="json"), "schema_version": version, "film_lost": None}
+    del line["video_error"]
+    write(tmp_path, json.dumps(line).encode() + b"\n")
+    sentence = f"line 1 has schema version {version}, but this roboirg reads only version 3;"
+    for read in (read_records, read_results, read_index, RecordStore):
+        with pytest.raises(StoreError, match=sentence):
+            read(tmp_path)
+
+
+def test_a_damaged_line_loses_only_its_episode(tmp_path: Path) -> None:
+    run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
+    lines = (tmp_path / RECORDS_FILE).read_bytes().splitlines(keepends=True)
+    write(tmp_path, *lines[:2], lines[2][:40] + b"\x00\xff\n", *lines[3:])
+    contents = read_contents(tmp_path / RECORDS_FILE)
+    assert (len(contents.records), contents.damaged, contents.torn) == (7, (3,), b"")
+    summary = run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
+    assert summary.played == 1
+    assert len(read_records(tmp_path)) == 8
+
+
+def test_results_are_records_without_the_course(tmp_path: Path) -> None:
+    run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
+    records, results = read_records(tmp_path), read_results(tmp_path)
+    for record, result in zip(records, results, strict=True):
+        assert type(result) is Result
+        assert dict(result) == {name: getattr(record, name) for name in Result.model_fields}
+
+
+def test_the_index_knows_a_job_by_all_its_fields() -> None:
+    job = small_plan().jobs()[0]
+    assert len(identity_key(job)) == len(Job.model_fields) - 1
+    others = {"stages": (1, 5), "demonstration_frames": 4, "actions": "ee_pose", "meshes": "light"}
+    for name, value in others.items():
+        assert identity_key(job.model_copy(update={name: value})) != identity_key(job)
+    assert identity_key(job.model_copy(update={"spec": "openpi://elsewhere"})) == identity_key(job)
+
+
+MANY = 100_000
+
+
+def test_very_many_records_need_little_memory(tmp_path: Path) -> None:
+    (record,) = [FakePlay()(small_plan(1).jobs()[0])]
+    # Long ones: what an episode of BinFill has in events.
+    record = record.model_copy(update={"events": record.events * 40})
+    line = record.model_dump_json().encode()
+    seed = b'"policy_seed":0'
+    assert line.count(seed) == 1
+    with (tmp_path / RECORDS_FILE).open("wb") as file:
+        for number in range(MANY):
+            file.write(line.replace(seed, b'"policy_seed":%d' % number) + b"\n")
+    code = (
+        "import pathlib, sys\n"
+        "from roboirg.records.store import RecordStore\n"
+        "with RecordStore(pathlib.Path(sys.argv[1])) as store:\n"
+        "    count = len(store.stored)\n"
+        # Not what `resource` tells, which may be the parent's from before the fork.
+        "status = pathlib.Path('/proc/self/status').read_text().split()\n"
+        "print(count, status[status.index('VmHWM:') + 1])\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=True
+    )
+    count, kilobytes = map(int, done.stdout.split())
+    assert count == MANY
+    assert kilobytes < 500_000

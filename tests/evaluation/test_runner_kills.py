@@ -1,0 +1,59 @@
+"""SIGKILL at random moments, again and again, and the same command after each of them."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import evaluation_fakes
+from evaluation_fakes import FakePlay, comparable, is_alive, small_plan, worker_pids
+
+from roboirg.evaluation.executors.executor import InProcess
+from roboirg.evaluation.runner import run_plan
+from roboirg.records.store import RECORDS_FILE, read_contents, read_records
+
+KILLS = int(os.environ.get("ROBOIRG_TEST_KILLS", "12"))
+EPISODES, SEEDS = 25, max(1, KILLS // 12)
+"""Two records each; more than the kills let through, so that the run is always being killed."""
+
+
+def test_after_any_number_of_sigkills_the_records_are_those_of_an_undisturbed_run(
+    tmp_path: Path,
+) -> None:
+    folder, undisturbed = tmp_path / "killed", tmp_path / "undisturbed"
+    folder.mkdir()
+    plan = small_plan(EPISODES, seeds=SEEDS)
+    run_plan(plan, undisturbed, FakePlay(), InProcess())
+    command = [
+        sys.executable,
+        evaluation_fakes.__file__,
+        str(folder),
+        str(EPISODES),
+        str(SEEDS),
+        "0.2",
+    ]
+    rng, seen, late = random.Random(0), 0, 0
+    for _ in range(KILLS):
+        child = subprocess.Popen(command)
+        # From before anything is imported to the middle of episodes.
+        time.sleep(rng.uniform(0.05, 2.5))
+        late += child.poll() is not None
+        child.send_signal(signal.SIGKILL)
+        child.wait()
+        contents = read_contents(folder / RECORDS_FILE)
+        # Nothing that was there is lost, nothing is doubled.
+        assert len(contents.records) >= seen
+        assert len({record.identity for record in contents.records}) == len(contents.records)
+        assert not contents.damaged
+        seen = len(contents.records)
+    assert subprocess.run(command, check=False).returncode == 0
+    assert not any(map(is_alive, worker_pids(folder)))
+    killed = {record.slug: comparable(record) for record in read_records(folder)}
+    assert killed == {record.slug: comparable(record) for record in read_records(undisturbed)}
+    assert read_contents(folder / RECORDS_FILE).torn == b""
+    assert late < KILLS / 2  # most of them hit a run

@@ -1,0 +1,203 @@
+"""The shipped splits are what the rule gives: scene, words and oracle agree."""
+
+import dataclasses
+import io
+from collections import Counter
+
+import pytest
+from rich.console import Console
+from seed_selection_fakes import die, refuse, take_the_third
+
+from roboirg.core.episode import SPLITS
+from roboirg.core.errors import InvalidValueError, RoboIRGError, SceneRejectedError
+from roboirg.episodes.splits import SIZES, TaskSplits, get_episode, shipped_splits, slot_seed
+from roboirg.evaluation.seed_selection import (
+    ACCEPTANCE_SETTINGS,
+    EpisodeSlot,
+    Rejection,
+    SelectedSeed,
+    check_kept_splits,
+    check_seed,
+    check_words,
+    episode_slots,
+    find_seed,
+    find_seeds,
+    merge_splits,
+)
+from roboirg.evaluation.seed_summary import cause_lines, follow_progress, print_summary
+from roboirg.language import expressible, find_refusals
+from roboirg.language.settings import all_settings, settings_of
+from roboirg.tasks import every_task, get_task
+
+TASKS = tuple(every_task())
+each_task = pytest.mark.parametrize("task", TASKS)
+
+
+def passed_over(slot):
+    return shipped_splits()[slot.task].passed_over.get(f"{slot.split}/{slot.index}", 0)
+
+
+def first_seed(slot):
+    return slot_seed(get_task(slot.task), slot.split, slot.index)
+
+
+@each_task
+def test_every_setting_of_every_episode_can_be_expressed(task):
+    for split in SPLITS:
+        for index in range(SIZES[split]):
+            assert expressible(get_episode(task, split, index)) == settings_of(get_task(task))
+
+
+@each_task
+def test_scene_and_words_allow_the_shipped_seeds_and_rule_out_no_more_than_were_passed_over(task):
+    for slot in episode_slots([task]):
+        ruled_out = len(find_seed(slot, check_words).rejections)
+        assert ruled_out <= passed_over(slot)
+        assert check_words(slot, first_seed(slot) + passed_over(slot)) is None
+
+
+@pytest.mark.sim
+@each_task
+def test_the_rule_gives_the_shipped_seeds(task):
+    """For a plain episode, and for one for which seeds were passed over."""
+    refused = [slot for slot in episode_slots([task]) if passed_over(slot)]
+    for slot in (EpisodeSlot(task, "test", 1), *refused[-1:]):
+        assert len(find_seed(slot, check_seed).rejections) == passed_over(slot), slot.key
+
+
+@pytest.mark.sim
+@each_task
+def test_seeds_passed_over_for_the_oracle_s_sake_had_to_be(task):
+    """A seed that scene and words allow was only passed over if the oracle fails there."""
+    allowed = [
+        (slot, seed)
+        for slot in episode_slots([task])
+        for seed in range(first_seed(slot), first_seed(slot) + passed_over(slot))
+        if check_words(slot, seed) is None
+    ]
+    for slot, seed in allowed[:2]:
+        rejection = check_seed(slot, seed)
+        assert rejection is not None, (slot.key, seed)
+        assert rejection.reason == "oracle failed"
+
+
+def test_the_first_seed_that_can_be_taken_is_found_with_what_was_amiss_before():
+    found = find_seed(EpisodeSlot("PickXtimes", "val", 4), take_the_third)
+    assert [one.seed for one in found.rejections] == [1_010_400, 1_010_401]
+    with pytest.raises(
+        SceneRejectedError, match=r"1010400 to 1010499 .* PickXtimes/val/4.*timeout"
+    ):
+        find_seed(EpisodeSlot("PickXtimes", "val", 4), refuse)
+
+
+def test_reasons_are_told_apart():
+    assert check_words(EpisodeSlot("VideoUnmask", "val", 15), 1_061_500) == Rejection(
+        1_061_500,
+        "not expressible",
+        "spatial: no landmark singles out a target",
+    )
+    rejections = find_seed(EpisodeSlot("VideoPlaceOrder", "train", 3), check_words).rejections
+    assert {one.reason for one in rejections} == {"no room"}
+    assert all("no place for" in one.cause for one in rejections)
+
+
+def test_a_new_setting_does_not_change_which_seeds_are_accepted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    slots = [EpisodeSlot("VideoUnmask", "val", index) for index in (0, 15)]
+    before = [find_seed(slot, check_words) for slot in slots]
+    mute = dataclasses.replace(
+        all_settings()["direct"], name="mute", order=9, refusal=lambda _request: "it is mute"
+    )
+    every = {**all_settings(), "mute": mute}
+    monkeypatch.setattr("roboirg.language.settings.all_settings", lambda: every)
+    episode = get_episode("VideoUnmask", "val", 0)
+    assert "mute" in settings_of(get_task("VideoUnmask"))
+    assert "mute" not in expressible(episode)
+    assert find_refusals(episode) == {"mute": "it is mute"}
+    assert [find_seed(slot, check_words) for slot in slots] == before
+
+
+def test_seeds_are_accepted_by_the_settings_of_the_first_release() -> None:
+    assert set(ACCEPTANCE_SETTINGS) <= set(all_settings())
+    assert [*ACCEPTANCE_SETTINGS] == ["explicit", "direct", "reasoning", "contextual", "spatial"]
+
+
+def test_processes_find_what_one_finds():
+    slots = episode_slots(["VideoPlaceButton"], ["val"])
+    alone = list(find_seeds(slots, 0, check_words))
+    assert [one.slot for one in alone] == list(slots)
+    assert any(one.rejections for one in alone)
+    console = Console(file=io.StringIO(), width=100)
+    assert list(follow_progress(find_seeds(slots, 2, check_words), slots, console)) == alone
+    assert "[50/50]" in console.file.getvalue()
+
+
+def test_what_ends_a_search_is_named():
+    slots = episode_slots(["PickXtimes"], ["val"])[:3]
+    with pytest.raises(SceneRejectedError, match="PickXtimes/val/0"):
+        list(find_seeds(slots[:1], 1, refuse))
+    with pytest.raises(RoboIRGError, match="worker process died"):
+        list(find_seeds(slots, 1, die))
+    with pytest.raises(InvalidValueError, match="workers is -1"):
+        list(find_seeds(slots, -1))
+
+
+def test_what_was_not_built_again_stays():
+    slots = episode_slots(["VideoUnmask"], ["test"])
+    built = [SelectedSeed(slot, ()) for slot in slots]
+    now = merge_splits(built, shipped_splits())
+    assert now == dict(shipped_splits())
+    assert list(now) == list(TASKS)
+    three = (Rejection(0, "no room", "no place"),) * 3
+    now = merge_splits([SelectedSeed(slots[7], three), *built[:7], *built[8:]], shipped_splits())
+    assert now["VideoUnmask"].passed_over == {
+        **shipped_splits()["VideoUnmask"].passed_over,
+        "test/7": 3,
+    }
+    assert now["VideoUnmask"].sha256 != shipped_splits()["VideoUnmask"].sha256
+    assert now["PickXtimes"] == shipped_splits()["PickXtimes"]
+
+
+def test_only_what_is_valid_can_stay():
+    check_kept_splits(["VideoUnmask"], ["test"], shipped_splits())
+    check_kept_splits(["VideoUnmask"], SPLITS, {})
+    with pytest.raises(
+        InvalidValueError, match=r"VideoUnmask/train/0 .* all splits of VideoUnmask"
+    ):
+        check_kept_splits(["VideoUnmask"], ["test"], {})
+    with pytest.raises(InvalidValueError, match=r"VideoUnmask/val/15"):
+        check_kept_splits(["VideoUnmask"], ["train", "test"], {"VideoUnmask": TaskSplits("", {})})
+
+
+def test_the_summary_tells_how_many_and_why():
+    easy, hard = EpisodeSlot("PickXtimes", "val", 0), EpisodeSlot("PickXtimes", "val", 3)
+    found = [
+        SelectedSeed(easy, (Rejection(5, "no room", "no place for cube_red"),)),
+        SelectedSeed(
+            hard,
+            (
+                Rejection(7, "not expressible", "spatial"),
+                Rejection(8, "oracle failed", "timeout"),
+                Rejection(9, "oracle failed", "timeout"),
+            ),
+        ),
+    ]
+    console = Console(file=io.StringIO(), width=80)
+    print_summary(found, console)
+    rows = [line.split() for line in console.file.getvalue().splitlines()]
+    cells = Counter({row[3]: row for row in rows if "PickXtimes" in row[1:2]})
+    assert [part for part in cells["easy"] if part != "│"] == [
+        "PickXtimes",
+        "easy",
+        *"121",
+        "50",
+        "%",
+    ]
+    assert [part for part in cells["hard"] if part != "│"] == [
+        "PickXtimes", "hard", *"1412", "75", "%",
+    ]  # fmt: skip
+    assert cause_lines(found) == [
+        "PickXtimes: 1 × not expressible: spatial (first: PickXtimes/val/3, seed 7)",
+        "PickXtimes: 2 × oracle failed: timeout (first: PickXtimes/val/3, seed 8)",
+    ]

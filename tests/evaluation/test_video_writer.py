@@ -1,0 +1,80 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from roboirg.evaluation.video_writer import (
+    DEMONSTRATION_COLOR,
+    GAP,
+    VideoOptions,
+    VideoWriter,
+    compose_frame,
+)
+
+av = pytest.importorskip("av")
+
+
+class Grey:
+    def picture(self, camera: str) -> np.ndarray:
+        return np.full((256, 256, 3), 200 if camera == "wrist" else 90, np.uint8)
+
+
+def test_a_video_is_small_playable_and_appears_when_complete(tmp_path: Path) -> None:
+    video = VideoWriter(tmp_path / "videos" / "x.mp4")
+    video.add_frame(Grey(), True)
+    for _ in range(20):
+        video.add_frame(Grey())
+    assert not video.path.exists()
+    assert video.finish()
+    assert sorted(path.name for path in video.path.parent.iterdir()) == ["x.jpg", "x.mp4"]
+    assert video.path.stat().st_size < 20_000
+    with av.open(str(video.path)) as container:
+        stream = container.streams.video[0]
+        assert stream.codec_context.name == "h264"
+        assert stream.codec_context.pix_fmt == "yuv420p"
+        assert (stream.width, stream.height, stream.average_rate) == (512 + GAP, 256, 10)
+        frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(stream)]
+    assert len(frames) > 21
+    assert np.abs(frames[0][1, 100].astype(int) - DEMONSTRATION_COLOR).max() < 40
+    assert abs(int(frames[-1][128, 128, 0]) - 90) < 8
+    assert abs(int(frames[-1][128, 384, 0]) - 200) < 8
+
+
+def test_a_video_thrown_away_leaves_nothing(tmp_path: Path) -> None:
+    video = VideoWriter(tmp_path / "x.mp4", VideoOptions(cameras=("front",)))
+    video.add_frame(Grey())
+    video.discard()
+    assert not video.finish()
+    assert list(tmp_path.iterdir()) == []
+
+
+class Broken:
+    def close(self) -> None:
+        raise OSError("disk full")
+
+
+def test_throwing_away_never_raises(tmp_path: Path) -> None:
+    video = VideoWriter(tmp_path / "x.mp4", VideoOptions(cameras=("front",)))
+    video._container = Broken()  # type: ignore[assignment]
+    video.partial.mkdir()  # cannot be unlinked
+    video.discard()
+    assert video._container is None
+    assert not video.finish()
+
+
+def test_only_the_demonstration_has_a_border() -> None:
+    pictures = [Grey().picture("front"), Grey().picture("wrist")]
+    assert tuple(compose_frame(pictures, is_demonstration=True)[0, 0]) == DEMONSTRATION_COLOR
+    assert tuple(compose_frame(pictures, is_demonstration=False)[0, 0]) == (90, 90, 90)
+
+
+def test_a_black_line_parts_the_pictures() -> None:
+    frame = compose_frame(
+        [Grey().picture("front"), Grey().picture("wrist")], is_demonstration=False
+    )
+    assert frame.shape == (256, 512 + GAP, 3)
+    assert not frame[:, 256 : 256 + GAP].any()
+    assert frame[:, :256].min() == frame[:, :256].max() == 90
+    assert frame[:, 256 + GAP :].min() == 200

@@ -1,0 +1,211 @@
+"""A policy that misbehaves in every way costs its own episodes and nothing else."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import re
+import signal
+import time
+from collections import Counter
+from pathlib import Path
+
+import chaos_policy
+import pytest
+from evaluation_fakes import FakePlay, comparable, small_plan
+
+from roboirg.core.errors import RoboIRGError
+from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
+from roboirg.evaluation.executors.executor import LocalProcesses
+from roboirg.evaluation.executors.workers import Worker
+from roboirg.evaluation.plan import Plan
+from roboirg.evaluation.rollout import EpisodeRunner, load_policy
+from roboirg.evaluation.runner import UNREACHABLE_AFTER, RunSummary, run_plan
+from roboirg.records.record import Job, Record
+from roboirg.records.store import read_records
+
+TIMEOUT_S = 3.0
+
+
+def plan_of_chaos() -> Plan:
+    """Enough episodes for every misdeed to happen, and twice as many good ones."""
+    plan = Plan(
+        policies=(chaos_policy.SPEC,),
+        tasks=("PickXtimes",),
+        settings=("direct",),
+        episodes=tuple(range(50)),
+        policy_seeds=tuple(range(4)),
+        max_steps=15,
+        policy_timeout_s=TIMEOUT_S,
+        tries=1,
+    )
+    jobs, chosen, met = plan.jobs(), [], Counter[str | None]()
+    for job in jobs:
+        misdeed = load_policy(job).misdeed  # type: ignore[attr-defined]
+        if met[misdeed] < (1 if misdeed else 2 * len(chaos_policy.KINDS)):
+            met[misdeed] += 1
+            chosen.append(job)
+    assert set(met) == {None, *chaos_policy.KINDS}
+
+    class Chosen(Plan):
+        def jobs(self) -> tuple[Job, ...]:
+            return tuple(chosen)
+
+    return Chosen(**dict(plan))
+
+
+def play(plan: Plan, folder: Path) -> tuple[RunSummary, dict[Job, Record]]:
+    player = EpisodeRunner(folder, policy_timeout_s=plan.policy_timeout_s)
+    summary = run_plan(plan, folder, player, LocalProcesses(2, episode_timeout_s=600))
+    return summary, {record.identity: record for record in read_records(folder)}
+
+
+@pytest.fixture
+def plan(monkeypatch: pytest.MonkeyPatch) -> Plan:
+    monkeypatch.syspath_prepend(Path(chaos_policy.__file__).parent)
+    return plan_of_chaos()
+
+
+@pytest.mark.sim
+def test_a_policy_of_chaos_costs_its_own_episodes_and_nothing_else(
+    plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    summary, wild = play(plan, tmp_path / "wild")
+    monkeypatch.setenv(chaos_policy.CALM, "1")
+    _, calm = play(plan, tmp_path / "calm")
+
+    assert (summary.missing, summary.total) == (0, len(plan.jobs()))
+    assert len(summary.errors) == len(chaos_policy.KINDS)
+    for job, record in wild.items():
+        misdeed = chaos_policy.misdeed(record.policy_metadata.get("seed", _seed(job)))  # type: ignore[arg-type]
+        if misdeed is None:
+            assert comparable(record) == comparable(calm[job])
+            assert record.usage == {"calls": 3.0}
+        else:
+            assert (misdeed, record.outcome, record.error) == (
+                misdeed,
+                "error",
+                chaos_policy.KINDS[misdeed],
+            )
+            assert record.cause is not None
+            assert record.cause.startswith(chaos_policy.KINDS[misdeed].replace("_", " ") + ": ")
+            assert "\n" not in record.cause
+    causes = {misdeed: wild[job].cause for job, misdeed in _misdeeds(plan).items()}
+    assert causes["hang"] == "timeout: the policy's act() did not return in time"
+    assert causes["hang in reset"] == "timeout: the policy's reset() did not return in time"
+    crash = f"policy: the process died of signal {signal.SIGSEGV:d} in the policy's act()"
+    assert causes["crash"] == crash
+    assert causes["die"] == "policy: the process ended with exit code 0 in the policy's act()"
+    assert causes["too much"] == (
+        "invalid action: 200000 actions at once are too many; at most 10000."
+    )
+    assert "1000013 characters of JSON; at most 65536" in str(causes["wordy"])
+
+
+def _misdeeds(plan: Plan) -> dict[Job, str]:
+    found = {job: chaos_policy.misdeed(_seed(job)) for job in plan.jobs()}
+    return {job: misdeed for job, misdeed in found.items() if misdeed is not None}
+
+
+def _seed(job: Job) -> int:
+    return load_policy(job).seed  # type: ignore[attr-defined]
+
+
+def sleepy(job: Job) -> Record:
+    time.sleep(3600)
+    raise AssertionError(job)
+
+
+def test_an_episode_that_takes_too_long_is_ended_and_named(tmp_path: Path) -> None:
+    plan = small_plan(1)
+    executor = LocalProcesses(2, episode_timeout_s=0.5)
+    summary = run_plan(plan, tmp_path, sleepy, executor)
+    assert len(summary.errors) == 2
+    for record in read_records(tmp_path):
+        assert record.error == "timeout"
+        # The process may not have got as far as the episode.
+        phase = "(worker startup|environment)"
+        words = rf"timeout: the episode took longer than 0\.5 s \(now in the {phase}\)"
+        assert re.fullmatch(words, str(record.cause))
+        assert record.duration_s >= 0.5
+
+
+def crashing(job: Job) -> Record:
+    ctypes.string_at(0)
+    raise AssertionError(job)
+
+
+def test_a_crash_in_the_simulators_native_code_is_the_worlds(tmp_path: Path) -> None:
+    plan = small_plan(1)
+    summary = run_plan(plan, tmp_path, crashing, LocalProcesses(2))
+    assert (summary.total, len(summary.errors)) == (2, 2)
+    for record in read_records(tmp_path):
+        # Such a crash may pass, so it was tried again.
+        assert (record.error, record.attempt) == ("environment", 2)
+        assert record.cause == (
+            f"environment: the process died of signal {signal.SIGSEGV:d} in the environment"
+        )
+
+
+class Homeless:
+    """Cannot be received by another process."""
+
+    def __call__(self, job: Job) -> Record:
+        raise AssertionError(job)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return os._exit, (3,)
+
+
+def test_processes_that_cannot_start_end_the_run(tmp_path: Path) -> None:
+    words = r"No worker process can start \(environment: .* exit code 3 in the worker startup\)"
+    with pytest.raises(RoboIRGError, match=words):
+        run_plan(small_plan(50), tmp_path, Homeless(), LocalProcesses(2))
+    assert len(read_records(tmp_path)) < 10
+
+
+def test_an_overdue_worker_is_killed() -> None:
+    worker = Worker.start(sleepy, small_plan(1).jobs()[0])
+    assert worker.kill_if_overdue(3600) is None
+    record = worker.kill_if_overdue(0.0)
+    assert record is not None
+    assert worker.is_dead
+    assert worker.process.exitcode == -signal.SIGKILL
+
+
+@pytest.mark.parametrize(
+    ("whom", "error", "kind"),
+    [
+        ("policy", ConnectionRefusedError("refused"), "connection"),
+        ("policy", TimeoutError("slow"), "timeout"),
+        ("policy", OSError("odd"), "policy"),
+        ("environment", TimeoutError("slow"), "environment"),
+    ],
+)
+def test_whose_fault_it_is(whom: str, error: Exception, kind: str) -> None:
+    with pytest.raises(EpisodeError) as caught, attribute_errors(whom):  # type: ignore[arg-type]
+        raise error
+    assert caught.value.kind == kind
+
+
+class Unreachable:
+    """Every episode of one policy ends without a connection."""
+
+    def __init__(self, policy: str) -> None:
+        self.policy = policy
+
+    def __call__(self, job: Job) -> Record:
+        record = FakePlay()(job)
+        if job.policy != self.policy:
+            return record
+        lost = {"outcome": "error", "error": "connection", "cause": "connection: refused"}
+        return record.model_copy(update=lost)
+
+
+def test_a_policy_that_cannot_be_reached_is_left_and_the_others_go_on(tmp_path: Path) -> None:
+    plan = small_plan(50, ("random", "oracle"))
+    summary = run_plan(plan, tmp_path, Unreachable("random"), LocalProcesses(1))
+    assert summary.unreachable == ("random",)
+    assert len(summary.errors) == UNREACHABLE_AFTER
+    assert summary.missing == 100 - UNREACHABLE_AFTER
+    assert sum(record.policy == "oracle" for record in read_records(tmp_path)) == 100

@@ -1,0 +1,184 @@
+"""An installed package adds a task, a setting and a protocol: the recipes of the docs."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import sysconfig
+import venv
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+RECIPES = {
+    "task": ("tasks.md", "Add a task"),
+    "setting": ("language.md", "Add a setting"),
+    "protocol": ("policies.md", "Add a protocol"),
+}
+PYPROJECT = """\
+[build-system]
+requires = ["hatchling"]
+build-backend = "hatchling.build"
+
+[project]
+name = "roboirg-outside"
+version = "1.0"
+
+[project.entry-points."roboirg.tasks"]
+outside = "roboirg_outside.task"
+
+[project.entry-points."roboirg.settings"]
+outside = "roboirg_outside.setting:SETTING"
+
+[project.entry-points."roboirg.protocols"]
+outside = "roboirg_outside.protocol"
+"""
+WITH_SETTING = "PickXtimes"
+"""A task of the benchmark to which the recipe's setting applies."""
+NAMES = """\
+from roboirg_outside.protocol import PROTOCOL
+from roboirg_outside.setting import SETTING
+from roboirg_outside.task import TASK
+import json
+print(json.dumps([TASK.name, SETTING.name, PROTOCOL.name, list(PROTOCOL.schemes)]))
+"""
+UNCHANGED = """\
+import sys
+sys.path[:0] = [{language!r}]
+import test_golden
+from roboirg.episodes.splits import fingerprint_of, shipped_splits
+for task, splits in shipped_splits().items():
+    assert fingerprint_of(task, splits.passed_over) == splits.sha256, task
+for (task, setting), expected in test_golden.GOLDEN.items():
+    assert test_golden.digest(task, setting) == expected, (task, setting)
+"""
+
+
+def recipe(page: str, heading: str) -> str:
+    """The first Python block of a section, as it stands in the docs."""
+    text = (ROOT / "docs" / page).read_text()
+    section = re.search(rf"^##+ {heading}\n(.*?)(?=^##|\Z)", text, flags=re.DOTALL | re.MULTILINE)
+    assert section, f"docs/{page} has no section {heading!r}"
+    block = re.search(r"```python\n(.*?)```", section[1], flags=re.DOTALL)
+    assert block, f"the section {heading!r} of docs/{page} has no Python block"
+    return block[1]
+
+
+@pytest.fixture(scope="module")
+def outside(tmp_path_factory):
+    """Install the recipes as a package into an environment of its own; yield its Python."""
+    folder = tmp_path_factory.mktemp("outside")
+    package = folder / "project" / "roboirg_outside"
+    package.mkdir(parents=True)
+    (package / "__init__.py").write_text('"""Three additions."""\n')
+    (package.parent / "pyproject.toml").write_text(PYPROJECT)
+    for name, (page, heading) in RECIPES.items():
+        (package / f"{name}.py").write_text(recipe(page, heading))
+    venv.create(folder / "env", with_pip=False)
+    python = folder / "env" / "bin" / "python"
+    scheme = {"base": str(folder / "env"), "platbase": str(folder / "env")}
+    site = Path(sysconfig.get_path("purelib", vars=scheme))
+    # The environment sees what this one has, and the package under test.
+    here = [sysconfig.get_path("purelib"), str(ROOT / "src")]
+    (site / "parent.pth").write_text("\n".join(here) + "\n")
+    install = ["install", "--quiet", "--no-deps", "--no-build-isolation", str(package.parent)]
+    subprocess.run([sys.executable, "-m", "pip", f"--python={python}", *install], check=True)
+    return python
+
+
+@pytest.fixture(scope="module")
+def names(outside):
+    return json.loads(subprocess.run([outside, "-c", NAMES], check=True, stdout=-1).stdout)
+
+
+@pytest.fixture(scope="module")
+def roboirg(outside, tmp_path_factory):
+    """Run a command in that environment and return what it prints."""
+    folder = tmp_path_factory.mktemp("work")
+
+    def run(*words: str) -> str:
+        command = [str(outside), "-m", "roboirg", *words]
+        env = {**os.environ, "COLUMNS": "200", "ROBOIRG_CACHE": "off"}
+        done = subprocess.run(
+            command, cwd=folder, env=env, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, f"{' '.join(words)}\n{done.stdout}\n{done.stderr}"
+        return done.stdout
+
+    run.folder = folder
+    return run
+
+
+def test_commands_list_what_the_package_adds(roboirg, names):
+    task, setting, protocol, _ = names
+    listed = {line.split()[0]: line for line in roboirg("tasks").splitlines()}
+    assert "explicit" in listed[task]
+    assert setting in listed[WITH_SETTING]
+    assert protocol in roboirg("serve", "--help")
+
+
+def test_words_of_the_new_setting_are_validated(roboirg, names):
+    task, setting, *_ = names
+    tasks = f"{task},{WITH_SETTING}"
+    said = roboirg("language", "validate", "--tasks", tasks, "--split", "test", "--seeds", "6")
+    assert {task, setting} <= set(said.replace("│", " ").split())
+    assert setting in roboirg("instruct", WITH_SETTING, "0", "--setting", setting)
+    roboirg("language", "card", "--out", "card.md")
+    assert f"### {WITH_SETTING}, {setting}" in (roboirg.folder / "card.md").read_text()
+    roboirg(
+        "export", "instructions", "--tasks", tasks, "--settings", setting, "--split", "test",
+        "--out", "words.jsonl",
+    )  # fmt: skip
+    rows = [json.loads(line) for line in (roboirg.folder / "words.jsonl").open()]
+    assert {row["setting"] for row in rows} == {setting}
+
+
+@pytest.mark.sim
+def test_an_episode_of_each_is_played_and_shown(roboirg, names):
+    task, setting, *_ = names
+    roboirg(
+        "run", "--policy", "listener", "--tasks", f"{task},{WITH_SETTING}", "--settings", "all",
+        "--episodes", "1", "--out", "played",
+    )  # fmt: skip
+    records = [json.loads(line) for line in (roboirg.folder / "played/records.jsonl").open()]
+    played = {(one["task"], one["setting"]) for one in records}
+    assert {(task, "direct"), (WITH_SETTING, "direct"), (WITH_SETTING, setting)} <= played
+    assert {one["outcome"] for one in records} == {"success"}
+    roboirg("report", "played")
+    page = (roboirg.folder / "played/report.html").read_text()
+    assert task in page
+    assert setting in page
+    table = roboirg("tables", "played", "--format", "csv")
+    assert task in table
+    assert setting in table
+    roboirg("figures", "played", "--out", "figures")
+    assert any(setting in path.read_text() for path in (roboirg.folder / "figures").glob("*.svg"))
+
+
+@pytest.mark.sim
+def test_the_new_protocol_serves_and_plays(outside, roboirg, names):
+    _, _, protocol, schemes = names
+    server = subprocess.Popen(
+        [outside, "-m", "roboirg", "serve", "random", "--protocol", protocol, "--port", "0"],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        address = re.search(rf"{re.escape(schemes[0])}://[\w.:]+", server.stdout.readline())
+        assert address, "serve does not print its address"
+        roboirg(
+            "run", "--policy", address[0], "--tasks", WITH_SETTING, "--settings", "explicit",
+            "--episodes", "1", "--max-steps", "20", "--out", "served",
+        )  # fmt: skip
+    finally:
+        server.terminate()
+        server.wait(60)
+    (record,) = [json.loads(line) for line in (roboirg.folder / "served/records.jsonl").open()]
+    assert (record["outcome"], record["steps"]) == ("failure", 20)
+
+
+def test_the_other_episodes_and_words_have_not_changed(outside):
+    script = UNCHANGED.format(language=str(ROOT / "tests" / "language"))
+    subprocess.run([outside, "-c", script], check=True)

@@ -1,0 +1,157 @@
+"""One table says what each kind of fact means, and a kind from outside needs nothing else."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import roboirg
+from roboirg.analysis.page.details import event_text
+from roboirg.core import fact_traits
+from roboirg.core.conditions import Fact, Rule, facts_of
+from roboirg.core.episode import Primitive, Scene, SceneObject, Stage
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.fact_traits import FACT_TRAITS, FactRole, FactTraits, register_fact_kind
+from roboirg.core.motions import Glow, Point, Shuttle, Vanish
+from roboirg.episodes.splits import get_episode
+from roboirg.judging import Judge
+from roboirg.judging.grounding_errors import classify_grounding_error
+from roboirg.records.record import EventRecord
+from roboirg.tasks import every_task
+from roboirg.visualization.episode_text import fact_words
+
+SOURCE = Path(roboirg.__file__).parent
+
+
+def literal_kinds() -> Iterator[tuple[str, str]]:
+    """The module and kind of every ``Fact("kind", ...)`` in the package."""
+    for path in SOURCE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            match node:
+                case ast.Call(func=ast.Name("Fact"), args=[ast.Constant(str(kind)), *_]):
+                    yield path.stem, kind
+
+
+def test_every_kind_that_is_detected_has_traits_and_the_other_way_round() -> None:
+    detected = {kind for module, kind in literal_kinds() if module == "fact_detection"}
+    assert detected == set(FACT_TRAITS)
+    assert {kind for _, kind in literal_kinds()} == set(FACT_TRAITS)
+
+
+@pytest.mark.parametrize("task", every_task())
+def test_facts_of_tasks_have_kinds_and_are_about_the_objects_of_their_kinds(task: str) -> None:
+    for index in range(8):
+        episode = get_episode(task, "test", index)
+        stages = (*episode.demonstration, *episode.stages)
+        facts = {fact for stage in stages for fact in facts_of(stage.expects)}
+        facts |= {fact for stage in stages for one in stage.forbids for fact in facts_of(one)}
+        facts |= set(episode.scene.past)
+        for motion in episode.scene.motions:
+            match motion:
+                case Glow(during=fact) | Vanish(when=fact) | Shuttle(stopped_by=fact):
+                    facts.add(fact)
+        for fact in facts:
+            traits = FACT_TRAITS[fact.kind]
+            kinds = {item.name: item.kind for item in episode.scene.objects} | {"robot": "robot"}
+            assert kinds[fact.subject] in traits.subjects, fact
+            assert (fact.place is None) == (not traits.places), fact
+            assert fact.place is None or kinds[fact.place] in traits.places, fact
+
+
+@pytest.mark.parametrize("kind", FACT_TRAITS)
+def test_traits_agree(kind: str) -> None:
+    traits = FACT_TRAITS[kind]
+    assert traits.holds_while
+    words = traits.past.format(subject="SUBJECT", place="PLACE")
+    assert ("PLACE" in words) == bool(traits.places)
+    assert ("SUBJECT" in words) == (traits.subjects != ("robot",))
+    assert (traits.role is FactRole.STATE) <= (not traits.touches)
+
+
+def test_an_unknown_kind_in_a_record_is_called_by_its_name() -> None:
+    assert fact_words(Fact("turned_over", "cup")) == "cup turned over"
+    assert not Fact("turned_over", "cup").traits.lasts
+
+
+# From outside
+
+TOPPLED = Fact("toppled", "pillar")
+
+
+@pytest.fixture
+def toppled(monkeypatch: pytest.MonkeyPatch) -> FactTraits:
+    monkeypatch.setattr(fact_traits, "_TRAITS", added := dict(FACT_TRAITS))
+    monkeypatch.setattr(fact_traits, "FACT_TRAITS", added)
+    traits = FactTraits(
+        role=FactRole.PRESS,
+        subjects=("pillar",),
+        holds_while="its center has been beyond x 0.05",
+        past="knocked {subject} over",
+        state="knocked over",
+        lasts=True,
+        detect=lambda context: (
+            Fact("toppled", name)
+            for name, body in context.bodies.items()
+            if body.item.kind == "pillar" and body.position.x > 0.05
+        ),
+    )
+    register_fact_kind("toppled", traits)
+    return traits
+
+
+def stage(expects: Fact, *forbids: Fact | Rule) -> Stage:
+    return Stage(expects, forbids, Primitive("hold", "robot"), "leave the pillar alone")
+
+
+def test_a_kind_from_outside_is_judged_and_described(toppled: FactTraits) -> None:
+    home = Fact("home", "robot")
+    pillar = SceneObject("pillar", "pillar", Point(0.0, 0.0, 0.05), color="red")
+    judge = Judge([stage(home, TOPPLED)], Scene((pillar,)))
+    judge.update(0, frozenset([TOPPLED]))
+    assert judge.cause == "knocked the red pillar over; expected: leave the pillar alone"
+    assert fact_words(TOPPLED) == "pillar knocked over"
+    event = EventRecord(step=3, kind="toppled", subject="pillar", place=None, holds=True)
+    assert event_text(event) == "pillar knocked over"
+    picked = Fact("picked", "cube")
+    plan = [stage(picked), stage(TOPPLED)]
+    assert classify_grounding_error(TOPPLED, plan, 0) == "wrong_count"
+    register_fact_kind("toppled", toppled)
+    with pytest.raises(InvalidValueError, match="already a kind of fact 'picked'"):
+        register_fact_kind("picked", toppled)
+
+
+@pytest.mark.sim
+def test_kinds_of_fact_and_object_from_outside_are_simulated(
+    toppled: FactTraits, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from sapien.wrapper.actor_builder import ActorBuilder
+
+    from roboirg.simulation import bodies, fact_detection
+    from roboirg.simulation.physics_settings import HOME_ACTION
+    from roboirg.simulation.world import World
+
+    def build_pillar(scene, item, visible):  # type: ignore[no-untyped-def]
+        builder = ActorBuilder()
+        builder.add_box_collision(half_size=[0.02, 0.02, 0.05])
+        if visible:
+            builder.add_box_visual(half_size=[0.02, 0.02, 0.05])
+        return bodies.finish_body(builder, scene, item, "dynamic")
+
+    monkeypatch.setattr(fact_detection, "FACT_TRAITS", fact_traits.FACT_TRAITS)
+    scene = Scene((SceneObject("pillar", "pillar", Point(0.0, 0.0, 0.05)),))
+    with pytest.raises(UnknownNameError, match="no kind of object 'pillar'"):
+        World(scene, visible=False)
+    monkeypatch.setattr(bodies, "_BUILDERS", added := dict(bodies.BODY_BUILDERS))
+    monkeypatch.setattr(bodies, "BODY_BUILDERS", added)
+    bodies.register_body_builder("pillar", build_pillar)
+    with pytest.raises(InvalidValueError, match="already a kind of object 'cube'"):
+        bodies.register_body_builder("cube", build_pillar)
+    world = World(scene, visible=False)
+    assert TOPPLED not in world.step(HOME_ACTION)
+    world.bodies["pillar"].put(Point(0.1, 0.0, 0.05))
+    assert TOPPLED in world.step(HOME_ACTION)
+    world.bodies["pillar"].put(Point(0.0, 0.0, 0.05))
+    assert TOPPLED in world.step(HOME_ACTION)

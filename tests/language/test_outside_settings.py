@@ -1,0 +1,184 @@
+"""A setting from outside: one file is enough for validation, card, statistics and export."""
+
+import dataclasses
+import io
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.episodes.splits import get_episode
+from roboirg.evaluation import seed_selection
+from roboirg.evaluation.plan import make_plan
+from roboirg.evaluation.seed_selection import EpisodeSlot, check_words
+from roboirg.language import (
+    FORMS,
+    card,
+    corpus_statistics,
+    expressible,
+    expression_figure,
+    find_refusals,
+    instruct,
+    instruct_with,
+    setting_names,
+    settings,
+    statistics_tables,
+)
+from roboirg.language.export import row
+from roboirg.language.setting import Setting
+from roboirg.language.settings import all_settings, direct
+from roboirg.language.validation import Batch, check_episode, episode_checks, validate_batch
+from roboirg.language.validation.validation_tables import validation_tables
+from roboirg.language.variants import all_variants, instructions, split_episodes
+from roboirg.tasks import all_tasks
+from roboirg.visualization.episode_text import instructions_table
+
+EPISODE = get_episode("PickXtimes", "test", 0)  # easy
+HARD = get_episode("PickXtimes", "test", 3)
+REASON = "the scene is too easy"
+
+DUMMY = Setting(
+    name="dummy",
+    order=9,
+    summary="direct, but not in easy scenes",
+    color="#123456",
+    say=direct.say,
+    applies_to=lambda task: task.suite == "counting",
+    refusal=lambda request: REASON if request.episode.difficulty == "easy" else None,
+    example=0,
+)
+
+
+@pytest.fixture
+def register(monkeypatch):
+    """Adds settings to those of the language for the length of a test."""
+    found = tuple(all_settings().values())
+
+    def add(*more):
+        monkeypatch.setattr(settings, "discover", lambda *_: [*found, *more])
+        all_settings.cache_clear()
+
+    yield add
+    monkeypatch.undo()
+    all_settings.cache_clear()
+
+
+def printed(*tables):
+    console = Console(width=200, file=io.StringIO())
+    for table in tables:
+        console.print(table)
+    return console.file.getvalue()
+
+
+def test_a_setting_is_in_the_lists_of_its_tasks(register):
+    before = len(all_variants())
+    register(DUMMY)
+    counting = [task.name for task in all_tasks().values() if task.suite == "counting"]
+    assert setting_names()[-1] == "dummy"
+    assert len(all_variants()) == before + len(counting)
+    assert {one.task for one in all_variants() if one.setting == "dummy"} == set(counting)
+    with pytest.raises(InvalidValueError, match="has no dummy setting"):
+        instruct(get_episode("VideoUnmask", "test", 0), "dummy")
+
+
+def test_a_refusal_says_why_wherever_it_shows(register):
+    register(DUMMY)
+    assert "dummy" not in expressible(EPISODE)
+    assert "dummy" in expressible(HARD)
+    assert find_refusals(EPISODE) == {"dummy": REASON}
+    with pytest.raises(InvalidValueError, match=f"dummy setting cannot express .*{REASON}"):
+        instruct(EPISODE, "dummy")
+    assert REASON in printed(instructions_table(EPISODE))
+    plan = make_plan(["listener"], tasks="PickXtimes", settings="all", episodes="0,3")
+    assert ["dummy" in plan.settings_of("PickXtimes", index) for index in (0, 3)] == [False, True]
+
+
+def test_validation_counts_what_a_setting_refuses(register):
+    register(DUMMY)
+    results = validate_batch(Batch("PickXtimes", "test", 0, 4))
+    assert not results.failures
+    assert results.texts["PickXtimes", "dummy"] == 2 * 2
+    assert results.refused["PickXtimes", "dummy", "", "easy"] == 2
+    text = printed(*validation_tables(results))
+    assert "Scenes that the dummy setting cannot express" in text
+    assert "Scenes that the spatial setting cannot express" in text
+    assert "2 of 2 (100.00 %)" in text
+    assert f"{REASON}: 2 refusals" in text
+
+
+def test_a_pairing_rule_of_a_setting_can_fail(register):
+    def must_be_explicit(instruct):
+        if instruct(InstructionOptions("dummy")).text != instruct(InstructionOptions()).text:
+            yield "not explicit"
+
+    register(dataclasses.replace(DUMMY, pairing_rules=must_be_explicit))
+    (failure,) = check_episode(HARD).failures
+    assert (failure.rule, failure.setting, failure.words) == ("pairing", "dummy", "not explicit")
+
+
+def test_a_new_setting_does_not_change_the_splits(register, monkeypatch):
+    slot = EpisodeSlot("PickXtimes", "test", 0)
+    register(DUMMY)
+    assert check_words(slot, EPISODE.seed) is None
+    for module in (seed_selection, episode_checks):
+        monkeypatch.setattr(module, "ACCEPTANCE_SETTINGS", ("direct", "dummy"))
+    rejection = check_words(slot, EPISODE.seed)
+    assert (rejection.reason, rejection.cause) == ("not expressible", f"dummy: {REASON}")
+    strict = check_episode(EPISODE, must_be_expressible=True)
+    assert [(one.rule, one.words) for one in strict.failures] == [("expressible", REASON)]
+
+
+def test_the_card_shows_the_first_example_that_can_be_expressed(register):
+    register(DUMMY)
+    page = card.language_card()
+    assert page.count(", dummy\n") == page.count("| dummy | ")
+    assert card.example_episode("PickXtimes", "dummy").index == 2
+    assert card.example_episode("PickXtimes", "direct").index == direct.SETTING.example
+
+
+def test_statistics_figure_and_export_have_the_setting(register, tmp_path):
+    pytest.importorskip("matplotlib")
+    register(DUMMY)
+    episodes = list(split_episodes("PickXtimes", "test"))
+    found = list(instructions(episodes, setting_names(), FORMS))
+    dummies = [one for one in (row(*one) for one in found) if one["setting"] == "dummy"]
+    assert len(dummies) == 2 * sum(episode.difficulty != "easy" for episode in episodes)
+    said = [one for _, one in found if one.form == "implicit"]
+    assert corpus_statistics.scene_counts(said)["dummy"] == len(dummies) / 2
+    assert "dummy" in printed(*statistics_tables.overview_tables(said))
+    _, picture = expression_figure.write_figure(said, tmp_path, "expressions", "A title")
+    assert DUMMY.color in picture.read_text()
+
+
+def recipe():
+    """The file that docs/language.md shows under "Add a setting"."""
+    page = (Path(__file__).parents[2] / "docs" / "language.md").read_text()
+    section = page[page.index("### Add a setting") :]
+    return re.search(r"```python\n(.*?)```", section, re.DOTALL)[1]
+
+
+def test_the_recipe_of_the_docs_is_a_setting_of_an_installed_package(tmp_path, monkeypatch):
+    (tmp_path / "my_setting.py").write_text(recipe())
+    info = tmp_path / "my_package-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-package\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[roboirg.settings]\ninterrupted = my_setting:SETTING\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    all_settings.cache_clear()
+    try:
+        assert setting_names()[-1] == "interrupted"
+        for index in range(4):
+            for task in ("PickXtimes", "BinFill"):
+                assert not check_episode(get_episode(task, "test", index)).failures
+        said = instruct_with(HARD, InstructionOptions("interrupted"))
+        assert [one.stage for one in said.utterances] == ["introduction", "distractor", "command"]
+        assert "interrupted" not in expressible(get_episode("VideoUnmask", "test", 0))
+    finally:
+        monkeypatch.undo()
+        sys.modules.pop("my_setting", None)
+        all_settings.cache_clear()
+    assert "interrupted" not in setting_names()

@@ -1,0 +1,195 @@
+"""Validation can fail: every rule notices words that break it."""
+
+import dataclasses
+import io
+
+import pytest
+from language_variants import SPATIAL_TASKS, random_episodes
+from rich.console import Console
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.episodes.splits import get_episode, slot_seed
+from roboirg.language import Utterance, expressible, instruct, instruct_with, interpret
+from roboirg.language.validation import (
+    RuleViolation,
+    ValidationResults,
+    batches,
+    check_episode,
+    pairing,
+    validate,
+)
+from roboirg.language.validation.episode_checks import (
+    leaking,
+    not_needed,
+    not_read_back,
+    not_self_contained,
+)
+from roboirg.language.validation.validation_run import RANDOM_BASE, random_episode
+from roboirg.language.validation.validation_tables import validation_tables
+from roboirg.tasks import every_task, get_task
+from roboirg.util.plurals import counted
+
+EPISODE = get_episode("PickXtimes", "test", 3)
+
+
+def read(text):
+    return interpret(text, EPISODE.scene, EPISODE.task)
+
+
+def commanding(instruction, command):
+    """The instruction with other words for its command."""
+    last = Utterance("command", command)
+    return dataclasses.replace(
+        instruction, utterances=(*instruction.utterances[:-1], last), mentions=()
+    )
+
+
+def another_goal():
+    goals = get_task(EPISODE.task).goals(EPISODE.scene)
+    return next(goal for goal in goals if goal != EPISODE.goal)
+
+
+def test_another_goal_is_not_read_back():
+    said = instruct(EPISODE, "direct")
+    assert not list(not_read_back(said, EPISODE, read))
+    other = dataclasses.replace(EPISODE, goal=another_goal())
+    assert list(not_read_back(said, other, read)) == [("read back", said.text)]
+
+
+def test_what_is_not_understood_is_not_read_back():
+    said = instruct(EPISODE, "direct")
+    assert list(not_read_back(commanding(said, "Hello there."), EPISODE, read))
+
+
+def test_an_implicit_command_is_not_self_contained():
+    said = instruct(EPISODE, "direct")
+    assert list(not_self_contained(said, EPISODE, read))
+    assert not list(not_self_contained(instruct(EPISODE, "direct", "resolved"), EPISODE, read))
+
+
+def test_a_command_that_says_all_does_not_need_its_introduction():
+    said = instruct(EPISODE, "direct")
+    assert not list(not_needed(said, EPISODE, read, exception=False))
+    assert list(not_needed(said, EPISODE, read, exception=True))
+    telling = commanding(said, instruct(EPISODE).command)
+    assert list(not_needed(telling, EPISODE, read, exception=False))
+    contradicting = dataclasses.replace(EPISODE, goal=another_goal())
+    assert list(not_needed(telling, contradicting, read, exception=True))
+
+
+@pytest.mark.parametrize("setting", ["direct", "reasoning", "contextual", "spatial"])
+def test_a_command_that_says_all_leaks(setting):
+    said = instruct(EPISODE, setting)
+    assert not list(leaking(said, EPISODE))
+    ((rule, words),) = leaking(commanding(said, instruct(EPISODE).command), EPISODE)
+    assert rule == "no leak"
+    assert " in: " in words
+
+
+def test_a_landmark_in_the_command_leaks():
+    said = instruct(EPISODE, "spatial")
+    assert list(
+        leaking(commanding(said, instruct(EPISODE, "spatial", "resolved").command), EPISODE)
+    )
+
+
+@pytest.mark.parametrize(
+    ("setting", "form", "changed", "complaint"),
+    [
+        ("contextual", "implicit", 0, "introduction or command"),
+        ("contextual", "implicit", -1, "introduction or command"),
+        ("direct", "resolved", -1, "is not the explicit one"),
+        ("spatial", "resolved", 0, "its context differs"),
+        ("reasoning", "resolved", -1, "more than its references"),
+    ],
+)
+def test_other_words_are_not_paired(monkeypatch, setting, form, changed, complaint):
+    def changing(episode, options):
+        said = instruct_with(episode, options)
+        if (options.setting, options.form) != (setting, form):
+            return said
+        turns = list(said.utterances)
+        turns[changed] = Utterance(turns[changed].stage, f"Well, {turns[changed].text}")
+        return dataclasses.replace(said, utterances=tuple(turns), mentions=())
+
+    assert not list(pairing.unpaired(EPISODE, expressible(EPISODE)))
+    monkeypatch.setattr(pairing, "instruct_with", changing)
+    found = list(pairing.unpaired(EPISODE, expressible(EPISODE)))
+    assert any(one == setting and complaint in words for one, words in found)
+
+
+def test_a_resolved_form_that_resolves_nothing_is_noticed(monkeypatch):
+    def lazy(episode, options):
+        return instruct_with(episode, options._replace(form="implicit"))
+
+    monkeypatch.setattr(pairing, "instruct_with", lazy)
+    complaints = " ".join(words for _, words in pairing.unpaired(EPISODE, expressible(EPISODE)))
+    assert "still the implicit one" in complaints
+    assert "still points back" in complaints
+
+
+def test_scenes_without_landmark_are_counted_and_fail_only_in_splits():
+    lacking = next(
+        episode
+        for episode in random_episodes("VideoUnmask", 1000)
+        if "spatial" not in expressible(episode)
+    )
+    found = check_episode(lacking)
+    assert not found.failures
+    assert found.refused["VideoUnmask", "spatial", "robot", lacking.difficulty] == 1
+    assert {one.setting for one in found.scenes} == {"spatial"}
+    ((refusal, count),) = found.reasons.items()
+    assert (refusal.setting, count) == ("spatial", found.refused.total())
+    strict = check_episode(lacking, must_be_expressible=True)
+    (failure,) = strict.failures
+    assert (failure.rule, failure.words) == ("expressible", refusal.reason)
+    (table,) = [one for one in validation_tables(found) if "spatial" in str(one.title)]
+    assert table.caption == f"{refusal.reason}: {counted(count, 'refusal')}"
+
+
+def test_random_scenes_are_not_those_of_the_splits():
+    last = max(slot_seed(task, "val", 50) for task in every_task().values())
+    assert last < RANDOM_BASE
+    for task in every_task():
+        assert random_episode(task, 7) == random_episode(task, 7)
+        assert random_episode(task, 7).difficulty == "hard"
+
+
+def test_processes_find_what_one_finds():
+    work = batches(("StopCube", "VideoUnmask"), (), 4)
+    found = []
+    for workers in (0, 2):
+        total = ValidationResults()
+        for _, evidence in validate(work, workers):
+            total.add(evidence)
+        found.append(total)
+    assert found[0] == found[1]
+    assert found[0].texts["VideoUnmask", "contextual"] == 4 * 16
+
+
+def test_batches_cover_everything_once():
+    work = batches(("PickXtimes",), ("test", "train"), 120)
+    assert sum(batch.size for batch in work) == 50 + 100 + 120
+    assert len(set(work)) == len(work)
+    assert [batch.size for batch in work if batch.split is None] == [50, 50, 20]
+    for seeds in (-1, 0):
+        with pytest.raises(InvalidValueError):
+            batches(("PickXtimes",), (), seeds)
+    with pytest.raises(InvalidValueError, match="workers"):
+        list(validate(work, -1))
+
+
+def test_the_tables_count_what_failed():
+    found = ValidationResults()
+    for task in SPATIAL_TASKS[:2]:
+        found.add(check_episode(get_episode(task, "test", 0)))
+    found.failures.append(
+        RuleViolation("no leak", "PickXtimes", "direct", "PickXtimes/test/0", 1, "one")
+    )
+    console = Console(width=150, file=io.StringIO())
+    for table in validation_tables(found):
+        console.print(table)
+    text = console.file.getvalue()
+    assert "2 (1 broken)" in text
+    assert "1 of 1 (100.00 %)" in text
+    assert "0 of 1" in text

@@ -1,0 +1,123 @@
+"""The bytes of messages: what is encoded is decoded, and hostile bytes are refused."""
+
+import contextlib
+
+import msgpack
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from roboirg.policies.remote.message_codec import CodecError, pack, unpack
+
+ARRAYS = hnp.arrays(
+    st.sampled_from(["|u1", "<f4", "<f8", ">i2", "|b1", "<i8", "<U3"]),
+    hnp.array_shapes(min_dims=0, min_side=0, max_side=4),
+)
+PLAIN = st.none() | st.booleans() | st.integers(-(2**63), 2**64 - 1) | st.text() | st.binary()
+MESSAGES = st.dictionaries(
+    st.text(),
+    st.recursive(
+        PLAIN | ARRAYS,
+        lambda held: st.lists(held, max_size=3) | st.dictionaries(st.text(), held, max_size=3),
+        max_leaves=5,
+    ),
+    max_size=4,
+)
+
+
+def same(one, other):
+    if isinstance(one, np.ndarray):
+        return one.dtype == other.dtype and one.tobytes() == other.tobytes()
+    if isinstance(one, dict):
+        return list(one) == list(other) and all(same(one[key], other[key]) for key in one)
+    if isinstance(one, list):
+        return len(one) == len(other) and all(map(same, one, other))
+    return type(one) is type(other) and one == other
+
+
+@settings(max_examples=50)
+@given(MESSAGES)
+def test_what_is_written_is_read(message):
+    assert same(unpack(pack(message)), message)
+
+
+@settings(max_examples=50)
+@given(st.binary(max_size=200) | MESSAGES.map(pack).map(lambda data: data[:-1]))
+def test_any_bytes_are_a_message_or_refused(data):
+    with contextlib.suppress(CodecError):
+        assert isinstance(unpack(data), dict)
+
+
+@given(
+    st.dictionaries(
+        st.sampled_from([b"__ndarray__", b"__npgeneric__", b"data", b"dtype", b"shape"]),
+        PLAIN
+        | st.lists(st.integers(-3, 2**40))
+        | st.sampled_from(["|u1", "<f8", "O", "V8", "<M8[s]", "|S0", "i4,i4", "(2,3)u1", ",", "<"]),
+    )
+)
+def test_any_description_of_an_array_is_one_or_refused(described):
+    try:
+        found = unpack(msgpack.packb({"x": described}))["x"]
+    except CodecError:
+        return
+    if isinstance(found, np.ndarray):
+        assert not found.flags.writeable
+
+
+def test_arrays_are_read_only_and_in_c_order():
+    array = np.asfortranarray(np.arange(6).reshape(2, 3))[:, ::-1]
+    found = unpack(pack({"x": array}))["x"]
+    assert np.array_equal(found, array)
+    with pytest.raises(ValueError, match="read-only"):
+        found[0] = 1
+
+
+def test_numpy_scalars_keep_their_type():
+    found = unpack(pack({"x": np.float32(2.5), "y": np.bool_(True), "z": np.int8(-3)}))
+    assert [(type(v), v) for v in found.values()] == [
+        (np.float32, 2.5),
+        (np.bool_, True),
+        (np.int8, -3),
+    ]
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        np.array([object()]),
+        np.zeros(2, np.complex64),
+        np.zeros(2, "i4,i4"),
+        np.complex128(1),
+        {1, 2},
+        2**80,
+    ],
+)
+def test_what_must_not_be_sent_is_refused(value):
+    with pytest.raises(CodecError, match="cannot be encoded"):
+        pack({"x": value})
+
+
+@pytest.mark.parametrize(
+    ("described", "words"),
+    [
+        ({b"data": b"x" * 8, b"dtype": "|O", b"shape": [1]}, "not accepted"),
+        ({b"data": b"x" * 8, b"dtype": "|V8", b"shape": [1]}, "not accepted"),
+        ({b"data": b"x" * 8, b"dtype": "<c8", b"shape": [1]}, "not accepted"),
+        ({b"data": b"x" * 8, b"dtype": "|u1", b"shape": [2**62, 4]}, "has 8 bytes"),
+        ({b"data": b"x" * 8, b"dtype": "|u1", b"shape": [-8]}, "shape of an array is"),
+        ({b"data": b"x" * 8, b"dtype": "|u1", b"shape": 8}, "shape of an array is 8"),
+        ({b"data": "text", b"dtype": "|u1", b"shape": [4]}, "is str, not bytes"),
+        ({b"dtype": "|u1", b"shape": [4]}, "is NoneType, not bytes"),
+    ],
+)
+def test_hostile_arrays_are_refused(described, words):
+    with pytest.raises(CodecError, match=words):
+        unpack(msgpack.packb({"x": {b"__ndarray__": True, **described}}))
+
+
+def test_a_deep_nest_is_refused():
+    with pytest.raises(CodecError):
+        unpack(b"\x81\xa1x" + b"\x91" * 100_000 + b"\x00")

@@ -1,0 +1,221 @@
+"""The conformance check finds what is wrong with a policy, and nothing where nothing is."""
+
+import sys
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from roboirg.cli.policy_commands import check_policy as command
+from roboirg.core.observations import CAMERAS
+from roboirg.policies.policy_check import FAIL, NOTE, PASS, check_policy
+from roboirg.policies.synthetic_episodes import SyntheticEpisodes
+
+
+class Sound:
+    """Keeps the contract; what it does depends on everything that it is given."""
+
+    observe_every = 1
+
+    def __init__(self, seed=0):
+        self.seed = seed
+
+    def reset(self, instruction, demonstration):
+        self.memory = float(len(instruction) + demonstration["front_rgb"].sum(dtype=float) % 97)
+
+    def act(self, observation):
+        joints = observation["joint_positions"] + 0.0001 * (self.memory % 7)
+        self.memory += len(observation["history"]) + observation["wrist_rgb"].mean() % 3
+        rng = np.random.default_rng([self.seed, int(self.memory)])
+        return np.tile(np.append(joints, rng.uniform(-1, 1)), (5, 1))
+
+
+class Shapeless(Sound):
+    def act(self, observation):
+        return np.zeros((3, 7))
+
+
+class NotFinite(Sound):
+    def act(self, observation):
+        return np.full((3, 8), np.nan)
+
+
+class Textual(Sound):
+    def act(self, observation):
+        return "left"
+
+
+class Raising(Sound):
+    def act(self, observation):
+        return observation["depth"]
+
+
+class Vandal(Sound):
+    def reset(self, instruction, demonstration):
+        super().reset(instruction, demonstration)
+        demonstration["front_rgb"][:] = 0
+
+
+class Sneaky(Sound):
+    def act(self, observation):
+        observation["joint_positions"] += 1
+        return super().act(observation)
+
+
+class Elephant(Sound):
+    """Never forgets."""
+
+    count = 0
+
+    def act(self, observation):
+        self.count += 1
+        return super().act(observation) * 0 + self.count / 10
+
+
+class Dice(Sound):
+    def act(self, observation):
+        return np.random.default_rng().uniform(-1, 1, (4, 8))
+
+
+class HonestDice(Dice):
+    deterministic = False
+
+
+class Growing(Sound):
+    """Gives another number of actions each time."""
+
+    total = 0
+
+    def act(self, observation):
+        type(self).total += 1
+        return np.zeros((self.total, 8))
+
+
+class Poisoned(Sound):
+    """What NaN did to it stays in the class."""
+
+    ruined = False
+
+    def act(self, observation):
+        type(self).ruined |= bool(np.isnan(observation["joint_positions"]).any())
+        return np.full((2, 8), np.nan) if self.ruined else super().act(observation)
+
+
+class Videophobe(Sound):
+    def reset(self, instruction, demonstration):
+        assert len(demonstration["joint_positions"]) == 0, "no films, please"
+        self.memory = 0
+
+
+class Reckless(Sound):
+    def act(self, observation):
+        return np.full((4, 8), 9.0)
+
+
+def found(policy, verdict):
+    return {f.check: f.message for f in check_policy(policy) if f.verdict == verdict}
+
+
+def test_a_sound_policy_passes_everything():
+    results = check_policy(f"{__name__}:Sound", seed=3)
+    assert {result.verdict for result in results} == {PASS, NOTE}
+    assert [result.check for result in results] == [
+        "loads",
+        "requirements",
+        "acts without a video",
+        "time",
+        "acts with a video",
+        "inputs unchanged",
+        "deterministic",
+        "reset forgets",
+        "broken sensors",
+    ]
+    assert all(result.message.endswith(".") for result in results)
+    assert "made with seed 3" in results[0].message
+    assert "5, 5, 5 actions of 8 numbers, float64" in results[2].message
+    assert found(Sound(), FAIL) == {}
+
+
+@pytest.mark.parametrize(
+    ("kind", "check", "words"),
+    [
+        (Shapeless, "acts without a video", "got shape (3, 7)"),
+        (NotFinite, "acts without a video", "finite number"),
+        (Textual, "acts without a video", "got str"),
+        (Raising, "acts without a video", "act(): KeyError: 'depth'"),
+        (Vandal, "inputs unchanged", "changed front_rgb in place"),
+        (Sneaky, "inputs unchanged", "changed joint_positions in place"),
+        (Elephant, "reset forgets", "differs by up to 0.3"),
+        (Dice, "deterministic", "Two equal episodes differ by up to"),
+        (Growing, "deterministic", "the number of actions"),
+        (Poisoned, "broken sensors", "finite number"),
+        (Videophobe, "acts with a video", "no films, please"),
+    ],
+)
+def test_what_is_wrong_is_found(kind, check, words):
+    failed = found(f"{__name__}:{kind.__name__}", FAIL)
+    assert words in failed[check]
+
+
+def test_what_is_allowed_is_noted():
+    notes = found(f"{__name__}:HonestDice", NOTE)
+    assert "as the policy declares" in notes["deterministic"]
+    assert found(f"{__name__}:HonestDice", FAIL) == {}
+    assert "12 of 12 actions" in found(f"{__name__}:Reckless", NOTE)["range without a video"]
+    assert "It is privileged" in found("oracle", NOTE)["loads"]
+
+
+@pytest.mark.parametrize(
+    ("spec", "words"),
+    [
+        ("nothing", "There is no policy 'nothing'"),
+        ("openpi://127.0.0.1:9?connect=0.1", "cannot be reached"),
+        ("openpi://127.0.0.1:9?conect=0.1", "Did you mean 'connect'?"),
+        (object(), "It has no reset()."),
+    ],
+)
+def test_what_cannot_be_tried_is_told(spec, words):
+    assert any(words in sentence for sentence in found(spec, FAIL).values())
+
+
+@pytest.mark.parametrize("cameras", [(), ("front",), CAMERAS])
+@pytest.mark.parametrize("frames", ["all", "none", 4])
+@pytest.mark.parametrize("every", [None, 1, 4])
+def test_made_up_episodes_are_what_was_asked_for(cameras, frames, every):
+    studio = SyntheticEpisodes(cameras, frames, every)
+    for size in (0, 10):
+        episode = studio.episode("Go.", size)
+        pictures = {f"{camera}_rgb" for camera in cameras}
+        assert {field for field in episode.first if field.endswith("_rgb")} == pictures
+        assert len(episode.demonstration["joint_positions"]) == size
+        expected = {"all": size, 4: -(-size // 4)}
+        assert {field for field in episode.demonstration if field.endswith("_rgb")} == (
+            set() if frames == "none" else pictures
+        )
+        for field in pictures if frames != "none" else ():
+            assert len(episode.demonstration[field]) == expected[frames]
+        later = studio.after(episode, 16)
+        assert ("history" in later) == (every is not None)
+        if every is not None:
+            assert len(later["history"]) == 16 // every
+            now = later["history"][-1]
+            assert all(np.array_equal(now[f], later[f]) for f in later if f != "history")
+
+
+@pytest.mark.parametrize(("name", "code"), [("Sound", 0), ("NotFinite", 2)])
+def test_the_command_prints_a_table_and_an_exit_code(name, code, tmp_path, monkeypatch):
+    (tmp_path / "my_policy.py").write_text(
+        "import numpy as np\nclass Sound:\n    value = 0.0\n    def reset(self, i, d): pass\n"
+        "    def act(self, o): return np.full((2, 8), self.value)\n"
+        "class NotFinite(Sound):\n    value = np.nan\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    monkeypatch.setenv("COLUMNS", "200")
+    app = typer.Typer()
+    app.command()(command)
+    result = CliRunner().invoke(app, [f"my_policy:{name}"])
+    assert result.exit_code == code, result.output
+    assert ("11 checks, none failed." if code == 0 else "1 of 3 checks failed.") in result.output
+    assert "Actions joint_angle" in result.output

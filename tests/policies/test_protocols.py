@@ -1,0 +1,198 @@
+"""Every protocol is one file, of this package or of another; the docs list and teach them."""
+
+import re
+import subprocess
+import sys
+import threading
+import tomllib
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from wire_episode import INSTRUCTION, moment, video
+
+import roboirg
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.policies import make_policy, play, protocols
+from roboirg.policies.policy_check import check_policy
+from roboirg.policies.policy_classes import url_schemes
+from roboirg.policies.protocols import all_protocols, protocols_by_scheme
+from roboirg.policies.remote.endpoints import RemoteOptions
+from roboirg.policies.serving.policy_server import open_server
+from roboirg.policies.transport import Transport
+
+PAGE = (Path(__file__).parents[2] / "docs" / "policies.md").read_text()
+
+
+@contextmanager
+def served(spec, protocol):
+    server = open_server(spec, protocol)
+    thread = threading.Thread(target=server.listening.serve_forever)
+    thread.start()
+    try:
+        yield server.url
+    finally:
+        server.listening.shutdown()
+        thread.join()
+
+
+@pytest.fixture
+def _fresh_registry():
+    """The registry is read again, in the test and after it."""
+    for cached in (all_protocols, protocols_by_scheme):
+        cached.cache_clear()
+    yield
+    for cached in (all_protocols, protocols_by_scheme):
+        cached.cache_clear()
+
+
+def fenced(language, word):
+    blocks = re.findall(rf"```{language}\n(.*?)```", PAGE, flags=re.DOTALL)
+    return next(block for block in blocks if word in block)
+
+
+@pytest.fixture
+def _tiny_package(tmp_path, monkeypatch, _fresh_registry):
+    """The recipe of the docs page, installed as a package of its own."""
+    (tmp_path / "tiny_protocol.py").write_text(fenced("python", "TinyPolicy"))
+    entries = tomllib.loads(fenced("toml", "roboirg.protocols"))["project"]["entry-points"]
+    info = tmp_path / "tiny-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: tiny\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(
+        "".join(
+            f"[{group}]\n" + "".join(f"{name} = {value}\n" for name, value in group_entries.items())
+            for group, group_entries in entries.items()
+        )
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    yield
+    sys.modules.pop("tiny_protocol", None)
+
+
+@pytest.mark.usefixtures("_tiny_package")
+def test_the_recipe_serves_and_plays_over_loopback():
+    assert "tiny" in url_schemes()
+    with served("random", "tiny") as url:
+        assert url.startswith("tiny://127.0.0.1:")
+        assert {result.verdict for result in check_policy(url)} == {"pass", "note"}
+        client, here = make_policy(url, 0), make_policy("random", 0)
+        for policy in (client, here):
+            policy.reset(INSTRUCTION, {})
+        for _ in range(3):
+            assert np.array_equal(client.act(moment(0)), here.act(moment(0)))
+        client.close()
+
+
+@pytest.mark.sim
+@pytest.mark.usefixtures("_tiny_package")
+def test_the_recipe_plays_an_episode():
+    with served("random", "tiny") as url:
+        client = make_policy(url, 0)
+        env = roboirg.make(
+            "PickXtimes", cameras=client.cameras, demonstration_frames="none", max_steps=20
+        )
+        assert play(env, client)["status"] == "timeout"
+        client.close()
+
+
+def test_the_page_lists_every_scheme():
+    rows = {
+        f"| `{scheme}://host:port` | {client.transport.name} | {protocol.summary} "
+        f"| {protocol.memory} |"
+        for protocol in all_protocols()
+        for scheme, client in protocol.clients.items()
+    }
+    assert rows == {line for line in PAGE.splitlines() if "://host:port` |" in line}
+
+
+def test_the_page_explains_every_option():
+    common = PAGE.split("Options of all protocols")[1].split("Options of some")
+    tables = {"common": common[0], "own": common[1].split("**One server")[0]}
+    for protocol in all_protocols():
+        for client in protocol.clients.values():
+            for option in client.options_type.model_fields:
+                table = tables["common" if option in RemoteOptions.model_fields else "own"]
+                assert f"`{option}`" in table, (protocol.name, option)
+
+
+def test_protocols_are_listed_without_their_network_libraries():
+    program = """
+import sys
+for name in ("websockets", "msgpack", "httpx", "platformdirs"):
+    sys.modules[name] = None  # an import raises ImportError
+from roboirg.core.errors import MissingDependencyError
+from roboirg.policies import load_policy_class
+from roboirg.policies.protocols import protocols_by_scheme
+schemes = list(protocols_by_scheme())
+for scheme in schemes:
+    try:
+        load_policy_class(f"{scheme}://localhost:1")
+    except MissingDependencyError as error:
+        assert "install roboirgbench[remote]" in str(error), error
+    else:
+        raise AssertionError(scheme)
+print(*schemes)
+sys.argv[1:] = ["serve", "--help"]
+from roboirg.cli import main
+main()
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    listed, help_text = done.stdout.split("\n", 1)
+    assert listed.split() == list(protocols_by_scheme())
+    for scheme in protocols_by_scheme():
+        assert scheme in help_text
+
+
+def test_an_unknown_scheme_names_the_nearest():
+    with pytest.raises(UnknownNameError, match="Did you mean 'openpi'"):
+        make_policy("openpy://localhost:1", 0)
+
+
+@pytest.mark.usefixtures("_fresh_registry")
+def test_two_protocols_cannot_share_a_scheme(monkeypatch):
+    first = all_protocols()[0]
+    monkeypatch.setattr(protocols, "all_protocols", lambda: (first, replace(first, name="other")))
+    with pytest.raises(InvalidValueError, match=f"'{first.name}' and 'other' both have"):
+        protocols_by_scheme()
+
+
+class LocalConnection:
+    """A transport without a network: hands messages to the handler of the last server."""
+
+    handler = None
+    metadata = {"local": True}  # noqa: RUF012
+
+    def __init__(self, spec):
+        self.closed = False
+
+    def request(self, message):
+        return type(self).handler(message)
+
+    def close(self):
+        self.closed = True
+
+
+LOCAL = Transport("local", f"{__name__}:LocalConnection", f"{__name__}:open_local")
+
+
+def open_local(service, metadata, host, port, key):
+    LocalConnection.handler = service.connection()
+    raise OSError("there is nothing to listen to")
+
+
+@pytest.mark.parametrize("scheme", protocols_by_scheme())
+def test_a_protocol_travels_over_any_transport(scheme, monkeypatch):
+    monkeypatch.setattr(protocols_by_scheme()[scheme].clients[scheme], "transport", LOCAL)
+    with pytest.raises(InvalidValueError, match="nothing to listen to"):
+        open_server("random", scheme)
+    client = make_policy(f"{scheme}://localhost:1?wait=0", 0)
+    client.reset(INSTRUCTION, video(2))
+    assert client.metadata == {"server": "localhost:1", "local": True}
+    assert client.act(moment(2, history=())).shape == (16, 8)
+    client.close()

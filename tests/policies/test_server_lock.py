@@ -1,0 +1,136 @@
+"""One episode at a time on a stateful server, across processes that may be killed."""
+
+import multiprocessing
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+from wire_episode import INSTRUCTION, moment, video
+from wire_servers import MmeVlaServer, WireServer
+
+from roboirg.core.errors import PolicyConnectionError, PolicyTimeoutError
+from roboirg.policies import make_policy
+from roboirg.policies.remote.endpoints import Endpoint
+from roboirg.policies.remote.server_lock import lock_server
+
+SPAWN = multiprocessing.get_context("spawn")
+ONE, TWO = Endpoint("h", 8001), Endpoint("h", 8002)
+
+
+def hold(folder, endpoint, ready, seconds):
+    lock = lock_server([endpoint], wait=5, folder=folder)
+    ready.set()
+    time.sleep(seconds)
+    lock.release()
+
+
+@pytest.fixture
+def holder(tmp_path):
+    """Another process that has the first server for a minute."""
+    ready = SPAWN.Event()
+    process = SPAWN.Process(target=hold, args=(tmp_path, ONE, ready, 60))
+    process.start()
+    assert ready.wait(30)
+    yield process
+    process.kill()
+    process.join()
+
+
+def test_another_process_waits_takes_another_server_or_inherits(holder, tmp_path):
+    start = time.monotonic()
+    with pytest.raises(PolicyTimeoutError, match=r"h:8001 was used by other .* for 0\.2 s"):
+        lock_server([ONE], wait=0.2, folder=tmp_path)
+    assert 0.2 <= time.monotonic() - start < 30
+    lock = lock_server([ONE, TWO], wait=0, folder=tmp_path)
+    assert lock.endpoint == TWO
+    with pytest.raises(PolicyTimeoutError, match="h:8001, h:8002 were"):
+        lock_server([ONE, TWO], wait=0, folder=tmp_path, shared=True)
+    os.kill(holder.pid, signal.SIGKILL)
+    assert lock_server([ONE, TWO], wait=10, folder=tmp_path).endpoint == ONE
+    lock.release()
+
+
+def test_those_who_share_do_not_exclude_each_other(tmp_path):
+    locks = [lock_server([ONE], wait=0, folder=tmp_path, shared=True) for _ in range(3)]
+    with pytest.raises(PolicyTimeoutError):
+        lock_server([ONE], wait=0, folder=tmp_path)
+    for lock in locks:
+        lock.release()
+        lock.release()
+    lock_server([ONE], wait=0, folder=tmp_path).release()
+
+
+def test_names_of_this_computer_are_one_server(tmp_path):
+    lock = lock_server([Endpoint("localhost", 1)], wait=0, folder=tmp_path)
+    with pytest.raises(PolicyConnectionError):
+        lock_server([Endpoint("127.0.0.1", 1)], wait=0, folder=tmp_path)
+    lock.release()
+
+
+def test_a_thread_does_not_wait_for_itself():
+    with MmeVlaServer() as server:
+        first, second = (make_policy(f"mme-vla://{server.place}", 0) for _ in range(2))
+        first.reset(INSTRUCTION, video(0))
+        with pytest.raises(PolicyConnectionError, match=r"another policy .*; close\(\) it"):
+            second.reset(INSTRUCTION, video(0))
+        first.close()
+        second.reset(INSTRUCTION, video(0))
+        del second  # forgotten, not closed
+        first.reset(INSTRUCTION, video(0))
+        first.close()
+
+
+def test_stateless_servers_are_shared():
+    with WireServer() as server:
+        policies = [make_policy(f"openpi://{server.place}", 0) for _ in range(3)]
+        for policy in policies:
+            policy.reset(INSTRUCTION, {})
+        for policy in policies:
+            assert len(policy.act(moment(0))) == 20
+            policy.close()
+
+
+def play(url, length, results, steps=12):
+    """An episode whose every answer has to be that of a server that saw nothing else."""
+    policy = make_policy(url, 0)
+    for _ in range(3):
+        policy.reset(INSTRUCTION, video(length))
+        for step in range(steps):
+            history = () if step == 0 else (moment(length + step),)
+            rows = policy.act(moment(length + step, history=history))
+            results.put((rows[0, :4].tolist(), [length + 1 + step, length, step + 1]))
+        policy.close()
+
+
+def test_processes_and_policies_do_not_mix_state():
+    with MmeVlaServer(delay=0.002) as one, MmeVlaServer(delay=0.002) as two:
+        url = f"mme-vla://{one.place},{two.place}?part=2"
+        results = SPAWN.Queue()
+        players = [SPAWN.Process(target=play, args=(url, length, results)) for length in (3, 5, 8)]
+        for player in players:
+            player.start()
+        found = [results.get(timeout=60) for _ in range(3 * 3 * 12)]
+        for player in players:
+            player.join()
+            assert player.exitcode == 0
+        assert one.connections + two.connections == 9
+        assert min(one.connections, two.connections) >= 1
+    for (frames, start, _, inferences), expected in found:
+        assert [frames, start, inferences] == expected
+
+
+def test_a_large_demonstration_arrives():
+    frames = np.empty((1080, 256, 256, 3), np.uint8)
+    frames[:] = np.arange(1080, dtype=np.uint16).astype(np.uint8)[:, None, None, None]
+    felt = {"joint_positions": np.zeros((1080, 7), np.float32), "gripper": np.zeros((1080, 2))}
+    with MmeVlaServer(delay=0.01) as server:
+        policy = make_policy(f"mme-vla://{server.place}?timeout=60", 0)
+        policy.reset(INSTRUCTION, {"front_rgb": frames, **felt})
+        rows = policy.act(moment(1, size=256, history=()))
+        policy.close()
+        assert server.bytes == 1081 * 256 * 256 * 3
+        assert server.parts == [16] * 67 + [9]
+        assert rows[0, :2].tolist() == [1081, 1080]
+        assert max(map(len, server.messages)) < 4 * 2**20

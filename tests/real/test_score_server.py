@@ -1,0 +1,275 @@
+"""The operator's page over real sockets, in a real browser, and killed in between."""
+
+import json
+import re
+import shutil
+import signal
+import threading
+import urllib.error
+import urllib.parse
+import urllib.request
+
+import pytest
+from real_start import start
+
+from roboirg.real.pages.score_server import ScoreServer
+from roboirg.real.study.failure_choices import failure_choices
+from roboirg.real.study.study_plan import make_study, write_study
+from roboirg.real.study.trial_log import TrialLog, trial_metadata
+from roboirg.records.store import read_records
+
+CHROMIUM = shutil.which("chromium") or ""
+NARROW = {"width": 400, "height": 800}
+
+
+@pytest.fixture
+def served(small):
+    plan, folder = small
+    server = ScoreServer(plan, folder, "ann")
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    yield server
+    server.shutdown()
+    server.server_close()
+
+
+def ask(server, path, form=None, *, host=None, origin=None):
+    """Return the status, headers and text of a response."""
+    port = server.server_address[1]
+    data = None if form is None else urllib.parse.urlencode(form).encode()
+    request = urllib.request.Request(f"http://127.0.0.1:{port}{path}", data)
+    if host:
+        request.add_header("Host", host)
+    if origin:
+        request.add_header("Origin", origin)
+
+    class Stay(urllib.request.HTTPRedirectHandler):
+        def redirect_request(self, *args):
+            return None
+
+    try:
+        answer = urllib.request.build_opener(Stay).open(request, timeout=10)
+    except urllib.error.HTTPError as error:
+        answer = error
+    with answer:
+        return answer.status, answer.headers, answer.read().decode()
+
+
+def fetch(url, form=None):
+    """Return the text of a page of a server in another process."""
+    data = None if form is None else urllib.parse.urlencode(form).encode()
+    with urllib.request.urlopen(url, data, timeout=30) as answer:  # noqa: S310 - our own server
+        return answer.read().decode()
+
+
+def form_of(server, trial, choice, **more):
+    revision = server.read_trial_log().revision(trial.name)
+    return {
+        "token": server.token,
+        "trial": trial.name,
+        "revision": revision,
+        "choice": choice,
+        **more,
+    }
+
+
+def test_only_pages_of_this_server_are_answered(served):
+    trial = served.plan.trials[0]
+    port = served.server_address[1]
+    assert served.server_address[0] == "127.0.0.1"
+    form = form_of(served, trial, "success")
+    refused = [
+        ask(served, "/"),
+        ask(served, "/?token=wrong"),
+        ask(served, f"/?token={served.token}", host="evil.example"),
+        ask(served, "/score", {**form, "token": "wrong"}),
+        ask(served, "/score", {name: form[name] for name in form if name != "token"}),
+        ask(served, "/score", form, host=f"evil.example:{port}"),
+        ask(served, "/score", form, origin="http://evil.example"),
+        ask(served, "/undo", {"last": ""}),
+    ]
+    assert {status for status, _, _ in refused} == {403}
+    assert not any(served.token in f"{headers}{text}" for _, headers, text in refused)
+    assert not (served.folder / "records.jsonl").exists()
+    status, headers, _ = ask(served, "/score", form, origin=f"http://127.0.0.1:{port}")
+    assert status == 303
+    assert len(read_records(served.folder)) == 1
+    status, headers, _ = ask(served, f"/?token={served.token}")
+    assert status == 200
+    assert headers["Referrer-Policy"] == "no-referrer"
+    assert "default-src 'none'" in headers["Content-Security-Policy"]
+
+
+def test_malformed_forms_are_refused(served):
+    token = served.token
+    assert ask(served, "/elsewhere", {"token": token})[0] == 404
+    assert ask(served, f"/elsewhere?token={token}")[0] == 404
+    assert ask(served, f"/?token={token}&trial=missing")[0] == 400
+    assert ask(served, "/score", {"token": token, "note": "x" * 70_000})[0] == 413
+    for form in ({"trial": "missing"}, form_of(served, served.plan.trials[0], "magic"), {}):
+        status, headers, _ = ask(served, "/score", {**form, "token": token})
+        assert status == 303
+        assert "message=" in headers["Location"]
+    assert not (served.folder / "records.jsonl").exists()
+
+
+def test_a_page_that_is_out_of_date_scores_nothing(served):
+    trial = served.plan.trials[0]
+    form = form_of(served, trial, "success")
+    ask(served, "/score", form)
+    _, headers, _ = ask(served, "/score", {**form, "choice": "dropped"})
+    assert "has+changed+since" in headers["Location"]
+    assert served.read_trial_log().newest(trial.name).outcome == "success"
+    _, headers, _ = ask(served, "/undo", {"token": served.token, "last": "another"})
+    assert "nothing+was+undone" in headers["Location"]
+    assert served.read_trial_log().state(trial.name) == "scored"
+
+
+def test_what_an_operator_types_is_text(served):
+    trial = served.plan.trials[0]
+    note = "<script>alert(1)</script> \"quoted\" & 'so'"
+    ask(served, "/score", form_of(served, trial, "success", note=note, video="../secret.mp4"))
+    record = served.read_trial_log().newest(trial.name)
+    assert trial_metadata(record)["note"] == note
+    assert record.video is None
+    _, _, page = ask(served, f"/?token={served.token}&trial={trial.name}&message=<b>x</b>")
+    assert "<script>alert" not in page
+    assert "<b>x</b>" not in page
+    # The record has the path of a video inside the folder.
+    (served.folder / "films").mkdir()
+    (served.folder / "films" / "a.mp4").write_bytes(b"film")
+    ask(served, "/score", form_of(served, trial, "success", video="films/a.mp4"))
+    assert served.read_trial_log().newest(trial.name).video == "films/a.mp4"
+
+
+def test_a_kill_between_two_clicks_costs_nothing(small):
+    plan, folder = small
+    for number, trial in enumerate(plan.trials):
+        process = start("score", folder, "--operator", "ann")
+        url = re.search(r"http\S+", process.stdout.readline())[0]
+        page = fetch(url)
+        assert f"{number} of 4 scored" in page
+        assert f"<h1>{number + 1}. {trial.name}</h1>" in page
+        form = {
+            "token": url.partition("token=")[2], "trial": trial.name, "revision": "0",
+            "choice": "success",
+        }  # fmt: skip
+        address = url.partition("/?")[0] + "/score"
+        fetch(address, form)
+        process.send_signal(signal.SIGKILL)
+        process.wait(timeout=30)
+    assert [one.outcome for one in read_records(folder)] == ["success"] * 4
+
+
+# In a browser.
+
+
+@pytest.fixture(scope="module")
+def browser():
+    if not CHROMIUM:
+        pytest.skip("no chromium on this machine")
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as driver:
+        found = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield found
+        found.close()
+
+
+def press(page, key):
+    """Press a key that loads a page, and wait for it."""
+    with page.expect_navigation():
+        page.keyboard.press(key)
+
+
+def key_of(trial, choice):
+    if choice in ("success", "void"):
+        return choice[0]
+    return str([one.key for one in failure_choices(trial.episode)].index(choice) + 1)
+
+
+@pytest.mark.browser
+def test_a_study_is_scored_by_keyboard_alone_and_survives_a_kill(browser, tmp_path):
+    plan = make_study(
+        ("listener", "forgetful"), tasks=("PutInBox", "PickByCount"), trials=1, demonstrations=0
+    )
+    write_study(plan, tmp_path)
+    wanted = {}
+    for number, trial in enumerate(plan.trials):
+        keys = ["success", *(one.key for one in failure_choices(trial.episode))]
+        wanted[trial.name] = keys[number % len(keys)]
+    half = len(plan.trials) // 2
+    for trials in (plan.trials[:half], plan.trials[half:]):
+        process = start("score", tmp_path, "--operator", "ann")
+        page = browser.new_page(viewport=NARROW)
+        troubles = []
+        page.on("console", lambda message, into=troubles: into.append(message.text))
+        page.on("pageerror", lambda error, into=troubles: into.append(str(error)))
+        page.goto(re.search(r"http\S+", process.stdout.readline())[0])
+        for trial in trials:
+            assert trial.name in page.inner_text("h1")
+            for turn in page.locator("ol.said li").all_inner_texts():
+                assert turn.startswith("“")
+            press(page, key_of(trial, wanted[trial.name]))
+            assert trial.name in page.inner_text("[role=status]")
+        assert troubles == []
+        process.send_signal(signal.SIGKILL)
+        process.wait(timeout=30)
+        page.close()
+    trial_log = TrialLog.read(plan, tmp_path)
+    for trial in plan.trials:
+        record = trial_log.newest(trial.name)
+        choice = wanted[trial.name]
+        assert record.outcome == ("success" if choice == "success" else "failure")
+        assert trial_metadata(record)["operator"] == "ann"
+        if choice != "success":
+            assert choice.startswith(record.attribution.failure)
+
+
+@pytest.mark.browser
+def test_notes_corrections_and_undo_by_keyboard(browser, served):
+    first = served.plan.trials[0]
+    page = browser.new_page(viewport=NARROW)
+    page.goto(served.url)
+    page.keyboard.press("n")
+    page.keyboard.type("1 s u v: keys in a field are letters")
+    page.keyboard.press("Enter")
+    assert not (served.folder / "records.jsonl").exists()
+    press(page, "s")
+    record = served.read_trial_log().newest(first.name)
+    assert trial_metadata(record)["note"] == "1 s u v: keys in a field are letters"
+    # Back, and another verdict: the correction counts.
+    press(page, "ArrowLeft")
+    assert first.name in page.inner_text("h1")
+    assert page.locator("button[aria-pressed=true]").count() == 1
+    press(page, "1")
+    assert served.read_trial_log().newest(first.name).attribution.failure == "wrong_place"
+    press(page, "u")
+    assert served.read_trial_log().newest(first.name).outcome == "success"
+    press(page, "u")
+    assert served.read_trial_log().state(first.name) == "open"
+    page.close()
+
+
+@pytest.mark.browser
+def test_the_page_fits_narrow_screens_and_says_what_it_shows(browser, served):
+    for scheme in ("light", "dark"):
+        page = browser.new_page(viewport=NARROW, color_scheme=scheme)
+        page.goto(served.url)
+        assert page.evaluate("document.documentElement.scrollWidth") <= NARROW["width"]
+        assert page.locator("svg[role=img] title").count() == 1
+        assert page.locator("fieldset legend").count() == 4
+        for button in page.locator("main button").all():
+            assert button.get_attribute("aria-keyshortcuts")
+            assert button.bounding_box()["height"] >= 40
+        for field in page.locator("input[type=text]").all():
+            assert field.evaluate("field => field.labels.length") == 1
+        # By tabs alone too.
+        page.keyboard.press("Tab")
+        assert page.evaluate("document.activeElement.tagName") == "BUTTON"
+        page.close()
+
+
+def test_the_page_does_not_name_the_policy(served):
+    _, _, page = ask(served, f"/?token={served.token}")
+    assert "listener" not in page
+    assert "forgetful" not in page
+    assert json.dumps(served.token)[1:-1] in page

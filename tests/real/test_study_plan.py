@@ -1,0 +1,279 @@
+"""Plans: balanced for any seed, interleaved, and a seed changes the order and nothing else."""
+
+import csv
+import io
+import math
+from collections import Counter
+from itertools import groupby
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from roboirg import language
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.language.settings import setting_names
+from roboirg.real.pages.arrangement_svg import draw_svg
+from roboirg.real.pages.trial_sheet import _pages, write_sheet
+from roboirg.real.study.arrangement_shapes import Shape, scene_shapes, square_corners
+from roboirg.real.study.counterbalancing import (
+    Arrangement,
+    counterbalanced_order,
+    read_arrangement,
+)
+from roboirg.real.study.failure_choices import failure_choices
+from roboirg.real.study.plan_csv import demonstrations_csv, trials_csv
+from roboirg.real.study.study_plan import StudyPlan, make_study, read_study, write_study
+
+TASKS = ("PutInBox", "PickByCount")
+SETTINGS = setting_names()
+
+plans = st.builds(
+    make_study,
+    st.lists(st.sampled_from(["listener", "forgetful", "pi0.5", "a:B"]), min_size=1, unique=True),
+    tasks=st.lists(st.sampled_from(TASKS), min_size=1, unique=True),
+    settings=st.lists(st.sampled_from(SETTINGS), min_size=1, unique=True),
+    trials=st.integers(1, 24),
+    demonstrations=st.sampled_from([0, 1, 7, 50]),
+    seed=st.integers(0, 2**63),
+)
+
+
+def spread(counts, everything):
+    return max(counts[one] for one in everything) - min(counts[one] for one in everything)
+
+
+def arrangement_counts(episodes):
+    """Count arrangements and their factors."""
+    arrangements = [read_arrangement(episode) for episode in episodes]
+    factors = ("color", "left", "repeats", "side")
+    counts = {name: Counter(getattr(one, name) for one in arrangements) for name in factors}
+    return {"arrangement": Counter(arrangements), **counts}
+
+
+def check_balance(task, episodes):
+    found = arrangement_counts(episodes)
+    orders = counterbalanced_order(task)
+    assert spread(found["arrangement"], orders) <= 1
+    for factor in ("color", "left", "repeats"):
+        assert spread(found[factor], {getattr(one, factor) for one in orders}) <= 1, factor
+    assert spread(found["side"], ("left", "right")) <= 2
+
+
+@settings(max_examples=40)
+@given(plans)
+def test_every_condition_meets_the_same_balanced_arrangements(plan):
+    cells = {}
+    for trial in plan.trials:
+        job = trial.job
+        cells.setdefault((job.task, job.setting, job.policy), []).append(trial.episode)
+    for (task, _, _), episodes in cells.items():
+        check_balance(task, episodes)
+        first = next(found for (other, _, _), found in cells.items() if other == task)
+        assert {one.index for one in episodes} == {one.index for one in first}
+    for task in {one.task for one in plan.demonstrations}:
+        chosen = [one.episode for one in plan.demonstrations if one.task == task]
+        assert len({one.index for one in chosen}) == len(chosen)
+        check_balance(task, chosen)
+
+
+@settings(max_examples=40)
+@given(plans)
+def test_every_block_has_every_condition_once_on_one_arrangement(plan):
+    blocks = [list(trials) for _, trials in groupby(plan.trials, key=lambda trial: trial.block)]
+    conditions = Counter((t.job.setting, t.job.policy) for t in blocks[0])
+    assert set(conditions.values()) == {1}
+    for number, trials in enumerate(blocks, 1):
+        assert {trial.block for trial in trials} == {number}
+        assert len({(trial.job.task, trial.job.episode) for trial in trials}) == 1
+        assert Counter((t.job.setting, t.job.policy) for t in trials) == conditions
+    tasks = len({trial.job.task for trial in plan.trials})
+    turns = [trials[0].job.task for trials in blocks]
+    for start in range(0, len(turns), tasks):
+        assert len(set(turns[start : start + tasks])) == tasks
+
+
+@settings(max_examples=40)
+@given(plans, st.integers(0, 2**63))
+def test_a_seed_changes_the_order_and_nothing_else(plan, seed):
+    again = make_study(
+        plan.policies,
+        tasks=tuple(dict.fromkeys(trial.job.task for trial in plan.trials)),
+        settings=tuple(dict.fromkeys(trial.job.setting for trial in plan.trials)),
+        trials=len({(t.job.task, t.job.episode) for t in plan.trials})
+        // len({t.job.task for t in plan.trials}),
+        demonstrations=len(plan.demonstrations) // len({t.job.task for t in plan.trials}),
+        seed=seed,
+    )
+    assert {(t.name, t.job) for t in again.trials} == {(t.name, t.job) for t in plan.trials}
+    assert len({t.name for t in plan.trials}) == len(plan.trials) == len(again.trials)
+    assert set(again.demonstrations) == set(plan.demonstrations)
+
+
+def test_seeds_do_change_the_order_and_one_seed_does_not():
+    made = [
+        make_study(("a", "b"), tasks=TASKS, trials=4, demonstrations=4, seed=seed)
+        for seed in (0, 0, 1)
+    ]
+    assert made[0] == made[1]
+    assert [t.name for t in made[0].trials] != [t.name for t in made[2].trials]
+    assert made[0].demonstrations != made[2].demonstrations
+
+
+def test_no_condition_is_early_or_late_on_average():
+    # The order in a block is uniform: each condition is first in a tenth of 1600 blocks.
+    first = Counter()
+    for seed in range(80):
+        plan = make_study(("a", "b"), tasks=TASKS, trials=10, demonstrations=0, seed=seed)
+        for _, trials in groupby(plan.trials, key=lambda trial: trial.block):
+            job = next(trials).job
+            first[job.setting, job.policy] += 1
+    assert len(first) == 10
+    assert all(120 <= count <= 200 for count in first.values()), first
+
+
+def test_the_paper_s_study_is_the_default():
+    plan = make_study(("a", "b"), tasks=TASKS)
+    assert len(plan.trials) == 2 * 5 * 10 * 2
+    assert len(plan.demonstrations) == 2 * 50
+    picks = [t.episode for t in plan.trials if t.job.task == "PickByCount"]
+    assert set(arrangement_counts(picks)["color"].values()) == {50}
+    assert set(arrangement_counts(picks)["repeats"].values()) == {50}
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_all_arrangements_are_there_and_neighbors_are_opposites(task):
+    order = counterbalanced_order(task)
+    assert len(set(order)) == len(order) == (4 if task == "PutInBox" else 8)
+    for one, other in zip(order[::2], order[1::2], strict=True):
+        assert one.color != other.color
+        assert one.left != other.left
+        assert one.repeats != other.repeats or one.repeats is None
+
+
+def test_what_cannot_be_is_said():
+    with pytest.raises(InvalidValueError, match="too many for the split 'val'; at most 2"):
+        make_study(("a",), tasks=("PickByCount",), trials=50)
+    with pytest.raises(InvalidValueError, match="'a' is given twice"):
+        make_study(("a", "a"), tasks=TASKS)
+    with pytest.raises(InvalidValueError, match="PickXtimes is not a task for a real robot"):
+        make_study(("a",), tasks=("PickXtimes",))
+    with pytest.raises(UnknownNameError, match="no setting of PutInBox 'spatail'"):
+        make_study(("a",), tasks=("PutInBox",), settings=("spatail",))
+    with pytest.raises(InvalidValueError, match="trials is 0; it must be at least 1"):
+        make_study(("a",), tasks=TASKS, trials=0)
+
+
+def test_a_plan_is_read_as_it_was_written_and_not_overwritten(tmp_path):
+    plan = make_study(("a",), tasks=TASKS, trials=1, demonstrations=1)
+    write_study(plan, tmp_path)
+    write_study(plan, tmp_path)
+    assert read_study(tmp_path) == plan == StudyPlan.model_validate_json(plan.model_dump_json())
+    with pytest.raises(InvalidValueError, match="holds another plan"):
+        write_study(make_study(("a",), tasks=TASKS, trials=1, seed=1), tmp_path)
+    with pytest.raises(InvalidValueError, match="There is no plan in"):
+        read_study(tmp_path / "elsewhere")
+    (tmp_path / "plan.json").write_text('{"policies": ["oracle"]}')
+    with pytest.raises(InvalidValueError, match="is not the plan of a real-robot study"):
+        read_study(tmp_path)
+
+
+def test_csv_says_what_the_plan_says():
+    plan = make_study(("a", "b"), tasks=TASKS, trials=2, demonstrations=2)
+    rows = list(csv.DictReader(io.StringIO(trials_csv(plan))))
+    assert [row["trial"] for row in rows] == [trial.name for trial in plan.trials]
+    for row, trial in zip(rows, plan.trials, strict=True):
+        assert row["policy"] == trial.job.policy
+        assert row["instruction"] == language.instruct(trial.episode, trial.job.setting).text
+    shown = list(csv.DictReader(io.StringIO(demonstrations_csv(plan))))
+    assert [row["demonstration"] for row in shown] == [one.name for one in plan.demonstrations]
+    for row, one in zip(shown, plan.demonstrations, strict=True):
+        assert row["instruction"] == language.instruct(one.episode, "explicit").text
+
+
+def test_drawings_have_the_robot_s_left_on_the_left():
+    plan = make_study(("a",), tasks=TASKS, trials=4, demonstrations=0)
+    for trial in plan.trials:
+        for shape in scene_shapes(trial.episode.scene):
+            # Base frame: y to the left, and everything is in reach in front of the robot.
+            assert 0.35 < shape.x < 0.85
+            assert abs(shape.y) < 0.3
+        left = max(
+            (s for s in scene_shapes(trial.episode.scene) if s.form in ("square", "ring")),
+            key=lambda shape: shape.y,
+        )
+        picture = draw_svg(trial.episode.scene)
+        place = picture.index(f">{left.label}<")
+        x = float(picture[:place].rsplit('x="', 1)[1].split('"')[0])
+        others = [s.label for s in scene_shapes(trial.episode.scene) if s is not left]
+        for label in others:
+            at = picture.index(f">{label}<")
+            assert float(picture[:at].rsplit('x="', 1)[1].split('"')[0]) >= x
+
+
+@given(st.floats(-3.0, 3.0), st.floats(0.01, 0.2))
+def test_squares_are_turned_counter_clockwise(yaw, half):
+    shape = Shape("square", 0.6, -0.1, yaw, half, 0.0, "#000000", "box")
+    found = square_corners(shape, half)
+    for number, (x, y) in enumerate(found):
+        assert math.hypot(x - 0.6, y + 0.1) == pytest.approx(half * math.sqrt(2.0))
+        turned = math.atan2(y + 0.1, x - 0.6) - (math.pi / 4 - number * math.pi / 2 + yaw)
+        assert math.cos(turned) == pytest.approx(1.0)
+
+
+def test_the_sheet_is_the_same_for_the_same_plan(tmp_path):
+    plan = make_study(("a",), tasks=TASKS, trials=1, demonstrations=4)
+    assert write_sheet(plan, tmp_path / "a.pdf") == 2 + 2
+    write_sheet(plan, tmp_path / "b.pdf")
+    assert (tmp_path / "a.pdf").read_bytes() == (tmp_path / "b.pdf").read_bytes()
+    assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")
+    # Nothing half-written is left.
+    assert not list(tmp_path.glob(".*"))
+
+
+@pytest.mark.parametrize(
+    ("task", "wrong"),
+    [("PutInBox", {"wrong_place"}), ("PickByCount", {"wrong_object", "wrong_count"})],
+)
+def test_operators_choose_among_the_failures_of_the_task(task, wrong):
+    for trial in make_study(("a",), tasks=(task,), trials=8, demonstrations=0).trials:
+        choices = failure_choices(trial.episode)
+        assert {one.failure for one in choices if one.is_grounding} == wrong
+        assert [one.failure for one in choices if not one.is_grounding] == [
+            "nothing_reached", "missed_grasp", "dropped", "misplaced", "out_of_time",
+        ]  # fmt: skip
+        assert len({one.key for one in choices}) == len(choices)
+        meant = str(trial.episode.goal["color"])
+        for one in choices:
+            if one.failure in ("wrong_place", "wrong_object"):
+                assert meant not in one.words
+
+
+def test_sides_follow_from_colors():
+    assert Arrangement("green", "green").side == "left"
+    assert Arrangement("green", "purple").side == "right"
+
+
+def test_nothing_on_the_sheet_is_cut_off_or_overlaps():
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    plan = make_study(("a", "b"), tasks=TASKS, trials=4, demonstrations=50)
+    for page in _pages(plan):
+        canvas = FigureCanvasAgg(page)
+        canvas.draw()
+        renderer = canvas.get_renderer()
+        width, height = canvas.get_width_height()
+        boxes = [text.get_window_extent(renderer) for text in page.texts if text.get_text()]
+        for box in boxes:
+            assert 0 <= box.x0 <= box.x1 <= width
+            assert 0.03 * height <= box.y0 <= box.y1 <= height
+        for number, one in enumerate(boxes):
+            for other in boxes[:number]:
+                across = min(one.x1, other.x1) - max(one.x0, other.x0)
+                along = min(one.y1, other.y1) - max(one.y0, other.y0)
+                # Lines may touch, no more.
+                assert across <= 0 or along <= 0.25 * min(one.height, other.height)
+        for axes in page.axes:
+            frame = axes.get_tightbbox(renderer)
+            assert not any(frame.y0 < box.y1 - 2 and box.y0 < frame.y1 and
+                           frame.x0 < box.x1 and box.x0 < frame.x1 for box in boxes)  # fmt: skip

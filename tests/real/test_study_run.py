@@ -1,0 +1,159 @@
+"""A study from its plan to its table: played on the twin, killed, resumed, scored, told."""
+
+import re
+import shutil
+import signal
+import subprocess
+import time
+
+import pytest
+from real_start import start
+
+from roboirg.analysis.stats.cells import gather
+from roboirg.analysis.tables.paper_tables import make_table
+from roboirg.real.pages.study_figure import bar_series, write_figure
+from roboirg.real.study.failure_choices import failure_choices
+from roboirg.real.study.study_plan import read_study
+from roboirg.real.study.trial_log import TrialLog, trial_metadata
+from roboirg.records.store import read_records, read_results
+
+pytestmark = pytest.mark.sim
+
+SETTINGS = ("explicit", "reasoning", "contextual")
+OPTIONS = ("--policy", "listener", "--policy", "forgetful", "--settings", ",".join(SETTINGS))
+CHROMIUM = shutil.which("chromium")
+
+
+def finished(*words):
+    process = start(*words)
+    text, _ = process.communicate(timeout=300)
+    assert process.returncode == 0, text
+    return text
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """Twelve trials, played; killed after some and resumed."""
+    folder = tmp_path_factory.mktemp("study") / "run"
+    finished("plan", *OPTIONS, "--trials", 1, "--demonstrations", 2, "--out", folder)
+    assert {path.name for path in folder.iterdir()} == {
+        "plan.json", "trials.csv", "demonstrations.csv", "sheet.pdf",
+    }  # fmt: skip
+    # A busy machine must not make a policy late.
+    limits = folder.parent / "limits.json"
+    limits.write_text('{"policy_timeout_s": 60}')
+    play = ("run", folder, "--score", "operator", "--limits", limits)
+    process = start(*play)
+    records = folder / "records.jsonl"
+    deadline = time.monotonic() + 120
+    while not (records.exists() and records.read_text().count("\n") >= 4):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    process.send_signal(signal.SIGKILL)
+    process.wait(timeout=30)
+    killed = records.read_bytes()
+    assert killed.count(b"\n") < 12
+    text = finished(*play)
+    assert records.read_bytes().startswith(killed[: killed.rindex(b"\n")])
+    played = 12 - killed.count(b"\n")
+    assert f"Played {played} trials; 0 ended in an error." in text
+    return folder
+
+
+def test_every_trial_was_played_once_and_waits(study):
+    plan = read_study(study)
+    trial_log = TrialLog.read(plan, study)
+    assert len(read_records(study)) == len(plan.trials) == 12
+    assert len((study / "records.jsonl").read_text().splitlines()) == 12
+    assert {trial_log.state(trial.name) for trial in plan.trials} == {"waiting"}
+    # What the judge saw is not where the operator sees it.
+    assert not any(record.events or record.attribution for record in read_records(study))
+    table = make_table("real", gather([("run", read_results(study))]))
+    assert all(entry.percent is None for row in table.rows for entry in row.entries)
+
+
+@pytest.mark.browser
+def test_scored_in_a_browser_it_is_the_table_that_the_judge_would_have_given(study):
+    if not CHROMIUM:
+        pytest.skip("no chromium on this machine")
+    driver = pytest.importorskip("playwright.sync_api")
+    plan = read_study(study)
+    before = TrialLog.read(plan, study)
+    judged = {t.name: trial_metadata(before.newest(t.name))["judge"] for t in plan.trials}
+    process = start("score", study, "--operator", "ann")
+    with driver.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        page = browser.new_page()
+        page.goto(re.search(r"http\S+", process.stdout.readline())[0])
+        for number, trial in enumerate(plan.trials):
+            verdict = judged[trial.name]
+            choices = [one.failure for one in failure_choices(trial.episode)]
+            key = "s" if verdict["outcome"] == "success" else str(
+                choices.index(verdict["failure"]) + 1
+            )  # fmt: skip
+            with page.expect_navigation():
+                page.keyboard.press(key)
+            if number == 5:  # killed in the middle, and gone on
+                process.send_signal(signal.SIGKILL)
+                process.wait(timeout=30)
+                process = start("score", study, "--operator", "bob")
+                page.goto(re.search(r"http\S+", process.stdout.readline())[0])
+        browser.close()
+    process.kill()
+    process.wait(timeout=30)
+    records = {record.identity: record for record in read_records(study)}
+    for number, trial in enumerate(plan.trials):
+        record = records[trial.job]
+        assert record.outcome == judged[trial.name]["outcome"]
+        found = record.attribution.failure if record.attribution else None
+        assert found == judged[trial.name]["failure"]
+        assert trial_metadata(record)["operator"] == ("ann" if number <= 5 else "bob")
+        assert record.steps > 50
+    samples = gather([("run", read_results(study))])
+    table = make_table("real", samples, published=True)
+    ours = {(row.group, row.name): row for row in table.rows if row.source == "ours"}
+    assert set(ours) == {(one, who) for one in SETTINGS for who in ("listener", "forgetful")}
+    for setting in SETTINGS:
+        assert [float(entry.percent) for entry in ours[setting, "listener"].entries] == [100.0] * 3
+    assert sum(row.source == "published" for row in table.rows) == 10
+    # And the figure has the same numbers.
+    bars = {one.name: one.bars for one in bar_series(table)}
+    assert bars["listener"]["PutInBox", "reasoning"].percent == 100.0
+    assert bars["pi0.5"]["PickByCount", "explicit"].percent == 50.0
+    low, high = bars["pi0.5"]["PickByCount", "explicit"][1:]
+    assert (low, high) == pytest.approx((23.7, 76.3), abs=0.1)
+    for path in write_figure(samples, study / "figure"):
+        assert path.stat().st_size > 10_000
+
+
+def test_two_loops_do_not_share_a_robot(study):
+    from roboirg.real.study.study_run import lock_robot
+
+    with lock_robot(study):
+        process = start("run", study)
+        text, _ = process.communicate(timeout=120)
+    assert process.returncode != 0
+    assert "Another process plays the study" in text
+
+
+def test_a_policy_outside_the_plan_is_refused(study):
+    process = start("run", study, "--policy", "oracle")
+    text, _ = process.communicate(timeout=120)
+    assert "There is no policy in the plan 'oracle'" in text
+
+
+@pytest.mark.parametrize("sign", [signal.SIGINT, signal.SIGTERM])
+def test_a_run_that_is_told_to_end_keeps_what_was_played(sign, tmp_path):
+    finished(
+        "plan", *OPTIONS, "--trials", 1, "--demonstrations", 0, "--no-sheet", "--out", tmp_path
+    )
+    process = start("run", tmp_path)
+    assert process.stdout.readline().startswith("1. ")
+    process.send_signal(sign)
+    try:
+        process.communicate(timeout=60)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        raise
+    assert process.returncode == 130
+    assert read_records(tmp_path)

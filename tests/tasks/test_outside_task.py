@@ -1,0 +1,80 @@
+"""The task of the recipe in docs/tasks.md: one file from outside, and it works everywhere."""
+
+import importlib.util
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+import roboirg
+from roboirg import tasks
+from roboirg.core.conditions import Fact
+from roboirg.episodes.splits import get_episode, make_episode
+from roboirg.judging import Judge, Status
+from roboirg.language.settings import settings_of
+from roboirg.language.validation import check_episode
+from roboirg.policies import make_policy, play
+
+PAGE = (Path(__file__).parents[2] / "docs" / "tasks.md").read_text()
+NAME = "PlaceAndPress"
+
+
+@pytest.fixture
+def task(tmp_path, monkeypatch):
+    """The recipe's task, as if its package were installed."""
+    (code,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
+    (tmp_path / "place_and_press.py").write_text(code)
+    spec = importlib.util.spec_from_file_location(
+        "place_and_press", tmp_path / "place_and_press.py"
+    )
+    module = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, "place_and_press", module)
+    spec.loader.exec_module(module)
+    registry = (*tasks.every_task().values(), module.TASK)
+    caches = (tasks.all_tasks, tasks.all_suites)
+    with monkeypatch.context() as patch:
+        patch.setattr(tasks, "_registry", lambda: registry)
+        for cache in caches:
+            cache.cache_clear()
+        yield module.TASK
+    for cache in caches:
+        cache.cache_clear()
+
+
+def test_it_is_found_beside_the_benchmark(task):
+    assert tasks.get_task(NAME) is task
+    assert tasks.find_tasks([NAME]) == tasks.find_tasks([task.suite]) == (NAME,)
+    assert NAME not in tasks.find_tasks(["all"])
+    assert set(settings_of(task)) == {"explicit", "direct", "reasoning", "contextual"}
+
+
+def test_its_scenes_fit_and_its_instructions_are_valid(task):
+    assert len(task.commands.wordings) >= 2
+    for seed in range(40):
+        for difficulty in ("easy", "medium", "hard"):
+            make_episode(NAME, seed, difficulty)
+    for index in range(8):
+        assert not check_episode(get_episode(NAME, "test", index)).failures
+
+
+def test_its_causes_say_what_was_done_and_what_was_expected(task):
+    episode = get_episode(NAME, "test", 2)
+    color = episode.goal.text("color")
+    judge = Judge(episode.stages, episode.scene)
+    assert judge.update(0, frozenset([Fact("pressed", "button")])) is Status.FAILURE
+    assert judge.cause == f"pressed the button too early; expected: pick up the {color} cube"
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize("index", range(3))
+def test_the_oracle_solves_it(task, index):
+    env = roboirg.make(get_episode(NAME, "test", index), cameras=())
+    assert play(env, make_policy("oracle", 0))["status"] == "success"
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize("setting", ["direct", "reasoning", "contextual"])
+def test_the_listener_solves_it(task, setting):
+    env = roboirg.make(NAME, setting=setting, episode=1, cameras=())
+    assert play(env, make_policy("listener", 0))["status"] == "success"
