@@ -24,13 +24,11 @@ from numpy.typing import NDArray
 from roboirg.core import object_sizes
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import SPLITS, Color, Goal, Scene, SceneObject
-from roboirg.core.motions import Away, Glow, Motion, Point, Shuttle, Swap
+from roboirg.core.motions import Motion, Point, Shuttle
 from roboirg.episodes.recordings import FOLDER, INCOMPLETE
 from roboirg.episodes.scene_codec import encode
 from roboirg.tasks import bin_fill, stop_cube, swing_x_times, video_repick
 from roboirg.tasks.shared import unmask, unmask_swap, video_place
-from roboirg.tasks.shared.fixtures import marker_over
-from roboirg.tasks.shared.swapping import plan_swaps
 
 Row = Mapping[str, Any]
 Body = Sequence[float]
@@ -46,7 +44,9 @@ COLOR_OF_RGB: dict[tuple[float, ...], Color] = {
 def main() -> None:
     """Write the data file."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, help="with train.jsonl.gz, val.jsonl.gz, test.jsonl.gz")
+    parser.add_argument(
+        "folder", type=Path, help="with train.jsonl.gz, val.jsonl.gz, test.jsonl.gz"
+    )
     parser.add_argument("--out", type=Path, required=True)
     arguments = parser.parse_args()
     text = "".join(f"{line}\n" for line in converted_lines(arguments.folder))
@@ -211,15 +211,9 @@ def convert_swing_x_times(row: Row) -> tuple[Scene, Goal]:
         )
         for side in swing_x_times.SIDES
     )
-    markers = tuple(marker_over(one, one.name.replace("target", "marker")) for one in targets)
     color = facts["target_color_name"]
-    return (
-        Scene(
-            (make_button(row), *colored_cubes(row), *targets, *markers),
-            tuple(Glow(m.name, Fact("over", f"cube_{color}", tg.name), swing_x_times.LINGER) for m, tg in zip(markers, targets)),
-        ),
-        Goal.of(color=color, repeats=facts["num_repeats"]),
-    )
+    scene = swing_x_times.make_scene(make_button(row), colored_cubes(row), targets, f"cube_{color}")
+    return scene, Goal.of(color=color, repeats=facts["num_repeats"])
 
 
 def convert_bin_fill(row: Row) -> tuple[Scene, Goal]:
@@ -237,8 +231,7 @@ def convert_bin_fill(row: Row) -> tuple[Scene, Goal]:
     counts = {color: facts[f"{color}_cubes_target_number"] for color in bin_fill.GOAL_ORDER}
     named = tuple(color for color in bin_fill.GOAL_ORDER if counts[color])
     goal = Goal.of(colors=named, counts=tuple(counts[color] for color in named))
-    order = tuple(color for color, _ in facts["binfill_language_sequence"])
-    motions = bin_fill._motions(cubes, late=facts["dynamic"])
+    motions = bin_fill.plan_motions(cubes, late=facts["dynamic"])
     return Scene((make_button(row), bin_, *cubes), motions), goal
 
 
@@ -248,7 +241,7 @@ def unmask_scene(row: Row, *buttons: SceneObject) -> tuple[Scene, Goal]:
     containers = make_containers(row)
     colors: list[Color] = facts["color_names"]
     cubes = tuple(
-        unmask._hidden_cube(color, container)
+        unmask.hidden_cube(color, container)
         for color, container in zip(colors, containers, strict=False)
     )
     picks = sum(
@@ -264,19 +257,22 @@ def unmask_swap_scene(row: Row, *buttons: SceneObject) -> tuple[Scene, Goal]:
     """Containers that change places, three of which hide a cube."""
     facts = row["facts"]
     containers = make_containers(row)
-    by_source = {body_name(one): container for one, container in zip(facts["spawned_bins"], containers, strict=True)}
+    by_source = {
+        body_name(one): container
+        for one, container in zip(facts["spawned_bins"], containers, strict=True)
+    }
     covers = {
         color_in(body_name(cube)): by_source[body_name(cover)]
         for cube, cover in facts["cube_bin_pairs"]
     }
     colors: list[Color] = facts["color_names"]
-    cubes = tuple(unmask._hidden_cube(color, covers[color]) for color in colors)
+    cubes = tuple(unmask.hidden_cube(color, covers[color]) for color in colors)
     initiators = tuple(
         by_source[body_name(facts[f"swap_pair{number}_idx1"])].name
         for number in range(1, facts["swap_times"] + 1)
     )
     scene = Scene(
-        (*buttons, *containers, *cubes), _um(containers, cubes, initiators)
+        (*buttons, *containers, *cubes), unmask_swap.plan_motions(containers, cubes, initiators)
     )
     return scene, Goal.of(colors=tuple(colors[: facts["pick_times"]]))
 
@@ -322,9 +318,8 @@ def convert_video_repick(row: Row) -> tuple[Scene, Goal]:
         names[body_name(facts[f"swap_pair{number}_idx1"])]
         for number in range(1, facts["swap_times"] + 1)
     )
-    swaps: tuple[Motion, ...] = plan_swaps(cubes, initiators, start=0, lane=video_repick.SWAP_LANE, stage=video_repick.SWAP_STAGE)
-    past = (Fact("picked", target), Fact("lying", target))
-    return Scene((make_button(row), *cubes), swaps, past), Goal.of(repeats=facts["num_repeats"])
+    scene = video_repick.make_scene(make_button(row), cubes, target, initiators)
+    return scene, Goal.of(repeats=facts["num_repeats"])
 
 
 def place_scene(row: Row, site_radius: float) -> tuple[Scene, str]:
@@ -341,7 +336,8 @@ def place_scene(row: Row, site_radius: float) -> tuple[Scene, str]:
     swaps: tuple[Motion, ...] = ()
     if "swap_target_a" in facts:
         first, second = (body_name(facts[f"swap_target_{one}"]) for one in "ab")
-        swaps = (_ps(first, second, discs, past),)
+        others = tuple(disc.name for disc in discs if disc.name not in (first, second))
+        swaps = (video_place.plan_swap(first, second, others, past),)
     return Scene((site, make_button(row), *colored_cubes(row), *discs), swaps, past), color
 
 
@@ -367,19 +363,6 @@ def video_place_order(row: Row) -> tuple[Scene, Goal]:
     """The disc of a placement is wanted."""
     scene, color = place_scene(row, 0.1)
     return scene, Goal.of(color=color, placement=row["facts"]["which_in_subset"])
-
-
-def _um(containers, cubes, initiators):
-    swaps = plan_swaps(containers, initiators, start=unmask_swap.START, lane=unmask_swap.LANE)
-    end = unmask_swap.last_step(swaps)
-    away = [Away(cube.name, unmask_swap.START, end, under=cube.inside) for cube in cubes]
-    return (*unmask.appearing(containers), *swaps, *away)
-
-
-def _ps(first, second, discs, past):
-    others = tuple(d.name for d in discs if d.name not in (first, second))
-    kinds = [s.primitive.kind for s in video_place._demonstration_of(past)]
-    return Swap(first, second, 0, video_place.SWAP_STEPS, video_place.SWAP_LANE, pinned=others, stage=kinds.index("hold"))
 
 
 CONVERTERS: dict[str, Callable[[Row], tuple[Scene, Goal]]] = {

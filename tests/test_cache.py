@@ -110,7 +110,7 @@ def writer(folder, count, size):
 def test_two_processes_may_fill_it_at_once(tmp_path):
     processes = [writer(tmp_path, 300, 20_000) for _ in range(2)]
     for process in processes:
-        _, complaints = process.communicate(timeout=60)
+        _, complaints = process.communicate(timeout=600)
         assert (process.returncode, complaints) == (0, "")
     assert entries(tmp_path) == ["0", "1", "2", "3", "4"]
 
@@ -126,7 +126,7 @@ def test_a_kill_while_writing_leaves_no_bad_entry(tmp_path, caplog, monkeypatch)
             time.sleep(0.0002)
         time.sleep(0.0005 * number)
         os.kill(process.pid, signal.SIGKILL)
-        process.communicate(timeout=10)
+        process.communicate(timeout=600)
         assert process.returncode == -signal.SIGKILL
         parts = [name for name in entries(tmp_path) if name.endswith(".part")]
         caught_writing += len(parts) > caught_writing

@@ -69,7 +69,7 @@ def running(server):
 
 
 def get(port, path, **headers):
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=30)
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=600)
     connection.request("GET", path, headers=headers)
     response = connection.getresponse()
     body = response.read()
@@ -79,7 +79,7 @@ def get(port, path, **headers):
 
 def hang_up(port, request, *, reset, receive=0):
     """Send a request and disconnect; a reset makes the server's next read or write fail."""
-    raw = socket.create_connection(("127.0.0.1", port), timeout=30)
+    raw = socket.create_connection(("127.0.0.1", port), timeout=600)
     raw.sendall(request)
     if receive:
         raw.recv(receive)
@@ -134,7 +134,7 @@ def test_an_error_of_the_server_prints_its_traceback(make, tmp_path, capfd, monk
 def test_bodies_have_a_limit(length, tmp_path, capfd):
     server, _, path = score_server(tmp_path)
     with running(server) as port:
-        with socket.create_connection(("127.0.0.1", port), timeout=30) as raw:
+        with socket.create_connection(("127.0.0.1", port), timeout=600) as raw:
             head = f"POST /score HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nContent-Length: {length}"
             raw.sendall(f"{head}\r\n\r\n".encode("latin-1"))
             answer = b"".join(iter(lambda: raw.recv(65536), b""))

@@ -111,7 +111,7 @@ def test_processes_and_policies_do_not_mix_state():
         players = [SPAWN.Process(target=play, args=(url, length, results)) for length in (3, 5, 8)]
         for player in players:
             player.start()
-        found = [results.get(timeout=60) for _ in range(3 * 3 * 12)]
+        found = [results.get(timeout=600) for _ in range(3 * 3 * 12)]
         for player in players:
             player.join()
             assert player.exitcode == 0

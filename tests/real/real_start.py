@@ -30,4 +30,4 @@ def end_all():
     while STARTED:
         process = STARTED.pop()
         process.kill()
-        process.wait(timeout=30)
+        process.wait(timeout=600)

@@ -47,7 +47,7 @@ def ask(server, path, form=None, *, host=None, origin=None):
             return None
 
     try:
-        answer = urllib.request.build_opener(Stay).open(request, timeout=10)
+        answer = urllib.request.build_opener(Stay).open(request, timeout=600)
     except urllib.error.HTTPError as error:
         answer = error
     with answer:
@@ -57,7 +57,7 @@ def ask(server, path, form=None, *, host=None, origin=None):
 def fetch(url, form=None):
     """Return the text of a page of a server in another process."""
     data = None if form is None else urllib.parse.urlencode(form).encode()
-    with urllib.request.urlopen(url, data, timeout=30) as answer:  # noqa: S310 - our own server
+    with urllib.request.urlopen(url, data, timeout=600) as answer:  # noqa: S310 - our own server
         return answer.read().decode()
 
 
@@ -156,7 +156,7 @@ def test_a_kill_between_two_clicks_costs_nothing(small):
         address = url.partition("/?")[0] + "/score"
         fetch(address, form)
         process.send_signal(signal.SIGKILL)
-        process.wait(timeout=30)
+        process.wait(timeout=600)
     assert [one.outcome for one in read_records(folder)] == ["success"] * 4
 
 
@@ -212,7 +212,7 @@ def test_a_study_is_scored_by_keyboard_alone_and_survives_a_kill(browser, tmp_pa
             assert trial.name in page.inner_text("[role=status]")
         assert troubles == []
         process.send_signal(signal.SIGKILL)
-        process.wait(timeout=30)
+        process.wait(timeout=600)
         page.close()
     trial_log = TrialLog.read(plan, tmp_path)
     for trial in plan.trials:

@@ -50,7 +50,7 @@ def study(tmp_path_factory):
         assert time.monotonic() < deadline
         time.sleep(0.05)
     process.send_signal(signal.SIGKILL)
-    process.wait(timeout=30)
+    process.wait(timeout=600)
     killed = records.read_bytes()
     assert killed.count(b"\n") < 12
     text = finished(*play)
@@ -95,12 +95,12 @@ def test_scored_in_a_browser_it_is_the_table_that_the_judge_would_have_given(stu
                 page.keyboard.press(key)
             if number == 5:  # killed in the middle, and gone on
                 process.send_signal(signal.SIGKILL)
-                process.wait(timeout=30)
+                process.wait(timeout=600)
                 process = start("score", study, "--operator", "bob")
                 page.goto(re.search(r"http\S+", process.stdout.readline())[0])
         browser.close()
     process.kill()
-    process.wait(timeout=30)
+    process.wait(timeout=600)
     records = {record.identity: record for record in read_records(study)}
     for number, trial in enumerate(plan.trials):
         record = records[trial.job]
@@ -151,7 +151,7 @@ def test_a_run_that_is_told_to_end_keeps_what_was_played(sign, tmp_path):
     assert process.stdout.readline().startswith("1. ")
     process.send_signal(sign)
     try:
-        process.communicate(timeout=60)
+        process.communicate(timeout=600)
     except subprocess.TimeoutExpired:
         process.kill()
         raise

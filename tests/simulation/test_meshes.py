@@ -151,7 +151,7 @@ def test_a_kill_while_meshes_are_written_leaves_no_bad_entry(right, cache):
             time.sleep(0.0002)
         time.sleep(0.0004 * number)
         os.kill(process.pid, signal.SIGKILL)
-        process.communicate(timeout=10)
+        process.communicate(timeout=600)
         caught += len(complete(cache)) < DERIVED
         for name in complete(cache):
             assert (cache / name).read_bytes() == (sound / name).read_bytes()

@@ -12,7 +12,13 @@ from typing import Annotated
 
 import typer
 
-from roboirg.cli import language_commands, policy_commands, report_commands, run_commands
+from roboirg.cli import (
+    episode_commands,
+    language_commands,
+    policy_commands,
+    report_commands,
+    run_commands,
+)
 from roboirg.cli.bench_commands import bench
 from roboirg.cli.options import Distractor, Frame, Split, Stages, Tasks, Video, Workers
 from roboirg.cli.real_commands import real_app
@@ -76,6 +82,7 @@ app.command()(report_commands.figures)
 app.command()(report_commands.compare)
 app.command(cls=policy_commands.ProtocolHelpCommand)(policy_commands.serve)
 app.command("check-policy", cls=policy_commands.ProtocolHelpCommand)(policy_commands.check_policy)
+language_commands.export_app.command("episodes")(episode_commands.export_episodes)
 language_commands.export_app.command("records")(run_commands.export_records)
 
 

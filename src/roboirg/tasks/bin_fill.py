@@ -8,7 +8,7 @@ where the oracle shuffles the colors; here it takes them in the order of the goa
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -72,7 +72,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     cubes = _draw_cubes(rng, spawned, [button_keep_out(button), bin_footprint(bin_)])
     named = tuple(color for color in GOAL_ORDER if wanted.get(color))
     goal = Goal.of(colors=named, counts=tuple(wanted[color] for color in named))
-    return Scene((button, bin_, *cubes), _motions(cubes, late=late)), goal
+    return Scene((button, bin_, *cubes), plan_motions(cubes, late=late)), goal
 
 
 def _draw_wanted(
@@ -115,7 +115,7 @@ def _draw_cubes(
     return cubes
 
 
-def _motions(cubes: list[SceneObject], *, late: bool) -> tuple[Motion, ...]:
+def plan_motions(cubes: Sequence[SceneObject], *, late: bool) -> tuple[Motion, ...]:
     """Return the motions: binned cubes vanish, and late ones appear after the first of their color.
 
     As in RoboMME, the place of a late cube may be occupied.

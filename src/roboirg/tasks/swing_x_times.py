@@ -6,6 +6,8 @@ count. Facts: RoboMME.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from roboirg.core.conditions import Fact, OccurrenceCount, Rule
@@ -57,15 +59,29 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
         targets.append(target)
         obstacles.append(Circle(target.position.x, target.position.y, TARGET_RADIUS))
     chosen = cubes[int(rng.integers(len(cubes)))]
+    goal = Goal.of(color=str(chosen.color), repeats=repeats)
+    return make_scene(button, cubes, targets, chosen.name), goal
+
+
+def make_scene(
+    button: SceneObject, cubes: Sequence[SceneObject], targets: Sequence[SceneObject], cube: str
+) -> Scene:
+    """Return the scene in which each target lights up while the cube of the goal is over it.
+
+    Args:
+        button: the button.
+        cubes: all cubes.
+        targets: in the order of `SIDES`.
+        cube: name of the goal's cube.
+    """
     markers = [
         marker_over(target, f"marker_{side}") for side, target in zip(SIDES, targets, strict=True)
     ]
     motions = tuple(
-        Glow(marker.name, Fact("over", chosen.name, target.name), LINGER)
+        Glow(marker.name, Fact("over", cube, target.name), LINGER)
         for marker, target in zip(markers, targets, strict=True)
     )
-    goal = Goal.of(color=str(chosen.color), repeats=repeats)
-    return Scene((button, *cubes, *targets, *markers), motions), goal
+    return Scene((button, *cubes, *targets, *markers), motions)
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:

@@ -7,6 +7,8 @@ Facts: RoboMME.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from roboirg.core.conditions import All, Elapsed, Fact, Rule
@@ -58,11 +60,24 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     cubes = _draw_clutter(rng, button) if difficulty == "hard" else _draw_layout(rng, button)
     # The cube of the video starts the first swap, the others follow in any order.
     target, *others = (cubes[index].name for index in rng.permutation(len(cubes)))
-    motions = plan_swaps(
-        cubes, (target, *others)[:swaps], start=0, lane=SWAP_LANE, stage=SWAP_STAGE
-    )
+    scene = make_scene(button, cubes, target, (target, *others)[:swaps])
+    return scene, Goal.of(repeats=repeats)
+
+
+def make_scene(
+    button: SceneObject, cubes: Sequence[SceneObject], target: str, initiators: Sequence[str]
+) -> Scene:
+    """Return the scene whose video shows a cube picked up and put down, and then swaps.
+
+    Args:
+        button: the button.
+        cubes: all cubes.
+        target: name of the cube of the video.
+        initiators: names of the cubes that start a swap, in order.
+    """
+    motions = plan_swaps(cubes, initiators, start=0, lane=SWAP_LANE, stage=SWAP_STAGE)
     past = (Fact("picked", target), Fact("lying", target))
-    return Scene((button, *cubes), motions, past), Goal.of(repeats=repeats)
+    return Scene((button, *cubes), motions, past)
 
 
 def _draw_layout(rng: np.random.Generator, button: SceneObject) -> list[SceneObject]:

@@ -88,12 +88,13 @@ def hide_cubes(
         raise SceneRejectedError("fewer than three containers fit")
     order = rng.permutation(len(COLORS))
     return tuple(
-        _hidden_cube(COLORS[index], container)
+        hidden_cube(COLORS[index], container)
         for index, container in zip(order, containers, strict=False)
     )
 
 
-def _hidden_cube(color: Color, container: SceneObject) -> SceneObject:
+def hidden_cube(color: Color, container: SceneObject) -> SceneObject:
+    """Return the cube of a color under a container."""
     x, y, _ = container.position
     position = Point(x, y, object_sizes.HIDDEN_CUBE_HALF)
     return SceneObject(f"cube_{color}", "hidden_cube", position, 0.0, color, container.name)

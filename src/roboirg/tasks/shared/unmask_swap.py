@@ -50,19 +50,27 @@ def sample(
     """
     order = rng.permutation(len(COLORS))
     cubes = hide_cubes(rng, [containers[index] for index in order if index < len(containers)])
-    swaps = plan_swaps(
-        containers,
-        _initiators(rng, difficulty, containers),
-        start=START,
-        lane=LANE,
-    )
-    end = last_step(swaps)
-    away = [Away(cube.name, START, end, under=cube.inside) for cube in cubes]
-    # The cubes come last: when they return, their containers have arrived.
-    motions: tuple[Motion, ...] = (*appearing(containers), *swaps, *away)
+    motions = plan_motions(containers, cubes, _initiators(rng, difficulty, containers))
     picks = draw_number(rng, PICKS[difficulty])
     colors = tuple(str(cube.color) for cube in cubes[:picks])
     return Scene((*buttons, *containers, *cubes), motions), Goal.of(colors=colors)
+
+
+def plan_motions(
+    containers: Sequence[SceneObject], cubes: Sequence[SceneObject], initiators: Sequence[str]
+) -> tuple[Motion, ...]:
+    """Return all motions: containers appear and swap, cubes are away meanwhile.
+
+    Args:
+        containers: all containers.
+        cubes: those under them.
+        initiators: names of the containers that start a swap, in order.
+    """
+    swaps = plan_swaps(containers, initiators, start=START, lane=LANE)
+    end = last_step(swaps)
+    away = [Away(cube.name, START, end, under=cube.inside) for cube in cubes]
+    # The cubes come last: when they return, their containers have arrived.
+    return (*appearing(containers), *swaps, *away)
 
 
 def _initiators(

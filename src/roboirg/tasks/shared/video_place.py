@@ -71,6 +71,18 @@ def draw_table(
 def draw_swap(rng: np.random.Generator, discs: Sequence[SceneObject], past: Sequence[Fact]) -> Swap:
     """Draw two discs that change places when the robot holds still at the end of the video."""
     first, second, *others = (discs[index].name for index in rng.permutation(len(discs)))
+    return plan_swap(first, second, others, past)
+
+
+def plan_swap(first: str, second: str, others: Sequence[str], past: Sequence[Fact]) -> Swap:
+    """Return the swap of two discs at the end of the video.
+
+    Args:
+        first: name of a disc.
+        second: name of the other.
+        others: names of the discs that stay.
+        past: what the video shows.
+    """
     kinds = [stage.primitive.kind for stage in _demonstration_of(past)]
     hold = kinds.index("hold")
     return Swap(first, second, 0, SWAP_STEPS, SWAP_LANE, pinned=tuple(others), stage=hold)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from roboirg.core.episode import Episode, SceneObject
 from roboirg.episodes.scene_codec import Json, encode
+from roboirg.util.atomic_write import write_atomically
 
 
 def episode_row(episode: Episode) -> dict[str, Json]:
@@ -35,11 +36,12 @@ def write_episodes(episodes: Iterable[Episode], path: Path) -> int:
 
     Returns:
         How many lines were written.
+
+    Raises:
+        InvalidValueError: the file cannot be written.
     """
     lines = [json.dumps(episode_row(one), separators=(",", ":")) + "\n" for one in episodes]
-    partial = path.with_name(f".{path.name}.part")
-    partial.write_text("".join(lines), encoding="utf-8")
-    partial.replace(path)
+    write_atomically(path, "".join(lines))
     return len(lines)
 
 

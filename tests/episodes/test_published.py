@@ -1,0 +1,202 @@
+"""RoboMME's episodes as data: the shipped files are what the rows give, and they replay."""
+
+import contextlib
+import importlib.util
+import io
+import json
+import math
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roboirg.cli.app import app
+from roboirg.core.episode import DIFFICULTIES, SPLITS, Episode, Scene, SceneObject
+from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.core.motions import Point
+from roboirg.episodes import published_episodes
+from roboirg.episodes.episode_export import episode_row, write_episodes
+from roboirg.episodes.published_episodes import published_episode, published_text
+from roboirg.episodes.recordings import INCOMPLETE, recorded_actions
+from roboirg.episodes.scene_codec import decode, encode
+from roboirg.episodes.splits import SIZES, get_episode
+from roboirg.tasks import all_tasks, every_task, get_task
+
+ROWS = Path(__file__).parent / "robomme"
+SCRIPT = Path(__file__).parents[2] / "scripts" / "convert_robomme_episodes.py"
+RECORDED = ("VideoRepick", "VideoPlaceButton", "VideoPlaceOrder")
+NOT_BUILT = {
+    ("VideoPlaceOrder", "train"): 3,
+    ("VideoPlaceOrder", "val"): 2,
+    ("VideoPlaceButton", "val"): 1,
+}
+
+
+@pytest.fixture(scope="module")
+def converter():
+    spec = importlib.util.spec_from_file_location("convert_robomme_episodes", SCRIPT)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def roboirg(*words):
+    """Call a command in this process and return what it prints."""
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out):
+        typer.main.get_command(app)(list(map(str, words)), standalone_mode=False)
+    return out.getvalue()
+
+
+def as_episode(task, split, index):
+    """A published episode with the stages of its task."""
+    found, kind = published_episode(task, split, index), get_task(task)
+    return Episode(
+        task=task,
+        split=split,
+        index=index,
+        seed=found.seed,
+        difficulty=found.difficulty,
+        scene=found.scene,
+        goal=found.goal,
+        stages=kind.stages(found.scene, found.goal),
+        demonstration=kind.demonstration(found.scene),
+    )
+
+
+def test_the_shipped_file_is_what_the_rows_give(converter):
+    assert list(converter.converted_lines(ROWS)) == published_text().splitlines()
+
+
+def test_a_damaged_file_is_one_sentence(monkeypatch):
+    monkeypatch.setattr(published_episodes, "SHA256", "0" * 64)
+    with pytest.raises(RoboIRGError, match=r"published\.jsonl\.gz is damaged: its SHA-256 is 01ac"):
+        published_text()
+
+
+def test_every_episode_is_there_but_those_that_robomme_cannot_build():
+    missing = Counter(
+        (task, split)
+        for task in all_tasks()
+        for split in SPLITS
+        for index in range(SIZES[split])
+        if published_episode(task, split, index) is None
+    )
+    assert missing == NOT_BUILT
+    assert published_episode("PutInBox", "test", 0) is None
+
+
+@pytest.mark.parametrize("task", all_tasks())
+def test_published_episodes_are_episodes_of_the_task(task):
+    for split in SPLITS:
+        for index in range(SIZES[split]):
+            found = published_episode(task, split, index)
+            if found is None:
+                continue
+            assert found.goal in get_task(task).goals(found.scene)
+            assert found.difficulty in DIFFICULTIES
+            assert get_task(task).stages(found.scene, found.goal)
+            names = [item.name for item in found.scene.objects]
+            assert len(set(names)) == len(names)
+
+
+@pytest.mark.parametrize("task", every_task())
+def test_scenes_survive_the_codec(task):
+    for index in range(4):
+        episode = get_episode(task, "test", index)
+        written = json.loads(json.dumps([encode(episode.scene), encode(episode.goal)]))
+        scene, goal = decode(written)
+        assert goal == episode.goal
+        assert encode(scene) == encode(episode.scene)
+        assert [type(one) for one in scene.motions] == [type(one) for one in episode.scene.motions]
+
+
+finite = st.floats(-10, 10, allow_nan=False)
+
+
+@given(finite, finite, st.none() | st.floats(0.01, 1), st.none() | st.just("container_1"))
+def test_objects_survive_to_the_seventh_decimal(x, yaw, radius, inside):
+    item = SceneObject("one", "cube", Point(x, 0.0, 0.02), yaw, radius=radius, inside=inside)
+    (found,) = decode(json.loads(json.dumps(encode(Scene((item,)))))).objects
+    assert found.position.x == pytest.approx(x, abs=1e-7)
+    assert found.yaw == pytest.approx(yaw, abs=1e-7)
+    assert replace(found, position=item.position, yaw=yaw, radius=radius) == item
+
+
+def test_what_is_no_part_of_a_scene_is_refused():
+    with pytest.raises(TypeError, match="no part of a scene"):
+        encode(np.zeros(3))
+    with pytest.raises(KeyError):
+        decode({"type": "Unknown"})
+
+
+def test_recordings_are_as_long_as_robomme_s(converter):
+    compared = 0
+    for row in converter.read_rows(ROWS):
+        key = (row["task"], row["dataset"], row["episode"])
+        if "error" in row or row["task"] not in RECORDED or key in INCOMPLETE:
+            assert recorded_actions(*key) is None
+            continue
+        found = recorded_actions(*key)
+        stages = get_task(row["task"]).demonstration(published_episode(*key).scene)
+        seen = np.array([stage.recorded for stage in stages])[found.stages]
+        assert found.actions.shape == (row["elapsed"] - 1, 8)
+        assert int(seen.sum()) + 1 == row["frames"]
+        assert set(np.diff(found.stages.astype(int))) <= {0, 1}
+        compared += 1
+    assert compared == 590
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize("task", RECORDED)
+def test_a_recording_replays_to_robomme_s_poses(task, converter):
+    from roboirg.simulation.demonstration.recording import Recording
+    from roboirg.simulation.episode_session import EpisodeSession
+
+    row = next(
+        row for row in converter.read_rows(ROWS) if (row["task"], row["dataset"]) == (task, "test")
+    )
+    episode = as_episode(task, "test", 0)
+    session = EpisodeSession(episode, visible=False)
+    session.play_demonstration(recording=Recording(*recorded_actions(task, "test", 0), ""))
+    joints = session.world.robot.articulation.get_qpos().ravel()
+    assert np.abs(joints - row["ready"]["panda_wristcam"]["qpos"]).max() < 1e-6
+    assert session.world.elapsed == row["elapsed"]
+    for name, start in row["start"].items():
+        if isinstance(start, dict) or name == "goal_site":
+            continue
+        item = min(episode.scene.objects, key=lambda item: math.dist(item.position[:2], start[:2]))
+        place = session.world.bodies[item.name].position
+        # Resting cubes may differ by contacts; the one that was carried is within millimeters.
+        assert math.dist(place[:2], row["ready"][name][:2]) < 0.005
+
+
+def test_exported_episodes_say_everything(tmp_path):
+    path = tmp_path / "episodes.jsonl"
+    episodes = [get_episode("VideoUnmaskSwap", "test", index) for index in range(3)]
+    assert write_episodes(episodes, path) == 3
+    rows = [json.loads(line) for line in path.read_text().splitlines()]
+    assert rows == [json.loads(json.dumps(episode_row(one))) for one in episodes]
+    for row, episode in zip(rows, episodes, strict=True):
+        assert [one["name"] for one in row["objects"]] == [o.name for o in episode.scene.objects]
+        hidden = {one["hides"] for one in row["objects"] if one["hides"]}
+        assert hidden == {one.name for one in episode.scene.of_kind("hidden_cube")}
+        assert {one["type"] for one in row["motions"]} == {"Away", "Swap"}
+        assert row["goal"] == {"colors": list(episode.goal.texts("colors"))}
+
+
+def test_the_command_exports_a_split(tmp_path):
+    path = tmp_path / "episodes.jsonl"
+    said = roboirg("export", "episodes", "--tasks", "StopCube,real", "--out", path)
+    assert said == f"Wrote 150 episodes to {path}.\n"
+    rows = [json.loads(line) for line in path.read_text().splitlines()]
+    assert Counter(row["task"] for row in rows) == {
+        "StopCube": 50, "PutInBox": 50, "PickByCount": 50,
+    }  # fmt: skip
+    with pytest.raises(InvalidValueError, match="is not a file in an existing folder"):
+        roboirg("export", "episodes", "--out", tmp_path)
