@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from roboirg.core.episode import SPLITS, Episode
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, SceneRejectedError, UnknownNameError
+from roboirg.episodes import splits
 from roboirg.episodes.fingerprint import fingerprint, plain
 from roboirg.episodes.splits import (
     MAX_REJECTED,
@@ -113,3 +114,18 @@ def test_wrong_names_and_numbers_are_named_with_what_would_be_right():
     for wrong in (-1, 50, 1.0, "0", True):
         with pytest.raises(InvalidValueError, match="has episodes 0 to 49"):
             get_episode("PickXtimes", "test", wrong)
+
+
+def test_a_task_without_shipped_seeds_passes_over_those_without_a_scene(monkeypatch):
+    task = get_task("PickXtimes")
+    first = splits.slot_seed(task, "val", 7)
+
+    def sample(rng, difficulty):
+        seed = rng.bit_generator.seed_seq.entropy
+        if seed < first + 3:
+            raise SceneRejectedError("no room")
+        return task.sample(rng, difficulty)
+
+    picky = dataclasses.replace(task, name="Picky", sample=sample)
+    monkeypatch.setattr(splits, "get_task", lambda _name: picky)
+    assert splits.get_episode("Picky", "val", 7).seed == first + 3

@@ -20,7 +20,7 @@ from typing import NamedTuple, SupportsIndex
 import numpy as np
 
 from roboirg.core.episode import SPLITS, Difficulty, Episode, Split
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, SceneRejectedError, UnknownNameError
 from roboirg.episodes.fingerprint import fingerprint
 from roboirg.tasks import Task, get_task
 
@@ -121,11 +121,13 @@ def splits_text(splits: Mapping[str, TaskSplits]) -> str:
 def get_episode(task_name: str, split: str, index: SupportsIndex) -> Episode:
     """Return episode number `index` (from 0) of a split of a task.
 
-    A task that is not in ``splits.json`` uses the first seed of each episode.
+    A task that is not in ``splits.json``, such as one of another package, uses the first seed that
+    gives a scene.
 
     Raises:
         UnknownNameError: there is no such task or split.
         InvalidValueError: the split has no episode of that number.
+        SceneRejectedError: no seed of the episode gives a scene.
     """
     task, split_name = get_task(task_name), check_split(split)
     return _episode(task.name, split_name, _check_index(split_name, index))
@@ -160,8 +162,13 @@ def _check_index(split: Split, index: SupportsIndex) -> int:
 @functools.lru_cache(maxsize=4096)
 def _episode(task: str, split: Split, index: int) -> Episode:
     entry = shipped_splits().get(task)
-    passed_over = entry.passed_over.get(slot_key(split, index), 0) if entry else 0
-    return _slot_episode(task, split, index, passed_over)
+    if entry is not None:
+        passed_over = entry.passed_over.get(slot_key(split, index), 0)
+        return _slot_episode(task, split, index, passed_over)
+    for passed_over in range(MAX_REJECTED):
+        with contextlib.suppress(SceneRejectedError):
+            return _slot_episode(task, split, index, passed_over)
+    return _slot_episode(task, split, index, MAX_REJECTED)
 
 
 def _slot_episode(task: str, split: Split, index: int, passed_over: int) -> Episode:
