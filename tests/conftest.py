@@ -1,6 +1,7 @@
-"""Shared by all tests: how strictly Hypothesis looks, and no cache but a test's own."""
+"""Shared by all tests: Hypothesis's profile, no cache but a test's own, and Ctrl-C that works."""
 
 import os
+import signal
 
 from hypothesis import HealthCheck, settings
 
@@ -12,3 +13,7 @@ settings.load_profile("roboirg")
 
 # What an earlier version left in the user's cache must not decide a test.
 os.environ["ROBOIRG_CACHE"] = "off"
+
+# A shell starts background jobs with SIGINT ignored, which programs under test would inherit.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -242,3 +242,19 @@ def test_other_names_are_refused() -> None:
         get_format("html")
     with pytest.raises(UnknownNameError, match="Did you mean 'main'"):
         make_table("mian", {})
+
+
+def test_tasks_outside_the_paper_have_a_table_of_their_own(result) -> None:
+    ours = whole(result)
+    outside = [
+        result(outcome, episode, policy="a", task="Outside", setting=setting)
+        for setting in ("explicit", "direct")
+        for episode, outcome in enumerate(("success", "failure"))
+    ]
+    cells = gather([("run", [*ours, *outside])])
+    table = make_table("other", cells, published=True)
+    assert [column.name for column in table.columns] == ["Outside", "Avg"]
+    assert entries(table, "direct")["Outside"].percent == Decimal("50.00")
+    assert is_informative("other", cells)
+    assert not is_informative("other", gather([("run", ours)]))
+    assert make_table("main", cells).rows == make_table("main", gather([("run", ours)])).rows

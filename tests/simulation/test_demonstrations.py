@@ -39,7 +39,7 @@ def unplanned(monkeypatch):
     """Makes planning fail once called."""
 
     def forbid():
-        monkeypatch.setattr(MotionPrimitives, "perform", None)
+        monkeypatch.setattr(MotionPrimitives, "execute", None)
 
     return forbid
 

@@ -99,7 +99,7 @@ def tables(
         typer.Argument(help="The --out folders of runs; none with --published.", metavar="RUN"),
     ] = None,
     which: Annotated[
-        str, typer.Option(help="main, planner, context, real, coverage, or all that apply.")
+        str, typer.Option(help="main, planner, context, real, other, coverage, or all that apply.")
     ] = _ALL,
     format: Annotated[  # noqa: A002
         str, typer.Option(help="terminal, markdown, latex or csv.")
@@ -151,10 +151,13 @@ def compare(
 
 
 def _tables(which: str, cells: Cells, *, published: bool, chance: bool) -> list[Table]:
+    from roboirg.analysis.published import RATE_TABLES
     from roboirg.analysis.tables.paper_tables import WHICH, is_informative, make_table
 
     if which == _ALL:
-        wanted: list[str] = [one for one in WHICH if published or is_informative(one, cells)]
+        wanted: list[str] = [
+            one for one in WHICH if is_informative(one, cells) or (published and one in RATE_TABLES)
+        ]
     elif which in WHICH:
         wanted = [which]
     else:

@@ -10,6 +10,7 @@ import numpy as np
 
 from roboirg.analysis.published import (
     AVERAGE,
+    RATE_TABLES,
     PublishedRow,
     RateTable,
     published_coverage,
@@ -45,9 +46,9 @@ from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.settings import EXPLICIT, all_settings, settings_of
 from roboirg.records.record import Job
-from roboirg.tasks import all_tasks
+from roboirg.tasks import all_tasks, every_task
 
-Which = Literal["main", "planner", "context", "real", "coverage"]
+Which = Literal["main", "planner", "context", "real", "other", "coverage"]
 WHICH: tuple[Which, ...] = get_args(Which)
 
 OVERALL = AVERAGE
@@ -59,6 +60,7 @@ TITLES: Mapping[Which, str] = {
     "planner": "High-level planners",
     "context": "Stages of the contextual setting",
     "real": "Real world",
+    "other": "Tasks outside the paper",
     "coverage": "Implicit references in benchmarks",
 }
 
@@ -75,7 +77,7 @@ def make_table(which: str, cells: Cells, *, published: bool = False, chance: boo
     """Make one of the paper's tables.
 
     Args:
-        which: main, planner, context, real or coverage.
+        which: main, planner, context, real, other or coverage.
         cells: as `gather` makes them; may be empty if published rows are shown.
         published: whether to add the paper's rows.
         chance: whether to add the chance level below the policies.
@@ -104,7 +106,8 @@ def is_informative(which: Which, cells: Cells) -> bool:
 
 
 def _rate_table(which: RateTable, cells: Cells, *, published: bool, chance: bool) -> Table:
-    columns = _columns(which)
+    tasks = _tasks(which, cells)
+    columns = _columns(which, tasks)
     rng = np.random.default_rng(SEED)
     rows = [
         Row(
@@ -117,7 +120,7 @@ def _rate_table(which: RateTable, cells: Cells, *, published: bool, chance: bool
     ]
     if chance:
         rows += _chance_rows(which, columns, cells)
-    if published:
+    if published and which in RATE_TABLES:
         rows += [_published_row(which, columns, row) for row in published_rows(which)]
     rows = with_best(with_changes(columns, _grouped(which, rows), _reference_finder(which, rows)))
     return Table(
@@ -126,15 +129,24 @@ def _rate_table(which: RateTable, cells: Cells, *, published: bool, chance: bool
         heads=("policy", "stages") if which == "context" else ("setting", "policy"),
         columns=columns,
         rows=tuple(rows),
-        notes=notes_of(which, rows, cells, published_tasks(which)),
+        notes=notes_of(which, rows, cells, tasks),
     )
 
 
-def _columns(which: RateTable) -> tuple[Column, ...]:
+def _tasks(which: RateTable, cells: Cells) -> tuple[str, ...]:
+    """Return the tasks of a table: the paper's, or all others that were played."""
+    if which != "other":
+        return published_tasks(which)
+    known = {*published_tasks("main"), *published_tasks("real")}
+    installed = [*every_task()]
+    played = {key.task for key in cells} - known
+    return tuple(sorted(played, key=lambda task: (task not in installed, task)))
+
+
+def _columns(which: RateTable, tasks: Sequence[str]) -> tuple[Column, ...]:
     """Return the tasks, in the main table by suite with its average; the overall average last."""
-    tasks = published_tasks(which)
     if which != "main":
-        return (*(Column(task) for task in tasks), Column(OVERALL, averages=tasks))
+        return (*(Column(task) for task in tasks), Column(OVERALL, averages=tuple(tasks)))
     registry = all_tasks()
     suites: dict[str, list[str]] = {}
     for task in tasks:
@@ -144,12 +156,12 @@ def _columns(which: RateTable) -> tuple[Column, ...]:
         group = suite.capitalize()
         columns += [Column(name, group) for name in names]
         columns.append(Column(f"{group} {AVERAGE}", group, tuple(names)))
-    return (*columns, Column(OVERALL, averages=tasks))
+    return (*columns, Column(OVERALL, averages=tuple(tasks)))
 
 
 def _positions(which: RateTable, cells: Cells) -> Iterator[tuple[PolicyRun, Position]]:
     """Yield the position of each row, by policy run and instruction options."""
-    tasks = set(published_tasks(which))
+    tasks = set(_tasks(which, cells))
     played = {(key.policy_run, key.options) for key in cells if key.task in tasks}
     shown = _shown_options(which, (options for _, options in played))
     for policy_run, label in labels(cells).items():
@@ -189,7 +201,7 @@ def _entries(
         task: _entry(
             cells.get(CellKey(policy_run, task, options)), rng, applies=_applies(task, options)
         )
-        for task in published_tasks(which)
+        for task in _tasks(which, cells)
     }
 
 
@@ -213,7 +225,7 @@ def _entry(cell: CellResults | None, rng: np.random.Generator, *, applies: bool)
 
 def _applies(task: str, options: InstructionOptions) -> bool:
     """Whether a task has a setting; taken for granted if either is not installed."""
-    known = all_tasks().get(task)
+    known = every_task().get(task)
     is_known = known is not None and options.setting in all_settings()
     return known is None or not is_known or options.setting in settings_of(known)
 
@@ -225,7 +237,7 @@ def _chance_rows(which: RateTable, columns: Sequence[Column], cells: Cells) -> l
         return rows
     for options in dict.fromkeys(position.options for _, position in _positions(which, cells)):
         entries = {}
-        for task in published_tasks(which):
+        for task in _tasks(which, cells):
             level = _chance(task, options, cells)
             entries[task] = Entry(
                 None if level is None else percent(level), applies=_applies(task, options)
@@ -235,7 +247,7 @@ def _chance_rows(which: RateTable, columns: Sequence[Column], cells: Cells) -> l
 
 
 def _chance(task: str, options: InstructionOptions, cells: Cells) -> Fraction | None:
-    if task not in all_tasks() or options.setting not in all_settings():
+    if task not in every_task() or options.setting not in all_settings():
         return None
     return chance_level(
         Job(
