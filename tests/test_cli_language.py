@@ -137,7 +137,7 @@ def test_a_broken_rule_is_told_and_ends_with_a_sentence(monkeypatch: pytest.Monk
     words = ("--tasks", "PickXtimes", "--split", "none", "--seeds", "1", "--workers", "0")
     result = CliRunner().invoke(cli.app, ["language", "validate", *words])
     assert isinstance(result.exception, RoboIRGError)
-    assert "1 rules were broken in 1 texts." in str(result.exception)
+    assert "Found 1 broken rule in 1 text." in str(result.exception)
     assert "no leak: PickXtimes/test/0, seed 7, direct: [red]ly" in result.output
 
 

@@ -140,8 +140,8 @@ def validate_instructions(
     work = batches(names, () if split.strip().lower() == "none" else _splits(split), seeds)
     count = core_count() if workers is None else workers
     found = ValidationResults()
-    for evidence in _followed(validate(work, count), work):
-        found.add(evidence)
+    for results in _with_progress(validate(work, count), work):
+        found.add(results)
     console = _console()
     for table in validation_tables(found):
         console.print(table)
@@ -150,7 +150,8 @@ def validate_instructions(
         console.print(f"{failure.rule}: {where}: {failure.words}", markup=False)
     if found.failures:
         texts = found.texts.total()
-        raise RoboIRGError(f"{len(found.failures)} rules were broken in {texts} texts.")
+        broken = counted(len(found.failures), "broken rule")
+        raise RoboIRGError(f"Found {broken} in {counted(texts, 'text')}.")
 
 
 @language_app.command()
@@ -167,21 +168,21 @@ def card(
         write_atomically(out, language_card())
 
 
-def _followed(
+def _with_progress(
     found: Iterable[tuple[Batch, ValidationResults]], work: Sequence[Batch]
 ) -> Iterable[ValidationResults]:
-    """What is found; meanwhile a bar, or a line now and then, tells how far it is."""
+    """Yield the results; show progress as a bar, or as lines without a terminal."""
     from rich.console import Console
     from rich.progress import Progress
 
     console = Console(stderr=True)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("episodes", total=sum(batch.size for batch in work))
-        for number, (batch, evidence) in enumerate(found, start=1):
+        for number, (batch, results) in enumerate(found, start=1):
             bar.advance(task, batch.size)
             if not console.is_terminal and number % _LINE_EVERY == 0:
                 console.print(f"{number} of {len(work)} batches", highlight=False)
-            yield evidence
+            yield results
 
 
 def _console() -> Console:
