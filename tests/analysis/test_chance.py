@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from roboirg.analysis.stats.chance import chance_level, chance_of
+from roboirg.analysis.stats.chance import chance_level
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.plan import instruct_job
 from roboirg.language.variants import all_variants
@@ -35,13 +35,13 @@ def test_implicit_commands_do(variant) -> None:
 
 @pytest.mark.parametrize(("setting", "form"), [("contextual", "resolved"), ("direct", "resolved")])
 def test_resolved_commands_leave_nothing_to_chance(setting: str, form: str) -> None:
-    assert chance_of(job("PickXtimes", setting, form=form)) == 1
+    assert chance_level([job("PickXtimes", setting, form=form)]) == 1
 
 
 def test_by_hand() -> None:
     """StopCube has the second to the fifth visit, VideoRepick one to three repeats."""
-    assert chance_of(job("StopCube", "direct")) == Fraction(1, 4)
-    assert chance_of(job("VideoRepick", "direct")) == Fraction(1, 3)
+    assert chance_level([job("StopCube", "direct")]) == Fraction(1, 4)
+    assert chance_level([job("VideoRepick", "direct")]) == Fraction(1, 3)
 
 
 @pytest.mark.parametrize("task", ["PickXtimes", "VideoUnmask", "BinFill"])
@@ -56,7 +56,7 @@ def test_it_is_what_the_forgetful_listener_comes_to(task: str, setting: str) -> 
         get_task(task).stages(episode.scene, ForgetfulPolicy(seed=seed).decide(env, "")) == wanted  # type: ignore[arg-type]
         for seed in range(400)
     ]
-    level = float(chance_of(played))
+    level = float(chance_level([played]))
     assert np.mean(right) == pytest.approx(level, abs=0.01 + 3 * np.sqrt(level * (1 - level) / 400))
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from roboirg.analysis.figures import FigureData, write_figures
 from roboirg.analysis.page.report import write_report
-from roboirg.analysis.stats.chance import chance_of
+from roboirg.analysis.stats.chance import chance_level
 from roboirg.analysis.stats.comparison import compare
 from roboirg.analysis.stats.run_summary import ALL
 from roboirg.core.instruction_options import InstructionOptions
@@ -66,7 +66,7 @@ def test_elsewhere_it_guesses_and_every_miss_is_one_of_grounding(run: Path) -> N
         for record in of(run, "forgetful")
         if record.setting != "explicit" and record.form == "implicit"
     ]
-    chances = [float(chance_of(record.identity)) for record in guessed]
+    chances = [float(chance_level([record.identity])) for record in guessed]
     won = sum(record.outcome == "success" for record in guessed)
     deviation = math.sqrt(sum(chance * (1 - chance) for chance in chances))
     assert abs(won - sum(chances)) < MOST_DEVIATIONS * deviation

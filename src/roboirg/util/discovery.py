@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.metadata
 import pkgutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from types import ModuleType
 from typing import Protocol, TypeVar
 
@@ -47,11 +47,6 @@ def discover(package: ModuleType, attribute: str, kind: type[Thing], group: str)
         _take_name(taken, thing, entry, group)
         found.append(thing)
     return found
-
-
-def entry_point_names(group: str) -> Mapping[str, str]:
-    """Return the distribution of each entry point of a group, by the entry point's name."""
-    return {entry.name: _distribution(entry) for entry in _sorted_entry_points(group)}
 
 
 def discover_in_modules(package: ModuleType, attribute: str, kind: type[Thing]) -> list[Thing]:

@@ -19,21 +19,15 @@ from roboirg.records.record import Job
 from roboirg.tasks import get_task
 
 
-def chance_of(job: Job) -> Fraction:
-    """Return the probability that the forgetful listener chooses right.
+def chance_level(jobs: Iterable[Job]) -> Fraction | None:
+    """Return the mean chance over the distinct instructions of some jobs; None without jobs.
 
-    Args:
-        job: an episode with its instruction options; the policy and its seed do not matter.
+    Policies and their seeds do not matter.
 
     Raises:
-        UnknownNameError: the task does not exist.
-        InvalidValueError: the episode does not exist, or has no such instruction.
+        UnknownNameError: a task does not exist.
+        InvalidValueError: an episode does not exist, or has no such instruction.
     """
-    return _chance(job.task, job.split, job.episode, job.options)
-
-
-def chance_level(jobs: Iterable[Job]) -> Fraction | None:
-    """Return the mean chance over the distinct instructions of some jobs; None without jobs."""
     instructions = dict.fromkeys((job.task, job.split, job.episode, job.options) for job in jobs)
     chances = [_chance(*each) for each in instructions]
     return sum(chances, Fraction(0)) / len(chances) if chances else None

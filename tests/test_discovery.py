@@ -1,0 +1,72 @@
+"""Entry points of other packages: what is taken, and what is refused in one sentence."""
+
+import dataclasses
+import importlib.metadata
+from types import ModuleType
+
+import pytest
+
+from roboirg import tasks
+from roboirg.core.errors import InvalidValueError
+from roboirg.tasks import Task, get_task
+from roboirg.util import discovery
+
+OUTSIDE = dataclasses.replace(get_task("PickXtimes"), name="Outside", suite="lab")
+MODULE = ModuleType("outside")
+MODULE.TASK = OUTSIDE
+
+
+def fail():
+    raise RuntimeError("out of order")
+
+
+class EntryPoint:
+    dist = type("Distribution", (), {"name": "a-lab"})
+
+    def __init__(self, load):
+        self.name, self.value, self.load = "outside", "outside:TASK", load
+
+
+@pytest.fixture
+def install(monkeypatch):
+    """Make an entry point the only one that is installed."""
+
+    def add(load):
+        entries = [EntryPoint(load)]
+        monkeypatch.setattr(importlib.metadata, "entry_points", lambda *, group: entries)
+
+    return add
+
+
+def found():
+    return discovery.discover(tasks, "TASK", Task, tasks.ENTRY_POINTS)
+
+
+@pytest.mark.parametrize("thing", [OUTSIDE, MODULE], ids=["object", "module"])
+def test_an_entry_point_names_the_object_or_its_module(install, thing):
+    install(lambda: thing)
+    assert found()[-1] is OUTSIDE
+    assert len(found()) == len(discovery.discover_in_modules(tasks, "TASK", Task)) + 1
+
+
+@pytest.mark.parametrize(
+    ("load", "sentence"),
+    [
+        (fail, r"'outside' \(outside:TASK\) of a-lab .* cannot be loaded: RuntimeError: out of"),
+        (lambda: 7, r"of a-lab in the group 'roboirg.tasks' is 7; it must be a Task, or a module"),
+        (lambda: ModuleType("empty"), "is None; it must be a Task, or a module with one as TASK"),
+        (lambda: get_task("BinFill"), "a-lab adds 'BinFill' .* a name that roboirg has; choose"),
+    ],
+    ids=["raises", "no task", "empty module", "taken"],
+)
+def test_a_bad_entry_point_is_one_sentence_that_names_its_package(install, load, sentence):
+    get_task("BinFill")  # known before the entry points change
+    install(load)
+    with pytest.raises(InvalidValueError, match=sentence):
+        found()
+
+
+def test_the_suites_of_the_benchmark_are_closed(install):
+    install(lambda: dataclasses.replace(OUTSIDE, suite="counting"))
+    with pytest.raises(InvalidValueError, match="Outside of another package is in the suite"):
+        tasks._registry.__wrapped__()
