@@ -63,7 +63,8 @@ def test_results_are_records_without_the_course(tmp_path: Path) -> None:
 
 def test_the_index_knows_a_job_by_all_its_fields() -> None:
     job = small_plan().jobs()[0]
-    assert len(identity_key(job)) == len(Job.model_fields) - 1
+    not_counted = {"spec", "wordings_file"}
+    assert len(identity_key(job)) == len(Job.model_fields.keys() - not_counted)
     others = {"stages": (1, 5), "demonstration_frames": 4, "actions": "ee_pose", "meshes": "light"}
     for name, value in others.items():
         assert identity_key(job.model_copy(update={name: value})) != identity_key(job)

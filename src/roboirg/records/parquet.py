@@ -26,6 +26,8 @@ _TEXT_COLUMNS = [
     "actions",
     "demonstration_frames",
     "meshes",
+    "wordings",
+    "wordings_file",
     "spec",
     "difficulty",
     "outcome",

@@ -52,6 +52,7 @@ NON_DETERMINISTIC_FIELDS = frozenset(
         "usage",
         "video",
         "video_error",
+        "wordings_file",
     }
 )
 """Fields that may differ when the same command runs twice: times, costs, paths, attempts, …"""
@@ -62,7 +63,7 @@ class _RecordModel(BaseModel):
 
 
 class Job(_RecordModel):
-    """One episode to play. All fields but `spec` identify its record.
+    """One episode to play. All fields but `spec` and `wordings_file` identify its record.
 
     Attributes:
         policy: name of the policy, often its spec.
@@ -82,6 +83,9 @@ class Job(_RecordModel):
         demonstration_frames: which frames of the video the policy gets; None for its own choice.
         observe_every: control steps between observations; None for the policy's own choice.
         meshes: faithful or light.
+        wordings: name and fingerprint of the wording file whose commands are used, for example
+            ``robomme@1a2b3c4d``; None for our own.
+        wordings_file: path of that file; not part of the identity, because a file may be moved.
         spec: spec of the policy if that is not its name; not part of the identity, because an
             address may change.
     """
@@ -102,6 +106,8 @@ class Job(_RecordModel):
     demonstration_frames: DemonstrationFrames | None = None
     observe_every: int | None = None
     meshes: str = DEFAULT_MESHES
+    wordings: str | None = None
+    wordings_file: str | None = None
     spec: str | None = None
 
     @property
@@ -126,7 +132,7 @@ class Job(_RecordModel):
         return f"{readable}-{hashlib.sha256(identity.encode()).hexdigest()[:8]}"
 
 
-IDENTITY = tuple(name for name in Job.model_fields if name != "spec")
+IDENTITY = tuple(name for name in Job.model_fields if name not in {"spec", "wordings_file"})
 """The fields that identify a job."""
 
 

@@ -63,6 +63,7 @@ class RecordIndexEntry(msgspec.Struct, frozen=True, gc=False):
     demonstration_frames: int | str | None = None
     observe_every: int | None = None
     meshes: str = DEFAULT_MESHES
+    wordings: str | None = None
     policy_version: str = "unknown"
     cause: str | None = None
     attempt: int = 1
