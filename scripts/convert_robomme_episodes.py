@@ -232,7 +232,8 @@ def convert_bin_fill(row: Row) -> tuple[Scene, Goal]:
     named = tuple(color for color in bin_fill.GOAL_ORDER if counts[color])
     goal = Goal.of(colors=named, counts=tuple(counts[color] for color in named))
     motions = bin_fill.plan_motions(cubes, late=facts["dynamic"])
-    return Scene((make_button(row), bin_, *cubes), motions), goal
+    order = tuple(color for color, _ in facts["binfill_language_sequence"])
+    return Scene((make_button(row), bin_, *cubes), motions, color_order=order), goal
 
 
 def unmask_scene(row: Row, *buttons: SceneObject) -> tuple[Scene, Goal]:

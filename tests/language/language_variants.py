@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 from roboirg.core.episode import SPLITS, Episode
 from roboirg.core.errors import SceneRejectedError
+from roboirg.episodes import splits
 from roboirg.episodes.splits import CYCLE, get_episode, make_episode
-from roboirg.language import variants
 from roboirg.language.settings import settings_of
 from roboirg.tasks import every_task
 
@@ -17,8 +17,7 @@ SPATIAL_TASKS = tuple(name for name, task in every_task().items() if "spatial" i
 
 def split_episodes(task: str) -> Iterator[Episode]:
     """All episodes of all splits."""
-    for split in SPLITS:
-        yield from variants.split_episodes(task, split)
+    return splits.split_episodes([task], SPLITS)
 
 
 def first_episodes(task: str, split: str, count: int) -> Iterator[Episode]:

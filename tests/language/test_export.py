@@ -8,9 +8,9 @@ import pytest
 from language_variants import TASKS
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
-from roboirg.episodes.splits import get_episode
+from roboirg.episodes.splits import get_episode, split_episodes
 from roboirg.language import FORMS, export, setting_names
-from roboirg.language.variants import instructions, split_episodes
+from roboirg.language.variants import instructions
 
 LISTS = {
     "patterns": str,
@@ -136,7 +136,7 @@ def test_without_pyarrow_one_sentence_says_what_to_do(monkeypatch):
 
 
 def test_every_episode_is_there():
-    episodes = list(split_episodes("StopCube", "test"))
+    episodes = list(split_episodes(["StopCube"], ["test"]))
     found = [export.row(*one) for one in instructions(episodes, setting_names(), FORMS)]
     assert len(found) == 50 * 4 * 2  # no spatial setting
     assert [one["episode"] for one in found[::8]] == list(range(50))

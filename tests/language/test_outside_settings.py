@@ -11,7 +11,7 @@ from rich.console import Console
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.episodes.splits import get_episode
+from roboirg.episodes.splits import get_episode, split_episodes
 from roboirg.evaluation import seed_selection
 from roboirg.evaluation.plan import make_plan
 from roboirg.evaluation.seed_selection import EpisodeSlot, check_words
@@ -33,7 +33,7 @@ from roboirg.language.setting import Setting
 from roboirg.language.settings import all_settings, direct
 from roboirg.language.validation import Batch, check_episode, episode_checks, validate_batch
 from roboirg.language.validation.validation_tables import validation_tables
-from roboirg.language.variants import all_variants, instructions, split_episodes
+from roboirg.language.variants import all_variants, instructions
 from roboirg.tasks import all_tasks
 from roboirg.visualization.episode_text import instructions_table
 
@@ -143,7 +143,7 @@ def test_the_card_shows_the_first_example_that_can_be_expressed(register):
 def test_statistics_figure_and_export_have_the_setting(register, tmp_path):
     pytest.importorskip("matplotlib")
     register(DUMMY)
-    episodes = list(split_episodes("PickXtimes", "test"))
+    episodes = list(split_episodes(["PickXtimes"], ["test"]))
     found = list(instructions(episodes, setting_names(), FORMS))
     dummies = [one for one in (row(*one) for one in found) if one["setting"] == "dummy"]
     assert len(dummies) == 2 * sum(episode.difficulty != "easy" for episode in episodes)

@@ -8,9 +8,10 @@ from language_variants import TASKS
 from rich.console import Console
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.episodes.splits import split_episodes
 from roboirg.language import corpus_statistics, expression_figure, setting_names, statistics_tables
 from roboirg.language.settings import settings_of
-from roboirg.language.variants import instructions, split_episodes
+from roboirg.language.variants import instructions
 from roboirg.tasks import every_task
 from roboirg.util import figure_files
 
@@ -18,7 +19,7 @@ from roboirg.util import figure_files
 @functools.cache
 def said():
     """All implicit forms of the test split."""
-    episodes = [episode for task in TASKS for episode in split_episodes(task, "test")]
+    episodes = list(split_episodes(TASKS, ["test"]))
     return tuple(one for _, one in instructions(episodes, setting_names(), ("implicit",)))
 
 

@@ -137,10 +137,9 @@ def build_splits(
     """Select the seeds of the splits again; tasks and splits not named stay unchanged."""
     from rich.console import Console
 
-    from roboirg.core.episode import SPLITS
     from roboirg.episodes import splits
     from roboirg.evaluation.executors.executor import core_count
-    from roboirg.evaluation.plan_parsing import means_all, parse_names
+    from roboirg.evaluation.plan_parsing import parse_names, parse_splits
     from roboirg.evaluation.seed_selection import (
         check_kept_splits,
         episode_slots,
@@ -152,7 +151,7 @@ def build_splits(
     from roboirg.util.atomic_write import write_atomically
 
     names = find_tasks(parse_names("task", tasks))
-    wanted = SPLITS if means_all(split) else (splits.check_split(split),)
+    wanted = parse_splits(split)
     check_kept_splits(names, wanted, splits.shipped_splits())
     if out is not None and not Path(out).parent.is_dir():
         raise InvalidValueError(f"There is no folder for {out!r}; create it first.")
@@ -161,7 +160,7 @@ def build_splits(
     count = core_count() if workers is None else workers
     found = follow_progress(find_seeds(slots, count), slots, console)
     print_summary(found, console)
-    text = splits.splits_text(merge_splits(found, splits.shipped_splits()))
+    text = splits.splits_text(merge_splits(names, found, splits.shipped_splits()))
     if out is None:
         typer.echo(text, nl=False)
     else:

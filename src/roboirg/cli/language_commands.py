@@ -24,7 +24,6 @@ from roboirg.util.plurals import counted
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from roboirg.core.episode import Split
     from roboirg.language.validation import Batch, ValidationResults
 
 # Heavy modules are imported inside the commands, so that --help is fast.
@@ -62,10 +61,11 @@ def export_instructions(
 ) -> None:
     """Export a row per episode, setting and form (columns: see docs/language.md)."""
     from roboirg.core.instruction_options import InstructionOptions
-    from roboirg.evaluation.plan_parsing import parse_names, parse_stages
+    from roboirg.episodes.splits import split_episodes
+    from roboirg.evaluation.plan_parsing import parse_names, parse_splits, parse_stages
     from roboirg.language import FORMS
     from roboirg.language.export import EXPORT_FORMATS, check_export_support, row, write_rows
-    from roboirg.language.variants import instructions, split_episodes
+    from roboirg.language.variants import instructions
 
     kind = _known("format", format, EXPORT_FORMATS)
     check_export_support(kind)
@@ -73,9 +73,7 @@ def export_instructions(
         raise InvalidValueError(f"{str(out)!r} is not a file in an existing folder.")
     names, chosen = _tasks(tasks), _settings(settings)
     spoken = [_known("form", one, FORMS) for one in parse_names("form", forms)]
-    episodes = [
-        episode for task in names for one in _splits(split) for episode in split_episodes(task, one)
-    ]
+    episodes = list(split_episodes(names, parse_splits(split)))
     said = instructions(
         episodes,
         chosen,
@@ -99,17 +97,17 @@ def stats(
     ] = None,
 ) -> None:
     """Count words, referring expressions, patterns, relations and landmarks."""
+    from roboirg.episodes.splits import split_episodes
+    from roboirg.evaluation.plan_parsing import parse_splits
     from roboirg.language.expression_figure import write_figure
     from roboirg.language.statistics_tables import overview_tables
-    from roboirg.language.variants import instructions, split_episodes
+    from roboirg.language.variants import instructions
     from roboirg.util.figure_files import check_figure_support
 
     if out is not None:
         check_figure_support()
-    names, wanted = _tasks(tasks), _splits(split)
-    episodes = (
-        episode for task in names for one in wanted for episode in split_episodes(task, one)
-    )
+    names, wanted = _tasks(tasks), parse_splits(split)
+    episodes = split_episodes(names, wanted)
     said = [one for _, one in instructions(episodes, _settings("all"), ("implicit",))]
     console = _console()
     for table in overview_tables(said):
@@ -133,11 +131,12 @@ def validate_instructions(
 ) -> None:
     """Read all instructions back and check their rules; exit code 2 if one is broken."""
     from roboirg.evaluation.executors.executor import core_count
+    from roboirg.evaluation.plan_parsing import parse_splits
     from roboirg.language.validation import ValidationResults, batches, validate
     from roboirg.language.validation.validation_tables import validation_tables
 
     names = _tasks(tasks)
-    work = batches(names, () if split.strip().lower() == "none" else _splits(split), seeds)
+    work = batches(names, () if split.strip().lower() == "none" else parse_splits(split), seeds)
     count = core_count() if workers is None else workers
     found = ValidationResults()
     for results in _with_progress(validate(work, count), work):
@@ -208,14 +207,6 @@ def _settings(text: str) -> tuple[str, ...]:
     if means_all(text):
         return setting_names()
     return tuple(_known("setting", name, setting_names()) for name in parse_names("setting", text))
-
-
-def _splits(text: str) -> tuple[Split, ...]:
-    from roboirg.core.episode import SPLITS
-    from roboirg.episodes.splits import check_split
-    from roboirg.evaluation.plan_parsing import means_all
-
-    return SPLITS if means_all(text) else (check_split(text),)
 
 
 def _known(kind: str, name: str, known: Sequence[Name]) -> Name:

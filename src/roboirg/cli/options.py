@@ -12,7 +12,7 @@ Tasks = Annotated[
 ]
 Settings = Annotated[str, typer.Option(help="Settings, separated by commas; all for every one.")]
 Forms = Annotated[str, typer.Option(help="implicit, resolved, or both separated by a comma.")]
-Split = Annotated[str, typer.Option(help="train, val or test.")]
+Split = Annotated[str, typer.Option(help="train, val, test or random.")]
 Video = Annotated[str, typer.Option(help="Record videos of episodes: off, failures or all.")]
 AnySplit = Annotated[str, typer.Option(help="train, val, test or all.")]
 Stages = Annotated[str, typer.Option(help="Stages of the contextual setting, such as 1,5.")]

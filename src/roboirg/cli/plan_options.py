@@ -20,7 +20,7 @@ Settings = Annotated[
 Forms = Annotated[
     str | None, typer.Option(help="implicit, resolved, or both separated by a comma.  (implicit)")
 ]
-Split = Annotated[str | None, typer.Option(help="train, val or test.  (test)")]
+Split = Annotated[str | None, typer.Option(help="train, val, test or random.  (test)")]
 Episodes = Annotated[
     str | None, typer.Option(help="4 for the first four, or a list such as 0,3,5-9.  (4)")
 ]

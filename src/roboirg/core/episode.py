@@ -20,7 +20,7 @@ from roboirg.core.motions import Motion, Point
 
 Color = Literal["red", "green", "blue", "yellow", "gray", "purple"]
 Difficulty = Literal["easy", "medium", "hard"]
-Split = Literal["train", "val", "test"]
+Split = Literal["train", "val", "test", "random"]
 Suite = str
 """One of `SUITES`, or the suite of another package's tasks."""
 ObjectKind = str
@@ -34,8 +34,9 @@ SUITES: tuple[Suite, ...] = (*BENCHMARK_SUITES, "real")
 """The suites of this package. The tasks of the real robot are not part of the benchmark."""
 DIFFICULTIES: tuple[Difficulty, ...] = ("easy", "medium", "hard")
 SPLITS: tuple[Split, ...] = ("train", "val", "test")
+"""The splits of fixed episodes. ``random`` holds any number of episodes, drawn from their seeds."""
 
-ENVIRONMENT_VERSION = 0
+ENVIRONMENT_VERSION = 1
 """Increases with any change of scenes, rules, physics or observations that could change scores."""
 
 ROBOT_BASE = (-0.615, 0.0, 0.0)
@@ -82,11 +83,13 @@ class Scene:
         objects: in the order in which they were placed.
         motions: scripted movements.
         past: the acts that the video shows, in order; empty if it shows none.
+        color_order: the order in which stages take the colors of the goal; empty for the goal's.
     """
 
     objects: tuple[SceneObject, ...]
     motions: tuple[Motion, ...] = ()
     past: tuple[Fact, ...] = ()
+    color_order: tuple[Color, ...] = ()
 
     def __getitem__(self, name: str) -> SceneObject:
         """Return the object of that name; KeyError if there is none."""
@@ -249,12 +252,14 @@ class Episode:
         task: name of the task.
         split: the split it belongs to.
         index: 0-based position in the split.
-        seed: of the scene sampler.
-        difficulty: of the scene sampler.
+        seed: RoboMME's, or that of the scene sampler.
+        difficulty: of the scene.
         scene: objects at the start and their scripted movements.
         goal: the meaning of the instruction.
         stages: what the policy must do, in order.
         demonstration: stages that the oracle plays before the policy's turn; may be empty.
+        recorded: whether the demonstration replays RoboMME's recorded actions; otherwise the
+            oracle plans it.
     """
 
     task: str
@@ -266,6 +271,7 @@ class Episode:
     goal: Goal
     stages: tuple[Stage, ...]
     demonstration: tuple[Stage, ...] = ()
+    recorded: bool = False
 
     @property
     def key(self) -> str:

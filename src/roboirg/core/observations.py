@@ -16,6 +16,10 @@ CAMERAS = (FRONT, WRIST)
 DemonstrationFrames = Literal["all", "none"] | int
 """Which frames of the video are included: all, none, or every n-th, the first included."""
 
+DemonstrationSource = Literal["none", "recorded", "planned"]
+"""Who moves the robot in a demonstration: RoboMME's recorded actions, or the oracle; ``none``
+without a demonstration."""
+
 
 def check_cameras(cameras: object) -> tuple[str, ...]:
     """Return a value as names of cameras.

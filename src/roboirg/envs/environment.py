@@ -15,6 +15,7 @@ from roboirg.core.episode import Episode, Stage
 from roboirg.core.errors import InvalidValueError, MotionPlanningError, UnknownNameError
 from roboirg.core.instruction_options import ALL_STAGES, InstructionOptions
 from roboirg.core.observations import CAMERAS, DemonstrationFrames
+from roboirg.episodes.recordings import recorded_actions
 from roboirg.episodes.splits import get_episode
 from roboirg.judging import Event, Status, plain_subgoal
 from roboirg.language import instruct
@@ -38,7 +39,7 @@ MAX_STEPS = 1300
 """Control steps a policy has, as in RoboMME's published experiments."""
 MAX_INSTRUCTION_LENGTH = 100_000
 PRINTABLE = "".join(chr(code) for code in range(32, 127))
-COMPLETED = "all tasks completed"
+COMPLETED = "All tasks completed"
 """The subgoal after the last stage."""
 
 FrameHook = Callable[["RoboIRGEnv", bool], None]
@@ -69,7 +70,8 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     `elapsed_steps` since the start of the world, `events` since the last call, `subgoal` in words,
     and `grounded_subgoal` with `grounded`. At reset also `demonstration`, arrays as in the
     observation with a leading axis T (pictures are drawn when they are read), and
-    `demonstration_subgoals`, T texts.
+    `demonstration_subgoals`, T texts, and `demonstration_source`: ``recorded`` (RoboMME's
+    actions), ``planned`` by the oracle, or ``none``.
 
     The arguments are those of `roboirg.make`, which documents them.
 
@@ -179,7 +181,10 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         """Start the episode again. The episode is the same for every seed."""
         super().reset(seed=seed, options=options)
         recording = replay_or_plan(
-            self.episode, self._play_demonstration, watched=self._frame_hook is not None
+            self.episode,
+            self._play_demonstration,
+            _shipped_recording(self.episode),
+            watched=self._frame_hook is not None,
         )
         self._after_step(self.session.judge.published)
         state = self._current
@@ -188,6 +193,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
                 self.episode, recording, self._spec, state.video_proprioception
             ),
             "demonstration_subgoals": state.video_subgoals,
+            "demonstration_source": recording.source,
         }
         return self._observe(), {**self._info(), **shown}
 
@@ -356,3 +362,10 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         if state.pixel_grounding is not None:
             info["grounded_subgoal"] = state.pixel_grounding.text
         return info
+
+
+def _shipped_recording(episode: Episode) -> Recording | None:
+    """Return RoboMME's recording of the demonstration; None if there is none."""
+    if not episode.recorded:
+        return None
+    return Recording(*recorded_actions(episode.task, episode.split, episode.index), end="")

@@ -49,7 +49,7 @@ def make(task: str | Episode, **options: Unpack[EnvOptions]) -> RoboIRGEnv:
     Keyword Args:
         setting: explicit, direct, reasoning, contextual or spatial.
         form: implicit, or resolved for the paired explicit counterpart.
-        split: train, val or test.
+        split: train, val, test or random.
         episode: index of the episode in the split, from 0.
         stages: stages, of five, that a contextual instruction includes.
         distractor: neutral or competing, for contextual instructions.

@@ -22,7 +22,7 @@ from roboirg.core.errors import RoboIRGError
 from roboirg.episodes.scene_codec import decode
 
 FILE = "published.jsonl.gz"
-SHA256 = "01ac7ab477c6849bd2d75737a48ff16e3312f1b5621f5bfe97c669d0f4690060"
+SHA256 = "46b79134d1d1fa16d9465bdc74050aee3a0df4a4f68c77c8d972613e31715338"
 """Of the file's text, before compression."""
 
 
@@ -40,6 +40,11 @@ class PublishedEpisode(NamedTuple):
     difficulty: Difficulty
     scene: Scene
     goal: Goal
+
+
+def is_published(task: str, split: str, index: int) -> bool:
+    """Return whether an episode is one of RoboMME's; the others are sampled."""
+    return (task, split, index) in _lines()
 
 
 def published_episode(task: str, split: str, index: int) -> PublishedEpisode | None:

@@ -60,7 +60,7 @@ class Plan(BaseModel):
         tasks: names of tasks.
         settings: names, or ``"all"`` for every setting that can express the episode.
         forms: implicit, resolved or both.
-        split: train, val or test.
+        split: train, val, test or random.
         episodes: 0-based positions in the split.
         policy_seeds: every seed plays every episode.
         stages: sets of stages for settings that read them; every set is played.

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 
 from roboirg import language
+from roboirg.core.episode import SPLITS, Split
 from roboirg.core.errors import InvalidValueError
 from roboirg.episodes import splits
 
@@ -60,6 +61,15 @@ def name_and_spec(policy: str) -> tuple[str, str]:
 def means_all(text: str) -> bool:
     """Return whether a list of names contains ``all``."""
     return ALL in (word.strip().lower() for word in text.split(","))
+
+
+def parse_splits(text: str) -> tuple[Split, ...]:
+    """Return the splits of a name: train, val or test, or ``all`` of them.
+
+    Raises:
+        UnknownNameError: there is no such split of fixed episodes.
+    """
+    return SPLITS if means_all(text) else (splits.check_fixed_split(text),)
 
 
 def parse_episodes(text: str, split: str = "test") -> tuple[int, ...]:

@@ -275,6 +275,7 @@ def _play_to_end(
         device = str(env.render_device)
         result.render_device = None if device == NO_RENDER_DEVICE else device
         result.demonstration_steps = len(info["demonstration"]["joint_positions"])
+        result.demonstration_source = info["demonstration_source"]
         result.policy_start_step = int(info["elapsed_steps"])
         result.add_events(info)
     with guard.policy("policy's reset()", "policy_reset"):

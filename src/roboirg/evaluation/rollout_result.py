@@ -14,6 +14,7 @@ from pydantic import JsonValue
 from roboirg import language
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
+from roboirg.core.observations import DemonstrationSource
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.code_fingerprint import code_fingerprint
 from roboirg.evaluation.plan import instruct_job
@@ -42,6 +43,7 @@ class RolloutResult:
         timed_out: whether the policy used up its steps.
         steps: control steps of the policy.
         demonstration_steps: frames of the video shown before the policy's turn.
+        demonstration_source: whose actions it shows: recorded, planned or none.
         policy_start_step: control steps of the episode before the policy's turn.
         elapsed_steps: control steps of the episode in all.
         instruction: what the policy was told; None if the episode did not get that far.
@@ -59,6 +61,7 @@ class RolloutResult:
     timed_out: bool = False
     steps: int = 0
     demonstration_steps: int = 0
+    demonstration_source: DemonstrationSource = "none"
     policy_start_step: int = 0
     elapsed_steps: int = 0
     instruction: language.Instruction | None = None
@@ -143,6 +146,7 @@ def make_record(
         attribution=_attribution(episode, result),
         steps=result.steps,
         demonstration_steps=result.demonstration_steps,
+        demonstration_source=result.demonstration_source,
         instruction=tuple(UtteranceRecord(**asdict(one)) for one in instruction.utterances),
         mentions=tuple(MentionSpan(**asdict(one)) for one in instruction.mentions),
         command=explicit.text,

@@ -14,6 +14,7 @@ from roboirg.core.errors import (
     SceneRejectedError,
 )
 from roboirg.envs.factory import make
+from roboirg.episodes.published_episodes import is_published
 from roboirg.episodes.splits import (
     MAX_REJECTED,
     SIZES,
@@ -51,7 +52,7 @@ class Rejection(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class EpisodeSlot:
-    """An episode that needs a seed."""
+    """An episode that is sampled and needs a seed."""
 
     task: str
     split: Split
@@ -82,12 +83,13 @@ SeedCheck = Callable[[EpisodeSlot, int], Rejection | None]
 def episode_slots(
     tasks: Sequence[str], splits: Sequence[Split] = SPLITS
 ) -> tuple[EpisodeSlot, ...]:
-    """Return a slot for every episode of the tasks' splits, in order."""
+    """Return a slot for every sampled episode of the tasks' splits, in order."""
     return tuple(
         EpisodeSlot(task, split, index)
         for task in tasks
         for split in splits
         for index in range(SIZES[split])
+        if not is_published(task, split, index)
     )
 
 
@@ -180,11 +182,17 @@ def check_kept_splits(
 
 
 def merge_splits(
-    found: Sequence[SelectedSeed], known: Mapping[str, TaskSplits]
+    tasks: Sequence[str], found: Sequence[SelectedSeed], known: Mapping[str, TaskSplits]
 ) -> dict[str, TaskSplits]:
-    """Return the splits to ship: the selected seeds, and the known ones of other episodes."""
+    """Return the splits to ship, with new fingerprints of the named tasks.
+
+    Args:
+        tasks: names of the tasks whose splits are built.
+        found: the seeds selected for their sampled episodes; others keep the known ones.
+        known: the splits shipped before.
+    """
     splits = {task: known[task] for task in every_task() if task in known}
-    for task in dict.fromkeys(one.slot.task for one in found):
+    for task in tasks:
         old = known[task].passed_over if task in known else {}
         new = {one.slot: len(one.rejections) for one in found}
         counts: dict[str, int] = {}

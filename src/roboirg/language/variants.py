@@ -6,9 +6,8 @@ import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from roboirg.core.episode import Episode, Split
+from roboirg.core.episode import Episode
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.episodes.splits import SIZES, get_episode
 from roboirg.language.generator import find_refusal, instruct_with
 from roboirg.language.instruction import FORMS, Instruction
 from roboirg.language.settings import all_settings, settings_of
@@ -66,9 +65,3 @@ def instructions(
             wanted = options._replace(setting=setting, form=form)
             if find_refusal(episode, wanted) is None:
                 yield episode, instruct_with(episode, wanted)
-
-
-def split_episodes(task: str, split: Split) -> Iterator[Episode]:
-    """Yield all episodes of a split of a task."""
-    for index in range(SIZES[split]):
-        yield get_episode(task, split, index)

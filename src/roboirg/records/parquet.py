@@ -30,6 +30,7 @@ _TEXT_COLUMNS = [
     "wordings_file",
     "spec",
     "difficulty",
+    "demonstration_source",
     "outcome",
     "error",
     "cause",

@@ -20,7 +20,7 @@ from roboirg.core.instruction_options import (
     DEFAULT_FRAME,
     InstructionOptions,
 )
-from roboirg.core.observations import DemonstrationFrames
+from roboirg.core.observations import DemonstrationFrames, DemonstrationSource
 
 SCHEMA_VERSION: Literal[3] = 3
 
@@ -68,7 +68,7 @@ class Job(_RecordModel):
     Attributes:
         policy: name of the policy, often its spec.
         task: name of the task.
-        split: train, val or test.
+        split: train, val, test or random.
         episode: 0-based position in the split.
         setting: name of the setting.
         form: implicit or resolved. The explicit setting is its own resolved form and is always
@@ -216,6 +216,8 @@ class Result(Job):
         steps: control steps that the policy played.
         demonstration_steps: frames of the video before the policy's turn, one per control step;
             0 without a video.
+        demonstration_source: whose actions the video shows: RoboMME's (``recorded``), the oracle's
+            (``planned``), or ``none``.
         privileged: whether the policy has access to the simulator's state (it has ``attach``).
         policy_version: distinguishes versions of a policy of the same name.
         language_version: version of the instruction generator.
@@ -234,6 +236,7 @@ class Result(Job):
     attribution: Attribution | None = None
     steps: int = 0
     demonstration_steps: int = 0
+    demonstration_source: DemonstrationSource = "none"
     privileged: bool
     policy_version: str = "unknown"
     language_version: str

@@ -1,8 +1,8 @@
 """BinFill: put a number of cubes of each named color into the bin, then press the button.
 
 Counting suite. Cubes vanish in the bin, so its content cannot be seen; in half of the episodes only
-one cube of each color is there at first. The numbers are judged, not the order. Facts: RoboMME,
-where the oracle shuffles the colors; here it takes them in the order of the goal.
+one cube of each color is there at first. The numbers are judged, not the order; the stages take the
+colors in an order of the scene. Facts: RoboMME.
 """
 
 from __future__ import annotations
@@ -72,7 +72,8 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     cubes = _draw_cubes(rng, spawned, [button_keep_out(button), bin_footprint(bin_)])
     named = tuple(color for color in GOAL_ORDER if wanted.get(color))
     goal = Goal.of(colors=named, counts=tuple(wanted[color] for color in named))
-    return Scene((button, bin_, *cubes), plan_motions(cubes, late=late)), goal
+    order = tuple(named[index] for index in rng.permutation(len(named)))
+    return Scene((button, bin_, *cubes), plan_motions(cubes, late=late), color_order=order), goal
 
 
 def _draw_wanted(
@@ -179,16 +180,17 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
         expects=pressed,
         forbids=tuple(_wrong_counts(scene, goal)),
         primitive=Primitive("press", "button"),
-        subgoal="press the button {at} to stop",
+        subgoal="press the button {at}",
         points_at="button",
     )
     return (*plan, press)
 
 
 def _wanted(scene: Scene, goal: Goal) -> Iterator[tuple[str, str, str]]:
-    """Yield color, ordinal and name of the cubes that the oracle takes, in order of appearance."""
-    for color, count in zip(goal.texts("colors"), goal.numbers("counts"), strict=True):
-        cubes = _of_color(scene, color)[:count]
+    """Yield color, ordinal and name of the cubes that the oracle takes, color by color."""
+    counts = dict(zip(goal.texts("colors"), goal.numbers("counts"), strict=True))
+    for color in dict.fromkeys((*scene.color_order, *counts)):
+        cubes = _of_color(scene, color)[: counts.get(color, 0)]
         for ordinal, cube in zip(ORDINALS, cubes, strict=False):
             yield color, ordinal, cube
 

@@ -125,7 +125,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
         expects=pressed,
         forbids=(*wrong_cubes, too_often),
         primitive=Primitive("press", "button"),
-        subgoal="press the button {at} to stop",
+        subgoal="press the button {at}",
         points_at="button",
     )
     return (pick, *swings, put_down, press)

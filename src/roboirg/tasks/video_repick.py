@@ -25,7 +25,7 @@ from roboirg.tasks.shared.fixtures import (
 )
 from roboirg.tasks.shared.layouts import layout_points
 from roboirg.tasks.shared.placement import Footprint, Region
-from roboirg.tasks.shared.swapping import SWAP_STEPS, plan_swaps
+from roboirg.tasks.shared.swapping import SWAP_START, SWAP_STEPS, plan_swaps
 from roboirg.tasks.task import Commands, Task, Wording
 
 REPEATS = (1, 3)
@@ -75,7 +75,7 @@ def make_scene(
         target: name of the cube of the video.
         initiators: names of the cubes that start a swap, in order.
     """
-    motions = plan_swaps(cubes, initiators, start=0, lane=SWAP_LANE, stage=SWAP_STAGE)
+    motions = plan_swaps(cubes, initiators, start=SWAP_START, lane=SWAP_LANE, stage=SWAP_STAGE)
     past = (Fact("picked", target), Fact("lying", target))
     return Scene((button, *cubes), motions, past)
 

@@ -7,7 +7,6 @@ from roboirg.language.validation.validation_results import RuleViolation, Valida
 from roboirg.language.validation.validation_run import (
     Batch,
     batches,
-    random_episode,
     validate,
     validate_batch,
 )
@@ -18,7 +17,6 @@ __all__ = [
     "ValidationResults",
     "batches",
     "check_episode",
-    "random_episode",
     "validate",
     "validate_batch",
 ]

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from roboirg.core.episode import Episode, Split
-from roboirg.core.errors import InvalidValueError, SceneRejectedError
-from roboirg.episodes.splits import SEED_STRIDE, SIZES, get_episode, make_episode, slot_difficulty
+from roboirg.core.episode import SPLITS, Split
+from roboirg.core.errors import InvalidValueError
+from roboirg.episodes.splits import SIZES, get_episode
 from roboirg.language.validation.episode_checks import check_episode
 from roboirg.language.validation.validation_results import ValidationResults
 from roboirg.util.parallel_map import parallel_map
 
-RANDOM_BASE = 10_000_000
-"""The first random seed; the seeds of the splits are smaller."""
 BATCH = 50
 """Maximum size of a batch, in episodes."""
 
@@ -24,13 +21,13 @@ class Batch(NamedTuple):
 
     Attributes:
         task: name of the task.
-        split: name of the split; None for random episodes.
+        split: name of the split.
         first: index of the first episode.
         size: number of episodes.
     """
 
     task: str
-    split: Split | None
+    split: Split
     first: int
     size: int
 
@@ -48,8 +45,8 @@ def batches(tasks: Sequence[str], splits: Sequence[Split], seeds: int) -> tuple[
     """
     if seeds < 0:
         raise InvalidValueError(f"The number of random seeds is {seeds}; it must be at least 0.")
-    amounts: list[tuple[Split | None, int]] = [(split, SIZES[split]) for split in splits]
-    amounts.append((None, seeds))
+    amounts = [(split, SIZES[split]) for split in splits]
+    amounts.append(("random", seeds))
     found = tuple(
         Batch(task, split, first, min(BATCH, amount - first))
         for task in tasks
@@ -61,28 +58,12 @@ def batches(tasks: Sequence[str], splits: Sequence[Split], seeds: int) -> tuple[
     return found
 
 
-def random_episode(task: str, index: int) -> Episode:
-    """Return an episode of no split; difficulties alternate as in the splits.
-
-    Raises:
-        SceneRejectedError: none of the seeds for this index gives a scene.
-    """
-    first = RANDOM_BASE + SEED_STRIDE * index
-    for seed in range(first, first + SEED_STRIDE):
-        with contextlib.suppress(SceneRejectedError):
-            return make_episode(task, seed, slot_difficulty(index), "test", index)
-    raise SceneRejectedError(f"No seed from {first} on gives a scene of {task}.")
-
-
 def validate_batch(batch: Batch) -> ValidationResults:
     """Check the episodes of a batch."""
     results = ValidationResults()
     for index in range(batch.first, batch.first + batch.size):
-        if batch.split is None:
-            results.add(check_episode(random_episode(batch.task, index)))
-        else:
-            episode = get_episode(batch.task, batch.split, index)
-            results.add(check_episode(episode, must_be_expressible=True))
+        episode = get_episode(batch.task, batch.split, index)
+        results.add(check_episode(episode, must_be_expressible=batch.split in SPLITS))
     return results
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from roboirg.core.episode import Color, Episode, ObjectKind
 from roboirg.core.errors import InvalidValueError
-from roboirg.episodes.splits import SIZES, check_split, get_episode
+from roboirg.episodes.splits import SIZES, check_fixed_split, get_episode
 from roboirg.tasks import get_task
 from roboirg.tasks.shared.real_table import left_to_right
 
@@ -117,6 +117,6 @@ def _arrangement(color: Color, left: Color, repeats: object) -> Arrangement:
 def _by_arrangement(task: str, split: str) -> dict[Arrangement, list[int]]:
     """Return the episodes of a split with each arrangement, in order."""
     found: dict[Arrangement, list[int]] = defaultdict(list)
-    for index in range(SIZES[check_split(split)]):
+    for index in range(SIZES[check_fixed_split(split)]):
         found[read_arrangement(get_episode(task, split, index))].append(index)
     return found

@@ -1,7 +1,8 @@
 """Cache of demonstrations: each is planned once, then its actions are replayed.
 
 A replay of the same actions in the same world gives the same bits. A hash of the final state
-verifies this, so results never depend on the cache.
+verifies this, so results never depend on the cache. Where RoboMME's own recording is shipped, it is
+replayed instead.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import importlib.metadata
 import logging
 import platform
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
@@ -34,12 +36,16 @@ _PACKAGES = ("sapien", "numpy", "scipy", "toppra")
 _log = logging.getLogger(__name__)
 
 
-def replay_or_plan(episode: Episode, play: PlayDemonstration, *, watched: bool) -> Recording:
-    """Play a demonstration: replay it if it is cached, otherwise plan it and cache it.
+def replay_or_plan(
+    episode: Episode, play: PlayDemonstration, shipped: Recording | None, *, watched: bool
+) -> Recording:
+    """Play a demonstration: replay it if it is shipped or cached, otherwise plan it and cache it.
 
     Args:
         episode: the episode.
         play: plays the demonstration; called again if a replay ends in another state.
+        shipped: RoboMME's recording, if there is one. If it does not complete the stages, which
+            no shipped one does where it was checked, the demonstration is planned.
         watched: whether a frame hook observes the steps. If so, the demonstration is planned,
             because a wrong replay would be noticed only at its end.
 
@@ -47,7 +53,12 @@ def replay_or_plan(episode: Episode, play: PlayDemonstration, *, watched: bool) 
         MotionPlanningError: the demonstration cannot be executed; the scene cannot be used.
     """
     if not episode.demonstration:
-        return play(None)
+        return replace(play(None), source="none")
+    if shipped is not None:
+        try:
+            return replace(play(shipped), source="recorded")
+        except MotionPlanningError as error:
+            _log.warning("%s The recorded actions are not used; planning it.", error)
     cache, key = open_cache("actions"), recording_key(episode)
     content = None if watched else cache.read(key)
     if content is not None:

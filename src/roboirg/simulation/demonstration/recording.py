@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.episode import Episode
+from roboirg.core.observations import DemonstrationSource
 
 
 class RecordedStep(NamedTuple):
@@ -34,11 +35,13 @@ class Recording:
             every demonstration.
         stages: (n,) index of each action's stage in the demonstration.
         end: hash of the state after the step at home, in hexadecimal.
+        source: where the actions come from.
     """
 
     actions: NDArray[np.float64]
     stages: NDArray[np.uint8]
     end: str
+    source: DemonstrationSource = "planned"
 
     @classmethod
     def from_steps(cls, steps: list[RecordedStep], end: str) -> Recording:

@@ -10,6 +10,8 @@ from roboirg.core.motions import Motion, Point, Swap
 
 SWAP_STEPS = 50
 """Control steps of one swap (RoboMME)."""
+SWAP_START = 1
+"""Control steps from the beginning of the video's holding stage to its first swap (RoboMME)."""
 
 
 def plan_swaps(

@@ -25,7 +25,7 @@ from roboirg.tasks.shared.fixtures import (
     draw_target,
 )
 from roboirg.tasks.shared.placement import Circle, Footprint, Region
-from roboirg.tasks.shared.swapping import SWAP_STEPS
+from roboirg.tasks.shared.swapping import SWAP_START, SWAP_STEPS
 
 CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
 
@@ -85,7 +85,7 @@ def plan_swap(first: str, second: str, others: Sequence[str], past: Sequence[Fac
     """
     kinds = [stage.primitive.kind for stage in _demonstration_of(past)]
     hold = kinds.index("hold")
-    return Swap(first, second, 0, SWAP_STEPS, SWAP_LANE, pinned=tuple(others), stage=hold)
+    return Swap(first, second, SWAP_START, SWAP_STEPS, SWAP_LANE, pinned=tuple(others), stage=hold)
 
 
 def visited(scene: Scene) -> tuple[str, ...]:
