@@ -319,7 +319,12 @@ def convert_video_repick(row: Row) -> tuple[Scene, Goal]:
         names[body_name(facts[f"swap_pair{number}_idx1"])]
         for number in range(1, facts["swap_times"] + 1)
     )
-    scene = video_repick.make_scene(make_button(row), cubes, target, initiators)
+    # RoboMME looks for the nearest cube once the first one has been put down, millimeters away.
+    partners = [
+        None if second is None else names[body_name(second)]
+        for _, second, *_ in facts.get("swap_schedule", ())
+    ]
+    scene = video_repick.make_scene(make_button(row), cubes, target, initiators, partners)
     return scene, Goal.of(repeats=facts["num_repeats"])
 
 

@@ -1,8 +1,7 @@
-"""The splits: seeds by the rule, and episodes that stay what they are."""
+"""The splits: published and sampled episodes, which stay what they are."""
 
 import dataclasses
 import json
-from collections import Counter
 
 import numpy as np
 import pytest
@@ -11,25 +10,39 @@ from roboirg.core.episode import SPLITS, Episode
 from roboirg.core.errors import InvalidValueError, SceneRejectedError, UnknownNameError
 from roboirg.episodes import splits
 from roboirg.episodes.fingerprint import fingerprint, plain
+from roboirg.episodes.published_episodes import is_published, published_episode
+from roboirg.episodes.recordings import is_recorded
 from roboirg.episodes.splits import (
     MAX_REJECTED,
     SEED_STRIDE,
-    SIZES,
     TaskSplits,
-    base_seed,
     fingerprint_of,
     get_episode,
     shipped_splits,
+    slot_seed,
+    split_episodes,
     splits_text,
 )
-from roboirg.tasks import every_task, get_task
+from roboirg.tasks import all_tasks, every_task, get_task
 
 TASKS = tuple(every_task())
+GAPS = {
+    "VideoPlaceButton": {"VideoPlaceButton/val/15"},
+    "VideoPlaceOrder": {
+        *(f"VideoPlaceOrder/train/{index}" for index in (7, 38, 75)),
+        *(f"VideoPlaceOrder/val/{index}" for index in (34, 43)),
+    },
+}
+"""Episodes that RoboMME cannot build."""
 each_task = pytest.mark.parametrize("task", TASKS)
 
 
 def episodes(task):
-    return [get_episode(task, split, index) for split in SPLITS for index in range(SIZES[split])]
+    return list(split_episodes([task], SPLITS))
+
+
+def slot(episode):
+    return episode.task, episode.split, episode.index
 
 
 def test_every_task_s_splits_are_shipped():
@@ -47,21 +60,38 @@ def test_no_task_s_episodes_have_drifted(task):
     assert fingerprint(episodes(task)) == shipped_splits()[task].sha256
 
 
-@each_task
-def test_difficulties_follow_the_cycle_and_seeds_the_rule(task):
+@pytest.mark.parametrize("task", all_tasks())
+def test_the_benchmark_s_episodes_are_robomme_s(task):
+    sampled = [episode for episode in episodes(task) if not is_published(*slot(episode))]
+    assert {episode.key for episode in sampled} == GAPS.get(task, set())
     for episode in episodes(task):
-        assert episode.difficulty == ("easy", "easy", "medium", "hard")[episode.index % 4]
-        first = base_seed(get_task(task), episode.split) + 100 * episode.index
-        passed_over = shipped_splits()[task].passed_over.get(f"{episode.split}/{episode.index}", 0)
-        assert episode.seed == first + passed_over
-    counts = Counter(episode.difficulty for episode in episodes(task) if episode.split == "test")
-    assert counts == {"easy": 26, "medium": 12, "hard": 12}
+        found = published_episode(*slot(episode))
+        if found is not None:
+            assert found == (episode.seed, episode.difficulty, episode.scene, episode.goal)
+            assert episode.recorded == is_recorded(*slot(episode))
 
 
 @each_task
-def test_counts_are_of_episodes_that_exist_and_stay_below_the_next_one_s_seeds(task):
-    keys = {f"{split}/{index}" for split in SPLITS for index in range(SIZES[split])}
-    assert set(shipped_splits()[task].passed_over) <= keys
+def test_sampled_episodes_follow_the_cycle_and_the_rule_of_seeds(task):
+    random = [get_episode(task, "random", index) for index in (0, 1, 2, 3, 999_999)]
+    for episode in [*episodes(task), *random]:
+        if is_published(*slot(episode)):
+            continue
+        assert episode.difficulty == ("easy", "easy", "medium", "hard")[episode.index % 4]
+        first = slot_seed(get_task(task), episode.split, episode.index)
+        if episode.split == "random":
+            assert first <= episode.seed < first + SEED_STRIDE
+        else:
+            key = f"{episode.split}/{episode.index}"
+            assert episode.seed == first + shipped_splits()[task].passed_over.get(key, 0)
+        assert not episode.recorded
+    assert random[4] == get_episode(task, "random", 999_999)
+
+
+@each_task
+def test_counts_are_of_sampled_episodes_and_stay_below_the_next_one_s_seeds(task):
+    sampled = {f"{one.split}/{one.index}" for one in episodes(task) if not is_published(*slot(one))}
+    assert set(shipped_splits()[task].passed_over) <= sampled
     assert all(0 < count <= MAX_REJECTED for count in shipped_splits()[task].passed_over.values())
     assert MAX_REJECTED < SEED_STRIDE
 
@@ -108,9 +138,11 @@ def test_the_file_reads_back_and_has_a_line_for_each_task():
 def test_wrong_names_and_numbers_are_named_with_what_would_be_right():
     with pytest.raises(UnknownNameError, match=r"no task 'PickXTime'.*PickXtimes.*Did you mean"):
         get_episode("PickXTime", "test", 0)
-    with pytest.raises(UnknownNameError, match=r"no split 'dev'.*train, val, test"):
+    with pytest.raises(UnknownNameError, match=r"no split 'dev'.*train, val, test, random"):
         get_episode("PickXtimes", "dev", 0)
     assert get_episode("PickXtimes", "test", np.int64(3)) == get_episode("PickXtimes", "test", 3)
+    with pytest.raises(UnknownNameError, match=r"no split 'random'.*train, val, test"):
+        splits.check_fixed_split("random")
     for wrong in (-1, 50, 1.0, "0", True):
         with pytest.raises(InvalidValueError, match="has episodes 0 to 49"):
             get_episode("PickXtimes", "test", wrong)
@@ -128,4 +160,5 @@ def test_a_task_without_shipped_seeds_passes_over_those_without_a_scene(monkeypa
 
     picky = dataclasses.replace(task, name="Picky", sample=sample)
     monkeypatch.setattr(splits, "get_task", lambda _name: picky)
-    assert splits.get_episode("Picky", "val", 7).seed == first + 3
+    picked = splits.get_episode("Picky", "val", 7)
+    assert picked.seed == first + 3

@@ -16,13 +16,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roboirg.cli.app import app
-from roboirg.core.episode import DIFFICULTIES, SPLITS, Episode, Scene, SceneObject
+from roboirg.core.episode import DIFFICULTIES, SPLITS, Scene, SceneObject
 from roboirg.core.errors import InvalidValueError, RoboIRGError
-from roboirg.core.motions import Point
+from roboirg.core.motions import Point, Swap
 from roboirg.episodes import published_episodes
 from roboirg.episodes.episode_export import episode_row, write_episodes
 from roboirg.episodes.published_episodes import published_episode, published_text
-from roboirg.episodes.recordings import INCOMPLETE, recorded_actions
+from roboirg.episodes.recordings import INCOMPLETE, is_recorded, recorded_actions
 from roboirg.episodes.scene_codec import decode, encode
 from roboirg.episodes.splits import SIZES, get_episode
 from roboirg.tasks import all_tasks, every_task, get_task
@@ -53,29 +53,13 @@ def roboirg(*words):
     return out.getvalue()
 
 
-def as_episode(task, split, index):
-    """A published episode with the stages of its task."""
-    found, kind = published_episode(task, split, index), get_task(task)
-    return Episode(
-        task=task,
-        split=split,
-        index=index,
-        seed=found.seed,
-        difficulty=found.difficulty,
-        scene=found.scene,
-        goal=found.goal,
-        stages=kind.stages(found.scene, found.goal),
-        demonstration=kind.demonstration(found.scene),
-    )
-
-
 def test_the_shipped_file_is_what_the_rows_give(converter):
     assert list(converter.converted_lines(ROWS)) == published_text().splitlines()
 
 
 def test_a_damaged_file_is_one_sentence(monkeypatch):
     monkeypatch.setattr(published_episodes, "SHA256", "0" * 64)
-    with pytest.raises(RoboIRGError, match=r"published\.jsonl\.gz is damaged: its SHA-256 is 01ac"):
+    with pytest.raises(RoboIRGError, match=r"published\.jsonl\.gz is damaged: its SHA-256 is 300e"):
         published_text()
 
 
@@ -140,7 +124,9 @@ def test_recordings_are_as_long_as_robomme_s(converter):
     for row in converter.read_rows(ROWS):
         key = (row["task"], row["dataset"], row["episode"])
         if "error" in row or row["task"] not in RECORDED or key in INCOMPLETE:
-            assert recorded_actions(*key) is None
+            assert not is_recorded(*key)
+            with pytest.raises(KeyError):
+                recorded_actions(*key)
             continue
         found = recorded_actions(*key)
         stages = get_task(row["task"]).demonstration(published_episode(*key).scene)
@@ -152,6 +138,50 @@ def test_recordings_are_as_long_as_robomme_s(converter):
     assert compared == 590
 
 
+def body_name(reference):
+    """``bin_0`` for ``<bin_0>``, also in a list of one."""
+    return (reference[0] if isinstance(reference, list) else reference).strip("<>")
+
+
+def is_body(episode, name, row, reference):
+    """Whether an object of ours is a body of RoboMME's, told by its place."""
+    start = row["start"].get(body_name(reference))
+    if not isinstance(start, list):
+        return episode.scene[name].kind == "button"
+    return math.dist(start[:2], episode.scene[name].position[:2]) < 1e-6
+
+
+def test_stages_point_at_the_objects_that_robomme_s_subgoals_point_at(converter):
+    compared = Counter()
+    for row in converter.read_rows(ROWS):
+        if "error" in row:
+            continue
+        episode = get_episode(row["task"], row["dataset"], row["episode"])
+        for shown, stages in ((True, episode.demonstration), (False, episode.stages)):
+            theirs = [one["segment"] for one in row["stages"] if one["demonstration"] == shown]
+            ours = [stage.points_at for stage in stages if stage.points_at]
+            for name, reference in zip(ours, filter(None, theirs), strict=True):
+                assert is_body(episode, name, row, reference), (episode.key, name, reference)
+                compared[row["task"]] += 1
+    assert compared.keys() == all_tasks().keys()
+
+
+def test_objects_change_places_with_the_partners_that_robomme_saw(converter):
+    compared = Counter()
+    for row in converter.read_rows(ROWS):
+        schedule = row.get("facts", {}).get("swap_schedule") or []
+        episode = get_episode(row["task"], row["dataset"], row["episode"])
+        swaps = [motion for motion in episode.scene.motions if isinstance(motion, Swap)]
+        for swap, (first, second, begin, end) in zip(swaps, schedule, strict=False):
+            assert is_body(episode, swap.first, row, first)
+            assert second is None or is_body(episode, swap.second, row, second)
+            assert swap.steps == end - begin
+            if swap.stage is None:
+                assert swap.start == begin
+            compared[row["task"]] += second is not None
+    assert compared == {"ButtonUnmaskSwap": 0, "VideoUnmaskSwap": 346, "VideoRepick": 281}
+
+
 @pytest.mark.sim
 @pytest.mark.parametrize("task", RECORDED)
 def test_a_recording_replays_to_robomme_s_poses(task, converter):
@@ -161,7 +191,7 @@ def test_a_recording_replays_to_robomme_s_poses(task, converter):
     row = next(
         row for row in converter.read_rows(ROWS) if (row["task"], row["dataset"]) == (task, "test")
     )
-    episode = as_episode(task, "test", 0)
+    episode = get_episode(task, "test", 0)
     session = EpisodeSession(episode, visible=False)
     session.play_demonstration(recording=Recording(*recorded_actions(task, "test", 0), ""))
     joints = session.world.robot.articulation.get_qpos().ravel()

@@ -30,6 +30,7 @@ from roboirg.language.settings import all_settings, settings_of
 from roboirg.tasks import every_task, get_task
 
 TASKS = tuple(every_task())
+REJECTED = Rejection(0, "no room", "no place")
 each_task = pytest.mark.parametrize("task", TASKS)
 
 
@@ -60,8 +61,9 @@ def test_scene_and_words_allow_the_shipped_seeds_and_rule_out_no_more_than_were_
 @each_task
 def test_the_rule_gives_the_shipped_seeds(task):
     """For a plain episode, and for one for which seeds were passed over."""
-    refused = [slot for slot in episode_slots([task]) if passed_over(slot)]
-    for slot in (EpisodeSlot(task, "test", 1), *refused[-1:]):
+    slots = episode_slots([task])
+    refused = [slot for slot in slots if passed_over(slot)]
+    for slot in (*slots[:1], *refused[-1:]):
         assert len(find_seed(slot, check_seed).rejections) == passed_over(slot), slot.key
 
 
@@ -124,9 +126,9 @@ def test_seeds_are_accepted_by_the_settings_of_the_first_release() -> None:
 
 
 def test_processes_find_what_one_finds():
-    slots = episode_slots(["VideoPlaceButton"], ["val"])
+    slots = [EpisodeSlot("VideoPlaceOrder", "val", index) for index in range(50)]
     alone = list(find_seeds(slots, 0, check_words))
-    assert [one.slot for one in alone] == list(slots)
+    assert [one.slot for one in alone] == slots
     assert any(one.rejections for one in alone)
     console = Console(file=io.StringIO(), width=100)
     assert list(follow_progress(find_seeds(slots, 2, check_words), slots, console)) == alone
@@ -134,7 +136,7 @@ def test_processes_find_what_one_finds():
 
 
 def test_what_ends_a_search_is_named():
-    slots = episode_slots(["PickXtimes"], ["val"])[:3]
+    slots = [EpisodeSlot("PickXtimes", "val", index) for index in range(3)]
     with pytest.raises(SceneRejectedError, match="PickXtimes/val/0"):
         list(find_seeds(slots[:1], 1, refuse))
     with pytest.raises(RoboIRGError, match="worker process died"):
@@ -143,31 +145,45 @@ def test_what_ends_a_search_is_named():
         list(find_seeds(slots, -1))
 
 
+def test_only_sampled_episodes_need_a_seed():
+    assert episode_slots(["VideoUnmask"]) == ()
+    assert episode_slots(["VideoPlaceButton"]) == (EpisodeSlot("VideoPlaceButton", "val", 15),)
+    assert len(episode_slots(["PutInBox"])) == sum(SIZES[split] for split in SPLITS)
+
+
 def test_what_was_not_built_again_stays():
-    slots = episode_slots(["VideoUnmask"], ["test"])
-    built = [SelectedSeed(slot, ()) for slot in slots]
-    now = merge_splits(built, shipped_splits())
+    slots = episode_slots(["VideoPlaceOrder"], ["val"])
+    built = [SelectedSeed(slot, (REJECTED,) * passed_over(slot)) for slot in slots]
+    tasks = ["VideoPlaceOrder", "VideoUnmask"]
+    now = merge_splits(tasks, built, shipped_splits())
     assert now == dict(shipped_splits())
     assert list(now) == list(TASKS)
-    three = (Rejection(0, "no room", "no place"),) * 3
-    now = merge_splits([SelectedSeed(slots[7], three), *built[:7], *built[8:]], shipped_splits())
-    assert now["VideoUnmask"].passed_over == {
-        **shipped_splits()["VideoUnmask"].passed_over,
-        "test/7": 3,
+    # Any seed that gives a scene will do.
+    other = next(
+        count
+        for count in range(passed_over(slots[0]) + 1, 100)
+        if check_words(slots[0], first_seed(slots[0]) + count) is None
+    )
+    changed = [SelectedSeed(slots[0], (REJECTED,) * other), *built[1:]]
+    now = merge_splits(tasks, changed, shipped_splits())
+    assert now["VideoPlaceOrder"].passed_over == {
+        **shipped_splits()["VideoPlaceOrder"].passed_over,
+        f"val/{slots[0].index}": other,
     }
-    assert now["VideoUnmask"].sha256 != shipped_splits()["VideoUnmask"].sha256
-    assert now["PickXtimes"] == shipped_splits()["PickXtimes"]
+    assert now["VideoPlaceOrder"].sha256 != shipped_splits()["VideoPlaceOrder"].sha256
+    assert now["VideoUnmask"] == shipped_splits()["VideoUnmask"]
 
 
 def test_only_what_is_valid_can_stay():
-    check_kept_splits(["VideoUnmask"], ["test"], shipped_splits())
-    check_kept_splits(["VideoUnmask"], SPLITS, {})
+    check_kept_splits(["VideoPlaceOrder"], ["test"], shipped_splits())
+    check_kept_splits(["VideoPlaceOrder"], SPLITS, {})
     with pytest.raises(
-        InvalidValueError, match=r"VideoUnmask/train/0 .* all splits of VideoUnmask"
+        InvalidValueError, match=r"VideoPlaceOrder/train/7 .* all splits of VideoPlaceOrder"
     ):
-        check_kept_splits(["VideoUnmask"], ["test"], {})
-    with pytest.raises(InvalidValueError, match=r"VideoUnmask/val/15"):
-        check_kept_splits(["VideoUnmask"], ["train", "test"], {"VideoUnmask": TaskSplits("", {})})
+        check_kept_splits(["VideoPlaceOrder"], ["test"], {})
+    nothing = {"VideoPlaceOrder": TaskSplits("", {})}
+    with pytest.raises(InvalidValueError, match=r"VideoPlaceOrder/train/7"):
+        check_kept_splits(["VideoPlaceOrder"], ["val", "test"], nothing)
 
 
 def test_the_summary_tells_how_many_and_why():

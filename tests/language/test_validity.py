@@ -8,10 +8,10 @@ import functools
 import pytest
 from language_variants import SPATIAL_TASKS, TASKS, random_episodes
 
-from roboirg.episodes.splits import SIZES
+from roboirg.episodes.splits import SIZES, get_episode
 from roboirg.language import expressible, instruct, interpret
 from roboirg.language.settings import settings_of
-from roboirg.language.validation import Batch, ValidationResults, random_episode, validate_batch
+from roboirg.language.validation import Batch, ValidationResults, validate_batch
 from roboirg.tasks import get_task
 
 RANDOM_SCENES = 24
@@ -84,7 +84,7 @@ def test_the_exceptions_of_necessity_are_the_named_ones():
 def test_hardly_any_episode_lacks_a_landmark(task):
     by_difficulty: dict[str, list[bool]] = {}
     for index in range(200):
-        episode = random_episode(task, index)
+        episode = get_episode(task, "random", index)
         told = "spatial" in expressible(episode)
         by_difficulty.setdefault(episode.difficulty, []).append(told)
     everywhere = [told for values in by_difficulty.values() for told in values]

@@ -4,6 +4,7 @@ import functools
 import itertools
 import math
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -216,7 +217,8 @@ def test_bin_fill_stages_take_the_cubes_color_by_color_as_they_appear(difficulty
         counts = dict(zip(goal.texts("colors"), goal.numbers("counts"), strict=True))
         assert len(stages) == 2 * sum(counts.values()) + 1
         picks, drops = stages[:-1:2], stages[1:-1:2]
-        names = [f"cube_{color}_{n}" for color, count in counts.items() for n in range(count)]
+        assert sorted(scene.color_order) == sorted(counts)
+        names = [f"cube_{color}_{n}" for color in scene.color_order for n in range(counts[color])]
         assert [stage.primitive.subject for stage in picks] == names
         assert [stage.primitive.subject for stage in drops] == names
         assert {stage.primitive.kind for stage in picks} == {"pick_cube"}
@@ -228,6 +230,7 @@ def test_bin_fill_subgoals_count_within_a_color():
     scene, _ = scenes("BinFill", "hard")[0]
     goal = next(g for g in bin_fill.goals(scene) if g.numbers("counts") == (2, 1))
     first, second = goal.texts("colors")
+    scene = replace(scene, color_order=())  # the goal's
     assert [stage.subgoal for stage in bin_fill.stages(scene, goal)] == [
         f"pick up the first {first} cube {{at}}",
         "put it into the bin {at}",
@@ -235,7 +238,14 @@ def test_bin_fill_subgoals_count_within_a_color():
         "put it into the bin {at}",
         f"pick up the first {second} cube {{at}}",
         "put it into the bin {at}",
-        "press the button {at} to stop",
+        "press the button {at}",
+    ]
+    turned = bin_fill.stages(replace(scene, color_order=(second,)), goal)
+    assert [stage.subgoal for stage in turned[::2]] == [
+        f"pick up the first {second} cube {{at}}",
+        f"pick up the first {first} cube {{at}}",
+        f"pick up the second {first} cube {{at}}",
+        "press the button {at}",
     ]
 
 
@@ -314,7 +324,7 @@ def test_swing_subgoals_number_the_repetitions():
         "move to the top of the right-side target {at} for the second time",
         "move to the top of the left-side target {at} for the second time",
         f"put the {color} cube on the table",
-        "press the button {at} to stop",
+        "press the button {at}",
     ]
 
 

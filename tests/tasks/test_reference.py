@@ -159,7 +159,7 @@ def test_repick_swaps_begin_with_the_shown_cube_and_go_to_the_nearest(difficulty
         assert initiators[0] == scene.past[0].subject
         assert len(set(initiators)) == len(initiators)
         for number, swap in enumerate(scene.motions):
-            assert (swap.start, swap.steps, swap.lane) == (50 * number, 50, 0.07)
+            assert (swap.start, swap.steps, swap.lane) == (1 + 50 * number, 50, 0.07)
             assert swap.second == nearest(places, swap.first)
             assert {swap.first, swap.second, *swap.pinned} == set(cubes)
             places[swap.first], places[swap.second] = places[swap.second], places[swap.first]
@@ -269,7 +269,7 @@ def test_place_swaps_two_drawn_discs_in_the_last_hold(task, difficulty):
             discs = {disc.name for disc in scene.of_kind("target")}
             assert {swap.first, swap.second, *swap.pinned} == discs
             assert len(swap.pinned) == len(discs) - 2
-            assert (swap.start, swap.steps, swap.lane) == (0, 50, 0.1)
+            assert (swap.start, swap.steps, swap.lane) == (1, 50, 0.1)
             stage = task.demonstration(scene)[swap.stage]
             assert (stage.primitive.kind, stage.lasting) == ("hold", 60)
             pairs.add((swap.first, swap.second))

@@ -73,6 +73,11 @@ def valid(task, difficulty, count=1):
     return tuple(found)
 
 
+def random_episodes(task):
+    """Sampled episodes of every difficulty."""
+    return [episode for difficulty in DIFFICULTIES for episode in valid(task, difficulty, 60)]
+
+
 def test_registry_holds_each_task_once_and_in_the_order_of_codes():
     codes = [task.code for task in every_task().values()]
     assert codes == sorted(set(codes))
@@ -158,9 +163,13 @@ def test_stages_and_motions_speak_of_things_that_exist(task):
 def test_episodes_are_plain_data(task):
     for episode in episodes(task):
         plain(episode)  # raises at anything else
-        again = make_episode(task, episode.seed, episode.difficulty, episode.split, episode.index)
-        assert again == episode
-        assert hash(again) == hash(episode)
+        hash(episode)
+    for difficulty in DIFFICULTIES:
+        for episode in valid(task, difficulty, 8):
+            plain(episode)
+            again = make_episode(task, episode.seed, difficulty)
+            assert again == episode
+            assert hash(again) == hash(episode)
 
 
 def solids(scene):
@@ -176,21 +185,26 @@ def solids(scene):
     return [footprints[item.kind](item) for item in scene.objects if item.kind in footprints]
 
 
-def discs(scene):
-    """Targets and sites, but for the one over which a shuttle runs: its place is free."""
+def discs(scene, *kinds):
+    """Targets or sites, but for the one over which a shuttle runs: its place is free."""
     if scene.of_kind("shuttle"):
         return []
     return [
         Circle(item.position.x, item.position.y, item.radius)
-        for item in (*scene.of_kind("target"), *scene.of_kind("site"))
+        for kind in kinds
+        for item in scene.of_kind(kind)
     ]
 
 
 @each_task
 def test_things_on_the_table_do_not_touch(task):
     for episode in episodes(task):
-        areas = [*solids(episode.scene), *discs(episode.scene)]
-        assert not any(overlap(*pair) for pair in itertools.combinations(areas, 2)), episode.key
+        # Cubes may lie where the video puts one back, as in RoboMME.
+        for areas in (
+            [*solids(episode.scene), *discs(episode.scene, "target")],
+            discs(episode.scene, "target", "site"),
+        ):
+            assert not any(overlap(*pair) for pair in itertools.combinations(areas, 2)), episode.key
 
 
 @each_task
@@ -204,9 +218,8 @@ def test_hidden_cubes_are_in_the_middle_of_their_containers(task):
 def test_everything_lies_on_the_table_and_what_is_handled_within_reach(task):
     for episode in episodes(task):
         for item in episode.scene.objects:
-            assert any(item.position.z == pytest.approx(height) for height in HEIGHTS[item.kind]), (
-                item
-            )
+            heights = HEIGHTS[item.kind]
+            assert any(item.position.z == pytest.approx(one, abs=1e-6) for one in heights), item
         for stage in (*episode.demonstration, *episode.stages):
             handled = {stage.primitive.subject, stage.primitive.place} - {None, "robot"}
             for x, y, _ in (episode.scene[name].position for name in handled):
@@ -225,7 +238,7 @@ def test_everything_is_in_the_front_picture(task):
 
 
 def test_pick_x_times_scenes_are_as_in_the_facts():
-    for episode in episodes("PickXtimes"):
+    for episode in random_episodes("PickXtimes"):
         cubes, (target,) = episode.scene.of_kind("cube"), episode.scene.of_kind("target")
         (button,) = episode.scene.of_kind("button")
         assert len(cubes) == (1 if episode.difficulty == "easy" else 3)
@@ -251,7 +264,7 @@ def test_pick_x_times_scenes_are_as_in_the_facts():
 
 
 def test_video_unmask_scenes_are_as_in_the_facts():
-    for episode in episodes("VideoUnmask"):
+    for episode in random_episodes("VideoUnmask"):
         containers = episode.scene.of_kind("container")
         hidden = episode.scene.of_kind("hidden_cube")
         colors = episode.goal.texts("colors")

@@ -22,7 +22,7 @@ from roboirg.core.errors import RoboIRGError
 from roboirg.episodes.scene_codec import decode
 
 FILE = "published.jsonl.gz"
-SHA256 = "46b79134d1d1fa16d9465bdc74050aee3a0df4a4f68c77c8d972613e31715338"
+SHA256 = "300e3420a23a54f5d77be1eee8d1cf9b103a8b864333100cdd69d1643268de83"
 """Of the file's text, before compression."""
 
 

@@ -65,7 +65,11 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
 
 
 def make_scene(
-    button: SceneObject, cubes: Sequence[SceneObject], target: str, initiators: Sequence[str]
+    button: SceneObject,
+    cubes: Sequence[SceneObject],
+    target: str,
+    initiators: Sequence[str],
+    partners: Sequence[str | None] = (),
 ) -> Scene:
     """Return the scene whose video shows a cube picked up and put down, and then swaps.
 
@@ -74,8 +78,16 @@ def make_scene(
         cubes: all cubes.
         target: name of the cube of the video.
         initiators: names of the cubes that start a swap, in order.
+        partners: names of those with whom they change places, where known; else the nearest.
     """
-    motions = plan_swaps(cubes, initiators, start=SWAP_START, lane=SWAP_LANE, stage=SWAP_STAGE)
+    motions = plan_swaps(
+        cubes,
+        initiators,
+        start=SWAP_START,
+        lane=SWAP_LANE,
+        stage=SWAP_STAGE,
+        partners=partners,
+    )
     past = (Fact("picked", target), Fact("lying", target))
     return Scene((button, *cubes), motions, past)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 
@@ -21,6 +22,7 @@ def plan_swaps(
     start: int,
     lane: float,
     stage: int | None = None,
+    partners: Sequence[str | None] = (),
 ) -> tuple[Swap, ...]:
     """Plan that each initiator in turn changes places with the object then nearest to it.
 
@@ -30,11 +32,13 @@ def plan_swaps(
         start: step of the first swap; the others follow without a pause.
         lane: sideways swing, m.
         stage: index of the demonstration's stage from which `start` counts; None: from reset.
+        partners: names of those with whom the first initiators change places instead, where known.
     """
     places: dict[str, Point] = {item.name: item.position for item in objects}
     swaps: list[Swap] = []
-    for number, first in enumerate(initiators):
-        second = nearest(places, first)
+    chosen = itertools.zip_longest(initiators, partners[: len(initiators)])
+    for number, (first, partner) in enumerate(chosen):
+        second = partner or nearest(places, first)
         pinned = tuple(name for name in places if name not in (first, second))
         begin = start + number * SWAP_STEPS
         swaps.append(Swap(first, second, begin, SWAP_STEPS, lane, pinned, stage))
