@@ -18,6 +18,7 @@ from roboirg.analysis.page.columns import UNATTRIBUTED
 from roboirg.analysis.page.entries import Run
 from roboirg.analysis.page.report import make_view, render, render_runs, write_report
 from roboirg.cli.report_commands import report
+from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.evaluation.plan import Plan, write_plan
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.records.record import Attribution, EventRecord, MentionSpan, Record, UtteranceRecord
@@ -393,7 +394,7 @@ def test_the_head_says_which_run_it_was(tmp_path: Path) -> None:
     assert "<dd>tuesday</dd>" in text
     assert "<dd>2026-01-02 03:04 to 03:09 UTC</dd>" in text
     assert "<dt>step limit</dt><dd>1300</dd>" in text
-    assert "<dt>environment</dt><dd>0</dd>" in text
+    assert f"<dt>environment</dt><dd>{ENVIRONMENT_VERSION}</dd>" in text
 
 
 def test_an_unknown_task_is_shown_too() -> None:

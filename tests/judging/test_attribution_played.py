@@ -63,7 +63,7 @@ def test_hands_that_do_another_task_well_fail_by_grounding(task: str) -> None:
     ("task", "episode", "failure", "subject"),
     [
         ("VideoUnmask", 0, "wrong_object", "container"),
-        ("PickXtimes", 1, "wrong_count", "button"),
+        ("PickXtimes", 7, "wrong_count", "button"),
         ("VideoPlaceOrder", 0, "wrong_place", "cube"),
     ],
 )

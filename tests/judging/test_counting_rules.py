@@ -98,7 +98,7 @@ def test_bin_fill_punishes_a_wrong_mix_one_step_after_the_last_drop(cubes, cause
     assert filled(*cubes).status is Status.ONGOING
     judge = filled(*cubes, then=[[]])
     assert judge.status is Status.FAILURE
-    assert judge.cause == f"{cause}; expected: press the button to stop"
+    assert judge.cause == f"{cause}; expected: press the button"
 
 
 @pytest.mark.parametrize(

@@ -169,7 +169,7 @@ def test_batches_cover_everything_once():
     work = batches(("PickXtimes",), ("test", "train"), 120)
     assert sum(batch.size for batch in work) == 50 + 100 + 120
     assert len(set(work)) == len(work)
-    assert [batch.size for batch in work if batch.split is None] == [50, 50, 20]
+    assert [batch.size for batch in work if batch.split == "random"] == [50, 50, 20]
     for seeds in (-1, 0):
         with pytest.raises(InvalidValueError):
             batches(("PickXtimes",), (), seeds)

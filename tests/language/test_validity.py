@@ -19,17 +19,21 @@ RANDOM_SCENES = 24
 
 
 @functools.cache
-def results(task: str, split: str | None) -> ValidationResults:
-    """Results for the test split of a task, or for None of random scenes."""
-    return validate_batch(Batch(task, split, 0, RANDOM_SCENES if split is None else SIZES[split]))
+def results(task: str, split: str) -> ValidationResults:
+    """Results for the test split of a task, or for random scenes."""
+    return validate_batch(Batch(task, split, 0, amount(split)))
+
+
+def amount(split: str) -> int:
+    return RANDOM_SCENES if split == "random" else SIZES[split]
 
 
 @pytest.mark.parametrize("task", TASKS)
-@pytest.mark.parametrize("split", ["test", None])
+@pytest.mark.parametrize("split", ["test", "random"])
 def test_every_instruction_is_valid(task, split):
     found = results(task, split)
     assert not found.failures
-    episodes = RANDOM_SCENES if split is None else SIZES[split]
+    episodes = amount(split)
     read = {setting: found.texts[task, setting] for setting in settings_of(get_task(task))}
     # Two forms; four sets of stages with two kinds of distractors; two frames.
     spatial = read.pop("spatial", 4 * episodes)
@@ -58,7 +62,7 @@ def test_long_contexts_are_read_back(task, distractor, distractors):
 def exceptions(task):
     """Groups of scenes that leave one candidate, with their share."""
     total = ValidationResults()
-    for split in ("test", None):
+    for split in ("test", "random"):
         total.add(results(task, split))
     return {
         (group.difficulty, group.pattern or group.setting): count / total.commands[group]
