@@ -13,6 +13,7 @@ from roboirg.analysis.stats.cells import (
     PolicyRun,
     gather,
     labels,
+    options_of,
     policy_order,
     sort_cells,
     task_order,
@@ -60,7 +61,7 @@ class EpisodeEntry:
     @property
     def options(self) -> InstructionOptions:
         """The instruction options."""
-        return self.record.options
+        return options_of(self.record)
 
 
 @dataclass(frozen=True, slots=True)
