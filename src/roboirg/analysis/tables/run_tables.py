@@ -104,6 +104,8 @@ def print_run_tables(tables: Sequence[RunTable], console: Console) -> None:
         console.width = max(console.width, MINIMUM_WIDTH)
     for table in tables:
         console.print(_grid(table))
+        # Not the grid's caption, which would be as narrow as the grid.
+        console.print(Text(_caption(table)), style="dim", highlight=False)
     console.print("; ".join(_legend(tables)), style="dim", highlight=False)
 
 
@@ -189,9 +191,6 @@ def _grid(table: RunTable) -> Grid:
         title=table.label,
         title_justify="left",
         title_style="bold",
-        caption=_caption(table),
-        caption_justify="left",
-        caption_style="dim",
     )
     grid.add_column("task")
     signs = _explicit_signs(table)
