@@ -14,7 +14,7 @@ from roboirg.analysis.figures.figure_style import (
     clear_axes,
     new_figure,
 )
-from roboirg.analysis.stats.cells import PolicyRun, options_of
+from roboirg.analysis.stats.cells import PolicyRun
 from roboirg.analysis.stats.option_labels import options_label, options_sort_key
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
@@ -93,7 +93,7 @@ def _counts(content: FigureData) -> tuple[Counts, Counter[tuple[PolicyRun, Instr
         played[key.policy_run, key.options] += cell.trials
     for policy_run, result in content.results:
         if result.outcome == "failure":
-            counts[policy_run, options_of(result)][failure_name(result)] += 1
+            counts[policy_run, result.options][failure_name(result)] += 1
     return counts, played
 
 

@@ -13,7 +13,6 @@ from roboirg.analysis.stats.cells import (
     PolicyRun,
     gather,
     labels,
-    options_of,
     policy_order,
     sort_cells,
     task_order,
@@ -61,7 +60,7 @@ class EpisodeEntry:
     @property
     def options(self) -> InstructionOptions:
         """The instruction options."""
-        return options_of(self.record)
+        return self.record.options
 
 
 @dataclass(frozen=True, slots=True)

@@ -114,13 +114,6 @@ class CellKey(NamedTuple):
     options: InstructionOptions
 
 
-def options_of(job: Job) -> InstructionOptions:
-    """Return the instruction options of a job; its wording file is one of its conditions."""
-    return InstructionOptions(
-        job.setting, job.form, job.stages, job.distractor, job.distractors, job.frame
-    )
-
-
 @dataclass(frozen=True, slots=True)
 class CellResults:
     """The results of one cell.
@@ -221,7 +214,7 @@ def gather(runs: Sequence[tuple[str, Sequence[Result]]], planned: Iterable[Job] 
             policy_runs.setdefault((result.policy, policy_run.conditions), policy_run)
             if jobs:
                 played.add(result.identity)
-            key = CellKey(policy_run, result.task, options_of(result))
+            key = CellKey(policy_run, result.task, result.options)
             if result.outcome == "error":
                 errors[key] += 1
             else:
@@ -231,7 +224,7 @@ def gather(runs: Sequence[tuple[str, Sequence[Result]]], planned: Iterable[Job] 
         conditions = EvalConditions.of(job)
         unplayed = PolicyRun(job.policy, conditions, None)
         policy_run = policy_runs.get((job.policy, conditions), unplayed)
-        missing[CellKey(policy_run, job.task, options_of(job))] += 1
+        missing[CellKey(policy_run, job.task, job.options)] += 1
     keys = dict.fromkeys([*verdicts, *errors, *missing])
     return {key: CellResults(verdicts.get(key, {}), errors[key], missing[key]) for key in keys}
 
