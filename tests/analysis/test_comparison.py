@@ -105,8 +105,9 @@ def test_policies_with_other_seeds_are_compared_by_episode(result) -> None:
     [
         ({"language_version": "2"}, "listener played language version 1 and forgetful version 2"),
         ({"environment_version": 2}, "environment version 1"),
-        ({"max_steps": 9}, "max_steps 1300 and forgetful with 9"),
-        ({"split": "val"}, "split test and forgetful with val"),
+        ({"max_steps": 9}, "max steps 1300 and forgetful with max steps 9"),
+        ({"split": "val"}, "split test and forgetful with split val"),
+        ({"wordings": "mine@0a"}, "with our own words and forgetful with the words of mine@0a"),
         ({"task": "BinFill"}, "no episode in common"),
         ({"setting": "direct"}, "no episode in common"),
     ],

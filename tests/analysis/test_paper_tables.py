@@ -213,6 +213,7 @@ def test_csv_has_every_entry_with_its_counts(result) -> None:
         "is_average": "no", "percent": "50.00", "word": "", "applies": "yes", "change": "",
         "best": "no", "incomplete": "errors", "successes": "1", "trials": "2", "episodes": "2",
         "errors": "1", "missing": "0", "low_percent": "9.45", "high_percent": "90.55",
+        "comparable": "", "differences": "",
     }  # fmt: skip
 
 
@@ -231,7 +232,7 @@ def test_latex_is_balanced_and_markdown_rectangular(result) -> None:
     assert r"\textbf{93.33}" in latex
     assert "93.33" in latex
     assert " -- " in latex
-    assert not set("↑↓→…–×") & set(latex)
+    assert not set("↑↓→…–×≠") & set(latex)
     markdown = FORMATS["markdown"].draw(table)
     lines = [line for line in markdown.splitlines() if line.startswith("|")]
     assert {line.replace("\\|", "").count("|") for line in lines} == {len(table.columns) + 3}

@@ -256,6 +256,25 @@ def test_versions_that_differ_stand_apart() -> None:
     )
 
 
+def test_words_that_differ_stand_apart_and_are_named() -> None:
+    found = next(one for one in records() if one.setting == "direct" and one.form == "implicit")
+    other = found.model_copy(update={"wordings": "mine@1a"})
+    page = Page(render([found, other]))
+    warnings = " ".join(words for _, words in page.warnings)
+    assert "Mixed words: our own words, the words of mine@1a." in warnings
+    assert "our own words, the words of mine@1a" in page.text.split("Mixed words")[0]
+    names = page.data["matrix"]["policies"]
+    assert [name.removesuffix(" (privileged)") for name in names] == [
+        f"{found.policy}, the words of mine@1a",
+        f"{found.policy}, our own words",
+    ]
+    theirs, ours = page.details
+    assert "resolved" in ours
+    assert "resolved" not in theirs  # it can be derived in our own words only
+    assert "in our own words" in page.string(ours["conditions"])
+    assert "in the words of mine@1a" in page.string(theirs["conditions"])
+
+
 def test_one_policy_alone_is_said_to_be_alone() -> None:
     one = [record for record in records() if record.policy == "listener"]
     assert [kind for kind, words in Page(render(one)).warnings if "Only one policy" in words]

@@ -25,6 +25,13 @@ def test_every_named_plan_can_be_played(name: str) -> None:
     assert make_plan(["random"], **read_plan_file(name)).fingerprint == plan.fingerprint
 
 
+def test_the_challenge_has_its_own_limit() -> None:
+    plan = make_plan(["random"], **read_plan_file("challenge"))
+    assert (plan.max_steps, len(plan.episodes), plan.split) == (1500, 10, "test")
+    assert {job.setting for job in plan.jobs()} == {"explicit"}
+    assert len(plan.jobs()) == 10 * len(all_tasks())
+
+
 def test_the_papers_protocol_is_the_papers() -> None:
     plan = make_plan(["random"], **read_plan_file("paper"))
     assert plan.tasks == tuple(all_tasks())

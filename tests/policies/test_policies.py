@@ -13,8 +13,10 @@ from roboirg.policies.loading import is_privileged, policy_version
 from roboirg.policies.policy_classes import BUILTIN
 from roboirg.policies.requirements import (
     wanted_actions,
+    wanted_calibration,
     wanted_cameras,
     wanted_demonstration_frames,
+    wanted_depth,
     wanted_history,
 )
 from roboirg.tasks import every_task
@@ -181,6 +183,8 @@ def test_a_wrong_action_space_is_told_before_anything_starts(monkeypatch, action
         ("demonstration_frames", 0, "demonstration_frames is 0"),
         ("observe_every", -1, "observe_every is -1; it must be None or a whole number"),
         ("observe_every", True, "observe_every is True"),
+        ("depth", 1, "depth is 1; it must be True or False"),
+        ("calibration", "yes", "calibration is 'yes'; it must be True or False"),
     ],
 )
 def test_a_wrong_wish_for_frames_is_told_before_anything_starts(
@@ -198,6 +202,18 @@ def test_a_policy_says_which_frames_it_wants(monkeypatch):
         assert wanted_demonstration_frames(load_policy_class(f"{__name__}:Silent")) == wish
     monkeypatch.setattr(Silent, "observe_every", property(lambda _self: 8), raising=False)
     assert wanted_history(make_policy(f"{__name__}:Silent", 0)) == 8
+
+
+@pytest.mark.parametrize(
+    ("attribute", "wanted"), [("depth", wanted_depth), ("calibration", wanted_calibration)]
+)
+def test_depth_and_matrices_are_wishes_and_need_a_camera(monkeypatch, attribute, wanted):
+    assert not wanted(Silent)
+    monkeypatch.setattr(Silent, attribute, True, raising=False)
+    assert wanted(load_policy_class(f"{__name__}:Silent"))
+    monkeypatch.setattr(Silent, "cameras", (), raising=False)
+    with pytest.raises(InvalidValueError, match=f"{attribute} is True, but cameras is "):
+        load_policy_class(f"{__name__}:Silent")
 
 
 def test_privileged_policies_are_known_by_name():

@@ -31,6 +31,23 @@ class Sound:
         return np.tile(np.append(joints, rng.uniform(-1, 1)), (5, 1))
 
 
+class Calibrated(Sound):
+    """Reads depth and matrices, of the video and of the present."""
+
+    depth = calibration = True
+
+    def reset(self, instruction, demonstration):
+        super().reset(instruction, demonstration)
+        assert demonstration["front_depth"].dtype == np.int16
+        self.memory += demonstration["front_extrinsic"].sum(dtype=float)
+
+    def act(self, observation):
+        assert observation["front_depth"].shape == (256, 256, 1)
+        assert observation["wrist_extrinsic"].shape == (3, 4)
+        assert observation["wrist_intrinsic"].shape == (3, 3)
+        return super().act(observation)
+
+
 class Shapeless(Sound):
     def act(self, observation):
         return np.zeros((3, 7))
@@ -115,6 +132,12 @@ class Reckless(Sound):
 
 def found(policy, verdict):
     return {f.check: f.message for f in check_policy(policy) if f.verdict == verdict}
+
+
+def test_depth_and_matrices_are_there_for_policies_that_want_them():
+    assert not found(f"{__name__}:Calibrated", FAIL)
+    requirements = found(f"{__name__}:Calibrated", PASS)["requirements"]
+    assert requirements.endswith("observations every 1, depth, calibration.")
 
 
 def test_a_sound_policy_passes_everything():

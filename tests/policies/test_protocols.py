@@ -12,9 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from wire_episode import INSTRUCTION, moment, video
+from wire_servers import ChallengeServer, unpack
 
 import roboirg
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.evaluation.rollout import env_requirements, make_env
 from roboirg.policies import make_policy, play, protocols
 from roboirg.policies.policy_check import check_policy
 from roboirg.policies.policy_classes import url_schemes
@@ -22,6 +24,7 @@ from roboirg.policies.protocols import all_protocols, protocols_by_scheme
 from roboirg.policies.remote.endpoints import RemoteOptions
 from roboirg.policies.serving.policy_server import open_server
 from roboirg.policies.transport import Transport
+from roboirg.records.record import Job
 
 PAGE = (Path(__file__).parents[2] / "docs" / "policies.md").read_text()
 
@@ -96,6 +99,37 @@ def test_the_recipe_plays_an_episode():
         )
         assert play(env, client)["status"] == "timeout"
         client.close()
+
+
+@pytest.mark.sim
+def test_a_challenge_server_is_shown_what_the_options_ask_for():
+    with ChallengeServer() as server:
+        client = make_policy(f"challenge://{server.place}?depth=yes&calibration=yes", 0)
+        job = Job(
+            policy="it", task="VideoUnmask", split="test", episode=0, setting="direct", max_steps=4
+        )
+        env = make_env(job, env_requirements(client, job))
+        info = play(env, client)
+        client.close()
+        _, first, later = map(unpack, server.messages)
+    assert info["status"] == "timeout"
+    shapes = {
+        "depth_list": ((256, 256, 1), "<i2"),
+        "camera_extrinsic_list": ((3, 4), "<f4"),
+        "rgb_list": ((256, 256, 3), "|u1"),
+    }
+    for message in (first, later):
+        for camera in ("front", "wrist"):
+            for name, expected in shapes.items():
+                column = message[f"{camera}_{name}"]
+                assert {(one.shape, one.dtype.str) for one in column} == {expected}
+                assert len(column) == len(message["joint_state_list"])
+            assert message[f"{camera}_camera_intrinsic"][0].tolist() == [128, 0, 128]
+    assert (first["is_first_step"], later["is_first_step"]) == (True, False)
+    assert len(first["front_depth_list"]) > 1
+    assert len(later["front_depth_list"]) == 3
+    # The camera on the table is 1 m away; nothing that it sees is nearer than the robot's hand.
+    assert 300 < np.median(first["front_depth_list"][0]) < 2000
 
 
 def test_the_page_lists_every_scheme():

@@ -73,6 +73,46 @@ def test_challenge_sends_these_bytes(server_class):
             assert server.messages == [reset, *requests]
 
 
+@pytest.mark.parametrize("server_class", [ChallengeServer, ChallengeHttpServer])
+def test_challenge_sends_depth_and_matrices_on_request(server_class):
+    http = server_class is ChallengeHttpServer
+    now, later, latest = (moment(number, sensors=True) for number in (3, 4, 5))
+    with server_class() as server:
+        url = f"challenge{'+http' if http else ''}://{server.place}?depth=yes&calibration=1"
+        policy = make_policy(url, 0)
+        assert (policy.depth, policy.calibration) == (True, True)
+        policy.reset(INSTRUCTION, video(3, sensors=True))
+        assert (policy.act({**now, "history": ()}) == 4).all()
+        assert (policy.act({**latest, "history": (later, latest)}) == 6).all()
+        policy.close()
+        sent = [one[1] if http else one for one in server.messages]
+        assert sent == captured("challenge-sensors")
+    first = unpack(sent[1])
+    assert [(one.shape, one.dtype) for one in first["front_depth_list"]] == [((8, 8, 1), "<i2")] * 4
+    matrices = first["wrist_camera_extrinsic_list"]
+    assert [(one.shape, one.dtype) for one in matrices] == [((3, 4), "<f4")] * 4
+    assert (first["wrist_camera_intrinsic"].shape) == (3, 3)  # one, not a list
+
+
+@pytest.mark.parametrize(
+    ("option", "kind", "others"), [("depth", "depth", "camera"), ("calibration", "camera", "depth")]
+)
+def test_depth_and_matrices_are_asked_for_one_by_one(option, kind, others):
+    with ChallengeServer() as server:
+        policy = make_policy(f"challenge://{server.place}?{option}=yes", 0)
+        policy.reset(INSTRUCTION, video(0))
+        with pytest.raises(InvalidValueError, match=r"lack 'front_\w+', .* ask for"):
+            policy.act(moment(0, history=()))
+        policy.reset(INSTRUCTION, video(0))
+        policy.act(moment(0, history=(), sensors=True))
+        policy.close()
+        names = unpack(server.messages[-1])
+    assert any(f"_{kind}_" in name for name in names)
+    assert not any(f"_{others}_" in name for name in names)
+    with pytest.raises(InvalidValueError, match=f"option {option} is 'maybe'"):
+        make_policy(f"challenge://{server.place}?{option}=maybe", 0)
+
+
 def test_without_history_mme_vla_is_sent_no_frames():
     class Baseline(MmeVlaServer):
         def infer(self, message):

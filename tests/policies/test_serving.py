@@ -109,6 +109,34 @@ def test_a_served_policy_gets_what_the_client_was_given(protocol):
         same(given, kept, shown)
 
 
+@pytest.mark.parametrize("protocol", ["challenge", "challenge+http"])
+def test_a_served_policy_gets_depth_and_matrices_if_the_client_sends_them(protocol):
+    moments = [moment(number, sensors=True) for number in range(6)]
+    shown = [field for field in moments[0] if field != "instruction"]
+    with served(HERE, protocol) as url:
+        client = make_policy(f"{url}?depth=yes&calibration=yes", 0)
+        client.reset(INSTRUCTION, video(3, sensors=True))
+        client.act({**moments[3], "history": ()})
+        client.act({**moments[5], "history": (moments[4], moments[5])})
+        client.close()
+    (policy,) = Recorder.episodes
+    same(video(3, sensors=True), policy.demonstration, shown)
+    same(moments[3], policy.calls[0], shown)
+    for given, kept in zip(moments[4:], policy.calls[1]["history"], strict=True):
+        same(given, kept, shown)
+    assert policy.calls[1]["front_depth"].dtype == np.int16
+
+
+def test_a_list_of_another_length_is_refused():
+    names = ("front_rgb", "wrist_rgb", "joint_state", "eef_state", "gripper_state")
+    request = {f"{name}_list": [np.zeros(3)] * 2 for name in names}
+    request |= {"task_goal": ["go"], "is_first_step": True, "front_depth_list": [np.zeros(3)]}
+    with served(HERE, "challenge") as url, connect(url.replace("challenge", "ws")) as raw:
+        raw.recv()
+        raw.send(pack(request))
+        assert "front_depth_list must be lists of the same length" in raw.recv()
+
+
 def test_mme_vla_has_one_memory_for_all_connections():
     frames = np.stack([moment(n)["front_rgb"][None] for n in range(3)])
     with served(HERE, "mme-vla") as url:

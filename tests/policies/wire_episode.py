@@ -10,7 +10,7 @@ def picture(number, size=8, channel=0):
     return (values % 251).astype(np.uint8).reshape(size, size, 3)
 
 
-def moment(number, size=8, history=None):
+def moment(number, size=8, history=None, *, sensors=False):
     observation = {
         "front_rgb": picture(number, size),
         "wrist_rgb": picture(number, size, channel=1),
@@ -19,13 +19,26 @@ def moment(number, size=8, history=None):
         "end_effector": np.arange(6, dtype=np.float64) + number / 4,
         "instruction": INSTRUCTION,
     }
+    if sensors:
+        observation |= calibrated(number, size)
     if history is not None:
         observation["history"] = tuple(history)
     return observation
 
 
-def video(length, size=8):
+def calibrated(number, size=8):
+    """Depth and matrices."""
+    fields = {}
+    for place, camera in enumerate(("front", "wrist")):
+        depth = np.arange(size * size, dtype=np.int16).reshape(size, size, 1) + 400 * place
+        fields[f"{camera}_depth"] = depth + np.int16(number)
+        fields[f"{camera}_extrinsic"] = np.eye(3, 4, dtype=np.float32) * (number + place + 1)
+        fields[f"{camera}_intrinsic"] = np.eye(3, dtype=np.float32) * 128
+    return fields
+
+
+def video(length, size=8, *, sensors=False):
     """A demonstration of a given length."""
-    moments = [moment(number, size) for number in range(length)] or [moment(0, size)]
-    fields = ("front_rgb", "wrist_rgb", "joint_positions", "gripper", "end_effector")
+    moments = [moment(number, size, sensors=sensors) for number in range(max(length, 1))]
+    fields = [field for field in moments[0] if field != "instruction"]
     return {field: np.stack([m[field] for m in moments])[:length] for field in fields}

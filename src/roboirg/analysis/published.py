@@ -29,6 +29,8 @@ TRIALS: Mapping[RateTable, tuple[int, int]] = {
     "real": (10, 1),
 }
 """Episodes and model seeds behind every published rate."""
+MAX_STEPS = 1300
+"""Control steps that the published policies had."""
 
 _FILES = {"main": "main", "planner": "planner", "context": "context", "real": "real_world"}
 _MODEL_COLUMNS = ("model", "planner")

@@ -35,7 +35,9 @@ Policies = Annotated[
 ]
 PlanName = Annotated[
     str | None,
-    typer.Option("--plan", help="YAML file, or paper, paper-context, paper-planners or quick."),
+    typer.Option(
+        "--plan", help="YAML file, or challenge, paper, paper-context, paper-planners or quick."
+    ),
 ]
 Out = Annotated[str, typer.Option(help="Output folder; give the same folder again to resume.")]
 Folder = Annotated[str, typer.Argument(help="Output folder of a run.")]

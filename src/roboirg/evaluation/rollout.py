@@ -39,8 +39,10 @@ from roboirg.evaluation.video_writer import VideoOptions, VideoWriter
 from roboirg.policies.base import Policy, PrivilegedPolicy
 from roboirg.policies.requirements import (
     wanted_actions,
+    wanted_calibration,
     wanted_cameras,
     wanted_demonstration_frames,
+    wanted_depth,
     wanted_history,
     wanted_history_cameras,
 )
@@ -130,6 +132,8 @@ class EnvRequirements(NamedTuple):
         observe_every: control steps between two observations in ``history``; None for no history.
         history_cameras: cameras recorded in the history; None for all of `cameras`.
         grounded: whether it passes on subgoals with pixels.
+        depth: whether it reads depth.
+        calibration: whether it reads the cameras' matrices.
     """
 
     cameras: tuple[str, ...]
@@ -138,6 +142,8 @@ class EnvRequirements(NamedTuple):
     observe_every: int | None = None
     history_cameras: tuple[str, ...] | None = None
     grounded: bool = False
+    depth: bool = False
+    calibration: bool = False
 
 
 class _CallGuard:
@@ -220,6 +226,8 @@ def env_requirements(policy: Policy, job: Job) -> EnvRequirements:
         wanted_history(policy) if every is None else every,
         wanted_history_cameras(policy),
         bool(getattr(policy, "grounded", False)),
+        wanted_depth(policy),
+        wanted_calibration(policy),
     )
 
 
@@ -233,6 +241,8 @@ def make_env(job: Job, needs: EnvRequirements) -> RoboIRGEnv:
         episode=job.episode,
         **job.options._asdict(),
         cameras=needs.cameras,
+        depth=needs.depth,
+        calibration=needs.calibration,
         actions=needs.actions.name,
         grounded=needs.grounded,
         demonstration_frames=needs.demonstration_frames,

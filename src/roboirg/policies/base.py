@@ -24,7 +24,8 @@ class Policy(Protocol):
     Pictures of the demonstration are rendered when they are read. ``demonstration_frames = 4``
     keeps every fourth, ``"none"`` none. With ``observe_every = n`` each observation has a
     ``history``: the observations after every n-th step of the last chunk, with the pictures of all
-    cameras, or only of ``history_cameras``.
+    cameras, or only of ``history_cameras``. ``depth = True`` adds depth for the same cameras and
+    ``calibration = True`` their matrices, as in `roboirg.core.observations.Observation`.
 
     All of these are optional, and so are the following. ``version`` (text) and ``metadata``
     (JSON values by name; read after `reset`) go into the records. ``usage()`` is called at the end

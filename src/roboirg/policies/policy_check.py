@@ -16,8 +16,10 @@ from roboirg.policies.base import Policy, close_policy
 from roboirg.policies.loading import make_policy
 from roboirg.policies.requirements import (
     wanted_actions,
+    wanted_calibration,
     wanted_cameras,
     wanted_demonstration_frames,
+    wanted_depth,
     wanted_history,
 )
 from roboirg.policies.synthetic_episodes import SyntheticEpisode, SyntheticEpisodes
@@ -154,16 +156,18 @@ class _PolicyChecker:
             self._space: ActionSpace = wanted_actions(policy)
             cameras, frames = wanted_cameras(policy), wanted_demonstration_frames(policy)
             every = wanted_history(policy)
+            depth, calibration = wanted_depth(policy), wanted_calibration(policy)
         except RoboIRGError as error:
             raise _CheckAbortedError("requirements", FAIL, str(error)) from error
         self._make_episodes: Callable[[], SyntheticEpisodes] = lambda: SyntheticEpisodes(
-            cameras, frames, every, self._seed
+            cameras, frames, every, self._seed, depth=depth, calibration=calibration
         )
+        more = ", depth" * depth + ", calibration" * calibration
         self._add(
             "requirements",
             PASS,
             f"Actions {self._space.name}, cameras {', '.join(cameras) or 'none'}, demonstration "
-            f"frames {frames}, observations every {every or 'chunk'}.",
+            f"frames {frames}, observations every {every or 'chunk'}{more}.",
         )
 
     def _check_actions(self, when: str, episode: SyntheticEpisode) -> _SyntheticRollout:

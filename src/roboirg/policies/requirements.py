@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from roboirg.core.actions import JOINT_ANGLE, ActionSpace, find_action_space
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import (
     CAMERAS,
     DemonstrationFrames,
@@ -63,11 +64,40 @@ def wanted_history_cameras(policy: object) -> tuple[str, ...] | None:
     return None if chosen is None else check_cameras(chosen)
 
 
+def wanted_depth(policy: object) -> bool:
+    """Return whether a policy, or a class of policies, wants depth beside the pictures.
+
+    Raises:
+        InvalidValueError: ``depth`` is neither True nor False, or there are no cameras.
+    """
+    return _beside_pictures(policy, "depth")
+
+
+def wanted_calibration(policy: object) -> bool:
+    """Return whether a policy, or a class of policies, wants the cameras' matrices.
+
+    Raises:
+        InvalidValueError: ``calibration`` is neither True nor False, or there are no cameras.
+    """
+    return _beside_pictures(policy, "calibration")
+
+
+def _beside_pictures(policy: object, attribute: str) -> bool:
+    wanted = getattr(policy, attribute, False)
+    if not isinstance(wanted, bool):
+        raise InvalidValueError(f"{attribute} is {wanted!r}; it must be True or False.")
+    if wanted and not wanted_cameras(policy):
+        raise InvalidValueError(f"{attribute} is True, but cameras is (); name a camera.")
+    return wanted
+
+
 REQUIREMENTS: Mapping[str, Callable[[object], object]] = {
     "cameras": wanted_cameras,
     "actions": wanted_actions,
     "demonstration_frames": wanted_demonstration_frames,
     "observe_every": wanted_history,
     "history_cameras": wanted_history_cameras,
+    "depth": wanted_depth,
+    "calibration": wanted_calibration,
 }
 """The function that reads each attribute of a policy and checks it."""

@@ -9,7 +9,11 @@ import numpy as np
 from roboirg.core.actions import ARM_JOINTS, JOINT_HIGH, JOINT_LOW, REACH_HIGH, REACH_LOW
 from roboirg.core.observations import CAMERAS, DemonstrationFrames, Observation
 
-PICTURE = (256, 256, 3)
+PICTURE, DEPTH = (256, 256, 3), (256, 256, 1)
+MAX_DEPTH = 2000
+"""Millimeters."""
+INTRINSIC = np.array([[128, 0, 128], [0, 128, 128], [0, 0, 1]], np.float32)
+"""From the camera's frame to pixels."""
 _FINGER_RANGE = 0.04
 """Meters."""
 
@@ -38,6 +42,8 @@ class SyntheticEpisodes:
         demonstration_frames: frames of the video.
         observe_every: control steps between the observations in ``history``.
         seed: of all random values.
+        depth: whether there is depth beside the pictures.
+        calibration: whether there are the cameras' matrices.
     """
 
     def __init__(
@@ -46,8 +52,12 @@ class SyntheticEpisodes:
         demonstration_frames: DemonstrationFrames = "all",
         observe_every: int | None = None,
         seed: int = 0,
+        *,
+        depth: bool = False,
+        calibration: bool = False,
     ) -> None:
         self._cameras = cameras
+        self._depth, self._calibration = depth, calibration
         self._frames = demonstration_frames
         self._every = observe_every
         self._rng = np.random.default_rng(seed)
@@ -57,7 +67,7 @@ class SyntheticEpisodes:
         observations = [self._observation(instruction) for _ in range(max(size, 1))]
         video: dict[str, Any] = {}
         for field in observations[0]:
-            is_picture = field.endswith("_rgb")
+            is_picture = field.endswith(("_rgb", "_depth"))
             if field != "instruction" and not (is_picture and self._frames == "none"):
                 every = self._frames if is_picture and isinstance(self._frames, int) else 1
                 video[field] = np.stack([one[field] for one in observations])[:size:every]
@@ -89,10 +99,15 @@ class SyntheticEpisodes:
 
     def _observation(self, instruction: str) -> dict[str, Any]:
         rng = self._rng
-        pictures = {
+        pictures: dict[str, Any] = {
             f"{camera}_rgb": rng.integers(0, 256, PICTURE, dtype=np.uint8)
             for camera in self._cameras
         }
+        for camera in self._cameras if self._depth else ():
+            pictures[f"{camera}_depth"] = rng.integers(0, MAX_DEPTH, DEPTH, dtype=np.int16)
+        for camera in self._cameras if self._calibration else ():
+            pictures[f"{camera}_extrinsic"] = rng.uniform(-1, 1, (3, 4)).astype(np.float32)
+            pictures[f"{camera}_intrinsic"] = INTRINSIC.copy()
         pose = np.append(rng.uniform(REACH_LOW, REACH_HIGH), rng.uniform(-np.pi, np.pi, 3))
         return {
             **pictures,

@@ -49,6 +49,18 @@ def challenge(moments, *, first):
     }
 
 
+def sensors(moments):
+    return {
+        "front_depth_list": [m["front_depth"] for m in moments],
+        "wrist_depth_list": [m["wrist_depth"] for m in moments],
+        "front_camera_extrinsic_list": [m["front_extrinsic"] for m in moments],
+        "wrist_camera_extrinsic_list": [m["wrist_extrinsic"] for m in moments],
+        "front_camera_intrinsic": moments[-1]["front_intrinsic"],
+        "wrist_camera_intrinsic": moments[-1]["wrist_intrinsic"],
+    }
+
+
+seen = [moment(number, sensors=True) for number in range(6)]
 subgoal = "pick up the red cube at <12, 34>"
 before = [moment(number) for number in range(3)]
 MESSAGES = {
@@ -62,6 +74,9 @@ MESSAGES = {
     "challenge-1-reset": {"reset": True},
     "challenge-2-infer": challenge([*before, now], first=True),
     "challenge-3-infer": challenge([later, latest], first=False),
+    "challenge-sensors-1-reset": {"reset": True},
+    "challenge-sensors-2-infer": {**challenge(seen[:4], first=True), **sensors(seen[:4])},
+    "challenge-sensors-3-infer": {**challenge(seen[4:], first=False), **sensors(seen[4:])},
 }
 
 if __name__ == "__main__":

@@ -27,7 +27,9 @@ def write_expressions(content: FigureData, folder: Path, name: str) -> tuple[Pat
         InvalidValueError: the folder is not writable.
     """
     jobs = [
-        result.identity.model_copy(update={"policy": "", "policy_seed": 0})
+        result.identity.model_copy(
+            update={"policy": "", "policy_seed": 0, "wordings_file": result.wordings_file}
+        )
         for _, result in content.results
         if result.form == "implicit" and result.setting != EXPLICIT
         if result.language_version == language.LANGUAGE_VERSION

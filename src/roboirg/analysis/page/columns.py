@@ -190,6 +190,7 @@ def _instruction_key(entry: EpisodeEntry) -> tuple[object, ...]:
         record.split,
         record.episode,
         entry.options._replace(form=""),
+        record.wordings,
         record.language_version,
         record.environment_version,
     )

@@ -8,6 +8,7 @@ from typing import Any
 
 from roboirg.analysis.page.episode_videos import EpisodeVideo
 from roboirg.analysis.page.reconstruction import resolved_form, stages_of
+from roboirg.analysis.stats.option_labels import words_label
 from roboirg.core.fact_traits import fact_traits
 from roboirg.language.settings import EXPLICIT
 from roboirg.records.record import EventRecord, Record
@@ -124,7 +125,11 @@ def _value(value: object) -> str:
 
 
 def _conditions(record: Record) -> str:
-    parts = [f"{record.split} split", f"at most {record.max_steps} steps"]
+    parts = [
+        f"{record.split} split",
+        f"at most {record.max_steps} steps",
+        f"in {words_label(record.wordings)}",
+    ]
     parts += [
         f"{name.replace('_', ' ')} {getattr(record, name)}"
         for name in ("actions", "demonstration_frames", "observe_every")

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from roboirg.analysis.page.entries import EpisodeEntries, Run
-from roboirg.analysis.stats.cells import PolicyRun, Versions
+from roboirg.analysis.stats.cells import FAIRNESS, EvalConditions, PolicyRun, Versions
 from roboirg.analysis.stats.comparison import compare
 from roboirg.analysis.stats.comparison_text import sentences
 from roboirg.analysis.stats.intervals import SEED
@@ -42,14 +42,21 @@ def facts_of(runs: Sequence[Run]) -> list[tuple[str, str]]:
     """Return the facts in the head of the page, each with its label."""
     records = [record for run in runs for record in run.records]
     times = sorted(record.started_at[:16].replace("T", " ") for record in records)
+    conditions = [EvalConditions.of(record) for record in records]
     facts = [
         ("run", " against ".join(run.name for run in runs)),
         ("played", _period(times[0], times[-1]) if times else ""),
         *(
-            (label, ", ".join(sorted({_text(getattr(one, name)) for one in records})))
+            (label, ", ".join(sorted({one.text(name) for one in conditions})))
             for label, name in (
                 ("split", "split"),
+                ("words", "wordings"),
                 ("step limit", "max_steps"),
+            )
+        ),
+        *(
+            (label, ", ".join(sorted({_text(getattr(one, name)) for one in records})))
+            for label, name in (
                 ("roboirg", "package_version"),
                 ("language", "language_version"),
                 ("environment", "environment_version"),
@@ -112,6 +119,14 @@ def _mixed(entries: EpisodeEntries) -> Iterable[str]:
         if len(found) > 1:
             yield (
                 f"Mixed versions of the {name}: {', '.join(sorted(map(str, found)))}. "
+                "They have separate heat maps and are never averaged."
+            )
+    conditions = {EvalConditions.of(entry.record) for entry in entries.all}
+    for name, plural in FAIRNESS.items():
+        values = {one.text(name) for one in conditions}
+        if len(values) > 1:
+            yield (
+                f"Mixed {plural}: {', '.join(sorted(values))}. "
                 "They have separate heat maps and are never averaged."
             )
     for policy in dict.fromkeys(one.policy for one in entries.names):

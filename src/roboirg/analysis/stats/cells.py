@@ -23,7 +23,7 @@ from roboirg.analysis.stats.intervals import (
     wilson_interval,
     without_spread,
 )
-from roboirg.analysis.stats.option_labels import options_sort_key
+from roboirg.analysis.stats.option_labels import options_sort_key, words_label
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import DemonstrationFrames
 from roboirg.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, Job, Result
@@ -46,11 +46,30 @@ class EvalConditions(NamedTuple):
     demonstration_frames: DemonstrationFrames | None = None
     observe_every: int | None = None
     meshes: str = DEFAULT_MESHES
+    wordings: str | None = None
 
     @classmethod
     def of(cls, job: Job) -> EvalConditions:
         """Return the conditions of a job."""
         return cls(**{name: getattr(job, name) for name in cls._fields})
+
+    def text(self, name: str) -> str:
+        """Return the value of a condition in words."""
+        return words_label(self.wordings) if name == "wordings" else str(getattr(self, name))
+
+    def label(self, name: str) -> str:
+        """Return a condition with its value."""
+        before = "" if name == "wordings" else f"{name.replace('_', ' ')} "
+        return before + self.text(name)
+
+
+FAIRNESS = {
+    "split": "splits",
+    "wordings": "words",
+    "max_steps": "step limits",
+    "meshes": "kinds of meshes",
+}
+"""Conditions that must be equal in a comparison, with their names in the plural."""
 
 
 class Versions(NamedTuple):
@@ -271,7 +290,7 @@ def labels(cells: Cells, privileged: Collection[str] = ()) -> dict[PolicyRun, st
 def _label(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> str:
     parts = [policy_run.policy]
     parts += [
-        f"{name.replace('_', ' ')} {getattr(policy_run.conditions, name)}"
+        policy_run.conditions.label(name)
         for name in EvalConditions._fields
         if len({getattr(other.conditions, name) for other in policy_runs}) > 1
     ]

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from roboirg.analysis.stats.cells import CellResults, Cells, PolicyRun
+from roboirg.analysis.stats.cells import FAIRNESS, CellResults, Cells, PolicyRun
 from roboirg.analysis.stats.intervals import ALPHA
 from roboirg.analysis.stats.multiple_testing import holm
 from roboirg.analysis.stats.option_labels import options_sort_key
@@ -178,10 +178,10 @@ def _check_fair(first: PolicyRun, second: PolicyRun) -> None:
                 f"{first.policy} played {name} version {one} and {second.policy} version {other}; "
                 "only results of the same version can be compared."
             )
-    for name in ("split", "max_steps", "meshes"):
-        one, other = getattr(first.conditions, name), getattr(second.conditions, name)
+    for name in FAIRNESS:
+        one, other = first.conditions.label(name), second.conditions.label(name)
         if one != other:
             raise InvalidValueError(
-                f"{first.policy} played with {name} {one} and {second.policy} with {other}; "
+                f"{first.policy} played with {one} and {second.policy} with {other}; "
                 "only results under the same conditions can be compared."
             )

@@ -31,6 +31,11 @@ def options_label(options: InstructionOptions) -> str:
     return f"{options.setting} ({', '.join(changed)})" if changed else options.setting
 
 
+def words_label(wordings: str | None) -> str:
+    """Return whose words the instructions have, from the identity of the wording file."""
+    return "our own words" if wordings is None else f"the words of {wordings}"
+
+
 def options_sort_key(options: InstructionOptions) -> tuple[object, ...]:
     """Sort by setting; within a setting the implicit form first, then by label."""
     is_implicit = options.form == _DEFAULTS.form

@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
+from roboirg.analysis.comparability import AllDifferences, differences_of
 from roboirg.analysis.published import (
     AVERAGE,
     RATE_TABLES,
@@ -19,7 +20,6 @@ from roboirg.analysis.published import (
 )
 from roboirg.analysis.stats.cells import (
     CellKey,
-    CellResults,
     Cells,
     PolicyRun,
     cell_interval,
@@ -79,7 +79,7 @@ def make_table(which: str, cells: Cells, *, published: bool = False, chance: boo
     Args:
         which: main, planner, context, real, other or coverage.
         cells: as `gather` makes them; may be empty if published rows are shown.
-        published: whether to add the paper's rows.
+        published: whether to add the paper's rows, and to say which rates can be compared.
         chance: whether to add the chance level below the policies.
 
     Raises:
@@ -109,18 +109,18 @@ def _rate_table(which: RateTable, cells: Cells, *, published: bool, chance: bool
     tasks = _tasks(which, cells)
     columns = _columns(which, tasks)
     rng = np.random.default_rng(SEED)
-    rows = [
-        Row(
-            position.group,
-            position.name,
-            "ours",
-            with_averages(columns, _entries(which, policy_run, position.options, cells, rng)),
-        )
-        for policy_run, position in _positions(which, cells)
-    ]
+    shows_published = published and which in RATE_TABLES
+    differences: AllDifferences = (
+        {key: differences_of(key, cell) for key, cell in cells.items()} if shows_published else {}
+    )
+    rows = []
+    for policy_run, position in _positions(which, cells):
+        keys = [CellKey(policy_run, task, position.options) for task in tasks]
+        entries = {key.task: _entry(key, cells, differences, rng) for key in keys}
+        rows.append(Row(position.group, position.name, "ours", with_averages(columns, entries)))
     if chance:
         rows += _chance_rows(which, columns, cells)
-    if published and which in RATE_TABLES:
+    if shows_published:
         rows += [_published_row(which, columns, row) for row in published_rows(which)]
     rows = with_best(with_changes(columns, _grouped(which, rows), _reference_finder(which, rows)))
     return Table(
@@ -129,7 +129,7 @@ def _rate_table(which: RateTable, cells: Cells, *, published: bool, chance: bool
         heads=("policy", "stages") if which == "context" else ("setting", "policy"),
         columns=columns,
         rows=tuple(rows),
-        notes=notes_of(which, rows, cells, tasks),
+        notes=notes_of(which, rows, cells, tasks, differences),
     )
 
 
@@ -190,24 +190,12 @@ def _stages(options: InstructionOptions) -> str:
     return ",".join(map(str, options.stages))
 
 
-def _entries(
-    which: RateTable,
-    policy_run: PolicyRun,
-    options: InstructionOptions,
-    cells: Cells,
-    rng: np.random.Generator,
-) -> dict[str, Entry]:
-    return {
-        task: _entry(
-            cells.get(CellKey(policy_run, task, options)), rng, applies=_applies(task, options)
-        )
-        for task in _tasks(which, cells)
-    }
-
-
-def _entry(cell: CellResults | None, rng: np.random.Generator, *, applies: bool) -> Entry:
+def _entry(
+    key: CellKey, cells: Cells, differences: AllDifferences, rng: np.random.Generator
+) -> Entry:
+    cell = cells.get(key)
     if cell is None:
-        return Entry(applies=applies)
+        return Entry(applies=_applies(key.task, key.options))
     marks = (ERROR_MARK if cell.errors else "") + (MISSING_MARK if cell.missing else "")
     return Entry(
         percent=None if cell.rate is None else percent(cell.rate),
@@ -220,6 +208,7 @@ def _entry(cell: CellResults | None, rng: np.random.Generator, *, applies: bool)
             cell.missing,
             cell_interval(cell, rng),
         ),
+        differences=differences.get(key),
     )
 
 

@@ -9,8 +9,21 @@ from rich.console import Console
 from rich.table import Table as Grid
 from rich.text import Text
 
-from roboirg.analysis.stats.cells import PolicyRun, gather, labels, policy_order, sort_cells
-from roboirg.analysis.stats.option_labels import options_label, options_sort_key
+from roboirg.analysis.comparability import (
+    AllDifferences,
+    comparison_notes,
+    comparison_sign,
+    differences_of,
+)
+from roboirg.analysis.stats.cells import (
+    Cells,
+    PolicyRun,
+    gather,
+    labels,
+    policy_order,
+    sort_cells,
+)
+from roboirg.analysis.stats.option_labels import REFERENCE, options_label, options_sort_key
 from roboirg.analysis.stats.paired_tests import Overlap
 from roboirg.analysis.stats.rates import points, whole_percent
 from roboirg.analysis.stats.run_summary import (
@@ -22,6 +35,7 @@ from roboirg.analysis.stats.run_summary import (
     group_by_scope,
 )
 from roboirg.analysis.tables.table import ERROR_MARK, MISSING_MARK
+from roboirg.analysis.tables.table_notes import where_played
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.records.record import Job, Result
 from roboirg.util.plurals import counted
@@ -42,17 +56,21 @@ class RunTable:
     """The results of one policy run.
 
     Attributes:
+        policy_run: whose results they are.
         label: policy, whether it is privileged, and the conditions if there are several.
         tasks: the rows.
         columns: the instruction options.
         cells: results by scope (a task or `ALL`) and options.
+        differences: of the explicit cells from the published rates.
         privileged: whether the policy uses the simulator's state.
     """
 
+    policy_run: PolicyRun
     label: str
     tasks: tuple[str, ...]
     columns: tuple[InstructionOptions, ...]
     cells: dict[tuple[Scope, InstructionOptions], ScopeResults]
+    differences: AllDifferences
     privileged: bool = False
 
 
@@ -69,7 +87,13 @@ def make_run_tables(records: Sequence[Result], planned: Sequence[Job] = ()) -> l
     cells = sort_cells(found, policy_order(found, policies))
     results = {one.key: one for one in group_by_scope(cells)}
     return [
-        _make_run_table(policy_run, label, results, privileged=policy_run.policy in privileged)
+        _make_run_table(
+            policy_run,
+            label,
+            results,
+            _explicit_differences(policy_run, cells),
+            privileged=policy_run.policy in privileged,
+        )
         for policy_run, label in labels(cells, privileged).items()
     ]
 
@@ -80,6 +104,8 @@ def print_run_tables(tables: Sequence[RunTable], console: Console) -> None:
         console.width = max(console.width, MINIMUM_WIDTH)
     for table in tables:
         console.print(_grid(table))
+        # Not the grid's caption, which would be as narrow as the grid.
+        console.print(Text(_caption(table)), style="dim", highlight=False)
     console.print("; ".join(_legend(tables)), style="dim", highlight=False)
 
 
@@ -128,6 +154,7 @@ def _make_run_table(
     policy_run: PolicyRun,
     label: str,
     results: dict[ScopeKey, ScopeResults],
+    differences: AllDifferences,
     *,
     privileged: bool,
 ) -> RunTable:
@@ -139,8 +166,23 @@ def _make_run_table(
     tasks = dict.fromkeys(scope.task for scope, _ in cells if scope.task is not None)
     columns = {options for _, options in cells}
     return RunTable(
-        label, tuple(tasks), tuple(sorted(columns, key=options_sort_key)), cells, privileged
+        policy_run,
+        label,
+        tuple(tasks),
+        tuple(sorted(columns, key=options_sort_key)),
+        cells,
+        differences,
+        privileged,
     )
+
+
+def _explicit_differences(policy_run: PolicyRun, cells: Cells) -> AllDifferences:
+    """Return the differences from the published rates; no other settings can be compared."""
+    return {
+        key: differences_of(key, cell)
+        for key, cell in cells.items()
+        if key.policy_run == policy_run and key.options == REFERENCE
+    }
 
 
 def _grid(table: RunTable) -> Grid:
@@ -149,13 +191,13 @@ def _grid(table: RunTable) -> Grid:
         title=table.label,
         title_justify="left",
         title_style="bold",
-        caption=_sizes(table),
-        caption_justify="left",
-        caption_style="dim",
     )
     grid.add_column("task")
+    signs = _explicit_signs(table)
+    common = next(iter(signs.values())) if len(set(signs.values())) == 1 else ""
     for options in table.columns:
-        grid.add_column(options_label(options), justify="right")
+        sign = common if options == REFERENCE else ""
+        grid.add_column(f"{options_label(options)} {sign}".rstrip(), justify="right")
     rows = [(task, Scope(task=task)) for task in table.tasks]
     if len(table.tasks) > 1:
         rows.append((ALL_TASKS, ALL))
@@ -163,6 +205,8 @@ def _grid(table: RunTable) -> Grid:
         if scope == ALL:
             grid.add_section()
         cells = [_text(table.cells.get((scope, options))) for options in table.columns]
+        if REFERENCE in table.columns and not common and name in signs:
+            cells[table.columns.index(REFERENCE)].append(f" {signs[name]}", "dim")
         grid.add_row(Text(name, "bold" if scope == ALL else ""), *cells)
     return grid
 
@@ -183,6 +227,18 @@ def _legend(tables: Sequence[RunTable]) -> list[str]:
     if any(table.privileged for table in tables):
         legend.append("privileged policies use the simulator's state")
     return legend
+
+
+def _caption(table: RunTable) -> str:
+    first = f"{where_played([table.policy_run.conditions])} {_sizes(table)}"
+    notes = comparison_notes(table.differences, {table.policy_run: table.label})
+    return "\n".join([first, *notes])
+
+
+def _explicit_signs(table: RunTable) -> dict[str, str]:
+    """Return for each task whether its explicit rate can be compared with the published one."""
+    signs = {key.task: comparison_sign(one) for key, one in table.differences.items()}
+    return {task: sign for task, sign in signs.items() if sign}
 
 
 def _sizes(table: RunTable) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Literal, NamedTuple
 
+from roboirg.analysis.comparability import Differences, comparison_sign, merged
 from roboirg.analysis.stats.intervals import Interval
 from roboirg.analysis.stats.rates import Change, change, mean_percent
 
@@ -52,6 +53,7 @@ class Entry:
         best: whether it is the best, or among the best, of its group.
         marks: of incomplete entries, as in the constants above.
         counts: behind the rate; None if they are unknown.
+        differences: from the published rate's conditions; None without a published rate beside it.
     """
 
     percent: Decimal | None = None
@@ -61,6 +63,12 @@ class Entry:
     best: bool = False
     marks: str = ""
     counts: Counts | None = None
+    differences: Differences | None = None
+
+    @property
+    def signs(self) -> str:
+        """The marks, and whether the rate can be compared with the published one."""
+        return self.marks + comparison_sign(self.differences)
 
     @property
     def text(self) -> str:
@@ -158,7 +166,11 @@ def _average(entries: Sequence[Entry]) -> Entry:
     if not rates:
         return Entry()
     is_partial = len(rates) < len(applying) or any(entry.marks for entry in applying)
-    return Entry(percent=mean_percent(rates), marks=PARTIAL_MARK if is_partial else "")
+    return Entry(
+        percent=mean_percent(rates),
+        marks=PARTIAL_MARK if is_partial else "",
+        differences=merged(entry.differences for entry in applying),
+    )
 
 
 def with_changes(

@@ -4,8 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from roboirg.analysis.comparability import AllDifferences, comparison_notes
 from roboirg.analysis.published import TRIALS, RateTable
-from roboirg.analysis.stats.cells import CellResults, Cells, PolicyRun
+from roboirg.analysis.stats.cells import (
+    FAIRNESS,
+    CellResults,
+    Cells,
+    EvalConditions,
+    PolicyRun,
+    labels,
+)
 from roboirg.analysis.stats.option_labels import (
     has_default_options,
     options_label,
@@ -30,7 +38,11 @@ ARROWS = {"up": "↑", "down": "↓", "same": "→"}
 
 
 def notes_of(
-    which: RateTable, rows: Sequence[Row], cells: Cells, tasks: Sequence[str]
+    which: RateTable,
+    rows: Sequence[Row],
+    cells: Cells,
+    tasks: Sequence[str],
+    differences: AllDifferences,
 ) -> tuple[str, ...]:
     """Return the notes of a table of rates."""
     shown = {
@@ -43,11 +55,15 @@ def notes_of(
     return (
         RATES_NOTE,
         *_sign_notes(which, entries),
+        *_condition_notes([one.conditions for one in policy_runs]),
         *_size_notes(shown.values()),
         *_incomplete_notes(shown.values(), entries),
         *_version_notes(policy_runs),
         *_omission_notes(which, cells, tasks),
         *_published_notes(which, rows),
+        *comparison_notes(
+            {key: one for key, one in differences.items() if key in shown}, labels(cells)
+        ),
     )
 
 
@@ -70,6 +86,37 @@ def _sign_notes(which: RateTable, entries: Sequence[Entry]) -> list[str]:
     if any(not entry.applies for entry in entries):
         notes.append(f"{NOT_APPLICABLE} the setting is not defined for the task.")
     return notes
+
+
+def _condition_notes(conditions: Sequence[EvalConditions]) -> list[str]:
+    """Say which episodes were played in whose words, and what is not the same in all rows."""
+    if not conditions:
+        return []
+    notes = [where_played(conditions)]
+    for name, plural in FAIRNESS.items():
+        values = _distinct(conditions, name)
+        if len(values) > 1:
+            notes.append(
+                f"Results of several {plural} ({', '.join(values)}) have separate rows; they are "
+                "not comparable."
+            )
+    return [note for note in notes if note]
+
+
+def where_played(conditions: Sequence[EvalConditions]) -> str:
+    """Return a sentence with the split, the words and the limit, if all have the same."""
+    usual = {
+        "split": "on the {} split",
+        "wordings": "in {}",
+        "max_steps": "with at most {} steps",
+    }
+    same = {name: values[0] for name in usual if len(values := _distinct(conditions, name)) == 1}
+    words = ", ".join(usual[name].format(value) for name, value in same.items())
+    return f"Played {words}." if words else ""
+
+
+def _distinct(conditions: Iterable[EvalConditions], name: str) -> list[str]:
+    return sorted({one.text(name) for one in conditions})
 
 
 def _size_notes(cells: Iterable[CellResults]) -> list[str]:
@@ -124,8 +171,11 @@ def _version_notes(policy_runs: Sequence[PolicyRun]) -> list[str]:
             notes.append(
                 f"Several versions of {policy} ({', '.join(versions)}) have separate rows."
             )
-    if any(len({one.conditions for one in own}) > 1 for own in by_policy.values()):
-        notes.append("Results under different conditions have separate rows.")
+    others = [name for name in EvalConditions._fields if name not in FAIRNESS]
+    for own in by_policy.values():
+        if any(len(_distinct([one.conditions for one in own], name)) > 1 for name in others):
+            notes.append("Results under different conditions have separate rows.")
+            break
     return notes
 
 

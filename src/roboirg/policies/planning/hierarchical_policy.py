@@ -21,8 +21,10 @@ from roboirg.policies.planning.observation_merging import (
 from roboirg.policies.planning.planner import Planner
 from roboirg.policies.requirements import (
     wanted_actions,
+    wanted_calibration,
     wanted_cameras,
     wanted_demonstration_frames,
+    wanted_depth,
     wanted_history,
     wanted_history_cameras,
 )
@@ -67,6 +69,8 @@ class HierarchicalPolicy:
         if self.actions == WAYPOINT.name and self.observe_every is None:
             # Only the history tells how many control steps a waypoint took.
             self.observe_every = 1
+        self.depth = wanted_depth(policy) or wanted_depth(planner)
+        self.calibration = wanted_calibration(policy) or wanted_calibration(planner)
         self.grounded = any(getattr(one, "grounded", False) for one in (planner, policy))
         self._observed = self._step = self._rows = 0
 

@@ -21,8 +21,10 @@ from roboirg.policies.planning.vlm_listener import ListenerOptions, VLMListener
 from roboirg.policies.policy_urls import parse_query
 from roboirg.policies.requirements import (
     wanted_actions,
+    wanted_calibration,
     wanted_cameras,
     wanted_demonstration_frames,
+    wanted_depth,
     wanted_history,
     wanted_history_cameras,
 )
@@ -53,6 +55,8 @@ class PolicyFactory:
         self.demonstration_frames = wanted_demonstration_frames(sample)
         self.observe_every = wanted_history(sample)
         self.history_cameras = wanted_history_cameras(sample)
+        self.depth = wanted_depth(sample)
+        self.calibration = wanted_calibration(sample)
         self.grounded = bool(getattr(sample, "grounded", False))
         self.version = str(getattr(sample, "version", "unknown"))
 

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from roboirg.core.observations import Demonstration, Observation
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.observations import CAMERAS, Demonstration, Observation
 from roboirg.policies.base import Policy, close_policy
 from roboirg.policies.protocol import Protocol
 from roboirg.policies.remote.endpoints import ActionSpaceName, RemoteOptions
@@ -34,7 +35,17 @@ FIELDS: Mapping[str, str] = {
     "eef_state_list": "end_effector",
     "gripper_state_list": "gripper",
 }
-"""The challenge's field names and ours."""
+"""The challenge's names of lists, and our fields."""
+DEPTH_FIELDS: Mapping[str, str] = {f"{camera}_depth_list": f"{camera}_depth" for camera in CAMERAS}
+"""With ``depth``: int16 (H, W, 1), mm."""
+EXTRINSIC_FIELDS: Mapping[str, str] = {
+    f"{camera}_camera_extrinsic_list": f"{camera}_extrinsic" for camera in CAMERAS
+}
+"""With ``calibration``: float32 (3, 4), from the world's frame to the camera's."""
+INTRINSIC_FIELDS: Mapping[str, str] = {
+    f"{camera}_camera_intrinsic": f"{camera}_intrinsic" for camera in CAMERAS
+}
+"""With ``calibration``: one float32 (3, 3) for the whole message, not a list."""
 
 
 class ChallengeOptions(RemoteOptions):
@@ -42,10 +53,14 @@ class ChallengeOptions(RemoteOptions):
 
     Attributes:
         actions: action space of the submission.
+        depth: whether to send depth.
+        calibration: whether to send the cameras' matrices.
     """
 
     timeout: float = Field(120.0, gt=0)
     actions: ActionSpaceName = "joint_angle"
+    depth: bool = False
+    calibration: bool = False
 
 
 class ChallengePolicy(RemotePolicy):
@@ -57,6 +72,12 @@ class ChallengePolicy(RemotePolicy):
 
     def __init__(self, url: str, seed: int = 0) -> None:
         super().__init__(url, seed)
+        self.depth, self.calibration = self.options.depth, self.options.calibration
+        self._fields = {
+            **FIELDS,
+            **(DEPTH_FIELDS if self.depth else {}),
+            **(EXTRINSIC_FIELDS if self.calibration else {}),
+        }
         self._demonstration: Demonstration | None = None
 
     def begin_episode(self, demonstration: Demonstration) -> None:
@@ -65,14 +86,26 @@ class ChallengePolicy(RemotePolicy):
         self.request_confirmed({"reset": True}, "reset_finished")
 
     def request_actions(self, observation: Observation) -> NDArray[np.floating[Any]]:
-        """Send everything seen since the last call; return all actions of the reply."""
+        """Send everything seen since the last call; return all actions of the reply.
+
+        Raises:
+            InvalidValueError: there is no depth or calibration, but the URL's options ask for it.
+        """
+        intrinsic = INTRINSIC_FIELDS if self.calibration else {}
+        for field in (*self._fields.values(), *intrinsic.values()):
+            if field not in observation:
+                raise InvalidValueError(
+                    f"Observations lack {field!r}, which the options of challenge:// ask for; make "
+                    "the environment with depth=True or calibration=True, or leave the option out."
+                )
         demonstration, self._demonstration = self._demonstration, None
         first = demonstration is not None
         seen = (observation,) if first else observation["history"] or (observation,)
         message = {
             "task_goal": [self.instruction],
             "is_first_step": first,
-            **{name: _column(field, demonstration, seen) for name, field in FIELDS.items()},
+            **{name: _column(field, demonstration, seen) for name, field in self._fields.items()},
+            **{name: observation[field] for name, field in intrinsic.items()},  # type: ignore[literal-required]
         }
         return self.read_actions(self.request(message))
 
@@ -124,18 +157,23 @@ def _column(
 def _read_observations(message: Message) -> list[Observation]:
     """Return the observations in a request, oldest first.
 
+    Depth and matrices are read if the client sends them.
+
     Raises:
         ValueError: a list is missing, or they differ in length.
     """
     goals = message.get("task_goal")
     if not isinstance(goals, list) or not goals or not isinstance(goals[0], str):
         raise ValueError("'task_goal' must be a list of texts.")
-    columns = {field: message.get(name) for name, field in FIELDS.items()}
+    optional = {**DEPTH_FIELDS, **EXTRINSIC_FIELDS}
+    names = {**FIELDS, **{name: optional[name] for name in optional if name in message}}
+    columns = {field: message.get(name) for name, field in names.items()}
     lengths = {len(column) if isinstance(column, list) else 0 for column in columns.values()}
     if len(lengths) > 1 or 0 in lengths:
-        raise ValueError(f"{', '.join(FIELDS)} must be lists of the same length, at least 1.")
+        raise ValueError(f"{', '.join(names)} must be lists of the same length, at least 1.")
+    same = {field: message[name] for name, field in INTRINSIC_FIELDS.items() if name in message}
     found: list[Any] = [
-        {**dict(zip(columns, values, strict=True)), "instruction": goals[0]}
+        {**dict(zip(columns, values, strict=True)), **same, "instruction": goals[0]}
         for values in zip(*(column or () for column in columns.values()), strict=True)
     ]
     return found
@@ -145,7 +183,8 @@ def _stack(observations: list[Observation]) -> dict[str, Any]:
     """Return all observations but the last as a demonstration."""
     return {
         field: np.stack([one[field] for one in observations])[:-1]  # type: ignore[literal-required]
-        for field in FIELDS.values()
+        for field in observations[0]
+        if field != "instruction"
     }
 
 

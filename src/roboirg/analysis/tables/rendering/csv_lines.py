@@ -35,6 +35,8 @@ HEAD = (
     "missing",
     "low_percent",
     "high_percent",
+    "comparable",
+    "differences",
 )
 """The columns. Unknown values are empty; notes are left out."""
 
@@ -71,6 +73,8 @@ def _line(table: Table, row: Row, column: Column, entry: Entry) -> list[object]:
         " ".join(_MARK_NAMES[mark] for mark in entry.marks),
         *(["", "", "", "", ""] if counts is None else counts[:5]),
         *ends,
+        "" if entry.differences is None else _flag(not entry.differences),
+        "; ".join(entry.differences or ()),
     ]
 
 

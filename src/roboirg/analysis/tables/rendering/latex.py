@@ -18,6 +18,7 @@ _SPECIAL = {
     "↑": r"$\uparrow$",
     "↓": r"$\downarrow$",
     "→": r"$\rightarrow$",
+    "≠": r"$\neq$",
 }
 
 
@@ -70,8 +71,8 @@ def _cell(entry: Entry) -> str:
         text = rf"\textbf{{{text}}}"
     if entry.change:
         text += rf"\,{_ARROWS[entry.change]}"
-    if entry.marks:
-        text += rf"\textsuperscript{{{_escaped(entry.marks)}}}"
+    if entry.signs:
+        text += rf"\textsuperscript{{{_escaped(entry.signs)}}}"
     return text
 
 

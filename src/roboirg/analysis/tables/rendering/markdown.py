@@ -27,7 +27,7 @@ def _line(cells: list[str]) -> str:
 
 def _cell(entry: Entry) -> str:
     text = f"**{entry.text}**" if entry.best else entry.text
-    parts = (text, ARROWS[entry.change] if entry.change else "", _escaped(entry.marks))
+    parts = (text, ARROWS[entry.change] if entry.change else "", _escaped(entry.signs))
     return " ".join(filter(None, parts))
 
 

@@ -90,8 +90,8 @@ def _cell(row: Row, entry: Entry) -> Text:
     text = Text(entry.text, "bold" if entry.best else "")
     if entry.change:
         text.append(f" {ARROWS[entry.change]}")
-    if entry.marks:
-        text.append(f" {entry.marks}" if entry.text else entry.marks, "bold yellow")
+    if entry.signs:
+        text.append(f" {entry.signs}" if entry.text else entry.signs, "bold yellow")
     text.stylize(_style(row))
     return text
 
