@@ -38,6 +38,8 @@ from roboirg.util.parallel_map import parallel_map
 
 ROWS = Path(__file__).parents[1] / "tests" / "episodes" / "robomme"
 ROBOT = "panda_wristcam"
+SITE = "goal_site"
+"""Invisible, and under the table in RoboMME."""
 JOINT_LIMIT = 1e-6
 """rad."""
 BODY_LIMITS = (1e-4, 5e-3)
@@ -111,7 +113,7 @@ def _our_names(episode: Episode, row: Row) -> dict[str, str]:
             episode.scene.objects, key=lambda item: math.dist(item.position, _place(body))
         ).name
         for name, body in row["start"].items()
-        if name != ROBOT
+        if name not in (ROBOT, SITE)
     }
 
 
