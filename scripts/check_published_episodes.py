@@ -27,12 +27,14 @@ from rich.table import Table
 from roboirg.core.episode import Episode, Split
 from roboirg.core.errors import MotionPlanningError
 from roboirg.core.motions import Swap
+from roboirg.core.observations import Demonstration
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.envs.factory import make
 from roboirg.episodes.published_episodes import is_published
 from roboirg.episodes.splits import get_episode, split_episodes
 from roboirg.evaluation.plan_parsing import parse_names, parse_splits
-from roboirg.evaluation.seed_selection import oracle_failure
+from roboirg.policies import play
+from roboirg.policies.builtin.oracle_policy import OraclePolicy
 from roboirg.tasks import find_tasks
 from roboirg.util.parallel_map import parallel_map
 
@@ -56,18 +58,18 @@ class Comparison:
     """How an episode compares with RoboMME's.
 
     Attributes:
-        failure: why the oracle fails; None if it succeeds.
         moves: whether the arm moves in the video.
-        source: whose actions the video shows; empty if it could not be made.
-        joints: largest difference of a joint after the video, rad.
+        recorded: whether the video shows RoboMME's recorded actions.
+        failure: why the oracle fails; None if it succeeds.
+        joints: largest difference of a joint after the video, rad; infinite if there is no video.
         bodies: distance of each body from its place there, m.
-        lengths: our frames and control steps, and theirs.
+        lengths: frames and control steps of the video, ours and theirs.
         swaps: for each swap whose partner RoboMME's data name, the two objects of ours and theirs.
     """
 
-    failure: str | None
     moves: bool
-    source: str = ""
+    recorded: bool
+    failure: str | None = None
     joints: float = math.inf
     bodies: Mapping[str, float] = field(default_factory=dict)
     lengths: tuple[tuple[int, int], tuple[int, int]] = ((0, 0), (0, 0))
@@ -79,25 +81,41 @@ class Comparison:
         return max(self.bodies.values(), default=math.inf)
 
 
+class ComparingOracle(OraclePolicy):
+    """The oracle, which first compares what it finds with what RoboMME's simulator had.
+
+    Args:
+        row: RoboMME's data of the episode.
+        result: where the comparison is written.
+    """
+
+    def __init__(self, row: Row, result: Comparison) -> None:
+        super().__init__()
+        self._row, self._result = row, result
+
+    def reset(self, instruction: str, demonstration: Demonstration) -> None:
+        """Compare, then plan as the oracle."""
+        env, row, result = self._attached(), self._row, self._result
+        frames, steps = len(demonstration["joint_positions"]) + 1, env.session.world.elapsed
+        result.lengths = (frames, steps), (row["frames"], row["elapsed"])
+        result.joints = _joint_difference(env, row)
+        result.bodies = dict(_distances(env, row, _our_names(env.episode, row)))
+        super().reset(instruction, demonstration)
+
+
 def compare(slot: Slot) -> Comparison:
-    """Play an episode and compare it with RoboMME's."""
+    """Play an episode with the oracle and compare it with RoboMME's."""
     episode, row = get_episode(*slot), _rows()[slot]
-    result = Comparison(
-        failure=oracle_failure(episode),
-        moves=any(stage.primitive.kind == "pick_cube" for stage in episode.demonstration),
-    )
-    env = make(episode, cameras=())
+    moves = any(stage.primitive.kind == "pick_cube" for stage in episode.demonstration)
+    result = Comparison(moves, episode.recorded)
+    result.swaps = tuple(_swaps(episode, row, _our_names(episode, row)))
     try:
-        _, info = env.reset()
-    except MotionPlanningError:
-        return result  # `failure` says so
-    names = _our_names(episode, row)
-    frames = len(info["demonstration"]["joint_positions"]) + 1
-    result.source = info["demonstration_source"]
-    result.lengths = (frames, info["elapsed_steps"]), (row["frames"], row["elapsed"])
-    result.joints = _joint_difference(env, row)
-    result.bodies = dict(_distances(env, row, names))
-    result.swaps = tuple(_swaps(episode, row, names))
+        info = play(make(episode, cameras=()), ComparingOracle(row, result))
+    except MotionPlanningError as error:
+        result.failure = str(error)
+    else:
+        if info["status"] != "success":
+            result.failure = str(info["cause"] or info["status"])
     return result
 
 
@@ -158,9 +176,9 @@ def exceptions(one: Comparison) -> Iterator[str]:
     """Yield what is not as in RoboMME, or not as it should be."""
     if one.failure is not None:
         yield f"the oracle fails: {one.failure}"
-    if one.moves and one.source != "recorded":
+    if one.moves and not one.recorded:
         yield "the video is planned, as no recording completes it"
-    if one.source and one.joints > JOINT_LIMIT:
+    if one.bodies and one.joints > JOINT_LIMIT:
         yield f"joints differ by up to {one.joints:.1e} rad"
     far = {name: away for name, away in one.bodies.items() if away > BODY_LIMITS[0]}
     if far:
