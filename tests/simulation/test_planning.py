@@ -5,8 +5,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from roboirg.core.actions import JOINT_HIGH, JOINT_LOW
+from roboirg.core.conditions import Fact
+from roboirg.core.episode import Primitive, Scene, SceneObject
 from roboirg.core.errors import MotionPlanningError
+from roboirg.core.motions import Point
+from roboirg.core.object_sizes import CUBE_HALF
 from roboirg.episodes.splits import get_episode
+from roboirg.simulation.expert import primitives
 from roboirg.simulation.expert.motion_planning import MotionPlanner, ToolPose
 from roboirg.simulation.expert.primitives import MotionPrimitives
 from roboirg.simulation.expert.trajectory_timing import (
@@ -157,3 +162,33 @@ def test_first_picks_take_as_long_as_robomme_s(task, primitive, low, high):
                 world.step(action)
         assert low <= world.elapsed - begun <= high
         assert stage.expects in world.facts
+
+
+def lifted(*objects: SceneObject) -> bool:
+    """Whether the expert picks up the first of several objects."""
+    world = World(Scene(objects), visible=False)
+    for piece in MotionPrimitives(world).execute(Primitive("pick_cube", objects[0].name)):
+        for action in piece:
+            world.step(action)
+    return Fact("picked", objects[0].name) in world.facts
+
+
+def cube(name: str, x: float, y: float, yaw: float = 0.0) -> SceneObject:
+    return SceneObject(name, "cube", Point(x, y, CUBE_HALF), yaw, "red")
+
+
+def test_a_cube_at_the_edge_of_the_workspace_is_gripped_short_of_its_middle(planner):
+    place = np.array([0.171, -0.159, CUBE_HALF])
+    with pytest.raises(MotionPlanningError, match="cannot reach"):
+        planner.plan_move(HOME, ToolPose(place, DOWN))
+    assert lifted(cube("far", *place[:2], yaw=2.22))
+    with pytest.raises(MotionPlanningError, match="cannot reach"):
+        lifted(cube("too_far", place[0] + 0.02, place[1]))
+
+
+def test_where_open_fingers_land_on_neighbors_a_narrower_gripper_picks(monkeypatch):
+    around = [(0.07, 0.0), (-0.07, 0.0), (0.0, 0.07), (0.0, -0.07)]
+    cubes = [cube(f"cube_{number}", -0.05 + x, 0.1 + y) for number, (x, y) in enumerate(around)]
+    assert lifted(cube("middle", -0.05, 0.1), *cubes)
+    monkeypatch.setattr(primitives, "NARROW", primitives.OPEN)
+    assert not lifted(cube("middle", -0.05, 0.1), *cubes)

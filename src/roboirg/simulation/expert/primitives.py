@@ -7,6 +7,8 @@ RoboMME's.
 
 from __future__ import annotations
 
+import contextlib
+import math
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -14,7 +16,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from roboirg.core.actions import ARM_JOINTS
-from roboirg.core.episode import Primitive
+from roboirg.core.conditions import Fact
+from roboirg.core.episode import ROBOT_BASE, Primitive
 from roboirg.core.errors import MotionPlanningError
 from roboirg.core.motions import Point
 from roboirg.simulation.expert.grasping import grasp_rotations
@@ -40,6 +43,11 @@ BUTTON_CONTACT = 0.037
 """Tool height at which closed fingers have pressed a button."""
 ARM_LAG = 3
 """Control steps by which the arm lags behind its targets."""
+NARROW = 0.6
+"""Gripper action that leaves 0.06 m between the fingers, to pick a cube with others close by; used
+after the pick with open fingers has failed, as they landed on something."""
+SHORTFALLS = (0.0025, 0.005, 0.0075, 0.01)
+"""Meters by which a move stays short of a place that lies just beyond the arm's reach."""
 ASIDE = Point(0.0, 0.0, 0.2)
 HOMING_STEPS = 30
 
@@ -68,14 +76,21 @@ class MotionPrimitives:
         return _ROUTINES[primitive.kind](self, primitive)
 
     def _pick_cube(self, primitive: Primitive) -> Iterator[JointTrajectory]:
-        yield self._grip(OPEN)
-        cube = self._position(primitive.subject)
-        approach, rotation = self._approach(primitive.subject, CUBE_HOVER)
+        for opening in (OPEN, NARROW):
+            yield from self._grasp_and_lift(primitive.subject, opening)
+            if Fact("picked", primitive.subject) in self._world.facts:
+                return
+
+    def _grasp_and_lift(self, cube: str, opening: float) -> Iterator[JointTrajectory]:
+        """Yield the trajectories that pick a cube with the gripper opened to `opening`."""
+        yield self._grip(opening)
+        place = self._position(cube)
+        approach, rotation = self._approach(cube, CUBE_HOVER)
         yield approach
-        yield self._grip(OPEN)
-        yield self._move(self._position(primitive.subject), rotation)
+        yield self._grip(opening)
+        yield self._move(self._position(cube), rotation)
         yield self._grip(CLOSED)
-        yield self._move(_above(cube, CUBE_HOVER), rotation)
+        yield self._move(_above(place, CUBE_HOVER), rotation)
 
     def _place_on(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         place, rotation = self._place(primitive), self._rotation()
@@ -174,13 +189,25 @@ class MotionPrimitives:
         rotations = grasp_rotations(name, self._world.bodies, self._rotation())
         for rotation in rotations[:-1]:
             try:
-                return self._move(goal, rotation), rotation
+                return self._plan(goal, rotation), rotation
             except MotionPlanningError:
                 continue  # a wrist limit; another side may work
         return self._move(goal, rotations[-1]), rotations[-1]
 
     def _move(self, position: Point, rotation: Rotation) -> JointTrajectory:
-        """Plan a straight move to a pose, via home if the straight line is not feasible."""
+        """Plan a straight move to a pose, via home if the straight line is not feasible.
+
+        At the edge of the workspace the move ends up to 1 cm nearer to the robot.
+        """
+        try:
+            return self._plan(position, rotation)
+        except MotionPlanningError:
+            for shortfall in SHORTFALLS:
+                with contextlib.suppress(MotionPlanningError):
+                    return self._plan(_towards_robot(position, shortfall), rotation)
+            raise
+
+    def _plan(self, position: Point, rotation: Rotation) -> JointTrajectory:
         goal = ToolPose(np.asarray(position, dtype=np.float64), rotation)
         return self._with_gripper(self._planner.plan_move(self._world.robot.arm_positions, goal))
 
@@ -220,3 +247,10 @@ _ROUTINES: dict[str, Callable[[MotionPrimitives, Primitive], Iterator[JointTraje
 
 def _above(place: Point, height: float) -> Point:
     return Point(place.x, place.y, height)
+
+
+def _towards_robot(place: Point, distance: float) -> Point:
+    """Return the place moved in the plane towards the robot's base."""
+    x, y = place.x - ROBOT_BASE[0], place.y - ROBOT_BASE[1]
+    share = distance / math.hypot(x, y)
+    return Point(place.x - share * x, place.y - share * y, place.z)
