@@ -1,13 +1,13 @@
 """Random scenes are distributed as RoboMME's published ones.
 
 For each task and difficulty, `SAMPLED` scenes of fixed seeds are compared with all published ones,
-in every quantity of `measures` (Kolmogorov-Smirnov) and every label of `labels` (chi-square). All
-tests of the eleven tasks are one family: by Bonferroni, equal distributions would be called
-different somewhere in at most one of a hundred such families (`FAMILY_SIZE`).
+in every quantity of `measures` (Kolmogorov-Smirnov) and every trait of `labels` (chi-square). All
+tests of all tasks are one family, of size 1 % by Bonferroni: each of the 33 pairs of task and
+difficulty has an equal share of it, and each comparison an equal share of its pair's.
 
-What we draw otherwise on purpose is no label here: the direction of StopCube's path depends on its
-target in RoboMME, the number of VideoUnmaskSwap's swaps on its layout. Both have RoboMME's
-distribution by themselves.
+What we draw otherwise on purpose is not compared: in RoboMME, the direction of StopCube's path
+follows from its target, and the layout of VideoUnmaskSwap from the number of swaps. Here they are
+independent; each by itself is as in RoboMME.
 """
 
 import functools
@@ -20,13 +20,13 @@ import numpy as np
 import pytest
 from scipy.stats import chi2_contingency, ks_2samp
 
-from roboirg.core.episode import DIFFICULTIES, SPLITS
+from roboirg.core.episode import DIFFICULTIES, SPLITS, Goal, Scene
 from roboirg.core.errors import SceneRejectedError
-from roboirg.core.motions import Away, Shuttle, Swap
+from roboirg.core.motions import Away, Point, Shuttle, Swap
 from roboirg.episodes.published_episodes import published_episode
-from roboirg.tasks import get_task
-from roboirg.tasks.shared import fixtures, video_place
+from roboirg.tasks import bin_fill, get_task, video_repick
 from roboirg.tasks.shared.fixtures import cube_footprint
+from roboirg.tasks.shared.placement import Circle, overlap
 
 TASKS = (
     "BinFill",
@@ -48,6 +48,8 @@ MOST_EPISODES = 100
 KINDS = ("button", "bin", "cube", "hidden_cube", "container", "target", "site", "shuttle")
 RARE = 10
 """Labels with fewer scenes in both samples together are joined."""
+RESOLUTION = 1e-6
+"""Differences that mean nothing: published places are rounded to 1e-7 m."""
 
 
 @functools.cache
@@ -59,6 +61,7 @@ def published(task, difficulty):
     return [(one.scene, one.goal) for one in found if one and one.difficulty == difficulty]
 
 
+@functools.cache
 def sampled(task, difficulty):
     """Scene and goal of the first seeds that give one."""
     found, seeds = [], itertools.count(FIRST_SEED)
@@ -159,46 +162,91 @@ def labels(scene, goal):
     return found
 
 
-def of_key(rows, key):
-    return [row[key] for row in rows if key in row]
-
-
 def p_values(task, difficulty, ours):
-    """A p-value for every measure and label that differs within the two samples."""
+    """A p-value for every measure and label that is not the same in all scenes."""
     theirs = published(task, difficulty)
     found = {}
-    two = [[measures(*one) for one in scenes] for scenes in (ours, theirs)]
-    for key in sorted(set().union(*two[0], *two[1])):
-        first, second = (of_key(rows, key) for rows in two)
-        if not first or not second:
-            found[key] = 0.0
-        elif np.ptp([*first, *second]) > 1e-6:
-            # Published places are rounded to 1e-7 m.
-            found[key] = ks_2samp(np.round(first, 6), np.round(second, 6), method="asymp").pvalue
-    two = [[labels(*one) for one in scenes] for scenes in (ours, theirs)]
-    for key in sorted(set().union(*two[0], *two[1])):
-        counts = [Counter(map(str, of_key(rows, key))) for rows in two]
-        found[key] = same_shares(*counts)
-    return found
+    for traits, p_value in ((measures, same_distribution), (labels, same_shares)):
+        first, second = ([traits(*one) for one in scenes] for scenes in (ours, theirs))
+        for key in sorted(set().union(*first, *second)):
+            values = [[row[key] for row in rows if key in row] for rows in (first, second)]
+            found[key] = p_value(*values)
+    return {key: p for key, p in found.items() if p is not None}
+
+
+def same_distribution(first, second):
+    """Kolmogorov and Smirnov's p-value; None if all values are equal."""
+    if not first or not second:
+        return 0.0
+    if np.ptp([*first, *second]) < RESOLUTION:
+        return None
+    return ks_2samp(*(np.round(one, 6) for one in (first, second)), method="asymp").pvalue
 
 
 def same_shares(first, second):
-    """Chi-square's p-value; labels that are rare in both are joined."""
-    both = first + second
+    """Chi-square's p-value; labels that are rare in both are joined; None if only one is left."""
+    counts = [Counter(map(str, one)) for one in (first, second)]
+    both = counts[0] + counts[1]
     kept = [label for label in both if both[label] >= RARE]
-    table = [[counts[label] for label in kept] for counts in (first, second)]
-    for row, counts in zip(table, (first, second), strict=True):
-        row.append(counts.total() - sum(row))
+    table = [[*(one[label] for label in kept), 0] for one in counts]
+    for row, one in zip(table, counts, strict=True):
+        row[-1] = one.total() - sum(row)
     filled = np.array(table)[:, np.sum(table, axis=0) > 0]
-    return 1.0 if filled.shape[1] < 2 else chi2_contingency(filled).pvalue
+    return None if filled.shape[1] == 1 else chi2_contingency(filled).pvalue
 
 
-@functools.cache
-def family():
-    """All p-values, by task, difficulty and name."""
-    return {
-        (task, difficulty, key): p
-        for task in TASKS
-        for difficulty in DIFFICULTIES
-        for key, p in p_values(task, difficulty, sampled(task, difficulty)).items()
-    }
+def differing(task, difficulty, ours):
+    """What differs significantly between these scenes and the published ones."""
+    found = p_values(task, difficulty, ours)
+    share = FAMILY_SIZE / (len(TASKS) * len(DIFFICULTIES) * len(found))
+    return {key: p for key, p in found.items() if p < share}
+
+
+@pytest.mark.parametrize("difficulty", DIFFICULTIES)
+@pytest.mark.parametrize("task", TASKS)
+def test_random_scenes_are_distributed_as_published_ones(task, difficulty):
+    assert not differing(task, difficulty, sampled(task, difficulty))
+
+
+# A wrong sampler is found out
+
+
+@pytest.mark.parametrize(("module", "task"), [(bin_fill, "BinFill"), (video_repick, "VideoRepick")])
+def test_gaps_around_whole_squares_are_found_out(monkeypatch, module, task):
+    monkeypatch.setattr(module, "cube_obstacle", cube_footprint)
+    draw_anew = sampled.__wrapped__
+    assert "nearest cubes" in differing(task, "hard", draw_anew(task, "hard"))
+
+
+@pytest.mark.parametrize("task", ["VideoPlaceButton", "VideoPlaceOrder"])
+@pytest.mark.parametrize("difficulty", DIFFICULTIES)
+def test_cubes_that_avoid_the_site_are_found_out(task, difficulty):
+    free = [(scene, goal) for scene, goal in sampled(task, difficulty) if site_is_free(scene)]
+    assert "cube to site" in differing(task, difficulty, free)
+
+
+def site_is_free(scene):
+    (site,) = scene.of_kind("site")
+    around = Circle(*site.position[:2], site.radius)
+    return not any(overlap(around, cube_footprint(cube)) for cube in scene.of_kind("cube"))
+
+
+def test_shifted_scenes_are_found_out():
+    shifted = [(moved(scene, 0.04), goal) for scene, goal in sampled("PickXtimes", "easy")]
+    assert "first button x" in differing("PickXtimes", "easy", shifted)
+
+
+def moved(scene, along_x):
+    def place(item):
+        x, y, z = item.position
+        return replace(item, position=Point(x + along_x, y, z))
+
+    return Scene(tuple(map(place, scene.objects)), scene.motions, scene.past)
+
+
+def test_a_goal_that_is_never_drawn_is_found_out():
+    fewer = [
+        (scene, Goal.of(color=goal["color"], repeats=min(goal["repeats"], 2)))
+        for scene, goal in sampled("PickXtimes", "easy")
+    ]
+    assert "repeats 0" in differing("PickXtimes", "easy", fewer)
