@@ -303,13 +303,12 @@ def _groups(
         return
     for others, measure, tie in _orders(place.group, candidates, scene, mirrored=mirrored):
         border = _ranked(others, place.size, measure, tie)
-        inside = [
-            item
-            for item in others
-            if border and item not in border and measure(item) < measure(border[0])
-        ]
-        for some in itertools.combinations(border, place.size - len(inside)):
-            yield [*inside, *some]
+        if not border:
+            continue
+        outside = [item for item in others if measure(item) > max(map(measure, border))]
+        inside = len(others) - len(border) - len(outside)
+        for dropped in itertools.combinations(border, len(border) + inside - place.size):
+            yield [item for item in others if item not in (*outside, *dropped)]
 
 
 def _orders(
