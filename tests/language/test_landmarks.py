@@ -19,7 +19,7 @@ from roboirg.language.landmarks import FRAMES, MARGIN, candidates_in, landmarks,
 GRID = st.integers(-17, 17).map(lambda step: step / 100)
 PLACES = st.lists(st.tuples(GRID, GRID), min_size=1, max_size=8, unique=True)
 """Centimeter grid: ties, exact margins and collinear rows are common."""
-LONGEST = 14
+LONGEST = 12
 """Words of a landmark of the last classes: prompts must stay short."""
 
 
