@@ -176,24 +176,26 @@ def solids(scene):
     return [footprints[item.kind](item) for item in scene.objects if item.kind in footprints]
 
 
-def discs(scene):
-    """Targets, but for the one over which a shuttle runs: its place is free."""
-    return [] if scene.of_kind("shuttle") else circles(scene.of_kind("target"))
-
-
-def circles(items):
-    return [Circle(item.position.x, item.position.y, item.radius) for item in items]
+def discs(scene, *kinds):
+    """Targets or sites, but for the one over which a shuttle runs: its place is free."""
+    if scene.of_kind("shuttle"):
+        return []
+    return [
+        Circle(item.position.x, item.position.y, item.radius)
+        for kind in kinds
+        for item in scene.of_kind(kind)
+    ]
 
 
 @each_task
 def test_things_on_the_table_do_not_touch(task):
     for episode in episodes(task):
-        areas = [*solids(episode.scene), *discs(episode.scene)]
-        assert not any(overlap(*pair) for pair in itertools.combinations(areas, 2)), episode.key
-        # Cubes may lie where the video puts one back; discs and buttons may not.
-        sites = circles(episode.scene.of_kind("site"))
-        fixed = [*discs(episode.scene), *map(button_footprint, episode.scene.of_kind("button"))]
-        assert not any(overlap(*pair) for pair in itertools.product(sites, fixed)), episode.key
+        # Cubes may lie where the video puts one back, as in RoboMME.
+        for areas in (
+            [*solids(episode.scene), *discs(episode.scene, "target")],
+            discs(episode.scene, "target", "site"),
+        ):
+            assert not any(overlap(*pair) for pair in itertools.combinations(areas, 2)), episode.key
 
 
 @each_task
