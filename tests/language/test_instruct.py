@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 import pytest
-from language_variants import PAIRS, random_episodes
+from language_variants import PAIRS, without_landmark
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.episodes.splits import get_episode
@@ -75,11 +75,8 @@ def test_distractors_are_as_many_as_asked_for():
 
 
 def test_an_episode_without_landmark_is_refused_in_the_spatial_setting():
-    lacking = next(
-        episode
-        for episode in random_episodes("VideoUnmask", 1000)
-        if "spatial" not in expressible(episode)
-    )
+    lacking = without_landmark(EPISODE)
+    assert "spatial" not in expressible(lacking)
     with pytest.raises(InvalidValueError, match="no landmark"):
         instruct(lacking, "spatial")
 

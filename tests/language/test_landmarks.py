@@ -1,5 +1,6 @@
 """Landmarks: clear margins, mirrored frames, and a reader that finds the same object."""
 
+import itertools
 import math
 
 import pytest
@@ -7,16 +8,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from language_variants import SPATIAL_TASKS, random_episodes
 
-from roboirg.core.episode import COLORS, Point, Scene, SceneObject
+from roboirg.core.episode import COLORS, SPLITS, Point, Scene, SceneObject
 from roboirg.core.motions import Away
+from roboirg.episodes.published_episodes import published_episode
 from roboirg.language import FORMS, expressible, instruct, interpret
 from roboirg.language.interpreter.places import find_objects, read_places
 from roboirg.language.interpreter.tokens import split_sentences
-from roboirg.language.landmarks import MARGIN, landmarks, selectors
+from roboirg.language.landmarks import FRAMES, MARGIN, candidates_in, landmarks, selectors
 
 GRID = st.integers(-17, 17).map(lambda step: step / 100)
 PLACES = st.lists(st.tuples(GRID, GRID), min_size=1, max_size=8, unique=True)
 """Centimeter grid: ties, exact margins and collinear rows are common."""
+LONGEST = 12
+"""Words of a landmark of the last classes: prompts must stay short."""
 
 
 def containers(places):
@@ -68,6 +72,41 @@ def test_every_class_reads_as_it_selects(places, button, target):
                 check_reader(scene, "cube", selector.landmark, selected, frame)
 
 
+@settings(max_examples=100, deadline=None)
+@given(PLACES, st.tuples(GRID, GRID), st.sampled_from(["robot", "camera"]))
+def test_every_class_reads_as_it_selects_among_many(places, button, frame):
+    fixture = SceneObject("button", "button", Point(*button, 0.0))
+    scene = Scene((fixture, *containers(places).objects))
+    for selector in selectors(scene, "container", frame):
+        selected = selector.select()
+        if selected is not None:
+            check_reader(scene, "container", selector.landmark, selected, frame)
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+@pytest.mark.parametrize("task", SPATIAL_TASKS)
+def test_every_published_scene_can_be_told_by_places(task, frame):
+    for split, index in itertools.product(SPLITS, range(100)):
+        found = published_episode(task, split, index)
+        if found is None:
+            continue
+        named, scene = set(slot_colors(found.goal)), found.scene
+        thing = "cube" if scene.of_kind("cube") else "container"
+        told = set()
+        for cube in (*candidates_in(scene, "cube"), *scene.of_kind("hidden_cube")):
+            place = scene[cube.inside] if cube.inside else cube
+            words = landmarks(scene, thing, place, frame) if cube.color in named else ()
+            told |= {cube.color} if words else set()
+            for one in words:
+                check_reader(scene, thing, one, place, frame)
+                assert one.level < 10 or len(one.phrase.split()) <= LONGEST
+        assert told == named, (task, split, index)
+
+
+def slot_colors(goal):
+    return goal.texts("colors") if "colors" in dict(goal.slots) else (goal.text("color"),)
+
+
 def check_reader(scene, thing, landmark, target, frame):
     (sentence,) = split_sentences(f"the {thing} {landmark.phrase}")
     (place,) = read_places(sentence)
@@ -110,6 +149,39 @@ def test_collinear_things_are_told_by_rank():
     scene = containers([(0.0, y) for y in (-0.16, -0.08, 0.0, 0.08, 0.16)])
     assert phrases(scene, "container_2") == {"third from the left", "third from the right"}
     assert phrases(scene, "container_3") == {"second from the left"}
+
+
+def test_things_in_the_middle_of_a_row_are_told_by_a_higher_rank():
+    scene = containers([(0.0, y) for y in (-0.15, -0.1, -0.05, 0.0, 0.05, 0.1, 0.15)])
+    by_rank = {"fourth from the left", "fourth from the right"}
+    every = {one.landmark.phrase: one for one in selectors(scene, "container", "robot")}
+    assert all(every[words].select() is scene["container_3"] for words in by_rank)
+    assert {every[words].landmark.level for words in by_rank} == {10}
+
+
+def test_a_thing_is_told_among_a_few_that_stand_apart():
+    # Two far ones and three near ones, in rows.
+    scene = containers([(0.1, 0.1), (0.12, -0.1), (-0.1, 0.11), (-0.11, -0.09), (-0.12, 0.0)])
+    found = selected(scene)
+    assert found["at the far left among the two farthest from you"] is scene["container_0"]
+    assert found["at the far right among the two farthest from you"] is scene["container_1"]
+    assert found["second from the left among the three closest to you"] is scene["container_4"]
+    # Four near or far ones do not end clearly; and a group along its own line is no help.
+    assert not any(words.endswith("among the four closest to you") for words in found)
+    assert "closest to you among the two farthest from you" not in found
+
+
+def selected(scene):
+    """What each of the words selects, if anything."""
+    found = {one.landmark.phrase: one.select() for one in selectors(scene, "container", "robot")}
+    return {words: item for words, item in found.items() if item is not None}
+
+
+@pytest.mark.parametrize("gap", [MARGIN / 2, math.nextafter(MARGIN, 0.0), MARGIN])
+def test_a_group_ends_clearly(gap):
+    scene = containers([(gap, 0.1), (gap, -0.1), (0.0, 0.0), (-0.1, 0.0)])
+    words = "at the far left among the two farthest from you"
+    assert (words in selected(scene)) == (gap >= MARGIN)
 
 
 def test_left_is_the_robots_and_mirrored_for_the_camera():
@@ -157,12 +229,30 @@ def test_a_corner_is_used_only_if_it_does_not_matter_which_one_is_meant():
         ("closest to the near left corner of the table", [(-0.1, 0.1), (-0.098, 0.1), (0.0, 0.0)]),
         ("farthest from the container at the far right", [(0.1, 0.0), (-0.1, 0.0), (0.0, -0.1)]),
         ("closest to the container at the far left", [(0.1, 0.0), (-0.1, 0.0), (0.0, 0.1)]),
+        ("at the far left among the two closest to you", [(0.0, 0.1), (0.005, 0.15), (-0.1, 0.0)]),
+        ("at the far left among the two closest to you", [(0.0, 0.1), (-0.1, 0.095), (0.1, 0.2)]),
+        ("at the far left among the two containers closest to you", [(0.0, 0.1), (-0.1, 0.095)]),
     ],
 )
 def test_the_reader_reports_near_ties(words, places):
     scene = containers(places)
     (place,) = read_places(*split_sentences(f"the container {words}"))
-    assert find_objects(place, scene, "container", mirrored=False) == scene.objects[:2]
+    found = find_objects(place, scene, "container", mirrored=False)
+    assert sorted(item.name for item in found) == ["container_0", "container_1"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "at the far left among the two second closest to you",
+        "at the far left among the four closest to you",
+        "fourth from the left among the three closest to you",
+    ],
+)
+def test_groups_that_there_are_not_hold_nothing(words):
+    scene = containers([(0.0, 0.1), (-0.1, 0.0), (0.1, 0.2)])
+    (place,) = read_places(*split_sentences(f"the container {words}"))
+    assert find_objects(place, scene, "container", mirrored=False) == ()
 
 
 def test_a_place_of_two_things_makes_two_goals():

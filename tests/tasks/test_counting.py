@@ -17,9 +17,11 @@ from roboirg.core.motions import Away, Glow, Shuttle, Vanish
 from roboirg.tasks import bin_fill, stop_cube, swing_x_times
 from roboirg.tasks.shared.fixtures import (
     bin_footprint,
+    bin_keep_out,
     button_footprint,
     button_keep_out,
     cube_footprint,
+    cube_obstacle,
     draw_bin,
 )
 from roboirg.tasks.shared.placement import Circle, Rectangle, Region, overlap
@@ -155,14 +157,19 @@ def test_bin_fill_places_are_free(difficulty):
         assert bin_.position.z == 0.025
         assert abs(bin_.yaw) <= math.radians(20)
         assert not overlap(bin_footprint(bin_), button_footprint(button))
-        taken = [button_keep_out(button), bin_footprint(bin_)]
+        taken = [button_keep_out(button), bin_keep_out(bin_)]
         for cube in scene.of_kind("cube"):
             assert -0.28 <= cube.position.x <= 0.08
             assert -0.23 <= cube.position.y <= 0.23
             assert cube.position.z == object_sizes.CUBE_HALF
-            clear = cube_footprint(cube).grown(0.02)
-            assert not any(overlap(clear, other) for other in taken)
-            taken.append(cube_footprint(cube))
+            assert not overlap(cube_footprint(cube), bin_footprint(bin_))
+            check_free(cube, taken)
+
+
+def check_free(cube, taken):
+    """The cube keeps 0.02 from what was placed before, and so will later ones from it."""
+    assert not any(overlap(cube_footprint(cube).grown(0.02), other) for other in taken)
+    taken.append(cube_obstacle(cube))
 
 
 def test_bin_fill_keeps_the_bin_off_the_button(monkeypatch):
@@ -265,8 +272,7 @@ def test_swing_scenes_are_as_in_the_facts(difficulty):
         for cube in cubes:
             assert -0.33 <= cube.position.x <= 0.13
             assert -0.23 <= cube.position.y <= 0.23
-            assert not any(overlap(cube_footprint(cube).grown(0.02), other) for other in taken)
-            taken.append(cube_footprint(cube))
+            check_free(cube, taken)
         for name, low, high in (("target_right", -0.26, -0.14), ("target_left", 0.14, 0.26)):
             target = scene[name]
             assert -0.16 <= target.position.x <= -0.04

@@ -7,9 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from roboirg.core.episode import Point, SceneObject
+from roboirg.tasks.shared.fixtures import cube_footprint, cube_obstacle
 from roboirg.tasks.shared.placement import (
     MAX_DRAWS,
     Circle,
+    Line,
     Rectangle,
     Region,
     distance_to,
@@ -88,6 +91,46 @@ def test_regions_draw_inside_themselves(seed, x, y, half_x, half_y):
     drawn = Region(x, y, half_x, half_y).draw(np.random.default_rng(seed), inset)
     assert abs(drawn[0] - x) <= half_x - inset + 1e-12
     assert abs(drawn[1] - y) <= half_y - inset + 1e-12
+
+
+def test_a_line_is_as_long_as_it_is_and_has_no_breadth():
+    line = Line(0, 0, 1, 0)
+    assert overlap(Circle(0, 0.5, 0.5), line)
+    assert not overlap(Circle(0, 0.501, 0.5), line)
+    assert overlap(Circle(1.5, 0, 0.5), line)
+    assert not overlap(Circle(1.501, 0, 0.5), line)
+    assert overlap(Rectangle(2, 0, 1, 1), line)
+    assert not overlap(Rectangle(2.001, 0, 1, 1), line)
+    assert not overlap(Rectangle(0, 1.001, 1, 1), line)
+
+
+def test_a_turned_square_is_not_seen_to_be_clear_across_a_line():
+    # Its nearest corner is 0.1 away, but its sides' projections meet those of the line.
+    beside = Rectangle(0, 0.1 + math.sqrt(2), 1, 1, math.pi / 4)
+    assert not overlap(beside, Rectangle(0, 0, 1, 0))
+    assert overlap(beside, Line(0, 0, 1, 0))
+
+
+cubes = st.builds(
+    lambda x, y, yaw: SceneObject("cube", "cube", Point(x, y, 0.02), yaw),
+    st.floats(-0.08, 0.08),
+    st.floats(-0.08, 0.08),
+    st.floats(0, 2 * math.pi),
+)
+
+
+@given(cubes, cubes)
+def test_cubes_never_overlap_although_some_count_as_lines(first, second):
+    if not overlap(cube_footprint(second).grown(0.02), cube_obstacle(first)):
+        assert not overlap(cube_footprint(second).grown(-1e-9), cube_footprint(first))
+
+
+def test_half_of_the_cubes_count_as_lines_in_either_direction():
+    yaws = 2 * math.pi * np.random.default_rng(0).random(4000)
+    found = [cube_obstacle(SceneObject("cube", "cube", Point(0, 0, 0.02), yaw)) for yaw in yaws]
+    lines = [(one.yaw - yaw) for one, yaw in zip(found, yaws, strict=True) if isinstance(one, Line)]
+    assert 0.46 < len(lines) / len(yaws) < 0.54
+    assert 0.45 < sum(turn > 0.1 for turn in lines) / len(lines) < 0.55
 
 
 @pytest.mark.parametrize("free_after", [0, 5, MAX_DRAWS - 1])

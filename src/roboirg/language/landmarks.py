@@ -7,9 +7,9 @@ robot" in the camera frame, so that one instruction has one point of view.
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache, partial
 from typing import Literal, NamedTuple
 
 from roboirg.core.episode import ObjectKind, Scene, SceneObject
@@ -29,6 +29,9 @@ Frame = Literal["robot", "camera"]
 FRAMES: tuple[Frame, ...] = ("robot", "camera")
 
 ORDINALS = {1: "second", 2: "third"}
+FOURTH = {3: "fourth"}
+SIZES = {2: "two", 3: "three", 4: "four"}
+"""Of groups of which a landmark singles out one object."""
 PAIRED: tuple[ObjectKind, ...] = ("box", "tape")
 """Kinds of objects that always come in pairs."""
 
@@ -41,7 +44,9 @@ class Landmark(NamedTuple):
         level: class, in the order of preference: 1 extremes and the sides of a pair, 2 corners,
             3 ranks, 4 fixtures, 5 cubes of another color, 6 nearest to an object of class 1 or 2,
             7 nearest to one of class 3, 8 second nearest to one of class 1 or 2, 9 third nearest
-            to one of class 1 or 2.
+            to one of class 1 or 2, 10 fourth in a row, 11 the extreme of a few that are extreme in
+            the other direction, 12 that of a few near or far from a fixture, 13 second or third of
+            a few.
         sided: whether the words name left or right, so that the frame matters.
     """
 
@@ -68,6 +73,14 @@ class Ranking(NamedTuple):
             return None
         return candidates[position]
 
+    def first(self, candidates: Sequence[SceneObject], size: int) -> tuple[SceneObject, ...]:
+        """Return the first `size` candidates; none unless the next one is clear by the margin."""
+        order = sorted(candidates, key=self.quantity, reverse=True)
+        if size >= len(order):
+            return ()
+        clear = self.quantity(order[size - 1]) - self.quantity(order[size]) >= self.margin
+        return tuple(order[:size]) if clear else ()
+
 
 class Selector(NamedTuple):
     """A landmark and its meaning: the candidate of rank `rank`.
@@ -87,7 +100,7 @@ class Selector(NamedTuple):
 
 
 # Cached: all forms of an episode ask for the same.
-@functools.lru_cache(maxsize=64)
+@lru_cache(maxsize=64)
 def landmarks(
     scene: Scene, thing: ObjectKind, target: SceneObject, frame: Frame = "robot"
 ) -> tuple[Landmark, ...]:
@@ -126,6 +139,11 @@ def selectors(scene: Scene, thing: ObjectKind, frame: Frame) -> Iterator[Selecto
     yield from _chains(thing, candidates, ranked, level=7)
     yield from _chains(thing, candidates, named, level=8, rank=1)
     yield from _chains(thing, candidates, named, level=9, rank=2)
+    yield from _ranks(candidates, frame, FOURTH, level=10)
+    extremes, ranks = partial(_extremes, frame=frame), partial(_ranks, frame=frame)
+    yield from _members(candidates, extremes(candidates), extremes, level=11)
+    yield from _members(candidates, _fixtures(scene, candidates), extremes, level=12)
+    yield from _members(candidates, extremes(candidates), ranks, level=13)
 
 
 def candidates_in(scene: Scene, thing: ObjectKind) -> tuple[SceneObject, ...]:
@@ -199,13 +217,18 @@ def _corners(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Sele
             yield Selector(Landmark(phrase, 2, sided=True), rankings, candidates)
 
 
-def _ranks(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
-    for rank, ordinal in ORDINALS.items():
+def _ranks(
+    candidates: tuple[SceneObject, ...],
+    frame: Frame,
+    ordinals: Mapping[int, str] = ORDINALS,
+    level: int = 3,
+) -> Iterator[Selector]:
+    for rank, ordinal in ordinals.items():
         # The last one in a row is the extreme of the other end.
         if rank > len(candidates) - 2:
             continue
         for direction in _directions(frame):
-            landmark = Landmark(f"{ordinal} {direction.rank}", 3, direction.sided)
+            landmark = Landmark(f"{ordinal} {direction.rank}", level, direction.sided)
             yield Selector(landmark, (direction.ranking,), candidates, rank)
 
 
@@ -248,6 +271,34 @@ def _chains(
         phrase = f"{nearest} to the {thing} {selector.landmark.phrase}"
         landmark = Landmark(phrase, level, selector.landmark.sided)
         yield Selector(landmark, (_nearness(anchor.position),), others, rank)
+
+
+def _members(
+    candidates: Sequence[SceneObject],
+    groups: Iterable[Selector],
+    inner: Callable[[tuple[SceneObject, ...]], Iterator[Selector]],
+    level: int,
+) -> Iterator[Selector]:
+    """Yield one of two, three or four objects at a place: *closest to you among the two there*.
+
+    Args:
+        candidates: all objects.
+        groups: selectors whose first two, three or four objects are a group.
+        inner: yields the selectors within a group.
+        level: of the landmarks.
+    """
+    for group in groups:
+        for size, number in SIZES.items():
+            (ranking,) = group.rankings
+            members = ranking.first(candidates, size)
+            for one in inner(members):
+                sided, of_sided = one.landmark.sided, group.landmark.sided
+                # Along one line, the words of the group would be superfluous or odd.
+                if group.landmark.level == 1 and sided == of_sided:
+                    continue
+                phrase = f"{one.landmark.phrase} among the {number} {group.landmark.phrase}"
+                landmark = Landmark(phrase, level, sided or of_sided)
+                yield one._replace(landmark=landmark)
 
 
 def _without(candidates: Sequence[SceneObject], anchor: SceneObject) -> tuple[SceneObject, ...]:

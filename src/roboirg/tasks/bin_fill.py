@@ -26,16 +26,16 @@ from roboirg.core.episode import (
 from roboirg.core.motions import Away, Motion, Vanish
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
-    bin_footprint,
+    bin_keep_out,
     button_footprint,
     button_keep_out,
-    cube_footprint,
+    cube_obstacle,
     draw_bin,
     draw_button,
     draw_cube,
     draw_number,
 )
-from roboirg.tasks.shared.placement import Footprint, Region
+from roboirg.tasks.shared.placement import Obstacle, Region
 from roboirg.tasks.task import Commands, Task, Wording
 from roboirg.util.plurals import counted
 
@@ -69,7 +69,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     present = present[: COLORS_PRESENT[difficulty]]
     wanted = _draw_wanted(rng, difficulty, present)
     spawned = _draw_spawned(rng, difficulty, present, wanted)
-    cubes = _draw_cubes(rng, spawned, [button_keep_out(button), bin_footprint(bin_)])
+    cubes = _draw_cubes(rng, spawned, [button_keep_out(button), bin_keep_out(bin_)])
     named = tuple(color for color in GOAL_ORDER if wanted.get(color))
     goal = Goal.of(colors=named, counts=tuple(wanted[color] for color in named))
     order = tuple(named[index] for index in rng.permutation(len(named)))
@@ -102,7 +102,7 @@ def _draw_spawned(
 
 
 def _draw_cubes(
-    rng: np.random.Generator, spawned: list[Color], obstacles: list[Footprint]
+    rng: np.random.Generator, spawned: list[Color], obstacles: list[Obstacle]
 ) -> list[SceneObject]:
     """Draw cubes of the given colors, numbered within their color: ``cube_red_0`` and so on."""
     taken = list(obstacles)
@@ -112,7 +112,7 @@ def _draw_cubes(
         name = f"cube_{color}_{next(numbers[color])}"
         cube = draw_cube(rng, name, color, CUBE_REGION, CUBE_GAP, taken)
         cubes.append(cube)
-        taken.append(cube_footprint(cube))
+        taken.append(cube_obstacle(cube))
     return cubes
 
 

@@ -45,8 +45,8 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     right = draw_button(rng, RIGHT_REGION, RIGHT)
     left = draw_button(rng, LEFT_REGION, LEFT)
     points = shifted_points(rng, unmask_swap.CONTAINERS[difficulty])
-    obstacles = [button_keep_out(button) for button in (right, left)]
-    containers = unmask_swap.draw_containers_about(rng, points, obstacles)
+    # As in RoboMME, the left button keeps no container away; none can touch it.
+    containers = unmask_swap.draw_containers_about(rng, points, [button_keep_out(right)])
     return unmask_swap.sample(rng, difficulty, containers, (right, left))
 
 

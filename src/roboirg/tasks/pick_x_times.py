@@ -13,13 +13,13 @@ from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, Stage
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     button_keep_out,
-    cube_footprint,
+    cube_obstacle,
     draw_button,
     draw_colored_cubes,
     draw_number,
     draw_target,
 )
-from roboirg.tasks.shared.placement import Footprint, Region
+from roboirg.tasks.shared.placement import Obstacle, Region
 from roboirg.tasks.task import Commands, Task, Wording
 
 CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
@@ -37,9 +37,9 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     """Draw button, cubes of different colors, target disc; goal cube and repeats are uniform."""
     repeats = draw_number(rng, REPEATS[difficulty])
     button = draw_button(rng, BUTTON_REGION)
-    obstacles: list[Footprint] = [button_keep_out(button)]
+    obstacles: list[Obstacle] = [button_keep_out(button)]
     cubes = draw_colored_cubes(rng, CUBES[difficulty], WORK_REGION, CUBE_GAP, obstacles)
-    obstacles += [cube_footprint(cube) for cube in cubes]
+    obstacles += [cube_obstacle(cube) for cube in cubes]
     target = draw_target(rng, "target", TARGET_RADIUS, WORK_REGION, TARGET_GAP, obstacles)
     chosen = cubes[int(rng.integers(len(cubes)))]
     goal = Goal.of(color=str(chosen.color), repeats=repeats)

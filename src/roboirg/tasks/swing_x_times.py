@@ -16,14 +16,14 @@ from roboirg.core.motions import Glow
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     button_keep_out,
-    cube_footprint,
+    cube_obstacle,
     draw_button,
     draw_colored_cubes,
     draw_number,
     draw_target,
     marker_over,
 )
-from roboirg.tasks.shared.placement import Circle, Footprint, Region
+from roboirg.tasks.shared.placement import Circle, Obstacle, Region
 from roboirg.tasks.task import Commands, Task, Wording
 
 CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
@@ -49,9 +49,9 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     """Draw button, cubes and a target on either side; goal cube and repeats are uniform."""
     repeats = draw_number(rng, REPEATS[difficulty])
     button = draw_button(rng, BUTTON_REGION)
-    obstacles: list[Footprint] = [button_keep_out(button)]
+    obstacles: list[Obstacle] = [button_keep_out(button)]
     cubes = draw_colored_cubes(rng, CUBES[difficulty], CUBE_REGION, CUBE_GAP, obstacles)
-    obstacles += [cube_footprint(cube) for cube in cubes]
+    obstacles += [cube_obstacle(cube) for cube in cubes]
     targets: list[SceneObject] = []
     for side, region in SIDES.items():
         name = f"target_{side}"

@@ -18,13 +18,13 @@ from roboirg.tasks.shared import video_stages
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     button_keep_out,
-    cube_footprint,
+    cube_obstacle,
     draw_button,
     draw_cube,
     draw_number,
 )
 from roboirg.tasks.shared.layouts import layout_points
-from roboirg.tasks.shared.placement import Footprint, Region
+from roboirg.tasks.shared.placement import Obstacle, Region
 from roboirg.tasks.shared.swapping import SWAP_START, SWAP_STEPS, plan_swaps
 from roboirg.tasks.task import Commands, Task, Wording
 
@@ -95,19 +95,19 @@ def make_scene(
 def _draw_layout(rng: np.random.Generator, button: SceneObject) -> list[SceneObject]:
     """Draw three cubes of one color, each near its point of a layout."""
     color = COLORS[int(rng.integers(len(COLORS)))]
-    obstacles: list[Footprint] = [button_keep_out(button)]
+    obstacles: list[Obstacle] = [button_keep_out(button)]
     cubes: list[SceneObject] = []
     for number, point in enumerate(layout_points(rng, LAYOUT_CUBES)):
         region = Region(*point, LAYOUT_HALF, LAYOUT_HALF)
         cube = draw_cube(rng, f"cube_{color}_{number}", color, region, GAP, obstacles)
         cubes.append(cube)
-        obstacles.append(cube_footprint(cube))
+        obstacles.append(cube_obstacle(cube))
     return cubes
 
 
 def _draw_clutter(rng: np.random.Generator, button: SceneObject) -> list[SceneObject]:
     """Draw five cubes of each color; in each round one of each, in any order."""
-    obstacles: list[Footprint] = [button_keep_out(button)]
+    obstacles: list[Obstacle] = [button_keep_out(button)]
     cubes: list[SceneObject] = []
     for number in range(CLUTTER_ROUNDS):
         for index in rng.permutation(len(COLORS)):
@@ -115,7 +115,7 @@ def _draw_clutter(rng: np.random.Generator, button: SceneObject) -> list[SceneOb
             name = f"cube_{color}_{number}"
             cube = draw_cube(rng, name, color, CLUTTER_REGION, GAP, obstacles)
             cubes.append(cube)
-            obstacles.append(cube_footprint(cube))
+            obstacles.append(cube_obstacle(cube))
     return cubes
 
 

@@ -6,6 +6,7 @@ means the first, second, ... of that order.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from typing import Literal, NamedTuple
 
 from roboirg.core.episode import Scene, SceneObject
 from roboirg.core.motions import Away
-from roboirg.language.interpreter.tokens import Sentence, color_of, ordinal_of
+from roboirg.language.interpreter.tokens import Sentence, color_of, number_of, ordinal_of
 
 Side = Literal["left", "right"]
 _SIDES: dict[str, Side] = {"left": "left", "right": "right"}
@@ -80,7 +81,26 @@ class RelativePlace:
     rank: int = 1
 
 
-Place = DirectionalPlace | RelativePlace
+@dataclass(frozen=True, slots=True)
+class MemberPlace:
+    """A place among the few things at another one.
+
+    Attributes:
+        member: the place within the group.
+        group: where its things stand.
+        size: number of things in the group.
+    """
+
+    member: Place
+    group: Place
+    size: int
+
+
+Place = DirectionalPlace | RelativePlace | MemberPlace
+
+
+Measure = Callable[[SceneObject], float]
+"""The order of things, small values first."""
 
 
 class PlaceMention(NamedTuple):
@@ -110,6 +130,25 @@ def read_places(words: Sentence) -> tuple[Place, ...]:
 
 def _read(words: Sentence, at: int, depth: int = 0) -> tuple[Place, int] | None:
     """Return the place whose words begin at this word, and the index after its last word."""
+    read = _read_one(words, at, depth)
+    return None if read is None else _read_group(words, *read, depth) or read
+
+
+def _read_group(words: Sentence, member: Place, at: int, depth: int) -> tuple[Place, int] | None:
+    """Read ``among the two at the far left``, after the place of one of them."""
+    number = _skip(words, at + 1)
+    size = number_of(_word(words, number))
+    if _word(words, at) != "among" or size is None or depth >= _MAX_DEPTH:
+        return None
+    start = _skip(words, number + 1)
+    if _word(words, start).removesuffix("s") in _THINGS:
+        start = _skip(words, start + 1)
+    group = _read(words, start, depth + 1)
+    return None if group is None else (MemberPlace(member, group[0], size), group[1])
+
+
+def _read_one(words: Sentence, at: int, depth: int) -> tuple[Place, int] | None:
+    """Read a place that is not one among others."""
     word = _word(words, at)
     rank = ordinal_of(word)
     if rank is not None:
@@ -240,16 +279,52 @@ def find_objects(
         kind: kind of the things to compare.
         mirrored: whether left and right are those of the front camera's picture.
     """
-    candidates = _present(scene, kind)
-    if isinstance(place, DirectionalPlace):
-        return _ranked(candidates, place.rank, *_measure(place, mirrored=mirrored))
+    return _find(place, _present(scene, kind), scene, mirrored=mirrored)
+
+
+def _find(
+    place: Place, candidates: list[SceneObject], scene: Scene, *, mirrored: bool
+) -> tuple[SceneObject, ...]:
     found: list[SceneObject] = []
-    for anchor in _anchors(place, scene, mirrored=mirrored):
-        sign = 1.0 if place.nearest else -1.0
-        away = _distance_to(*anchor.position[:2], sign)
-        others = [item for item in candidates if item is not anchor]
-        found += _ranked(others, place.rank, away, _TIE)
+    if isinstance(place, MemberPlace):
+        for group in _groups(place, candidates, scene, mirrored=mirrored):
+            found += _find(place.member, group, scene, mirrored=mirrored)
+    else:
+        for others, measure, tie in _orders(place, candidates, scene, mirrored=mirrored):
+            found += _ranked(others, place.rank, measure, tie)
     return tuple(dict.fromkeys(found))
+
+
+def _groups(
+    place: MemberPlace, candidates: list[SceneObject], scene: Scene, *, mirrored: bool
+) -> Iterator[list[SceneObject]]:
+    """Yield the things that may be meant by a group; several for near ties at its border."""
+    if isinstance(place.group, MemberPlace) or place.group.rank != 1:
+        return
+    for others, measure, tie in _orders(place.group, candidates, scene, mirrored=mirrored):
+        border = _ranked(others, place.size, measure, tie)
+        if not border:
+            continue
+        outside = [item for item in others if measure(item) > max(map(measure, border))]
+        inside = len(others) - len(border) - len(outside)
+        for dropped in itertools.combinations(border, len(border) + inside - place.size):
+            yield [item for item in others if item not in (*outside, *dropped)]
+
+
+def _orders(
+    place: DirectionalPlace | RelativePlace,
+    candidates: list[SceneObject],
+    scene: Scene,
+    *,
+    mirrored: bool,
+) -> Iterator[tuple[list[SceneObject], Measure, float]]:
+    """Yield what to compare, by what measure, and the margin of a tie; once for each anchor."""
+    if isinstance(place, DirectionalPlace):
+        yield (candidates, *_measure(place, mirrored=mirrored))
+        return
+    for anchor in _anchors(place, scene, mirrored=mirrored):
+        away = _distance_to(*anchor.position[:2], 1.0 if place.nearest else -1.0)
+        yield [item for item in candidates if item is not anchor], away, _TIE
 
 
 def _present(scene: Scene, kind: str) -> list[SceneObject]:
@@ -261,7 +336,7 @@ def _present(scene: Scene, kind: str) -> list[SceneObject]:
 
 
 def _ranked(
-    items: list[SceneObject], rank: int, measure: Callable[[SceneObject], float], tie: float
+    items: list[SceneObject], rank: int, measure: Measure, tie: float
 ) -> tuple[SceneObject, ...]:
     """Return the items of a rank, small measures first, with those that tie with them."""
     if rank > len(items):
@@ -270,9 +345,7 @@ def _ranked(
     return tuple(item for item in items if abs(measure(item) - wanted) <= tie)
 
 
-def _measure(
-    place: DirectionalPlace, *, mirrored: bool
-) -> tuple[Callable[[SceneObject], float], float]:
+def _measure(place: DirectionalPlace, *, mirrored: bool) -> tuple[Measure, float]:
     """Return the measure of a direction, the smallest first, and the margin of a tie."""
     if place.side is None:
         return lambda item: -place.depth * item.position.x, _TIE
@@ -285,7 +358,7 @@ def _measure(
     return lambda item: _tangent(item) * (-1.0 if left_of_robot else 1.0), _TANGENT_TIE
 
 
-def _distance_to(x: float, y: float, sign: float) -> Callable[[SceneObject], float]:
+def _distance_to(x: float, y: float, sign: float) -> Measure:
     return lambda item: sign * math.dist(item.position[:2], (x, y))
 
 

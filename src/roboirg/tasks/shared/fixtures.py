@@ -11,12 +11,25 @@ from roboirg.core import object_sizes
 from roboirg.core.episode import COLORS, Color, SceneObject
 from roboirg.core.errors import SceneRejectedError
 from roboirg.core.motions import Point
-from roboirg.tasks.shared.placement import Circle, Footprint, Rectangle, Region, place
+from roboirg.tasks.shared.placement import (
+    Circle,
+    Footprint,
+    Line,
+    Obstacle,
+    Rectangle,
+    Region,
+    place,
+)
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth")
 
 BIN_YAW = math.radians(20.0)
 """Largest rotation of the bin to either side."""
+
+LINE_TURNS = (None, None, 0.0, math.pi / 2)
+"""Direction, from a cube's yaw, of the line that stands for the cube; None for its square."""
+YAW_DIGITS = 1e6
+"""Digits of a yaw (rad) behind this one are as good as random."""
 
 
 def draw_number(rng: np.random.Generator, bounds: tuple[int, int]) -> int:
@@ -49,13 +62,26 @@ def cube_footprint(cube: SceneObject) -> Rectangle:
     return Rectangle(cube.position.x, cube.position.y, half, half, cube.yaw)
 
 
+def cube_obstacle(cube: SceneObject) -> Rectangle | Line:
+    """Return what keeps later objects away from a cube: its square, or a line instead.
+
+    RoboMME fits a box to each cube and projects the box's first two axes; rounding decides which
+    axes these are. For every other cube one of them is vertical, and only a line through the
+    middle of two sides remains. Here the digits of the yaw decide.
+    """
+    turn = LINE_TURNS[int(cube.yaw * YAW_DIGITS) % len(LINE_TURNS)]
+    if turn is None:
+        return cube_footprint(cube)
+    return Line(*cube.position[:2], object_sizes.CUBE_HALF, cube.yaw + turn)
+
+
 def draw_cube(
     rng: np.random.Generator,
     name: str,
     color: Color,
     region: Region,
     gap: float,
-    obstacles: Sequence[Footprint],
+    obstacles: Sequence[Obstacle],
 ) -> SceneObject:
     """Draw a cube with any yaw, at least `gap` meters from all obstacles.
 
@@ -76,7 +102,7 @@ def draw_colored_cubes(
     count: int,
     region: Region,
     gap: float,
-    obstacles: Sequence[Footprint],
+    obstacles: Sequence[Obstacle],
 ) -> tuple[SceneObject, ...]:
     """Draw `count` cubes of different colors, ``cube_red`` and so on, in random order.
 
@@ -89,7 +115,7 @@ def draw_colored_cubes(
         color = COLORS[index]
         cube = draw_cube(rng, f"cube_{color}", color, region, gap, taken)
         cubes.append(cube)
-        taken.append(cube_footprint(cube))
+        taken.append(cube_obstacle(cube))
     return tuple(cubes)
 
 
@@ -99,7 +125,7 @@ def draw_target(
     radius: float,
     region: Region,
     gap: float,
-    obstacles: Sequence[Footprint],
+    obstacles: Sequence[Obstacle],
     rgb: tuple[float, float, float] | None = None,
 ) -> SceneObject:
     """Draw a target disc of `radius` meters, at least `gap` meters from all obstacles.
@@ -127,7 +153,7 @@ def marker_over(target: SceneObject, name: str) -> SceneObject:
 
 
 def draw_bin(
-    rng: np.random.Generator, region: Region, obstacles: Sequence[Footprint], name: str = "bin"
+    rng: np.random.Generator, region: Region, obstacles: Sequence[Obstacle], name: str = "bin"
 ) -> SceneObject:
     """Draw a bin whose center is in the region and whose walls touch no obstacle.
 
@@ -143,6 +169,12 @@ def draw_bin(
     return placed(name, draw, bin_footprint, obstacles)
 
 
+def bin_keep_out(item: SceneObject) -> Rectangle:
+    """Return the square that keeps cubes away from a bin; as in RoboMME, it does not turn."""
+    half = object_sizes.BIN_HALF
+    return Rectangle(item.position.x, item.position.y, half, half)
+
+
 def bin_footprint(item: SceneObject) -> Rectangle:
     """Return the square that a bin covers, its hole included."""
     half = object_sizes.BIN_HALF
@@ -153,7 +185,7 @@ def placed(
     name: str,
     draw: Callable[[], SceneObject],
     clearance: Callable[[SceneObject], Footprint],
-    obstacles: Sequence[Footprint],
+    obstacles: Sequence[Obstacle],
 ) -> SceneObject:
     """Draw an object until its clearance is free of obstacles.
 

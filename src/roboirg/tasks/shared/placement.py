@@ -2,7 +2,7 @@
 
 Shapes are footprints on the table: rectangles for cubes, containers and buttons, circles for
 target discs. The first of at most 256 uniform draws with enough clearance is accepted, as in
-RoboMME; unlike there, obstacles are true rectangles.
+RoboMME, where every other cube stands in the way as a mere line.
 """
 
 from __future__ import annotations
@@ -49,7 +49,18 @@ class Circle:
     radius: float
 
 
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A straight line: middle, half length (m) and direction (rad)."""
+
+    x: float
+    y: float
+    half: float
+    yaw: float
+
+
 Footprint = Rectangle | Circle
+Obstacle = Footprint | Line
 
 
 class Region(NamedTuple):
@@ -69,10 +80,19 @@ class Region(NamedTuple):
         )
 
 
-def overlap(first: Footprint, second: Footprint) -> bool:
-    """Return whether two footprints touch or overlap."""
+def overlap(first: Footprint, second: Obstacle) -> bool:
+    """Return whether a footprint touches or overlaps an obstacle.
+
+    As in RoboMME, a line beside a rectangle counts as clear of it only if their projections on a
+    side of the rectangle or on the line are apart: not those across the line.
+    """
+    if isinstance(second, Line):
+        thin = Rectangle(second.x, second.y, second.half, 0.0, second.yaw)
+        if isinstance(first, Circle):
+            return overlap(first, thin)
+        return not (any(_separations(first, thin)) or _separations(thin, first)[0])
     if isinstance(first, Rectangle) and isinstance(second, Rectangle):
-        return not (_axis_separates(first, second) or _axis_separates(second, first))
+        return not any((*_separations(first, second), *_separations(second, first)))
     if isinstance(first, Circle) and isinstance(second, Circle):
         return math.hypot(first.x - second.x, first.y - second.y) <= first.radius + second.radius
     if isinstance(first, Circle) and isinstance(second, Rectangle):
@@ -88,19 +108,19 @@ def distance_to(rectangle: Rectangle, x: float, y: float) -> float:
     )
 
 
-def _axis_separates(first: Rectangle, second: Rectangle) -> bool:
-    """Return whether an axis of `first` separates the two (separating-axis test)."""
+def _separations(first: Rectangle, second: Rectangle) -> tuple[bool, bool]:
+    """Return for either axis of `first` whether it separates the two (separating-axis test)."""
     center_x, center_y = first.to_local(second.x, second.y)
     cos, sin = abs(math.cos(second.yaw - first.yaw)), abs(math.sin(second.yaw - first.yaw))
     reach_x = cos * second.half_x + sin * second.half_y
     reach_y = sin * second.half_x + cos * second.half_y
-    return abs(center_x) > first.half_x + reach_x or abs(center_y) > first.half_y + reach_y
+    return abs(center_x) > first.half_x + reach_x, abs(center_y) > first.half_y + reach_y
 
 
 def place(
     draw: Callable[[], Placement],
     clearance: Callable[[Placement], Footprint],
-    obstacles: Sequence[Footprint],
+    obstacles: Sequence[Obstacle],
 ) -> Placement | None:
     """Return the first of at most 256 draws whose clearance is free of all obstacles.
 

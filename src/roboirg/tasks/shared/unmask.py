@@ -69,7 +69,7 @@ def draw_containers_in(
         if spot is None:
             break
         position = Point(*spot, object_sizes.CONTAINER_HEIGHT)
-        yaw = rng.random() * math.pi / 2
+        yaw = -rng.random() * math.pi / 2
         container = SceneObject(f"container_{index}", "container", position, yaw)
         containers.append(container)
         taken.append(container_footprint(container).grown(gap))

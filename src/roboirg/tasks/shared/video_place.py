@@ -2,8 +2,7 @@
 
 In the video, one cube is placed on several discs, with a press of the button in between, and then
 put back on an invisible site; at the end two discs may change places. The policy places a cube on
-one of those discs. Unlike in RoboMME, the site stays free of other objects, so that the cube is
-never put back on another one. Facts: RoboMME.
+one of those discs. Facts: RoboMME.
 """
 
 from __future__ import annotations
@@ -19,12 +18,12 @@ from roboirg.core.motions import Point, Swap
 from roboirg.tasks.shared import video_stages
 from roboirg.tasks.shared.fixtures import (
     button_keep_out,
-    cube_footprint,
+    cube_obstacle,
     draw_button,
     draw_colored_cubes,
     draw_target,
 )
-from roboirg.tasks.shared.placement import Circle, Footprint, Region
+from roboirg.tasks.shared.placement import Circle, Obstacle, Region
 from roboirg.tasks.shared.swapping import SWAP_START, SWAP_STEPS
 
 CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
@@ -57,9 +56,11 @@ def draw_table(
     # A site is as high as a disc: the release height of the hand follows from it.
     site = SceneObject("site", "site", Point(x, y, object_sizes.TARGET_HEIGHT), radius=site_radius)
     button = draw_button(rng, BUTTON_REGION)
-    obstacles: list[Footprint] = [Circle(x, y, site_radius), button_keep_out(button)]
-    colored = draw_colored_cubes(rng, cubes, WORK_REGION, GAP, obstacles)
-    obstacles += [cube_footprint(cube) for cube in colored]
+    keep_out = button_keep_out(button)
+    # As in RoboMME, cubes may lie on the site; discs may not.
+    colored = draw_colored_cubes(rng, cubes, WORK_REGION, GAP, [keep_out])
+    obstacles: list[Obstacle] = [keep_out, Circle(x, y, site_radius)]
+    obstacles += [cube_obstacle(cube) for cube in colored]
     objects: list[SceneObject] = [site, button, *colored]
     for number in range(discs):
         disc = draw_target(rng, f"target_{number}", TARGET_RADIUS, WORK_REGION, GAP, obstacles)

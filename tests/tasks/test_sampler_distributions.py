@@ -1,0 +1,252 @@
+"""Random scenes are distributed as RoboMME's published ones.
+
+For each task and difficulty, `SAMPLED` scenes of fixed seeds are compared with all published ones,
+in every quantity of `measures` (Kolmogorov-Smirnov) and every trait of `labels` (chi-square). All
+tests of all tasks are one family, of size 1 % by Bonferroni: each of the 33 pairs of task and
+difficulty has an equal share of it, and each comparison an equal share of its pair's.
+
+What we draw otherwise on purpose is not compared: in RoboMME, the direction of StopCube's path
+follows from its target, and the layout of VideoUnmaskSwap from the number of swaps. Here they are
+independent; each by itself is as in RoboMME.
+"""
+
+import functools
+import itertools
+import math
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2_contingency, ks_2samp
+
+from roboirg.core.episode import DIFFICULTIES, SPLITS, Goal, Scene
+from roboirg.core.errors import SceneRejectedError
+from roboirg.core.motions import Away, Point, Shuttle, Swap
+from roboirg.episodes.published_episodes import published_episode
+from roboirg.tasks import bin_fill, get_task, video_repick
+from roboirg.tasks.shared.fixtures import cube_footprint
+from roboirg.tasks.shared.placement import Circle, overlap
+
+TASKS = (
+    "BinFill",
+    "PickXtimes",
+    "SwingXtimes",
+    "StopCube",
+    "VideoUnmask",
+    "ButtonUnmask",
+    "VideoUnmaskSwap",
+    "ButtonUnmaskSwap",
+    "VideoRepick",
+    "VideoPlaceButton",
+    "VideoPlaceOrder",
+)
+FAMILY_SIZE = 0.01
+SAMPLED = 300
+FIRST_SEED = 10_000_000
+MOST_EPISODES = 100
+KINDS = ("button", "bin", "cube", "hidden_cube", "container", "target", "site", "shuttle")
+RARE = 10
+"""Labels with fewer scenes in both samples together are joined."""
+RESOLUTION = 1e-6
+"""Differences that mean nothing: published places are rounded to 1e-7 m."""
+
+
+@functools.cache
+def published(task, difficulty):
+    """Scene and goal of all published episodes."""
+    found = (
+        published_episode(task, split, index) for split in SPLITS for index in range(MOST_EPISODES)
+    )
+    return [(one.scene, one.goal) for one in found if one and one.difficulty == difficulty]
+
+
+@functools.cache
+def sampled(task, difficulty):
+    """Scene and goal of the first seeds that give one."""
+    found, seeds = [], itertools.count(FIRST_SEED)
+    while len(found) < SAMPLED:
+        try:
+            found.append(get_task(task).sample(np.random.default_rng(next(seeds)), difficulty))
+        except SceneRejectedError:
+            continue
+    return found
+
+
+def distances(first, second):
+    return [
+        math.dist(one.position[:2], other.position[:2])
+        for one in first
+        for other in second
+        if one is not other
+    ]
+
+
+def measures(scene, goal):
+    """Quantities of a scene: places and spreads of each kind, gaps between kinds, times."""
+    found = {}
+    for kind in KINDS:
+        items = scene.of_kind(kind)
+        if not items:
+            continue
+        for axis in "xy":
+            values = [getattr(item.position, axis) for item in items]
+            found |= {f"first {kind} {axis}": values[0], f"last {kind} {axis}": values[-1]}
+            found |= {
+                f"mean {kind} {axis}": np.mean(values),
+                f"spread {kind} {axis}": np.ptp(values),
+            }
+        found[f"{kind} yaw"] = items[0].yaw % (2.0 * math.pi)
+        if len(items) > 1:
+            nearest = [min(distances([item], items)) for item in items]
+            found |= {f"nearest {kind}s": min(nearest), f"gap of {kind}s": np.mean(nearest)}
+    for one, other in itertools.combinations(KINDS, 2):
+        between = distances(scene.of_kind(one), scene.of_kind(other))
+        if between:
+            found |= {f"{one} to {other}": min(between), f"mean {one} to {other}": np.mean(between)}
+    wanted = wanted_object(scene, goal)
+    if wanted is not None:
+        found |= {"wanted x": wanted.position.x, "wanted y": wanted.position.y}
+    for motion in scene.motions:
+        if isinstance(motion, Shuttle):
+            along = [end - begin for begin, end in zip(motion.begin, motion.end, strict=True)]
+            found |= {"length of path": math.hypot(*along), "direction": math.atan2(*along[:2])}
+            found |= {f"rgb {number}": value for number, value in enumerate(scene["shuttle"].rgb)}
+    return found
+
+
+def wanted_object(scene, goal):
+    """The object that the goal or the video singles out, if any."""
+    slots = dict(goal.slots)
+    if scene.past:
+        return scene[scene.past[0].subject]
+    color = slots.get("color") or (slots.get("colors") or [None])[0]
+    named = [item for item in scene.objects if item.color == color]
+    return named[0] if color else None
+
+
+def labels(scene, goal):
+    """Countable traits of a scene: numbers of objects, slots of the goal, motions, the past."""
+    found = {f"number of {kind}s": len(scene.of_kind(kind)) for kind in KINDS}
+    for slot, value in goal.slots:
+        values = value if isinstance(value, tuple) else (value,)
+        found |= {f"{slot} {place}": one for place, one in enumerate(values)}
+        found[f"length of {slot}"] = len(values)
+        if slot == "counts":
+            found["goal's cubes"] = sum(values)
+    cubes = (*scene.of_kind("cube"), *scene.of_kind("hidden_cube"))
+    colors = [cube.color for cube in cubes]
+    found |= {"first color": colors[:1], "last color": colors[-1:]}
+    found["cubes per color"] = sorted(Counter(colors).values())
+    found["over cubes"] = sorted(str(cube.inside) for cube in cubes)
+    motions = scene.motions
+    found["late"] = sum(isinstance(one, Away) and one.start == 0 for one in motions)
+    swaps = [one for one in motions if isinstance(one, Swap)]
+    found["number of swaps"] = len(swaps)
+    found["undone"] = len({frozenset({one.first, one.second}) for one in swaps}) - len(swaps)
+    hiding = {cube.inside for cube in cubes}
+    answer = wanted_object(scene, goal)
+    for place, swap in enumerate(swaps):
+        moved = {swap.first, swap.second}
+        found[f"swap {place} moves the wanted"] = bool(
+            answer and {answer.name, answer.inside} & moved
+        )
+        found[f"swap {place} starts at a cube"] = swap.first in hiding
+        found[f"swap {place} moves discs in use"] = len(moved & {one.place for one in scene.past})
+    found["interval"] = [one.interval for one in motions if isinstance(one, Shuttle)]
+    found["length of the past"] = len(scene.past)
+    if scene.past:
+        found["past"] = [fact.kind for fact in scene.past]
+        found["discs of the past"] = [fact.place for fact in scene.past[:2]]
+        found["number of the video's cube"] = list(scene.objects).index(answer)
+    return found
+
+
+def p_values(task, difficulty, ours):
+    """A p-value for every measure and label that is not the same in all scenes."""
+    theirs = published(task, difficulty)
+    found = {}
+    for traits, p_value in ((measures, same_distribution), (labels, same_shares)):
+        first, second = ([traits(*one) for one in scenes] for scenes in (ours, theirs))
+        for key in sorted(set().union(*first, *second)):
+            values = [[row[key] for row in rows if key in row] for rows in (first, second)]
+            found[key] = p_value(*values)
+    return {key: p for key, p in found.items() if p is not None}
+
+
+def same_distribution(first, second):
+    """Kolmogorov and Smirnov's p-value; None if all values are equal."""
+    if not first or not second:
+        return 0.0
+    if np.ptp([*first, *second]) < RESOLUTION:
+        return None
+    return ks_2samp(*(np.round(one, 6) for one in (first, second)), method="asymp").pvalue
+
+
+def same_shares(first, second):
+    """Chi-square's p-value; labels that are rare in both are joined; None if only one is left."""
+    counts = [Counter(map(str, one)) for one in (first, second)]
+    both = counts[0] + counts[1]
+    kept = [label for label in both if both[label] >= RARE]
+    table = [[*(one[label] for label in kept), 0] for one in counts]
+    for row, one in zip(table, counts, strict=True):
+        row[-1] = one.total() - sum(row)
+    filled = np.array(table)[:, np.sum(table, axis=0) > 0]
+    return None if filled.shape[1] == 1 else chi2_contingency(filled).pvalue
+
+
+def differing(task, difficulty, ours):
+    """What differs significantly between these scenes and the published ones."""
+    found = p_values(task, difficulty, ours)
+    share = FAMILY_SIZE / (len(TASKS) * len(DIFFICULTIES) * len(found))
+    return {key: p for key, p in found.items() if p < share}
+
+
+@pytest.mark.parametrize("difficulty", DIFFICULTIES)
+@pytest.mark.parametrize("task", TASKS)
+def test_random_scenes_are_distributed_as_published_ones(task, difficulty):
+    assert not differing(task, difficulty, sampled(task, difficulty))
+
+
+# A wrong sampler is found out
+
+
+@pytest.mark.parametrize(("module", "task"), [(bin_fill, "BinFill"), (video_repick, "VideoRepick")])
+def test_gaps_around_whole_squares_are_found_out(monkeypatch, module, task):
+    monkeypatch.setattr(module, "cube_obstacle", cube_footprint)
+    draw_anew = sampled.__wrapped__
+    assert "nearest cubes" in differing(task, "hard", draw_anew(task, "hard"))
+
+
+@pytest.mark.parametrize("task", ["VideoPlaceButton", "VideoPlaceOrder"])
+@pytest.mark.parametrize("difficulty", DIFFICULTIES)
+def test_cubes_that_avoid_the_site_are_found_out(task, difficulty):
+    free = [(scene, goal) for scene, goal in sampled(task, difficulty) if site_is_free(scene)]
+    assert "cube to site" in differing(task, difficulty, free)
+
+
+def site_is_free(scene):
+    (site,) = scene.of_kind("site")
+    around = Circle(*site.position[:2], site.radius)
+    return not any(overlap(around, cube_footprint(cube)) for cube in scene.of_kind("cube"))
+
+
+def test_shifted_scenes_are_found_out():
+    shifted = [(moved(scene, 0.04), goal) for scene, goal in sampled("PickXtimes", "easy")]
+    assert "first button x" in differing("PickXtimes", "easy", shifted)
+
+
+def moved(scene, along_x):
+    def place(item):
+        x, y, z = item.position
+        return replace(item, position=Point(x + along_x, y, z))
+
+    return Scene(tuple(map(place, scene.objects)), scene.motions, scene.past)
+
+
+def test_a_goal_that_is_never_drawn_is_found_out():
+    fewer = [
+        (scene, Goal.of(color=goal["color"], repeats=min(goal["repeats"], 2)))
+        for scene, goal in sampled("PickXtimes", "easy")
+    ]
+    assert "repeats 0" in differing("PickXtimes", "easy", fewer)
