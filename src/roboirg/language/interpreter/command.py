@@ -53,6 +53,16 @@ class Command(NamedTuple):
         return tuple(describe(words) for words in self.handled)
 
     @property
+    def things_in_order(self) -> tuple[Description, ...]:
+        """The same, with a description for each color that one verb handles: the red, the blue."""
+        found: list[Description] = []
+        for words in self.handled:
+            thing, colors = describe(words), tuple(dict.fromkeys(colors_in(words)))
+            several = thing.kind == "color" and len(colors) > 1
+            found += [thing._replace(colors=(one,)) for one in colors] if several else [thing]
+        return tuple(found)
+
+    @property
     def boxes(self) -> tuple[Description, ...]:
         """The descriptions of the things that something is put into."""
         return tuple(describe(words) for words in self.entered)

@@ -73,7 +73,7 @@ _SINGLE = re.compile(
 )
 _FACTORS = {"twice": 2.0, "double": 2.0, "thrice": 3.0, "triple": 3.0, "half": 0.5}
 _ADVERBS = {"once": 1, "twice": 2, "thrice": 3}
-_TIMES = re.compile(r" (?:times?|rounds?|turns?|occasions?)\b")
+_TIMES = re.compile(r" (?:times?|rounds?|turns?|occasions?|cycles?)\b")
 
 Reading = tuple[re.Pattern[str], Callable[[re.Match[str]], CountExpression], bool]
 
@@ -133,6 +133,7 @@ def read_times(text: str) -> CountExpression | None:
     found = quantities(text)
     plain = [one for one in found if one.plain]
     times = [one for one in found if not one.plain]
-    times += [one for one in plain if text[one.start : one.end] in _ADVERBS]
-    times += [one for one in plain if _TIMES.match(text, one.end)]
+    times += [
+        one for one in plain if text[one.start : one.end] in _ADVERBS or _TIMES.match(text, one.end)
+    ]
     return times[0].expression if times else None

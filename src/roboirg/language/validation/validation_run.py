@@ -11,6 +11,7 @@ from roboirg.core.errors import InvalidValueError, SceneRejectedError
 from roboirg.episodes.splits import SEED_STRIDE, SIZES, get_episode, make_episode, slot_difficulty
 from roboirg.language.validation.episode_checks import check_episode
 from roboirg.language.validation.validation_results import ValidationResults
+from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.util.parallel_map import parallel_map
 
 RANDOM_BASE = 10_000_000
@@ -27,21 +28,26 @@ class Batch(NamedTuple):
         split: name of the split; None for random episodes.
         first: index of the first episode.
         size: number of episodes.
+        wordings: path of a wording file; None for our own words.
     """
 
     task: str
     split: Split | None
     first: int
     size: int
+    wordings: str | None = None
 
 
-def batches(tasks: Sequence[str], splits: Sequence[Split], seeds: int) -> tuple[Batch, ...]:
+def batches(
+    tasks: Sequence[str], splits: Sequence[Split], seeds: int, wordings: str | None = None
+) -> tuple[Batch, ...]:
     """Return batches of all episodes of the splits and of random ones.
 
     Args:
         tasks: names.
         splits: names.
         seeds: number of random episodes for each task.
+        wordings: path of a wording file; None for our own words.
 
     Raises:
         InvalidValueError: the number is negative, or there is nothing to validate.
@@ -51,7 +57,7 @@ def batches(tasks: Sequence[str], splits: Sequence[Split], seeds: int) -> tuple[
     amounts: list[tuple[Split | None, int]] = [(split, SIZES[split]) for split in splits]
     amounts.append((None, seeds))
     found = tuple(
-        Batch(task, split, first, min(BATCH, amount - first))
+        Batch(task, split, first, min(BATCH, amount - first), wordings)
         for task in tasks
         for split, amount in amounts
         for first in range(0, amount, BATCH)
@@ -77,12 +83,13 @@ def random_episode(task: str, index: int) -> Episode:
 def validate_batch(batch: Batch) -> ValidationResults:
     """Check the episodes of a batch."""
     results = ValidationResults()
+    identity = open_wordings(batch.wordings)
     for index in range(batch.first, batch.first + batch.size):
         if batch.split is None:
-            results.add(check_episode(random_episode(batch.task, index)))
+            results.add(check_episode(random_episode(batch.task, index), wordings=identity))
         else:
             episode = get_episode(batch.task, batch.split, index)
-            results.add(check_episode(episode, must_be_expressible=True))
+            results.add(check_episode(episode, must_be_expressible=True, wordings=identity))
     return results
 
 
