@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from roboirg.language.interpreter.descriptions import Description, describe
@@ -22,6 +22,8 @@ _INTO = word_set("into inside in")
 _BARE_PRONOUNS = word_set("it them that")
 _PARTICLES = word_set("up down back")
 _SINGULAR = word_set("it cube one")
+_JOINTS = word_set(", ; and then")
+_JOINED = word_set("container box one")
 _ADVERBS = word_set("once twice thrice")
 
 
@@ -54,9 +56,9 @@ class Command(NamedTuple):
 
     @property
     def things_in_order(self) -> tuple[Description, ...]:
-        """The same, with a description for each color that one verb handles: the red, the blue."""
+        """The same, with a description for each of the things that one verb handles in turn."""
         found: list[Description] = []
-        for words in self.handled:
+        for words in (part for clause in self.handled for part in _parts(clause)):
             thing, colors = describe(words), tuple(dict.fromkeys(colors_in(words)))
             several = thing.kind == "color" and len(colors) > 1
             found += [thing._replace(colors=(one,)) for one in colors] if several else [thing]
@@ -130,6 +132,16 @@ def _is_verb(words: Sentence, at: int) -> bool:
     if at == 0 or words[at - 1] in BEFORE_VERB or words[max(0, at - 2) : at] in _REQUESTS:
         return True
     return words[at - 1] in ("you", "do") and words[max(0, at - 2) : at - 1] in ((), (",",))
+
+
+def _parts(words: Sentence) -> Iterator[Sentence]:
+    """Yield the parts of ``the container at the left, and then the one at the right``."""
+    start = 0
+    for at in range(1, len(words) - 1):
+        if words[at - 1] in _JOINTS and words[at] == "the" and words[at + 1] in _JOINED:
+            yield words[start:at]
+            start = at
+    yield words[start:]
 
 
 def _items(words: Sentence) -> tuple[Item, ...]:

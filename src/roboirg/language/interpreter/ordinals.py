@@ -20,7 +20,8 @@ _ACTS = (
     "reache[sd]|arrive[sd]|passe[sd]|stop(?:s|ped)|move[sd]|goes|went|enter(?:s|ed)|return(?:s|ed)"
 )
 _BASE = re.compile(
-    rf"\s*(?P<that>that|it|this)\b(?! (?:is|was|has|{_ACTS})\b)|\s*(?:the |its )?(?P<ordinal>{ORDINAL}|last|final)\b"
+    rf"\s*(?P<that>that|it|this)\b(?! (?:is|was|has|{_ACTS})\b)"
+    rf"|\s*(?:the |its )?(?P<ordinal>{ORDINAL}|last|final)\b"
     rf"|\s*(?:(?:the )?{_NOUN} )?(?:number )?(?P<number>{NUMBER})\b"
 )
 _STEP = re.compile(

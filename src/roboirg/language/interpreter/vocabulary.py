@@ -9,7 +9,8 @@ from __future__ import annotations
 from roboirg.language.interpreter.tokens import color_of, number_of, ordinal_of, word_set
 
 TAKING = word_set(
-    "take pick grab grasp lift raise carry move bring fetch get uncover reveal remove hold swing transfer"
+    "take pick grab grasp lift raise carry move bring fetch get uncover reveal remove hold swing "
+    "transfer"
 )
 PUTTING = word_set("put place set lower return drop lay throw toss deposit insert")
 PRESSING = word_set("press push hit tap stop halt make let repeat wait")
@@ -18,8 +19,9 @@ VERBS = TAKING | PUTTING | PRESSING
 GERUNDS = word_set(
     "taking picking grabbing grasping lifting raising carrying moving bringing fetching getting "
     "uncovering removing holding swinging putting placing setting lowering returning dropping "
-    "laying throwing tossing pressing pushing hitting tapping stopping halting touching using repeating "
-    "waiting watching seeing swapping hiding covering containing passing reaching arriving"
+    "laying throwing tossing pressing pushing hitting tapping stopping halting touching using "
+    "repeating waiting watching seeing swapping hiding covering containing passing reaching "
+    "arriving doing performing finishing completing"
 )
 THING_NOUNS = word_set(
     "cube cubes box boxes tape tapes container containers target targets disc discs button buttons "

@@ -42,13 +42,19 @@ def series_noun(request: InstructionRequest, goal_value: GoalValue) -> str:
 
 def wrapped(request: InstructionRequest, goal_value: GoalValue, which: Phrase) -> Fields:
     """Return the command's field, given the words for the visit or placement."""
-    words = fill(WRAPPED[goal_value.slot_type], {"which": which})
+    words = fill(_wrapping(request, goal_value), {"which": which})
     outside = request.outside_phrase(goal_value.field)
     if outside is not None:
-        if outside.core.split()[-1] in OUTSIDE_NOUNS:
-            words = which
         words = (*plain(outside.before), *words, *plain(outside.after))
     return {goal_value.field: words}
+
+
+def _wrapping(request: InstructionRequest, goal_value: GoalValue) -> str:
+    """Return the words around an element; none if words from outside name just the element."""
+    outside = request.outside_phrase(goal_value.field)
+    if outside is not None and outside.core.split()[-1] in OUTSIDE_NOUNS:
+        return "{which}"
+    return WRAPPED[goal_value.slot_type]
 
 
 def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
@@ -62,7 +68,14 @@ def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) ->
     """Return ``that visit``."""
     (goal_value,) = goal_values
     words = f"that {series_noun(request, goal_value)}"
-    return wrapped(request, goal_value, anaphor(words, "that", goal_value.slot, goal_value.value))
+    slot, value = goal_value.slot, goal_value.value
+    outside = request.outside_phrase(goal_value.field)
+    if outside is None:
+        return wrapped(request, goal_value, anaphor(words, "that", slot, value))
+    # All of it takes the place of "the second target".
+    words = _wrapping(request, goal_value).format(which=words)
+    pointing = anaphor(words, "that", slot, value)
+    return {goal_value.field: (*plain(outside.before), *pointing, *plain(outside.after))}
 
 
 def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:

@@ -57,7 +57,7 @@ _Division = list[tuple[dict[str, SlotValue], dict[Goal, str]]]
 
 
 def _divisions(group: Sentences) -> Iterator[_Division]:
-    """Yield ways to tell goals apart, those with few conditions first; the last one always works."""
+    """Yield ways to tell goals apart, few conditions first; the last one always works."""
     slots = list(next(iter(group)).as_mapping())
     yield _divided(group, lambda _goal: {})
     yield _divided(group, lambda goal: {"repeats": 1} if _once(goal) else {})
@@ -143,7 +143,7 @@ def _overlapping(spans: Sequence[tuple[int, int]]) -> bool:
 def _tables(
     sentences: Sentences, literals: Sequence[str], names: Sequence[str]
 ) -> dict[str, dict[str, str]] | None:
-    """Return the words for each value; None if a sentence does not fit, or names one in two ways."""
+    """Return the words for each value; None if a sentence does not fit or contradicts others."""
     pattern = re.compile("(.+?)".join(map(re.escape, literals)))
     tables: dict[str, dict[str, str]] = {name: {} for name in names}
     for goal, sentence in sentences.items():
