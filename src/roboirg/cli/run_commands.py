@@ -35,7 +35,9 @@ Policies = Annotated[
 ]
 PlanName = Annotated[
     str | None,
-    typer.Option("--plan", help="YAML file, or paper, paper-context, paper-planners or quick."),
+    typer.Option(
+        "--plan", help="YAML file, or paper, paper-context, paper-planners, robomme or quick."
+    ),
 ]
 Out = Annotated[str, typer.Option(help="Output folder; give the same folder again to resume.")]
 Folder = Annotated[str, typer.Argument(help="Output folder of a run.")]
@@ -58,6 +60,7 @@ def run(
     distractor: options.Distractor = None,
     distractors: options.Distractors = None,
     frame: options.Frame = None,
+    wordings: options.Wordings = None,
     max_steps: options.MaxSteps = None,
     actions: options.Actions = None,
     demonstration_frames: options.DemonstrationFrames = None,
@@ -89,6 +92,7 @@ def run(
         distractor=distractor,
         distractors=distractors,
         frame=frame,
+        wordings=wordings,
         max_steps=max_steps,
         actions=actions,
         demonstration_frames=demonstration_frames,

@@ -20,7 +20,7 @@ def open_wordings(path: str | Path | None, identity: str | None = None) -> str |
     """Open a wording file for this process, and return its identity; None for no file.
 
     Args:
-        path: the file; None for our own words.
+        path: the file, or the identity of wordings that are open; None for our own words.
         identity: the wordings that are wanted; None for those of the file.
 
     Raises:
@@ -28,6 +28,8 @@ def open_wordings(path: str | Path | None, identity: str | None = None) -> str |
     """
     if identity in _OPEN:
         return identity
+    if str(path) in _OPEN:
+        return str(path)
     if path is None:
         if identity is not None:
             raise InvalidValueError(f"The wordings {identity} need their file; none was given.")
