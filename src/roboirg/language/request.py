@@ -147,12 +147,20 @@ class InstructionRequest:
     def by_color(self, color: GoalValue, cube: Phrase) -> Phrase:
         """Return words for the object to handle, given words for its cube."""
         outside = self.outside_phrase(color.field)
-        if outside is not None and outside.before:
+        if outside is not None and self.task.commands.thing not in outside.core:
             return (*plain(outside.before), *cube, *plain(outside.after))
         return fill(self.task.commands.by_color, {"cube": cube})
 
-    def by_place(self, place: Phrase, *, plural: bool = False) -> Phrase:
-        """Return words for the object to handle, given words for its place."""
+    def by_place(self, color: GoalValue, place: Phrase, *, plural: bool = False) -> Phrase:
+        """Return words for the object to handle, given words for its place.
+
+        Raises:
+            NoCommandError: the words from outside have no phrase for the object, only for its cube.
+        """
+        outside, commands = self.outside_phrase(color.field), self.task.commands
+        covered = commands.thing != commands.colored
+        if covered and outside is not None and commands.thing not in outside.text:
+            raise NoCommandError
         return fill(self.task.commands.by_place, {"place": place}, plural=plural)
 
     def targets(self, color: GoalValue) -> tuple[SceneObject, ...]:

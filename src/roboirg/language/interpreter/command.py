@@ -11,7 +11,9 @@ from roboirg.language.interpreter.quantities import CountExpression, Quantity, q
 from roboirg.language.interpreter.tokens import Sentence, colors_in, word_set
 from roboirg.language.interpreter.vocabulary import PUTTING, TAKING, VERBS
 
-BEFORE_VERB = word_set(", ; : and then to finally now after that next afterwards but first")
+BEFORE_VERB = word_set(
+    ", ; : and then to finally now after that next afterwards but first repeatedly"
+)
 _REQUESTS = frozenset(
     pair
     for modal in ("can", "could", "will", "would", "must", "should")
@@ -84,7 +86,7 @@ def is_command(words: Sentence) -> bool:
 def read_command(words: Sentence) -> Command:
     """Read the words of all commanding sentences as one command."""
     clauses = _clauses(words)
-    taken = [clause for clause in clauses if clause[0] in TAKING]
+    taken = [clause for clause in clauses if clause[0] in TAKING and not _shares(clause)]
     put = [clause for clause in clauses if clause[0] in PUTTING]
     return Command(
         " ".join(words),
@@ -118,6 +120,11 @@ def _continues(clause: Sentence) -> bool:
     """Return whether a clause goes on with the thing in the hand: ``carry it over``."""
     objects = [word for word in clause[1:3] if word not in _PARTICLES]
     return not objects or objects[0] in _BARE_PRONOUNS
+
+
+def _shares(clause: Sentence) -> bool:
+    """Return whether a verb has its object after the next verb: ``pick and place the cube``."""
+    return len(clause) > 1 and clause[-1] == "and" and set(clause[1:-1]) <= _PARTICLES
 
 
 def _clauses(words: Sentence) -> list[Sentence]:

@@ -34,7 +34,7 @@ _NEIGHBOR = re.compile(r"\b(?:neighbor\w* (?:of|to)|adjacent to|next to)\b")
 _PENULTIMATE = re.compile(
     rf"\b(?P<rank>{ORDINAL}|next) (?:to|from) (?:the )?last\b|\bpenultimate\b"
 )
-_BARE = re.compile(rf"\b(?:its|the) (?P<ordinal>{ORDINAL}|last)\b")
+_BARE = re.compile(rf"\b(?:its|the|placed) (?P<ordinal>{ORDINAL}|last)\b")
 _POINTER = re.compile(rf"\b(?:that|this|the same) (?:very )?(?:one|number|{_NOUN})\b")
 _LATER = ("after", "following", "later than", "behind", "next")
 

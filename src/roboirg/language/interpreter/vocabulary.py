@@ -10,9 +10,9 @@ from roboirg.language.interpreter.tokens import color_of, number_of, ordinal_of,
 
 TAKING = word_set(
     "take pick grab grasp lift raise carry move bring fetch get uncover reveal remove hold swing "
-    "transfer"
+    "transfer find locate"
 )
-PUTTING = word_set("put place set lower return drop lay throw toss deposit insert")
+PUTTING = word_set("put place set lower return drop lay throw toss deposit insert fill")
 PRESSING = word_set("press push hit tap stop halt make let repeat wait")
 VERBS = TAKING | PUTTING | PRESSING
 
@@ -50,8 +50,8 @@ PREPOSITIONS = word_set(
 _NOUNS = word_set(
     "table robot video camera picture beginning start outset end pair couple color colors amount "
     "place places spot position location press presses swaps swap order way hand mind "
-    "neighbor neighbors action actions motion motions movement task steps sequence demonstration "
-    "side top middle total object objects cycle cycles"
+    "neighbor neighbors action actions motion motions movement task process steps sequence "
+    "demonstration side top middle total object objects cycle cycles"
 )
 _PRONOUNS = word_set(
     "it them they you yourself i me us we what when where which who whichever there here then "

@@ -20,6 +20,7 @@ _COLOR = rf"(?:{'|'.join(ALL_COLORS)})"
 _CUBE = r"(?:cube|block)"
 _COUNT = rf"(?:{'|'.join(CARDINALS)}|[0-9]+|an?|the)"
 _PLACE = r"(?:target|disc|plate|pad|goal|place|spot|location|position)"
+_COVER = r"(?:container|cube|block|bin|cup|bowl|box|one)"
 _CLAUSE = r"[^,;]*?(?=[,;.]| and | then |$)"
 
 
@@ -49,7 +50,7 @@ _CUBES = _Context(
 _CONTEXTS: Mapping[str, _Context] = {
     "cube": _CUBES,
     "container": _CUBES._replace(
-        before=rf"\b(?:the|an?) (?:\w+ )?(?:container|{_CUBE}|bin|cup|bowl|box)s? (?:\w+ ){{0,5}}$",
+        before=rf"\b(?:the|an?|another) (?:\w+ )?{_COVER} (?:(?!and |then )\w+ ){{0,5}}$",
         after=rf" (?:is|was|are|were|lies|inside|under|beneath|underneath|below)\b{_CLAUSE}",
     ),
     "repeats": _Context("$", r" times?\b", r".*\b(?:times?|once|twice|thrice)"),
