@@ -38,14 +38,13 @@ def swing_x_times(self):
 
 def stop_cube(self):
     visit = ORDINALS[self.env.unwrapped.stop_time]
-    return f"Use the button to stop the moving cube exactly as it reaches the target for the {visit} time"
+    return f"Use the button to stop the cube exactly as it reaches the target for the {visit} time"
 
 
 def picks(self, count):
     first, second, _ = self.env.unwrapped.color_names
-    if count == 1:
-        return f"Lift the container hiding the {first} cube"
-    return f"Lift the container hiding the {first} cube and then the container hiding the {second} cube"
+    lift = f"Lift the container hiding the {first} cube"
+    return lift if count == 1 else f"{lift} and then the container hiding the {second} cube"
 
 
 def video_repick(self):

@@ -18,6 +18,8 @@ from roboirg.language.wordings.worded_command import goal_fields
 
 Sentences = Mapping[Goal, str]
 _TOKEN = re.compile(r"\w+|\s+|[^\w\s]")
+LONGEST = 5
+"""Most words that name a value; longer ones are another sentence."""
 _BASES = 12
 """Goals from which to look for the words of each field."""
 
@@ -152,6 +154,8 @@ def _tables(
             return None
         values = goal_fields(goal)
         for name, words in zip(names, found.groups(), strict=True):
-            if words != words.strip() or tables[name].setdefault(values[name], words) != words:
+            if words != words.strip() or len(words.split()) > LONGEST:
+                return None
+            if tables[name].setdefault(values[name], words) != words:
                 return None
     return tables
