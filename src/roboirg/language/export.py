@@ -57,7 +57,8 @@ def row(episode: Episode, instruction: Instruction) -> ExportRow:
         "distractor": metadata["distractor"],
         "distractors": metadata["distractors"],
         "templates": metadata["templates"],
-        "wordings": metadata["wordings"],
+        # Never null: readers infer the types of columns.
+        "wordings": metadata["wordings"] or "own",
         "command_template": metadata["command"],
         "language_version": metadata["language_version"],
     }
