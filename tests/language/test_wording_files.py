@@ -13,9 +13,10 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import instruct, instruct_with, interpret
 from roboirg.language.export import row
+from roboirg.language.validation.episode_checks import check_episode
 from roboirg.language.wordings.worded_command import StatedPhrase, TaskWordings, WordedCommand
 from roboirg.language.wordings.wording_file import parse_wordings, read_wordings
-from roboirg.language.wordings.wording_store import find_wordings, open_wordings
+from roboirg.language.wordings.wording_store import find_wordings, open_wordings, register_wordings
 from roboirg.language.wordings.wording_writer import wording_text
 
 HAND = """\
@@ -81,6 +82,15 @@ def test_a_file_by_hand(tmp_path):
     assert interpret(direct.text, once.scene, "PickXtimes").goals == (once.goal,)
     hidden = instruct(episode_with("VideoUnmask", colors=("red",)), "direct", wordings=identity)
     assert hidden.command == "lift the container with it"
+
+
+def test_the_example_in_the_docs_is_read_and_valid():
+    page = (Path(__file__).parents[2] / "docs" / "language.md").read_text()
+    (example,) = re.findall(r'```toml\n(name = "workshop".*?)```', page, re.DOTALL)
+    identity = register_wordings(parse_wordings(example, "example"))
+    for task in ("PickXtimes", "VideoUnmask"):
+        for episode in train_episodes(task, 0, 12):
+            assert not check_episode(episode, wordings=identity).failures
 
 
 def test_metadata_and_export_name_the_wording_and_the_command(tmp_path):

@@ -24,7 +24,7 @@ _INTO = word_set("into inside in")
 _BARE_PRONOUNS = word_set("it them that")
 _PARTICLES = word_set("up down back")
 _SINGULAR = word_set("it cube one")
-_JOINTS = word_set(", ; and then")
+_JOINTS = word_set(", ; and then finally afterwards next")
 _JOINED = word_set("container box one")
 _ADVERBS = word_set("once twice thrice")
 
@@ -145,7 +145,8 @@ def _parts(words: Sentence) -> Iterator[Sentence]:
     """Yield the parts of ``the container at the left, and then the one at the right``."""
     start = 0
     for at in range(1, len(words) - 1):
-        if words[at - 1] in _JOINTS and words[at] == "the" and words[at + 1] in _JOINED:
+        joined = words[at - 1] in _JOINTS or words[max(0, at - 2) : at] == ("after", "that")
+        if joined and words[at] == "the" and words[at + 1] in _JOINED:
             yield words[start:at]
             start = at
     yield words[start:]
