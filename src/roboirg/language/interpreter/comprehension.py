@@ -40,6 +40,8 @@ _AFTER_VERB = re.compile(rf"{OBJECT}|[,;:]|up\b|down\b|$")
 _BEFORE_UNKNOWN_VERB = BEFORE_VERB | {"you"}
 _COMPARISON = re.compile(r"\b(?P<word>more|fewer|less)\b(?: than \w+)?")
 _FIXED_GOALS = word_set("target targets disc discs")
+_BELOW = word_set("under below beneath underneath")
+_AFTER_BELOW = ((), (",",), (";",), ("and",), ("then",), ("which",))
 _LOCATING = PREPOSITIONS | PLACE_WORDS
 
 
@@ -156,6 +158,8 @@ def _locates(words: Sentence, at: int) -> bool:
         return following == ("of",)
     if words[at] == "between" and not _FIXED_GOALS.isdisjoint(words[at + 1 : at + 6]):
         return False  # the way of a cube
+    if words[at] in _BELOW and following in _AFTER_BELOW:
+        return False  # the container that the red cube is hidden under
     if words[at] == "next":
         return following == ("to",)
     return words[at] in PLACE_WORDS

@@ -18,6 +18,7 @@ _SPELLINGS = (
     ("can't", "can not"),
     ("won't", "will not"),
     ("n't", " not"),
+    ("(s)", "s"),
     ("colour", "color"),
     ("neighbour", "neighbor"),
     ("grey", "gray"),

@@ -53,7 +53,7 @@ _CONTEXTS: Mapping[str, _Context] = {
         before=rf"\b(?:the|an?|another) (?:\w+ )?{_COVER} (?:(?!and |then )\w+ ){{0,5}}$",
         after=rf" (?:is|was|are|were|lies|inside|under|beneath|underneath|below)\b{_CLAUSE}",
     ),
-    "repeats": _Context("$", r" times?\b", r"[\w-]+ times?|once|twice|thrice"),
+    "repeats": _Context("$", r" times?\b(?:\(s\))?", r"[\w-]+ times?(?:\(s\))?|once|twice|thrice"),
     "series": _Context(
         left=r"\b(?:the|its) $",
         right=rf" (?:time|visit|placement|pass|occasion|(?:\w+ )?{_PLACE})\b",
