@@ -25,6 +25,39 @@ def call(*words: str | Path) -> str:
     return result.output
 
 
+WORDINGS = """\
+name = "test"
+[StopCube.phrases]
+visit = { 2 = "the second time", 3 = "the third time", 4 = "the 4th time", 5 = "the 5th time" }
+[[StopCube.commands]]
+text = "press the button to stop the cube when it reaches the target for {visit}"
+"""
+
+
+def test_instructions_in_words_from_outside(tmp_path: Path):
+    file, out = tmp_path / "test.toml", tmp_path / "rows.jsonl"
+    file.write_text(WORDINGS)
+    said = call("instruct", "StopCube", "0", "--wordings", file)
+    assert said.count("press the button to stop the cube when it reaches the target for") == 4
+    call("export", "instructions", "--out", out, "--wordings", file, "--forms", "implicit")
+    rows = [json.loads(line) for line in out.read_text().splitlines()]
+    assert {row["task"] for row in rows} == {"StopCube"}  # all of the file
+    assert {row["wordings"].partition("@")[0] for row in rows} == {"test"}
+    (template,) = {row["command_template"] for row in rows}
+    assert template == WORDINGS.splitlines()[-1].partition('"')[2][:-1]
+    checked = ("--split", "val", "--seeds", "4", "--wordings", file, "--workers", "0")
+    assert "StopCube" in call("language", "validate", *checked)
+    with pytest.raises(InvalidValueError, match="have no commands of BinFill"):
+        call("instruct", "BinFill", "0", "--wordings", file)
+
+
+def test_validation_finds_what_words_from_outside_break(tmp_path: Path):
+    file = tmp_path / "test.toml"
+    file.write_text(WORDINGS.replace('"the 4th time"', '"the third time"'))
+    with pytest.raises(RoboIRGError, match="broken rule"):
+        call("language", "validate", "--split", "val", "--seeds", "0", "--wordings", file)
+
+
 def test_all_test_episodes_are_exported_without_a_simulator(tmp_path: Path):
     out = tmp_path / "instructions.jsonl"
     program = (

@@ -18,7 +18,13 @@ def write(folder: Path, text: str) -> str:
     return str(path)
 
 
-@pytest.mark.parametrize("name", named_plans())
+def test_robommes_plan_needs_its_words() -> None:
+    options = read_plan_file("robomme")
+    with pytest.raises(InvalidValueError, match=r"import-robomme PATH --out .* --wordings"):
+        make_plan(["random"], **options)
+
+
+@pytest.mark.parametrize("name", sorted({*named_plans()} - {"robomme"}))
 def test_every_named_plan_can_be_played(name: str) -> None:
     plan = make_plan(["random"], **read_plan_file(name))
     assert plan.jobs()

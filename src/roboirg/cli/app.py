@@ -18,9 +18,10 @@ from roboirg.cli import (
     policy_commands,
     report_commands,
     run_commands,
+    wording_commands,
 )
 from roboirg.cli.bench_commands import bench
-from roboirg.cli.options import Distractor, Frame, Split, Stages, Tasks, Video, Workers
+from roboirg.cli.options import Distractor, Frame, Split, Stages, Tasks, Video, Wordings, Workers
 from roboirg.cli.real_commands import real_app
 from roboirg.cli.run_commands import INTERRUPTED, USAGE_ERROR, Out
 from roboirg.core.errors import InvalidValueError, RoboIRGError
@@ -50,6 +51,7 @@ app = typer.Typer(
 app.add_typer(language_commands.language_app, name="language")
 app.add_typer(language_commands.export_app, name="export")
 app.add_typer(real_app, name="real")
+app.add_typer(wording_commands.wordings_app, name="wordings")
 app.command()(bench)
 
 
@@ -206,19 +208,27 @@ def instruct(
     stages: Stages = "1-5",
     distractor: Distractor = "neutral",
     frame: Frame = "robot",
+    wordings: Wordings = None,
 ) -> None:
     """Print the instructions of an episode."""
     from roboirg.episodes.splits import get_episode
     from roboirg.evaluation.plan_parsing import means_all, parse_stages
     from roboirg.language import instruct as make_instruction
     from roboirg.language import settings_of
+    from roboirg.language.wordings.wording_store import open_wordings
     from roboirg.tasks import get_task
 
-    spoken = parse_stages(stages)
+    spoken, identity = parse_stages(stages), open_wordings(wordings)
     found = get_episode(task, split, episode)
     for name in settings_of(get_task(task)) if means_all(setting) else (setting,):
         instruction = make_instruction(
-            found, name, form, stages=spoken, distractor=distractor, frame=frame
+            found,
+            name,
+            form,
+            stages=spoken,
+            distractor=distractor,
+            frame=frame,
+            wordings=identity,
         )
         typer.echo(typer.style(f"{name}:", bold=True))
         for utterance in instruction.utterances:

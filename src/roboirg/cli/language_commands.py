@@ -16,6 +16,7 @@ from roboirg.cli.options import (
     Settings,
     Stages,
     Tasks,
+    Wordings,
     Workers,
 )
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
@@ -58,6 +59,7 @@ def export_instructions(
     stages: Stages = "1-5",
     distractor: Distractor = "neutral",
     frame: Frame = "robot",
+    wordings: Wordings = None,
 ) -> None:
     """Export a row per episode, setting and form (columns: see docs/language.md)."""
     from roboirg.core.instruction_options import InstructionOptions
@@ -66,19 +68,23 @@ def export_instructions(
     from roboirg.language import FORMS
     from roboirg.language.export import EXPORT_FORMATS, check_export_support, row, write_rows
     from roboirg.language.variants import instructions
+    from roboirg.language.wordings.wording_store import open_wordings
 
     kind = _known("format", format, EXPORT_FORMATS)
     check_export_support(kind)
     if out.is_dir() or not out.parent.is_dir():
         raise InvalidValueError(f"{str(out)!r} is not a file in an existing folder.")
-    names, chosen = _tasks(tasks), _settings(settings)
+    identity = open_wordings(wordings)
+    names, chosen = _tasks(tasks, identity), _settings(settings)
     spoken = [_known("form", one, FORMS) for one in parse_names("form", forms)]
     episodes = list(split_episodes(names, parse_splits(split)))
     said = instructions(
         episodes,
         chosen,
         spoken,
-        InstructionOptions(stages=parse_stages(stages), distractor=distractor, frame=frame),
+        InstructionOptions(
+            stages=parse_stages(stages), distractor=distractor, frame=frame, wordings=identity
+        ),
     )
     rows = [row(episode, instruction) for episode, instruction in said]
     if not rows:
@@ -127,6 +133,7 @@ def validate_instructions(
     ] = 100,
     tasks: Tasks = "all",
     split: Annotated[str, typer.Option(help="train, val, test, all or none.")] = "all",
+    wordings: Wordings = None,
     workers: Workers = None,
 ) -> None:
     """Read all instructions back and check their rules; exit code 2 if one is broken."""
@@ -134,9 +141,11 @@ def validate_instructions(
     from roboirg.evaluation.plan_parsing import parse_splits
     from roboirg.language.validation import ValidationResults, batches, validate
     from roboirg.language.validation.validation_tables import validation_tables
+    from roboirg.language.wordings.wording_store import open_wordings
 
-    names = _tasks(tasks)
-    work = batches(names, () if split.strip().lower() == "none" else parse_splits(split), seeds)
+    names = _tasks(tasks, open_wordings(wordings))
+    wanted = () if split.strip().lower() == "none" else parse_splits(split)
+    work = batches(names, wanted, seeds, wordings)
     count = core_count() if workers is None else workers
     found = ValidationResults()
     for results in _with_progress(validate(work, count), work):
@@ -193,11 +202,16 @@ def _console() -> Console:
     return console
 
 
-def _tasks(text: str) -> tuple[str, ...]:
-    from roboirg.evaluation.plan_parsing import parse_names
+def _tasks(text: str, wordings: str | None = None) -> tuple[str, ...]:
+    """Return the tasks that were typed; of all, those that open wordings have commands of."""
+    from roboirg.evaluation.plan_parsing import means_all, parse_names
+    from roboirg.language.wordings.wording_store import find_wordings
     from roboirg.tasks import find_tasks
 
-    return find_tasks(parse_names("task", text))
+    names = find_tasks(parse_names("task", text))
+    if wordings is None or not means_all(text):
+        return names
+    return tuple(name for name in names if name in find_wordings(wordings).tasks)
 
 
 def _settings(text: str) -> tuple[str, ...]:

@@ -18,6 +18,9 @@ AnySplit = Annotated[str, typer.Option(help="train, val, test or all.")]
 Stages = Annotated[str, typer.Option(help="Stages of the contextual setting, such as 1,5.")]
 Distractor = Annotated[str, typer.Option(help="Kind of distractor in the contextual setting.")]
 Frame = Annotated[str, typer.Option(help="Frame of reference in the spatial setting.")]
+Wordings = Annotated[
+    str | None, typer.Option(help="Wording file whose commands are used instead of our own.")
+]
 Workers = Annotated[
     int | None,
     typer.Option(help="Worker processes, one per core by default; 0 uses this process only."),

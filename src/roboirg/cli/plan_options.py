@@ -45,6 +45,10 @@ Frame = Annotated[
     str | None,
     typer.Option(help="Frame of reference of the spatial setting: robot or camera.  (robot)"),
 ]
+Wordings = Annotated[
+    str | None,
+    typer.Option(help="Wording file: use its commands (docs/language.md).  (our own words)"),
+]
 MaxSteps = Annotated[
     int | None, typer.Option(help="Limit in control steps, 20 per second.  (1300)")
 ]

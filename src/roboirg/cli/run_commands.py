@@ -36,7 +36,8 @@ Policies = Annotated[
 PlanName = Annotated[
     str | None,
     typer.Option(
-        "--plan", help="YAML file, or challenge, paper, paper-context, paper-planners or quick."
+        "--plan",
+        help="YAML file, or challenge, paper, paper-context, paper-planners, robomme or quick.",
     ),
 ]
 Out = Annotated[str, typer.Option(help="Output folder; give the same folder again to resume.")]
@@ -60,6 +61,7 @@ def run(
     distractor: options.Distractor = None,
     distractors: options.Distractors = None,
     frame: options.Frame = None,
+    wordings: options.Wordings = None,
     max_steps: options.MaxSteps = None,
     actions: options.Actions = None,
     demonstration_frames: options.DemonstrationFrames = None,
@@ -91,6 +93,7 @@ def run(
         distractor=distractor,
         distractors=distractors,
         frame=frame,
+        wordings=wordings,
         max_steps=max_steps,
         actions=actions,
         demonstration_frames=demonstration_frames,

@@ -22,6 +22,8 @@ class InstructionOptions(NamedTuple):
         distractor: of the contextual setting: ``neutral`` or ``competing``.
         distractors: of the contextual setting: their number.
         frame: of the spatial setting: the frame of left and right, ``robot`` or ``camera``.
+        wordings: identity of the wording file whose commands are used, such as
+            ``robomme@1a2b3c4d``; None for our own. The process must have opened that file.
     """
 
     setting: str = "explicit"
@@ -30,3 +32,4 @@ class InstructionOptions(NamedTuple):
     distractor: str = DEFAULT_DISTRACTOR
     distractors: int = DEFAULT_DISTRACTORS
     frame: str = DEFAULT_FRAME
+    wordings: str | None = None

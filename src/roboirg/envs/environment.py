@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -18,7 +19,8 @@ from roboirg.core.observations import CAMERAS, DemonstrationFrames
 from roboirg.episodes.recordings import recorded_actions
 from roboirg.episodes.splits import get_episode
 from roboirg.judging import Event, Status, plain_subgoal
-from roboirg.language import instruct
+from roboirg.language import instruct_with
+from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.simulation.controllers import make_controller
 from roboirg.simulation.demonstration.demonstration_cache import replay_or_plan
 from roboirg.simulation.demonstration.demonstration_video import make_video
@@ -98,6 +100,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         distractor: str = "neutral",
         distractors: int = 1,
         frame: str = "robot",
+        wordings: str | Path | None = None,
         actions: str = JOINT_ANGLE.name,
         cameras: Sequence[str] = CAMERAS,
         depth: bool = False,
@@ -111,8 +114,16 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         render_mode: str | None = None,
     ) -> None:
         self.episode = task if isinstance(task, Episode) else get_episode(task, split, episode)
-        options = InstructionOptions(setting, form, tuple(stages), distractor, distractors, frame)
-        self.instruction = instruct(self.episode, **options._asdict())
+        options = InstructionOptions(
+            setting,
+            form,
+            tuple(stages),
+            distractor,
+            distractors,
+            frame,
+            open_wordings(wordings),
+        )
+        self.instruction = instruct_with(self.episode, options)
         self._space = find_action_space(actions)
         self.actions = self._space.name
         self._spec = ObservationSpec(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict, Unpack
 
 from roboirg.core.errors import MissingDependencyError
@@ -25,6 +26,7 @@ class EnvOptions(TypedDict, total=False):
     distractor: str
     distractors: int
     frame: str
+    wordings: str | Path | None
     actions: str
     cameras: Sequence[str]
     depth: bool
@@ -55,6 +57,7 @@ def make(task: str | Episode, **options: Unpack[EnvOptions]) -> RoboIRGEnv:
         distractor: neutral or competing, for contextual instructions.
         distractors: number of distractors in a contextual instruction.
         frame: whose left and right a spatial instruction uses: robot or camera.
+        wordings: wording file whose commands are used, or its identity; None for our own words.
         actions: joint_angle, ee_pose or waypoint.
         cameras: cameras whose pictures observations hold; () renders nothing.
         depth: add depth for the same cameras.
@@ -71,7 +74,8 @@ def make(task: str | Episode, **options: Unpack[EnvOptions]) -> RoboIRGEnv:
     Raises:
         MissingDependencyError: the simulator is not installed.
         UnknownNameError: a task, setting, split, form, action space or camera does not exist.
-        InvalidValueError: the split has no such episode, or the combination is not defined.
+        InvalidValueError: the split has no such episode, or the combination is not defined; or
+            the wording file cannot be read or lacks a command for the episode.
     """
     try:
         from roboirg.envs.environment import RoboIRGEnv

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from roboirg import language, policies, tasks
 from roboirg.core.actions import find_action_space
@@ -36,11 +36,15 @@ from roboirg.evaluation.plan_parsing import (
 )
 from roboirg.language.instruction import FORMS, Instruction
 from roboirg.language.settings import all_settings
+from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, ERROR_KINDS, ErrorKind, Job
 from roboirg.util.atomic_write import write_atomically
 from roboirg.util.short_hash import short_hash
 
 PLAN_FILE = "plan.json"
+
+REQUIRED = "required"
+"""Instead of a wording file in a plan: one must be given when the plan is run."""
 
 VideoMode = Literal["off", "failures", "all"]
 VIDEO_MODES: tuple[VideoMode, ...] = get_args(VideoMode)
@@ -67,6 +71,8 @@ class Plan(BaseModel):
         distractor: kind of distractor, for settings that read it.
         distractors: number of distractors, for settings that read it.
         frame: frame of reference, for settings that read it.
+        wordings: path of the wording file whose commands are used; None for our own.
+        wordings_identity: name and fingerprint of that file; read from it if it is not given.
         max_steps: the policy's limit, control steps.
         actions: required action space; None for each policy's own.
         demonstration_frames: which frames of the video policies get; None for each policy's choice.
@@ -93,6 +99,8 @@ class Plan(BaseModel):
     distractor: str = DEFAULT_DISTRACTOR
     distractors: int = DEFAULT_DISTRACTORS
     frame: str = DEFAULT_FRAME
+    wordings: str | None = None
+    wordings_identity: str | None = None
     max_steps: int = DEFAULT_MAX_STEPS
     actions: str | None = None
     demonstration_frames: DemonstrationFrames | None = None
@@ -103,6 +111,16 @@ class Plan(BaseModel):
     episode_timeout_s: float = 7200.0
     tries: int = 2
     retry_on: tuple[ErrorKind, ...] = RETRYABLE
+
+    @model_validator(mode="before")
+    @classmethod
+    def _identify_wordings(cls, fields: Any) -> Any:  # noqa: ANN401 - whatever is to be validated
+        if not isinstance(fields, dict) or fields.get("wordings") is None:
+            return fields
+        if fields.get("wordings_identity") is not None:
+            return fields
+        path = Path(str(fields["wordings"])).resolve()
+        return {**fields, "wordings": str(path), "wordings_identity": open_wordings(path)}
 
     @property
     def specs(self) -> dict[str, str]:
@@ -170,7 +188,8 @@ class Plan(BaseModel):
                     task=task,
                     split=self.split,
                     episode=episode,
-                    **options._asdict(),
+                    **options._replace(wordings=self.wordings_identity)._asdict(),
+                    wordings_file=self.wordings,
                     policy_seed=seeds[0],
                     max_steps=self.max_steps,
                     actions=self.actions,
@@ -202,7 +221,7 @@ class Plan(BaseModel):
     def _instruction_jobs(self) -> Iterator[Job]:
         """Yield one job for each instruction that the language may not be able to express."""
         # All settings with the default frame are only those that can express the episode.
-        usual = self.settings == "all" and self.frame == DEFAULT_FRAME
+        usual = self.settings == "all" and self.frame == DEFAULT_FRAME and self.wordings is None
         for task in self.tasks:
             for episode in self.episodes[:1] if usual else self.episodes:
                 yield from self._jobs_of(("", ""), task, episode, seeds=(0,))
@@ -266,6 +285,12 @@ def make_plan(
         InvalidValueError: a number or combination is out of range.
     """
     video, split = options.get("video", "off"), str(options.get("split", "test"))
+    if options.get("wordings") == REQUIRED:
+        raise InvalidValueError(
+            "This plan needs words from outside: make a wording file with `roboirg wordings "
+            "import-robomme PATH --out robomme.toml`, where PATH is a clone of RoboMME's "
+            "repository, and give it with --wordings robomme.toml."
+        )
     if video not in VIDEO_MODES:
         raise UnknownNameError("video mode", video, VIDEO_MODES)
     try:
@@ -304,10 +329,12 @@ def instruct_job(job: Job) -> Instruction:
     """Return the instruction of a job.
 
     Raises:
-        InvalidValueError: the setting and options cannot express the episode.
+        InvalidValueError: the setting and options cannot express the episode, or the job's
+            wording file is missing or has changed.
     """
     episode = splits.get_episode(job.task, job.split, job.episode)
-    return language.instruct_with(episode, job.options)
+    identity = open_wordings(job.wordings_file, job.wordings)
+    return language.instruct_with(episode, job.options._replace(wordings=identity))
 
 
 def _task_names(text: str) -> tuple[str, ...]:

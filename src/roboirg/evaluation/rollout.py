@@ -36,6 +36,7 @@ from roboirg.evaluation.executors.watchdog import Phase, watched
 from roboirg.evaluation.plan import VideoMode
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.video_writer import VideoOptions, VideoWriter
+from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.policies.base import Policy, PrivilegedPolicy
 from roboirg.policies.requirements import (
     wanted_actions,
@@ -186,7 +187,9 @@ def play_episode(
     Raises:
         RenderDeviceError: no Vulkan device can render.
         MissingDependencyError: a package has to be installed first.
+        InvalidValueError: the job's wording file is missing or has changed.
     """
+    open_wordings(job.wordings_file, job.wordings)
     result = RolloutResult()
     guard = _CallGuard(result, policy_timeout_s)
     policy, env = None, None
@@ -239,7 +242,7 @@ def make_env(job: Job, needs: EnvRequirements) -> RoboIRGEnv:
         job.task,
         split=job.split,
         episode=job.episode,
-        **job.options._asdict(),
+        **job.options._replace(wordings=job.wordings)._asdict(),
         cameras=needs.cameras,
         depth=needs.depth,
         calibration=needs.calibration,

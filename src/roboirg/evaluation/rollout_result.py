@@ -19,6 +19,7 @@ from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.code_fingerprint import code_fingerprint
 from roboirg.evaluation.plan import instruct_job
 from roboirg.judging import Event, attribute_failure
+from roboirg.language.settings import EXPLICIT
 from roboirg.policies.loading import is_privileged, policy_version
 from roboirg.records.record import (
     Attribution,
@@ -135,7 +136,7 @@ def make_record(
     episode = get_episode(job.task, job.split, job.episode)
     # An episode that failed before its reset has a record with the words it would have had.
     instruction = result.instruction or instruct_job(job)
-    explicit = language.instruct(episode)
+    explicit = instruct_job(job.model_copy(update={"setting": EXPLICIT}))
     return Record(
         **dict(job),
         seed=episode.seed,

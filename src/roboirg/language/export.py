@@ -57,6 +57,9 @@ def row(episode: Episode, instruction: Instruction) -> ExportRow:
         "distractor": metadata["distractor"],
         "distractors": metadata["distractors"],
         "templates": metadata["templates"],
+        # Never null: readers infer the types of columns.
+        "wordings": metadata["wordings"] or "own",
+        "command_template": metadata["command"],
         "language_version": metadata["language_version"],
     }
 

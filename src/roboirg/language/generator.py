@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, UnknownNameError
@@ -16,10 +18,18 @@ from roboirg.core.instruction_options import (
 from roboirg.language.instruction import FORMS, Instruction, Mention, Utterance
 from roboirg.language.landmarks import FRAMES
 from roboirg.language.phrases import speak
-from roboirg.language.request import DISTRACTORS, STAGE_SETS, InstructionRequest, InstructionSpec
+from roboirg.language.request import (
+    DISTRACTORS,
+    STAGE_SETS,
+    InstructionRequest,
+    InstructionSpec,
+    NoCommandError,
+)
 from roboirg.language.settings import get_setting, settings_of
 from roboirg.language.template_sampler import TemplateSampler
 from roboirg.language.templates import LANGUAGE_VERSION
+from roboirg.language.wordings.worded_command import TaskWordings, describe_goal
+from roboirg.language.wordings.wording_store import find_wordings
 from roboirg.tasks import get_task
 
 _DEFAULT_METADATA: dict[str, object] = {
@@ -33,6 +43,8 @@ _DEFAULT_METADATA: dict[str, object] = {
     "landmarks": [],
     "landmark_classes": [],
     "frame": None,
+    "wordings": None,
+    "command": "own",
 }
 """The metadata that apply to some settings only."""
 
@@ -46,6 +58,7 @@ def instruct(
     distractor: str = DEFAULT_DISTRACTOR,
     distractors: int = DEFAULT_DISTRACTORS,
     frame: str = DEFAULT_FRAME,
+    wordings: str | None = None,
 ) -> Instruction:
     """Return the instruction of an episode; the same arguments always give the same bytes.
 
@@ -59,15 +72,17 @@ def instruct(
         distractor: ``neutral`` remarks, or ``competing`` ones that name other values.
         distractors: number of remarks.
         frame: of left and right, ``robot`` or ``camera``.
+        wordings: identity of an open wording file, whose commands are used; None for our own.
 
     Raises:
         UnknownNameError: a name does not exist.
         InvalidValueError: the task lacks the setting, the stages are none of `STAGE_SETS`, the
-            number of distractors is below 1, or the setting cannot express the episode.
+            number of distractors is below 1, the setting cannot express the episode, or the
+            wordings are not open or lack a command for the goal.
     """
     return instruct_with(
         episode,
-        InstructionOptions(setting, form, tuple(stages), distractor, distractors, frame),
+        InstructionOptions(setting, form, tuple(stages), distractor, distractors, frame, wordings),
     )
 
 
@@ -81,7 +96,11 @@ def instruct_with(episode: Episode, options: InstructionOptions) -> Instruction:
             f"The {setting.name} setting cannot express episode {episode.key} "
             f"(seed {episode.seed}): {reason}."
         )
-    return _instruction(request, setting.say(request))
+    if request.wordings is not None and setting.name not in request.wordings.own:
+        with contextlib.suppress(NoCommandError):
+            return _instruction(request, setting.say(request))
+    own = replace(request, wordings=None, sampler=TemplateSampler(request.sampler.key))
+    return _instruction(own, setting.say(own))
 
 
 def find_refusal(episode: Episode, options: InstructionOptions) -> str | None:
@@ -119,7 +138,21 @@ def _request(episode: Episode, options: InstructionOptions) -> InstructionReques
     _check_options(options)
     task = get_task(episode.task)
     sampler = TemplateSampler(f"{LANGUAGE_VERSION}|{task.name}|{episode.seed}")
-    return InstructionRequest(episode, task, options, sampler)
+    wordings = None if options.wordings is None else _outside(episode, options.wordings)
+    return InstructionRequest(episode, task, options, sampler, wordings)
+
+
+def _outside(episode: Episode, identity: str) -> TaskWordings:
+    """Return the commands of an open wording file for an episode's task."""
+    found = find_wordings(identity).tasks.get(episode.task)
+    if found is None:
+        raise InvalidValueError(f"The wordings {identity} have no commands of {episode.task}.")
+    if found.find(episode.goal) is None:
+        raise InvalidValueError(
+            f"The wordings {identity} have no command of {episode.task} for the goal of episode "
+            f"{episode.key}: {describe_goal(episode.goal)}."
+        )
+    return found
 
 
 def _check_options(options: InstructionOptions) -> None:
@@ -139,7 +172,11 @@ def _check_options(options: InstructionOptions) -> None:
 
 
 def _instruction(request: InstructionRequest, spec: InstructionSpec) -> Instruction:
-    utterances, mentions = _spoken(spec)
+    outside = request.wordings is not None
+    utterances, mentions = _spoken(spec, as_written=outside)
+    notes: dict[str, object] = {"wordings": request.options.wordings}
+    if request.wordings is not None:
+        notes["command"] = request.wordings.commands[request.outside_index].text
     return Instruction(
         task=request.task.name,
         episode=request.episode.key,
@@ -150,17 +187,21 @@ def _instruction(request: InstructionRequest, spec: InstructionSpec) -> Instruct
         metadata={
             **_DEFAULT_METADATA,
             **spec.notes,
+            **notes,
             "language_version": LANGUAGE_VERSION,
             "templates": list(request.sampler.log),
         },
     )
 
 
-def _spoken(spec: InstructionSpec) -> tuple[tuple[Utterance, ...], tuple[Mention, ...]]:
+def _spoken(
+    spec: InstructionSpec, *, as_written: bool
+) -> tuple[tuple[Utterance, ...], tuple[Mention, ...]]:
     utterances: list[Utterance] = []
     mentions: list[Mention] = []
     for index, (stage, phrase) in enumerate(spec.utterances):
-        utterance, found = speak(index, stage, phrase)
+        capitalize = stage != "command" or not as_written
+        utterance, found = speak(index, stage, phrase, capitalize=capitalize)
         utterances.append(utterance)
         mentions += found
     return tuple(utterances), tuple(mentions)

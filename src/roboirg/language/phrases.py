@@ -14,6 +14,9 @@ from roboirg.language.instruction import Expression, Mention, Role, Utterance, U
 
 _MARK = re.compile(r"\{(?P<field>[a-z_.0-9]+)\}|\[(?P<one>[^\[\]|]*)\|(?P<many>[^\[\]|]*)\]")
 
+_PARTICLE = re.compile(r"(?<=\b(?:pick|lift|take|hold) )up $|(?<=\b(?:put|set|lay) )down $")
+_PRONOUNS = ("it", "them")
+
 
 class Tag(NamedTuple):
     """The referent of a piece of text; see `Mention`."""
@@ -69,6 +72,18 @@ def fill(template: str, fields: Mapping[str, Phrase], *, plural: bool = False) -
     return tuple(piece for piece in pieces if piece.text)
 
 
+def swap_particles(phrase: Phrase) -> Phrase:
+    """Move a pronoun between a verb and its particle: ``pick up it`` becomes ``pick it up``."""
+    pieces = list(phrase)
+    for at in range(len(pieces) - 1, 0, -1):
+        before, pronoun = pieces[at - 1 : at + 1]
+        found = _PARTICLE.search(before.text)
+        if found and before.tag is None and pronoun.tag and pronoun.text in _PRONOUNS:
+            verb = TaggedText(before.text[: found.start()])
+            pieces[at - 1 : at + 1] = [verb, pronoun, TaggedText(f" {found[0].strip()}")]
+    return tuple(pieces)
+
+
 def listed(phrases: Sequence[Phrase]) -> Phrase:
     """Join phrases into a list: ``a``, ``a and b``, ``a, b and c``."""
     pieces: list[TaggedText] = []
@@ -91,9 +106,16 @@ def sentences(phrases: Iterable[Phrase]) -> Phrase:
 
 
 def speak(
-    index: int, stage: UtteranceStage, phrase: Phrase
+    index: int, stage: UtteranceStage, phrase: Phrase, *, capitalize: bool = True
 ) -> tuple[Utterance, tuple[Mention, ...]]:
-    """Turn a phrase into the utterance of number `index`, and its tags into mentions."""
+    """Turn a phrase into the utterance of number `index`, and its tags into mentions.
+
+    Args:
+        index: position of the utterance.
+        stage: its part in the discourse.
+        phrase: its words.
+        capitalize: whether its sentences begin with a capital.
+    """
     mentions: list[Mention] = []
     start = 0
     for piece in phrase:
@@ -102,7 +124,7 @@ def speak(
             mentions.append(Mention(index, start, end, *piece.tag))
         start = end
     text = "".join(piece.text for piece in phrase)
-    return Utterance(stage, _capitalized(text)), tuple(mentions)
+    return Utterance(stage, _capitalized(text) if capitalize else text), tuple(mentions)
 
 
 def _capitalized(text: str) -> str:

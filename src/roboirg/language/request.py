@@ -12,8 +12,9 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.instruction import UtteranceStage
 from roboirg.language.landmarks import Frame
-from roboirg.language.phrases import Phrase, fill
+from roboirg.language.phrases import Phrase, antecedent, fill, plain, swap_particles
 from roboirg.language.template_sampler import TemplateSampler
+from roboirg.language.wordings.worded_command import StatedPhrase, TaskWordings, goal_fields
 from roboirg.tasks import Task, get_task
 
 Distractor = Literal["neutral", "competing"]
@@ -32,6 +33,18 @@ SLOT_TYPE_NAMES: Mapping[str, SlotTypeName] = {
 }
 """The type of each goal slot; counted colors are amounts, together with their counts."""
 COLOR_SLOTS = ("color", "colors")
+AMOUNT_FIELD = "cubes"
+"""The field of our commands that holds all colors with their counts.
+
+Those of others have ``cubes.0``, ``cubes.1`` and ``cubes.2``.
+"""
+
+_OUTSIDE = "wordings"
+"""Purpose of the commands from outside in the metadata."""
+
+
+class NoCommandError(Exception):
+    """The words from outside have no command that referring expressions can fill this way."""
 
 
 class GoalValue(NamedTuple):
@@ -69,12 +82,14 @@ class InstructionRequest:
         task: its task.
         options: valid ones; see `roboirg.language.instruct`.
         sampler: picks the wordings.
+        wordings: commands from outside; None for our own.
     """
 
     episode: Episode
     task: Task
     options: InstructionOptions
     sampler: TemplateSampler
+    wordings: TaskWordings | None = None
 
     @property
     def resolved(self) -> bool:
@@ -123,12 +138,29 @@ class InstructionRequest:
             )
         return tuple(other for other in colors if other != color)
 
-    def by_color(self, cube: Phrase) -> Phrase:
+    def outside_phrase(self, field: str) -> StatedPhrase | None:
+        """Return the words from outside for a field of the command; None for our own."""
+        if self.wordings is None:
+            return None
+        return self.wordings.phrase(self.episode.goal, field)
+
+    def by_color(self, color: GoalValue, cube: Phrase) -> Phrase:
         """Return words for the object to handle, given words for its cube."""
+        outside = self.outside_phrase(color.field)
+        if outside is not None and self.task.commands.thing not in outside.core:
+            return (*plain(outside.before), *cube, *plain(outside.after))
         return fill(self.task.commands.by_color, {"cube": cube})
 
-    def by_place(self, place: Phrase, *, plural: bool = False) -> Phrase:
-        """Return words for the object to handle, given words for its place."""
+    def by_place(self, color: GoalValue, place: Phrase, *, plural: bool = False) -> Phrase:
+        """Return words for the object to handle, given words for its place.
+
+        Raises:
+            NoCommandError: the words from outside have no phrase for the object, only for its cube.
+        """
+        outside, commands = self.outside_phrase(color.field), self.task.commands
+        covered = commands.thing != commands.colored
+        if covered and outside is not None and commands.thing not in outside.text:
+            raise NoCommandError
         return fill(self.task.commands.by_place, {"place": place}, plural=plural)
 
     def targets(self, color: GoalValue) -> tuple[SceneObject, ...]:
@@ -138,10 +170,59 @@ class InstructionRequest:
         return tuple(cube if cube.inside is None else scene[cube.inside] for cube in cubes)
 
     def command(self, fields: Mapping[str, Phrase]) -> Phrase:
-        """Fill the task's command, which has the same wording in all settings."""
+        """Fill the task's command, which has the same wording in all settings.
+
+        Raises:
+            NoCommandError: the words from outside have no command for these fields.
+        """
+        if self.wordings is not None:
+            return self._outside_command(self.wordings, fields)
         handled = max(1, len(self.values_of("color")))
         wordings = [one for one in self.task.commands.wordings if one.parts == handled]
         return fill(self.sampler.pick(f"command-{handled}", wordings).text, fields)
+
+    def _outside_command(self, wordings: TaskWordings, fields: Mapping[str, Phrase]) -> Phrase:
+        goal = self.episode.goal
+        names = goal_fields(goal)
+        stated = {name: self.outside_stated(name) for name in names}
+        pointed = {name for name in names if fields.get(name, stated[name]) != stated[name]}
+        command = wordings.find(goal, pointed)
+        if command is None:
+            raise NoCommandError
+        self.sampler.log.append(f"{_OUTSIDE}/{wordings.commands.index(command)}")
+        words = {name: fields[name] if name in pointed else stated[name] for name in names}
+        return swap_particles(fill(command.text, words))
+
+    @property
+    def outside_index(self) -> int:
+        """Index of the command from outside that `command` has filled."""
+        used = [one for one in self.sampler.log if one.startswith(f"{_OUTSIDE}/")]
+        return int(used[-1].partition("/")[2])
+
+    def outside_stated(self, field: str) -> Phrase:
+        """Return the words from outside for a field, with the value that they name."""
+        phrase = self.outside_phrase(field)
+        if phrase is None:
+            return ()
+        base, _, index = field.partition(".")
+        values = {one.field: one for one in self.goal_values}
+        if base != AMOUNT_FIELD:
+            value = values[field]
+            core = antecedent(phrase.core, value.slot, value.value)
+            return (*plain(phrase.before), *core, *plain(phrase.after))
+        count, color = values[f"counts.{index}"], values[f"colors.{index}"]
+        return (
+            *_tagged_words(phrase.before, count),
+            *antecedent(phrase.core, color.slot, color.value),
+            *plain(phrase.after),
+        )
+
+
+def _tagged_words(text: str, value: GoalValue) -> Phrase:
+    """Return words that name a value, with the spaces around them outside the mention."""
+    words = text.strip()
+    before, _, after = text.partition(words)
+    return (*plain(before), *antecedent(words, value.slot, value.value), *plain(after))
 
 
 class UtteranceSpec(NamedTuple):

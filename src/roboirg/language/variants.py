@@ -31,11 +31,18 @@ def all_variants() -> tuple[Variant, ...]:
     )
 
 
-def expressible_options(episode: Episode) -> Iterator[InstructionOptions]:
-    """Yield every setting, form and combination of options that can express an episode."""
+def expressible_options(
+    episode: Episode, wordings: str | None = None
+) -> Iterator[InstructionOptions]:
+    """Yield every setting, form and combination of options that can express an episode.
+
+    Args:
+        episode: what to say.
+        wordings: identity of an open wording file; None for our own words.
+    """
     for name in settings_of(get_task(episode.task)):
         wanted = [
-            InstructionOptions(name)._replace(**changes)
+            InstructionOptions(name, wordings=wordings)._replace(**changes)
             for changes in all_settings()[name].variants
         ]
         possible = [options for options in wanted if find_refusal(episode, options) is None]

@@ -112,7 +112,10 @@ class Job(_RecordModel):
 
     @property
     def options(self) -> InstructionOptions:
-        """The options of its instruction."""
+        """The options of its instruction, without `wordings`.
+
+        Wordings tell runs apart, as a step limit does: the columns of tables are the same in all.
+        """
         return InstructionOptions(
             self.setting, self.form, self.stages, self.distractor, self.distractors, self.frame
         )

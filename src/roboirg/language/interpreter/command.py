@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from roboirg.language.interpreter.descriptions import Description, describe
@@ -11,7 +11,9 @@ from roboirg.language.interpreter.quantities import CountExpression, Quantity, q
 from roboirg.language.interpreter.tokens import Sentence, colors_in, word_set
 from roboirg.language.interpreter.vocabulary import PUTTING, TAKING, VERBS
 
-BEFORE_VERB = word_set(", ; : and then to finally now after that next afterwards but first")
+BEFORE_VERB = word_set(
+    ", ; : and then to finally now after that next afterwards but first repeatedly"
+)
 _REQUESTS = frozenset(
     pair
     for modal in ("can", "could", "will", "would", "must", "should")
@@ -22,6 +24,8 @@ _INTO = word_set("into inside in")
 _BARE_PRONOUNS = word_set("it them that")
 _PARTICLES = word_set("up down back")
 _SINGULAR = word_set("it cube one")
+_JOINTS = word_set(", ; and then finally afterwards next")
+_JOINED = word_set("container box one")
 _ADVERBS = word_set("once twice thrice")
 
 
@@ -53,6 +57,16 @@ class Command(NamedTuple):
         return tuple(describe(words) for words in self.handled)
 
     @property
+    def things_in_order(self) -> tuple[Description, ...]:
+        """The same, with a description for each of the things that one verb handles in turn."""
+        found: list[Description] = []
+        for words in (part for clause in self.handled for part in _parts(clause)):
+            thing, colors = describe(words), tuple(dict.fromkeys(colors_in(words)))
+            several = thing.kind == "color" and len(colors) > 1
+            found += [thing._replace(colors=(one,)) for one in colors] if several else [thing]
+        return tuple(found)
+
+    @property
     def boxes(self) -> tuple[Description, ...]:
         """The descriptions of the things that something is put into."""
         return tuple(describe(words) for words in self.entered)
@@ -72,7 +86,7 @@ def is_command(words: Sentence) -> bool:
 def read_command(words: Sentence) -> Command:
     """Read the words of all commanding sentences as one command."""
     clauses = _clauses(words)
-    taken = [clause for clause in clauses if clause[0] in TAKING]
+    taken = [clause for clause in clauses if clause[0] in TAKING and not _shares(clause)]
     put = [clause for clause in clauses if clause[0] in PUTTING]
     return Command(
         " ".join(words),
@@ -108,6 +122,11 @@ def _continues(clause: Sentence) -> bool:
     return not objects or objects[0] in _BARE_PRONOUNS
 
 
+def _shares(clause: Sentence) -> bool:
+    """Return whether a verb has its object after the next verb: ``pick and place the cube``."""
+    return len(clause) > 1 and clause[-1] == "and" and set(clause[1:-1]) <= _PARTICLES
+
+
 def _clauses(words: Sentence) -> list[Sentence]:
     starts = [at for at in range(len(words)) if _is_verb(words, at)]
     ends = [*starts[1:], len(words)]
@@ -120,6 +139,17 @@ def _is_verb(words: Sentence, at: int) -> bool:
     if at == 0 or words[at - 1] in BEFORE_VERB or words[max(0, at - 2) : at] in _REQUESTS:
         return True
     return words[at - 1] in ("you", "do") and words[max(0, at - 2) : at - 1] in ((), (",",))
+
+
+def _parts(words: Sentence) -> Iterator[Sentence]:
+    """Yield the parts of ``the container at the left, and then the one at the right``."""
+    start = 0
+    for at in range(1, len(words) - 1):
+        joined = words[at - 1] in _JOINTS or words[max(0, at - 2) : at] == ("after", "that")
+        if joined and words[at] == "the" and words[at + 1] in _JOINED:
+            yield words[start:at]
+            start = at
+    yield words[start:]
 
 
 def _items(words: Sentence) -> tuple[Item, ...]:

@@ -14,7 +14,7 @@ from roboirg.language.interpreter.command import BEFORE_VERB
 from roboirg.language.interpreter.negations import OBJECT, VERB, unread_negations
 from roboirg.language.interpreter.places import place_mentions
 from roboirg.language.interpreter.quantities import quantities
-from roboirg.language.interpreter.tokens import Sentence, color_of, number_of
+from roboirg.language.interpreter.tokens import Sentence, color_of, number_of, word_set
 from roboirg.language.interpreter.vocabulary import (
     DETERMINERS,
     PLACE_WORDS,
@@ -39,6 +39,9 @@ _UNKNOWN_COMMAND = re.compile(
 _AFTER_VERB = re.compile(rf"{OBJECT}|[,;:]|up\b|down\b|$")
 _BEFORE_UNKNOWN_VERB = BEFORE_VERB | {"you"}
 _COMPARISON = re.compile(r"\b(?P<word>more|fewer|less)\b(?: than \w+)?")
+_FIXED_GOALS = word_set("target targets disc discs")
+_BELOW = word_set("under below beneath underneath")
+_AFTER_BELOW = ((), (",",), (";",), ("and",), ("then",), ("which",))
 _LOCATING = PREPOSITIONS | PLACE_WORDS
 
 
@@ -153,6 +156,10 @@ def _locates(words: Sentence, at: int) -> bool:
     following = words[at + 1 : at + 2]
     if words[at] in ("left", "right"):
         return following == ("of",)
+    if words[at] == "between" and not _FIXED_GOALS.isdisjoint(words[at + 1 : at + 6]):
+        return False  # the way of a cube
+    if words[at] in _BELOW and following in _AFTER_BELOW:
+        return False  # the container that the red cube is hidden under
     if words[at] == "next":
         return following == ("to",)
     return words[at] in PLACE_WORDS

@@ -86,7 +86,7 @@ def _no_goal(part: str) -> str:
 
 def _things_in_order(command: Command, resolver: ReferenceResolver) -> GoalTest:
     """Return a test for as many colors as things, each among those that its words allow."""
-    wanted = [resolver.objects(thing) for thing in command.things]
+    wanted = [resolver.objects(thing) for thing in command.things_in_order]
 
     def fits(goal: Goal) -> bool:
         colors = goal.texts("colors")

@@ -51,7 +51,9 @@ _THAN = re.compile(
     r"\b(other than|different from|different to|differs from|unlike|"
     r"not (in|of|among|one of|part of)|neither|except|apart from|outside)\b"
 )
-_OTHER_OF = re.compile(r"\bthe other (?:one |color )?(?:of|in|from)\b")
+_OTHER_OF = re.compile(
+    r"\bthe other (?:one |color )?(?:of|in|from)\b(?! (?:the |those |these )?(?:two )?moments)"
+)
 _ONE_NOT = re.compile(r"\bthe (?:one|color) (?:of|in|from)\b.*\b(?:not|other than|except)\b")
 _NOT = re.compile(rf"\b(?:not|other than|except) (?:in |for |the )?({COLOR})\b")
 

@@ -16,8 +16,12 @@ _ELEMENT = re.compile(
     rf"\b(?P<ordinal>{ORDINAL}|last|final) (?:\w+ )?{_NOUN}\b"
     rf"|\b{_NOUN} (?:number |no )?(?P<number>{NUMBER})\b(?! (?:after|before|visits|placements))"
 )
+_ACTS = (
+    "reache[sd]|arrive[sd]|passe[sd]|stop(?:s|ped)|move[sd]|goes|went|enter(?:s|ed)|return(?:s|ed)"
+)
 _BASE = re.compile(
-    rf"\s*(?P<that>that|it|this)\b|\s*(?:the |its )?(?P<ordinal>{ORDINAL}|last|final)\b"
+    rf"\s*(?P<that>that|it|this)\b(?! (?:is|was|has|{_ACTS})\b)"
+    rf"|\s*(?:the |its )?(?P<ordinal>{ORDINAL}|last|final)\b"
     rf"|\s*(?:(?:the )?{_NOUN} )?(?:number )?(?P<number>{NUMBER})\b"
 )
 _STEP = re.compile(
@@ -30,7 +34,7 @@ _NEIGHBOR = re.compile(r"\b(?:neighbor\w* (?:of|to)|adjacent to|next to)\b")
 _PENULTIMATE = re.compile(
     rf"\b(?P<rank>{ORDINAL}|next) (?:to|from) (?:the )?last\b|\bpenultimate\b"
 )
-_BARE = re.compile(rf"\b(?:its|the) (?P<ordinal>{ORDINAL}|last)\b")
+_BARE = re.compile(rf"\b(?:its|the|placed) (?P<ordinal>{ORDINAL}|last)\b")
 _POINTER = re.compile(rf"\b(?:that|this|the same) (?:very )?(?:one|number|{_NOUN})\b")
 _LATER = ("after", "following", "later than", "behind", "next")
 

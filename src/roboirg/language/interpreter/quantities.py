@@ -66,14 +66,17 @@ _NOT_AFTER = (
 )  # fmt: skip
 _POINTED = "".join(rf"(?<!\b{word} )" for word in _NOT_AFTER)
 """After one of these words a number word only points: ``those two``, ``the red one``."""
-_PLAIN = re.compile(rf"{_POINTED}\b(?P<number>{NUMBER})\b(?! times as)")
+_PLAIN = re.compile(
+    rf"{_POINTED}\b(?P<number>{NUMBER})\b(?! times as)"
+    rf"|(?<=\b(?:this|that) )(?P<times>{NUMBER})(?= times\b(?! as))"
+)
 _SINGLE = re.compile(
     r"(?<!\bas )(?<!\bthan )(?<!\bto )(?<!\bfrom )(?<!\bof )(?<!\bhides )(?<!\bover )"
     rf"\b(?:an?|the)(?: single)? (?={COLOR} (?:{THING}|one)\b)"
 )
 _FACTORS = {"twice": 2.0, "double": 2.0, "thrice": 3.0, "triple": 3.0, "half": 0.5}
 _ADVERBS = {"once": 1, "twice": 2, "thrice": 3}
-_TIMES = re.compile(r" (?:times?|rounds?|turns?|occasions?)\b")
+_TIMES = re.compile(r" (?:times?|rounds?|turns?|occasions?|cycles?)\b")
 
 Reading = tuple[re.Pattern[str], Callable[[re.Match[str]], CountExpression], bool]
 
@@ -99,7 +102,11 @@ _READINGS: tuple[Reading, ...] = (
     (_SAME, lambda _found: CountExpression(), False),
     (_SOME, lambda _found: CountExpression(quantity=2), True),
     (_ADVERB, lambda found: CountExpression(quantity=_ADVERBS[found[0]]), True),
-    (_PLAIN, lambda found: CountExpression(quantity=number_of(found["number"])), True),
+    (
+        _PLAIN,
+        lambda found: CountExpression(quantity=number_of(found["number"] or found["times"])),
+        True,
+    ),
     (_SINGLE, lambda _found: CountExpression(quantity=1), True),
 )
 """Pattern, reader, and whether it is a plain number; of two that overlap, the first one counts."""
@@ -119,7 +126,7 @@ def quantities(text: str) -> tuple[Quantity, ...]:
 def plain_numbers(words: Sentence) -> tuple[int, ...]:
     """Return the plain numbers of a sentence."""
     found = _PLAIN.finditer(" ".join(words))
-    numbers = (number_of(match["number"]) for match in found)
+    numbers = (number_of(match["number"] or match["times"]) for match in found)
     return tuple(number for number in numbers if number is not None)
 
 
@@ -133,6 +140,7 @@ def read_times(text: str) -> CountExpression | None:
     found = quantities(text)
     plain = [one for one in found if one.plain]
     times = [one for one in found if not one.plain]
-    times += [one for one in plain if text[one.start : one.end] in _ADVERBS]
-    times += [one for one in plain if _TIMES.match(text, one.end)]
+    times += [
+        one for one in plain if text[one.start : one.end] in _ADVERBS or _TIMES.match(text, one.end)
+    ]
     return times[0].expression if times else None

@@ -77,8 +77,10 @@ class ReferenceResolver:
         }
 
     def times(self, count: CountExpression | None) -> set[int] | None:
-        """Return the numbers that fit an expression."""
-        return None if count is None else count.results(self._introduced_numbers(count, None))
+        """Return the numbers of repetitions that fit an expression; once, without any number."""
+        if count is None:
+            return None if set(self._context.numbers) - {1} else {1}
+        return count.results(self._introduced_numbers(count, None))
 
     def _introduced_numbers(self, count: CountExpression, color: str | None) -> tuple[int, ...]:
         """Return the numbers to start from: those introduced with the color, else all."""

@@ -18,7 +18,8 @@ _WORD: dict[str, PressRelation] = {
     "after": "after", "following": "after", "followed": "after",
 }  # fmt: skip
 _NAMED = re.compile(
-    r"\b(before|prior to|preceding|preceded|after|following|followed)\b(?! (?:that|this|which)\b)"
+    r"\b(before|prior to|preceding|preceded|after|following|followed)\b"
+    r"(?! (?:that|this|which|watching|seeing|(?:the|this) (?:video|demonstration))\b)"
 )
 _NEIGHBOR = re.compile(r"\b(?:neighbor\w*|neighboring|adjacent|next to|beside)\b")
 _OTHER = re.compile(

@@ -18,6 +18,7 @@ _SPELLINGS = (
     ("can't", "can not"),
     ("won't", "will not"),
     ("n't", " not"),
+    ("(s)", "s"),
     ("colour", "color"),
     ("neighbour", "neighbor"),
     ("grey", "gray"),
@@ -42,6 +43,8 @@ def word_set(words: str) -> frozenset[str]:
     """Return the words of a string, for membership tests."""
     return frozenset(words.split())
 
+
+_SYNONYMS = {"block": "cube", "blocks": "cubes"}
 
 FILLERS = word_set("please okay kindly carefully gently slowly quickly softly neatly calmly")
 """Words that change nothing in any position; `split_sentences` drops them."""
@@ -77,7 +80,9 @@ def split_sentences(text: str) -> tuple[Sentence, ...]:
         text = text.replace(variant, usual)
     text = _MINUS.sub("minus ", text)
     parts = (_WORD.findall(part) for part in _SENTENCE_END.split(text))
-    kept = (tuple(word for word in part if word not in FILLERS) for part in parts)
+    kept = (
+        tuple(_SYNONYMS.get(word, word) for word in part if word not in FILLERS) for part in parts
+    )
     return tuple(part for part in kept if part)
 
 

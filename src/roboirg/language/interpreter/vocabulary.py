@@ -9,16 +9,19 @@ from __future__ import annotations
 from roboirg.language.interpreter.tokens import color_of, number_of, ordinal_of, word_set
 
 TAKING = word_set(
-    "take pick grab grasp lift raise carry move bring fetch get uncover remove hold swing"
+    "take pick grab grasp lift raise carry move bring fetch get uncover reveal remove hold swing "
+    "transfer find locate"
 )
-PUTTING = word_set("put place set lower return drop lay throw toss")
-PRESSING = word_set("press push hit tap stop halt make let")
+PUTTING = word_set("put place set lower return drop lay throw toss deposit insert fill")
+PRESSING = word_set("press push hit tap stop halt make let repeat wait")
 VERBS = TAKING | PUTTING | PRESSING
 
 GERUNDS = word_set(
     "taking picking grabbing grasping lifting raising carrying moving bringing fetching getting "
     "uncovering removing holding swinging putting placing setting lowering returning dropping "
-    "laying throwing tossing pressing pushing hitting tapping stopping halting touching using"
+    "laying throwing tossing pressing pushing hitting tapping stopping halting touching using "
+    "repeating waiting watching seeing swapping hiding covering containing passing reaching "
+    "arriving doing performing finishing completing"
 )
 THING_NOUNS = word_set(
     "cube cubes box boxes tape tapes container containers target targets disc discs button buttons "
@@ -47,7 +50,8 @@ PREPOSITIONS = word_set(
 _NOUNS = word_set(
     "table robot video camera picture beginning start outset end pair couple color colors amount "
     "place places spot position location press presses swaps swap order way hand mind "
-    "neighbor neighbors"
+    "neighbor neighbors action actions motion motions movement task process steps sequence "
+    "demonstration side top middle total object objects cycle cycles"
 )
 _PRONOUNS = word_set(
     "it them they you yourself i me us we what when where which who whichever there here then "
@@ -59,7 +63,9 @@ _VERB_FORMS = word_set(
     "exchanged shuffled started began stands stood happened showed shown saw seen went goes go "
     "going think thinks remember find choose chose chosen prefer preferred like liked want need "
     "sure use used keep kept see look differs took given say said meant mean forget worry hesitate "
-    "work preceded followed ready colored"
+    "work preceded followed ready colored watch watched repeated reaches reach reached arrives "
+    "arrived passed shown demonstrated contains contained visited finished finish done completed "
+    "complete remembering recalling returns returned according based initial original correct"
 )
 _COMPARISONS = word_set(
     "many often much more less fewer larger greater higher bigger smaller lower than as half "
@@ -70,7 +76,8 @@ _COMPARISONS = word_set(
 _CONNECTIVES = word_set(
     "and but so then now finally afterwards again also too with for before after during until up "
     "down back just only not no never together respectively "
-    "initially originally begin long"
+    "initially originally begin long while exactly precisely repeatedly forth altogether "
+    "previously already each"
 )
 _MODALS = word_set("can could will would must should may")
 _NEGATIONS = word_set("avoid refrain nothing none nor without instead rather dont")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from roboirg.language import templates
 from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain
-from roboirg.language.request import GoalValue, InstructionRequest
+from roboirg.language.request import GoalValue, InstructionRequest, NoCommandError
 from roboirg.language.slot_types import relation
 
 PAIR = "right before and right after the button press"
@@ -36,7 +36,7 @@ def _other(request: InstructionRequest) -> Derived:
         if request.resolved
         else anaphor(words, "other", goal_value.slot, goal_value.value)
     )
-    fields = relation.placed(goal_value, (*plain("at "), *other))
+    fields = relation.placed(request, goal_value, (*plain("at "), *other))
     return Derived(fill(template, introduced), fields, {"patterns": ["contextual logic"]})
 
 
@@ -48,6 +48,9 @@ def _neighbor(request: InstructionRequest) -> Derived:
     context = fill(
         template, {"moment": antecedent(templates.MOMENTS[rejected], REFERENCE, rejected)}
     )
+    outside = request.outside_phrase(goal_value.field)
+    if outside is not None and not outside.before:
+        raise NoCommandError  # there is no word for the target that this could replace
     words = _single(request, rejected)
     single = (
         antecedent(words, REFERENCE, rejected)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from roboirg.language import templates
 from roboirg.language.number_words import cardinal
 from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed
+from roboirg.language.phrases import Phrase, anaphor, antecedent, fill
 from roboirg.language.request import GoalValue, InstructionRequest, SlotTypeName
 from roboirg.language.slot_types import amount, ordinal
 from roboirg.language.slot_types.number import introduce_quantity
@@ -104,7 +104,7 @@ def _visit(request: InstructionRequest) -> Derived:
     (number,) = deduction.references
     value = fill(deduction.relation.value, {"number": _pointer(request, number)})
     context = introduce_quantity(request, REFERENCE, number)
-    return Derived(context, ordinal.by_number(goal_value, value), _notes(deduction))
+    return Derived(context, ordinal.by_number(request, goal_value, value), _notes(deduction))
 
 
 def _amounts(request: InstructionRequest) -> Derived:
@@ -119,7 +119,7 @@ def _amounts(request: InstructionRequest) -> Derived:
         for (shade, _), number in zip(amount.pairs(goal_values), deduction.references, strict=True)
     ]
     context = amount.introduce_references(request, goal_values, REFERENCE, deduction.references)
-    return Derived(context, {amount.FIELD: listed(items)}, _notes(deduction))
+    return Derived(context, amount.amounts(items), _notes(deduction))
 
 
 def _shade(goal_value: GoalValue) -> Phrase:

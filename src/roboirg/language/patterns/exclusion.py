@@ -42,7 +42,8 @@ def _thing(
     request: InstructionRequest, goal_value: GoalValue, template: str, fields: dict[str, Phrase]
 ) -> Phrase:
     words = {"thing": plain(request.task.commands.colored), **fields}
-    return request.by_color(fill(template, words, plural=request.count_of(goal_value) > 1))
+    cubes = fill(template, words, plural=request.count_of(goal_value) > 1)
+    return request.by_color(goal_value, cubes)
 
 
 def _singled(request: InstructionRequest, goal_value: GoalValue, pair: tuple[str, ...]) -> Phrase:

@@ -61,14 +61,17 @@ def _derive(request: InstructionRequest) -> Derived:
         if request.resolved
         else anaphor("that", "that", REFERENCE, position)
     )
-    element = (*plain(f"the {goal_value.slot_type} "), *fill(step.words, {"reference": reference}))
+    element = (
+        *plain(f"the {ordinal.series_noun(request, goal_value)} "),
+        *fill(step.words, {"reference": reference}),
+    )
     notes: dict[str, object] = {
         "patterns": ["sequential relation"],
         "relation": step.name,
         "reference": position,
     }
     context = ordinal.introduce_position(request, goal_value, REFERENCE, position)
-    return Derived(context, ordinal.wrapped(goal_value, element), notes)
+    return Derived(context, ordinal.wrapped(request, goal_value, element), notes)
 
 
 ORDINAL = Pattern(_allows, _derive)

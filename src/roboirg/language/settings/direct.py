@@ -39,7 +39,9 @@ def say(request: InstructionRequest) -> InstructionSpec:
 def _pairing_rules(instruct: Instruct) -> Iterator[str]:
     introduction = instruct(InstructionOptions("direct")).turns[0]
     explicit = instruct(InstructionOptions("explicit")).command
-    if instruct(InstructionOptions("direct", "resolved")).turns != (introduction, explicit):
+    resolved = instruct(InstructionOptions("direct", "resolved"))
+    paired = resolved.metadata["wordings"] is None or resolved.metadata["command"] != "own"
+    if paired and resolved.turns != (introduction, explicit):
         yield "resolved, its command is not the explicit one"
 
 

@@ -68,7 +68,7 @@ def say(request: InstructionRequest) -> InstructionSpec:
             if request.resolved
             else anaphor(words, expression, color.slot, color.value)
         )
-        things.append(request.by_place(place, plural=request.count_of(color) > 1))
+        things.append(request.by_place(color, place, plural=request.count_of(color) > 1))
     fields = stated(request) | described(request, things)
     utterances = (
         introduction(request, colors, chosen),

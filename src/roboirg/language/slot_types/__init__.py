@@ -41,5 +41,5 @@ def described(request: InstructionRequest, things: Sequence[Phrase]) -> Fields:
     fields: Fields = {}
     for slot_type, goal_values in slot_types_in(request):
         if slot_type.described is not None:
-            fields |= slot_type.described(goal_values, things)
+            fields |= slot_type.described(request, goal_values, things)
     return fields

@@ -8,12 +8,9 @@ from roboirg.language import templates
 from roboirg.language.instruction import Expression
 from roboirg.language.number_words import cardinal
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain
-from roboirg.language.request import GoalValue, InstructionRequest
+from roboirg.language.request import AMOUNT_FIELD, GoalValue, InstructionRequest
 from roboirg.language.slot_types import color, number
 from roboirg.language.slot_types.slot_type import Fields, SlotType
-
-FIELD = "cubes"
-"""The field of the command that holds all amounts."""
 
 
 def pairs(goal_values: tuple[GoalValue, ...]) -> tuple[tuple[GoalValue, GoalValue], ...]:
@@ -26,6 +23,12 @@ def pairs(goal_values: tuple[GoalValue, ...]) -> tuple[tuple[GoalValue, GoalValu
 def amount(count: Phrase, thing: Phrase) -> Phrase:
     """Join a count and a thing: ``two red cubes``."""
     return (*count, *plain(" "), *thing)
+
+
+def amounts(items: Sequence[Phrase]) -> Fields:
+    """Return the fields of the command for the words for each color with its count."""
+    single = {f"{AMOUNT_FIELD}.{index}": item for index, item in enumerate(items)}
+    return {AMOUNT_FIELD: listed(items), **single}
 
 
 def cubes(shade: GoalValue, count: int) -> Phrase:
@@ -42,10 +45,10 @@ def _count(goal_value: GoalValue) -> Phrase:
     return antecedent(cardinal(goal_value.number), goal_value.slot, goal_value.value)
 
 
-def _stated(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
     """Return ``two red cubes and one blue cube``."""
     things = [cubes(shade, count.number) for shade, count in pairs(goal_values)]
-    return _described(goal_values, things)
+    return _described(request, goal_values, things)
 
 
 def _reduced(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
@@ -60,7 +63,7 @@ def _reduced(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -
         )
         for (shade, count), (words, expression) in zip(matched, pointers, strict=True)
     ]
-    return {FIELD: listed(items)}
+    return amounts(items)
 
 
 def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
@@ -96,9 +99,17 @@ def _competing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) 
     return [*color.competing(request, goal_values), *number.competing(request, goal_values)]
 
 
-def _described(goal_values: tuple[GoalValue, ...], things: Sequence[Phrase]) -> Fields:
-    counts = [_count(count) for _, count in pairs(goal_values)]
-    return {FIELD: listed([amount(*one) for one in zip(counts, things, strict=True)])}
+def _described(
+    request: InstructionRequest, goal_values: tuple[GoalValue, ...], things: Sequence[Phrase]
+) -> Fields:
+    items: list[Phrase] = []
+    for index, ((_, count), thing) in enumerate(zip(pairs(goal_values), things, strict=True)):
+        outside = request.outside_phrase(f"{AMOUNT_FIELD}.{index}")
+        if outside is not None and outside.before:
+            items.append((*plain(outside.before), *thing, *plain(outside.after)))
+        else:
+            items.append(amount(_count(count), thing))
+    return amounts(items)
 
 
 AMOUNT = SlotType(

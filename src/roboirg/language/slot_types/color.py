@@ -28,7 +28,8 @@ def named(request: InstructionRequest, goal_value: GoalValue) -> Phrase:
 def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
     """Return ``the red cube``, or words for the container that hides it."""
     return {
-        goal_value.field: request.by_color(named(request, goal_value)) for goal_value in goal_values
+        goal_value.field: request.by_color(goal_value, named(request, goal_value))
+        for goal_value in goal_values
     }
 
 
@@ -36,7 +37,7 @@ def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) ->
     """Return ``it``, ``the former`` and ``the latter``, or ``the first``, etc."""
     return {
         goal_value.field: request.by_color(
-            anaphor(words, expression, goal_value.slot, goal_value.value)
+            goal_value, anaphor(words, expression, goal_value.slot, goal_value.value)
         )
         for goal_value, (words, expression) in zip(
             goal_values, REDUCED[len(goal_values)], strict=True
@@ -70,7 +71,9 @@ def competing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -
     return competing_remarks(templates.COMPETING_COLOR_DISTRACTORS, colors, str, goal_values)
 
 
-def _described(goal_values: tuple[GoalValue, ...], things: Sequence[Phrase]) -> Fields:
+def _described(
+    _request: InstructionRequest, goal_values: tuple[GoalValue, ...], things: Sequence[Phrase]
+) -> Fields:
     return {goal_value.field: thing for goal_value, thing in zip(goal_values, things, strict=True)}
 
 

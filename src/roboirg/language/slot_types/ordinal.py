@@ -15,6 +15,8 @@ INTRODUCTIONS = {
 }
 WRAPPED = {"visit": "{which}", "placement": "the target of {which}"}
 """The command's field around the words for the element of the series."""
+OUTSIDE_NOUNS = ("visit", "placement", "time", "pass", "occasion")
+"""Nouns for an element in the words of others that may follow *that*."""
 OWNERS = {"visit": "its", "placement": "the"}
 """The determiner; *its placement* would give the cube away, as only one was placed."""
 VISITS = (1, 2, 3, 4, 5)
@@ -31,21 +33,49 @@ def series_length(request: InstructionRequest, goal_value: GoalValue) -> int:
     return sum(fact.kind == "placed" and fact.place in targets for fact in scene.past)
 
 
-def wrapped(goal_value: GoalValue, which: Phrase) -> Fields:
+def series_noun(request: InstructionRequest, goal_value: GoalValue) -> str:
+    """Return the command's word for an element: ``visit``, or the one used outside: ``time``."""
+    outside = request.outside_phrase(goal_value.field)
+    noun = "" if outside is None else outside.core.split()[-1]
+    return noun if noun in OUTSIDE_NOUNS else goal_value.slot_type
+
+
+def wrapped(request: InstructionRequest, goal_value: GoalValue, which: Phrase) -> Fields:
     """Return the command's field, given the words for the visit or placement."""
-    return {goal_value.field: fill(WRAPPED[goal_value.slot_type], {"which": which})}
+    words = fill(_wrapping(request, goal_value), {"which": which})
+    outside = request.outside_phrase(goal_value.field)
+    if outside is not None:
+        words = (*plain(outside.before), *words, *plain(outside.after))
+    return {goal_value.field: words}
 
 
-def _stated(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+def _wrapping(request: InstructionRequest, goal_value: GoalValue) -> str:
+    """Return the words around an element; none if words from outside name just the element."""
+    outside = request.outside_phrase(goal_value.field)
+    if outside is not None and outside.core.split()[-1] in OUTSIDE_NOUNS:
+        return "{which}"
+    return WRAPPED[goal_value.slot_type]
+
+
+def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
     """Return ``its third visit``, ``the second placement``."""
     (goal_value,) = goal_values
     words = f"{OWNERS[goal_value.slot_type]} {ordinal(goal_value.number)} {goal_value.slot_type}"
-    return wrapped(goal_value, antecedent(words, goal_value.slot, goal_value.value))
+    return wrapped(request, goal_value, antecedent(words, goal_value.slot, goal_value.value))
 
 
 def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
     """Return ``that visit``."""
-    return wrapped(goal_values[0], _pointing(request, goal_values))
+    (goal_value,) = goal_values
+    words = f"that {series_noun(request, goal_value)}"
+    slot, value = goal_value.slot, goal_value.value
+    outside = request.outside_phrase(goal_value.field)
+    if outside is None:
+        return wrapped(request, goal_value, anaphor(words, "that", slot, value))
+    # All of it takes the place of "the second target".
+    words = _wrapping(request, goal_value).format(which=words)
+    pointing = anaphor(words, "that", slot, value)
+    return {goal_value.field: (*plain(outside.before), *pointing, *plain(outside.after))}
 
 
 def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
@@ -63,9 +93,10 @@ def introduce_position(
     return fill(template, {"which": which})
 
 
-def by_number(goal_value: GoalValue, value: Phrase) -> Fields:
+def by_number(request: InstructionRequest, goal_value: GoalValue, value: Phrase) -> Fields:
     """Return ``the visit whose number is ...``."""
-    return wrapped(goal_value, (*plain(f"the {goal_value.slot_type} whose number is "), *value))
+    words = plain(f"the {series_noun(request, goal_value)} whose number is ")
+    return wrapped(request, goal_value, (*words, *value))
 
 
 def _pointing(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:

@@ -11,11 +11,14 @@ from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_re
 EXPRESSIONS: dict[str, Expression] = {"at that moment": "that", "then": "then"}
 
 
-def placed(goal_value: GoalValue, moment: Phrase) -> Fields:
+def placed(request: InstructionRequest, goal_value: GoalValue, moment: Phrase) -> Fields:
     """Return ``the target where a cube was placed ...``.
 
     Not *it*: only one cube is placed in the video, so *it* would give the cube away.
     """
+    outside = request.outside_phrase(goal_value.field)
+    if outside is not None:
+        return {goal_value.field: (*plain(outside.before), *moment, *plain(outside.after))}
     return {goal_value.field: (*plain("the target where a cube was placed "), *moment)}
 
 
@@ -24,15 +27,16 @@ def named(goal_value: GoalValue) -> Phrase:
     return antecedent(templates.MOMENTS[str(goal_value.value)], goal_value.slot, goal_value.value)
 
 
-def _stated(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
-    return placed(goal_values[0], named(goal_values[0]))
+def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+    return placed(request, goal_values[0], named(goal_values[0]))
 
 
 def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
     """Return ``at that moment``, or ``then``."""
     (goal_value,) = goal_values
     words = request.sampler.pick("moment anaphor", templates.MOMENT_ANAPHORS)
-    return placed(goal_value, anaphor(words, EXPRESSIONS[words], goal_value.slot, goal_value.value))
+    moment = anaphor(words, EXPRESSIONS[words], goal_value.slot, goal_value.value)
+    return placed(request, goal_value, moment)
 
 
 def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:

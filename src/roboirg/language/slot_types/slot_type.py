@@ -37,7 +37,9 @@ class SlotType:
     reinforcements: tuple[str, ...]
     competing: Callable[[InstructionRequest, tuple[GoalValue, ...]], list[Phrase]]
     plural: Callable[[tuple[GoalValue, ...]], bool] = lambda goal_values: len(goal_values) > 1
-    described: Callable[[tuple[GoalValue, ...], Sequence[Phrase]], Fields] | None = None
+    described: (
+        Callable[[InstructionRequest, tuple[GoalValue, ...], Sequence[Phrase]], Fields] | None
+    ) = None
 
 
 def competing_remarks(

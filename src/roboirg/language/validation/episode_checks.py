@@ -32,18 +32,21 @@ Violation = tuple[Rule, str]
 """A rule and the words that break it."""
 
 
-def check_episode(episode: Episode, *, must_be_expressible: bool = False) -> ValidationResults:
+def check_episode(
+    episode: Episode, *, must_be_expressible: bool = False, wordings: str | None = None
+) -> ValidationResults:
     """Check all rules on all instructions of an episode.
 
     Args:
         episode: of a split or not.
         must_be_expressible: whether the refusal of a setting that selects seeds is a violation.
+        wordings: identity of an open wording file; None for our own words.
     """
     results = ValidationResults()
     # Texts repeat (stages 1 and 5 are the direct ones): read each once.
     read = functools.cache(lambda text: interpret(text, episode.scene, episode.task))
     commands: dict[str, set[str]] = {}
-    for options in expressible_options(episode):
+    for options in expressible_options(episode, wordings):
         setting = options.setting
         instruction = instruct_with(episode, options)
         results.texts[episode.task, setting] += 1
@@ -61,7 +64,7 @@ def check_episode(episode: Episode, *, must_be_expressible: bool = False) -> Val
             # The introduction alone says that left and right are the camera's: no reference.
             violations += not_self_contained(instruction, episode, read)
         _add_violations(results, episode, setting, violations)
-    for setting, words in unpaired(episode, expressible(episode)):
+    for setting, words in unpaired(episode, expressible(episode), wordings):
         _add_violations(results, episode, setting, [("pairing", words)])
     for setting in settings_of(get_task(episode.task)):
         _count_refusals(all_settings()[setting], episode, results)

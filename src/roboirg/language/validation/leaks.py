@@ -29,6 +29,10 @@ def find_leaks(instruction: Instruction, goal: Goal) -> frozenset[str]:
     """Return the words and landmarks of an implicit command that give a hidden value away."""
     words = frozenset(re.findall(r"[a-z0-9]+", _without_ranks(instruction).lower()))
     hidden = all_settings()[instruction.setting].hidden_slots(instruction, goal)
+    # The words of a template are the same for all goals.
+    template = instruction.metadata["command"]
+    if template != "own":
+        words -= frozenset(re.findall(r"[a-z0-9]+", str(template).lower()))
     found = [words & _spellings(goal[slot]) for slot in hidden]
     places = cast("list[str]", instruction.metadata["landmarks"])
     named = [place for place in places if place in instruction.command]

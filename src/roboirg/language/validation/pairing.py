@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import functools
+import re
 from collections.abc import Iterator, Sequence
 
 from roboirg.core.episode import Episode
@@ -12,19 +12,32 @@ from roboirg.language.instruction import Instruction, Mention
 from roboirg.language.settings import all_settings
 
 
-def unpaired(episode: Episode, settings: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Yield settings whose words differ from their counterpart, each with the difference."""
+def unpaired(
+    episode: Episode, settings: Sequence[str], wordings: str | None = None
+) -> Iterator[tuple[str, str]]:
+    """Yield settings whose words differ from their counterpart, each with the difference.
+
+    Args:
+        episode: what to say.
+        settings: names.
+        wordings: identity of an open wording file; None for our own words.
+    """
+
+    def say(options: InstructionOptions) -> Instruction:
+        return instruct_with(episode, options._replace(wordings=wordings))
+
     for name in settings:
         setting = all_settings()[name]
-        for complaint in setting.pairing_rules(functools.partial(instruct_with, episode)):
+        for complaint in setting.pairing_rules(say):
             yield name, complaint
         implicit, resolved = (
-            instruct_with(episode, InstructionOptions(name, form))
-            for form in ("implicit", "resolved")
+            say(InstructionOptions(name, form)) for form in ("implicit", "resolved")
         )
         if implicit.turns[:-1] != resolved.turns[:-1]:
             yield name, "resolved, its context differs"
-        if without_references(implicit) != without_references(resolved):
+        # In words from outside, one time may have a sentence of its own, without a number.
+        same = implicit.metadata["command"] == resolved.metadata["command"]
+        if same and without_references(implicit) != without_references(resolved):
             yield name, "resolved, more than its references differ"
         if setting.implicit and implicit.command == resolved.command:
             yield name, "resolved, its command is still the implicit one"
@@ -37,7 +50,7 @@ def without_references(instruction: Instruction) -> str:
     text = instruction.command
     for mention in reversed(_command_mentions(instruction)):
         text = f"{text[: mention.start]}@{text[mention.end :]}"
-    return text
+    return re.sub(r"@ (up|down)\b", r"\1 @", text)  # "pick it up", "pick up the red cube"
 
 
 def _command_mentions(instruction: Instruction) -> list[Mention]:

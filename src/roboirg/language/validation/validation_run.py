@@ -10,6 +10,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.episodes.splits import SIZES, get_episode
 from roboirg.language.validation.episode_checks import check_episode
 from roboirg.language.validation.validation_results import ValidationResults
+from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.util.parallel_map import parallel_map
 
 BATCH = 50
@@ -24,21 +25,26 @@ class Batch(NamedTuple):
         split: name of the split.
         first: index of the first episode.
         size: number of episodes.
+        wordings: path of a wording file; None for our own words.
     """
 
     task: str
     split: Split
     first: int
     size: int
+    wordings: str | None = None
 
 
-def batches(tasks: Sequence[str], splits: Sequence[Split], seeds: int) -> tuple[Batch, ...]:
+def batches(
+    tasks: Sequence[str], splits: Sequence[Split], seeds: int, wordings: str | None = None
+) -> tuple[Batch, ...]:
     """Return batches of all episodes of the splits and of random ones.
 
     Args:
         tasks: names.
         splits: names.
         seeds: number of random episodes for each task.
+        wordings: path of a wording file; None for our own words.
 
     Raises:
         InvalidValueError: the number is negative, or there is nothing to validate.
@@ -48,7 +54,7 @@ def batches(tasks: Sequence[str], splits: Sequence[Split], seeds: int) -> tuple[
     amounts = [(split, SIZES[split]) for split in splits]
     amounts.append(("random", seeds))
     found = tuple(
-        Batch(task, split, first, min(BATCH, amount - first))
+        Batch(task, split, first, min(BATCH, amount - first), wordings)
         for task in tasks
         for split, amount in amounts
         for first in range(0, amount, BATCH)
@@ -61,9 +67,11 @@ def batches(tasks: Sequence[str], splits: Sequence[Split], seeds: int) -> tuple[
 def validate_batch(batch: Batch) -> ValidationResults:
     """Check the episodes of a batch."""
     results = ValidationResults()
+    identity = open_wordings(batch.wordings)
     for index in range(batch.first, batch.first + batch.size):
         episode = get_episode(batch.task, batch.split, index)
-        results.add(check_episode(episode, must_be_expressible=batch.split in SPLITS))
+        expected = batch.split in SPLITS
+        results.add(check_episode(episode, must_be_expressible=expected, wordings=identity))
     return results
 
 

@@ -1,0 +1,1 @@
+"""Words from outside: the commands of others, from a wording file."""

@@ -1,0 +1,169 @@
+"""Commands in words from outside: their templates, cases and phrases, and which fits a goal."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from roboirg.core.episode import Goal, SlotValue
+
+FIELD = re.compile(r"\{([a-z]+(?:\.[0-9])?)\}")
+"""A field of a template, such as ``{color}`` or ``{colors.1}``."""
+
+
+class StatedPhrase(NamedTuple):
+    """The words for one value of a goal.
+
+    Attributes:
+        before: words that stay when only the core is replaced: *the container hiding*.
+        core: words that name the value: *the red cube*.
+        after: as `before`.
+    """
+
+    before: str
+    core: str
+    after: str
+
+    @property
+    def text(self) -> str:
+        """All of the words."""
+        return f"{self.before}{self.core}{self.after}"
+
+
+@dataclass(frozen=True, slots=True)
+class WordedCommand:
+    """One template.
+
+    Attributes:
+        text: the sentence, with fields.
+        when: the slot values of the goals that it is for; empty for all.
+        phrases: field or slot → value → words.
+    """
+
+    text: str
+    when: Mapping[str, SlotValue] = field(default_factory=dict)
+    phrases: Mapping[str, Mapping[str, StatedPhrase]] = field(default_factory=dict)
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """The fields of the template, in order."""
+        return tuple(FIELD.findall(self.text))
+
+    def phrase(self, name: str, value: str) -> StatedPhrase | None:
+        """Return the words for a value of a field; ``colors`` has those of ``colors.1``, too."""
+        table = self.phrases.get(name) or self.phrases.get(name.partition(".")[0], {})
+        return table.get(value)
+
+    def fits(self, goal: Goal, pointed: Collection[str] = ()) -> bool:
+        """Return whether the template tells a goal.
+
+        Args:
+            goal: the goal.
+            pointed: fields that referring expressions fill: the template must have these, and
+                needs no words for their values.
+        """
+        values = goal_fields(goal)
+        slots = goal.as_mapping()
+        if any(slots.get(slot) != value for slot, value in self.when.items()):
+            return False
+        if not set(self.fields) <= set(values) or not set(pointed) <= set(self.fields):
+            return False
+        for name, value in values.items():
+            if name not in self.fields:
+                if not _slots_of(name) <= set(self.when):
+                    return False
+            elif name not in pointed and self.phrase(name, value) is None:
+                return False
+        return True
+
+    def state(self, goal: Goal) -> str:
+        """Return the explicit command for a goal that the template fits."""
+        values = goal_fields(goal)
+
+        def words(found: re.Match[str]) -> str:
+            phrase = self.phrase(found[1], values[found[1]])
+            return found[0] if phrase is None else phrase.text
+
+        return FIELD.sub(words, self.text)
+
+
+@dataclass(frozen=True, slots=True)
+class TaskWordings:
+    """The commands of one task.
+
+    Attributes:
+        commands: templates; of several that fit a goal, the first one is used.
+        own: settings whose commands stay our own.
+    """
+
+    commands: tuple[WordedCommand, ...]
+    own: frozenset[str] = frozenset()
+
+    def find(self, goal: Goal, pointed: Collection[str] = ()) -> WordedCommand | None:
+        """Return the template for a goal; None if there is none. See `WordedCommand.fits`."""
+        return next((one for one in self.commands if one.fits(goal, pointed)), None)
+
+    def phrase(self, goal: Goal, name: str) -> StatedPhrase | None:
+        """Return the words for the value of a field, from the first template that has some."""
+        value = goal_fields(goal).get(name, "")
+        stated = self.find(goal)
+        for command in (*([] if stated is None else [stated]), *self.commands):
+            found = command.phrase(name, value)
+            if name in command.fields and found is not None:
+                return found
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class Wordings:
+    """The content of a wording file.
+
+    Attributes:
+        name: of the wordings.
+        fingerprint: of the file's content.
+        tasks: the commands of each task.
+        source: where the words come from, in a sentence.
+    """
+
+    name: str
+    fingerprint: str
+    tasks: Mapping[str, TaskWordings]
+    source: str = ""
+
+    @property
+    def identity(self) -> str:
+        """Name and fingerprint, as in records."""
+        return f"{self.name}@{self.fingerprint}"
+
+
+def goal_fields(goal: Goal) -> dict[str, str]:
+    """Return the value of each field that tells a goal: ``{"color": "red", "repeats": "3"}``.
+
+    A color with a count is one field, ``cubes.0``, with a value such as ``"2 red"``.
+    """
+    slots = goal.as_mapping()
+    if "counts" in slots:
+        pairs = zip(goal.texts("colors"), goal.numbers("counts"), strict=True)
+        return {f"cubes.{at}": f"{count} {color}" for at, (color, count) in enumerate(pairs)}
+    return {name: str(value) for slot in slots for name, value in _fields_of(goal, slot)}
+
+
+def _fields_of(goal: Goal, slot: str) -> Iterator[tuple[str, str | int]]:
+    value = goal[slot]
+    if isinstance(value, tuple):
+        for at, one in enumerate(goal.texts(slot)):
+            yield f"{slot}.{at}", one
+    else:
+        yield slot, value
+
+
+def _slots_of(name: str) -> set[str]:
+    base = name.partition(".")[0]
+    return {"colors", "counts"} if base == "cubes" else {base}
+
+
+def describe_goal(goal: Goal) -> str:
+    """Return a goal in words for messages: ``color red, repeats 3``."""
+    return ", ".join(f"{name} {value}" for name, value in goal_fields(goal).items())

@@ -1,0 +1,163 @@
+"""Wording files: read them, and check them.
+
+`docs/language.md`, "Words from outside", explains the format.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NoReturn
+
+from roboirg.core.episode import SlotValue
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.language.settings import all_settings
+from roboirg.language.wordings.worded_command import (
+    FIELD,
+    StatedPhrase,
+    TaskWordings,
+    WordedCommand,
+    Wordings,
+)
+from roboirg.tasks import every_task
+from roboirg.util.short_hash import short_hash
+
+FIELDS: tuple[str, ...] = (
+    "color", "repeats", "visit", "placement", "relation", "colors.0", "colors.1",
+    "cubes.0", "cubes.1", "cubes.2",
+)  # fmt: skip
+"""The fields that a command may have."""
+SLOTS = ("color", "colors", "counts", "repeats", "visit", "placement", "relation")
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+_PHRASE = re.compile(r"([^\[\]{}]*)\[([^\[\]{}]+)\]([^\[\]{}]*)|([^\[\]{}]+)")
+
+
+def read_wordings(path: str | Path) -> Wordings:
+    """Read a wording file.
+
+    Raises:
+        InvalidValueError: it cannot be read, is not TOML, or something in it is missing or wrong.
+    """
+    try:
+        data = Path(path).read_bytes()
+        text = data.decode()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidValueError(f"The wording file {str(path)!r} cannot be read: {error}.") from (
+            error
+        )
+    return parse_wordings(text, f"wording file {str(path)!r}")
+
+
+def parse_wordings(text: str, where: str) -> Wordings:
+    """Return the content of a wording file.
+
+    Args:
+        text: the file's text.
+        where: what to call the file in messages.
+
+    Raises:
+        InvalidValueError: as `read_wordings`.
+    """
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InvalidValueError(f"The {where} is not valid TOML: {error}.") from error
+    name, source = data.pop("name", None), data.pop("source", "")
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        raise InvalidValueError(
+            f"The {where} has the name {name!r}; it must begin with a line such as "
+            "name = \"robomme\", a word of letters, digits, '-' and '_'."
+        )
+    if not isinstance(source, str):
+        raise InvalidValueError(f"The {where} has the source {source!r}; it must be a text.")
+    for task in data:
+        if task not in every_task():
+            raise UnknownNameError(f"task (in the {where})", task, every_task())
+    tasks = {task: _TaskReader(where, task).read(content) for task, content in data.items()}
+    if not tasks:
+        raise InvalidValueError(f"The {where} has no task; add one such as [PickXtimes].")
+    return Wordings(name, short_hash(text)[:8], tasks, source)
+
+
+class _TaskReader:
+    """Reads the table of one task; its complaints name file and task."""
+
+    def __init__(self, where: str, task: str) -> None:
+        self._where = f"{task} in the {where}"
+
+    def read(self, content: object) -> TaskWordings:
+        """Return the commands of the task."""
+        table = self._table(content, "the task", ("own", "phrases", "commands"))
+        own, commands = table.get("own", []), table.get("commands", [])
+        if not isinstance(own, list) or not isinstance(commands, list) or not commands:
+            self._fail("needs [[TASK.commands]], and own, if given, must be a list")
+        for setting in own:
+            if setting not in all_settings():
+                raise UnknownNameError(f"setting ({self._where})", setting, all_settings())
+        shared = self._phrases(table.get("phrases", {}))
+        return TaskWordings(tuple(self._command(one, shared) for one in commands), frozenset(own))
+
+    def _command(
+        self, content: object, shared: Mapping[str, Mapping[str, StatedPhrase]]
+    ) -> WordedCommand:
+        table = self._table(content, "a command", ("text", "when", "phrases"))
+        text = table.get("text")
+        if not isinstance(text, str) or not text.strip():
+            self._fail(f"has a command with the text {text!r}; it must be a sentence")
+        if set("{}[]") & set(FIELD.sub("", text)):
+            self._fail(f"has a bracket that is no field in the command {text!r}")
+        when = {slot: self._condition(slot, value) for slot, value in
+                self._table(table.get("when", {}), "when", SLOTS).items()}  # fmt: skip
+        phrases = {**shared, **self._phrases(table.get("phrases", {}))}
+        names = FIELD.findall(text)
+        for at, name in enumerate(names):
+            if name not in FIELDS:
+                raise UnknownNameError(f"field ({self._where})", name, FIELDS)
+            if name in names[:at]:
+                self._fail(f"has the field {{{name}}} twice in the command {text!r}")
+            if name not in phrases and name.partition(".")[0] not in phrases:
+                self._fail(f"has no phrases for the field {{{name}}} of the command {text!r}")
+        return WordedCommand(text, when, phrases)
+
+    def _condition(self, slot: str, value: object) -> SlotValue:
+        if isinstance(value, str) or (isinstance(value, int) and not isinstance(value, bool)):
+            return value
+        if isinstance(value, list) and value and len({type(one) for one in value}) == 1:
+            if isinstance(value[0], str):
+                return tuple(str(one) for one in value)
+            if type(value[0]) is int:
+                return tuple(int(one) for one in value)
+        return self._fail(f"has the condition {slot} = {value!r}; it must be a word, a number or "
+                          "a list of them")  # fmt: skip
+
+    def _phrases(self, content: object) -> dict[str, dict[str, StatedPhrase]]:
+        names = {name for field in FIELDS for name in (field, field.partition(".")[0])}
+        tables = self._table(content, "phrases", sorted(names))
+        return {name: self._phrase_table(name, table) for name, table in tables.items()}
+
+    def _phrase_table(self, name: str, content: object) -> dict[str, StatedPhrase]:
+        if not isinstance(content, dict):
+            self._fail(f"has the phrases {name} = {content!r}; they must be a table of values")
+        return {value: self._phrase(name, value, text) for value, text in content.items()}
+
+    def _phrase(self, name: str, value: str, text: object) -> StatedPhrase:
+        found = _PHRASE.fullmatch(text) if isinstance(text, str) else None
+        if found is None:
+            self._fail(f"has the phrase {text!r} for {name} {value}; it must be words, with at "
+                       "most one part in [brackets]")  # fmt: skip
+        return StatedPhrase(found[1] or "", found[2] or found[4], found[3] or "")
+
+    def _table(
+        self, content: object, what: str, known: tuple[str, ...] | list[str]
+    ) -> dict[str, object]:
+        if not isinstance(content, dict):
+            self._fail(f"has {content!r} for {what}; it must be a table")
+        for key in content:
+            if key not in known:
+                raise UnknownNameError(f"key of {what} ({self._where})", key, known)
+        return content
+
+    def _fail(self, complaint: str) -> NoReturn:
+        raise InvalidValueError(f"{self._where} {complaint}.")

@@ -1,0 +1,62 @@
+"""The wording files that a process has opened.
+
+A process knows a wording file by its identity, name and fingerprint, once it has opened it: the
+options of an instruction hold the identity, and a job also says which file to open.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.language.wordings.worded_command import Wordings
+from roboirg.language.wordings.wording_file import read_wordings
+
+_OPEN: dict[str, Wordings] = {}
+"""The wordings of this process by identity."""
+
+
+def open_wordings(path: str | Path | None, identity: str | None = None) -> str | None:
+    """Open a wording file for this process, and return its identity; None for no file.
+
+    Args:
+        path: the file, or the identity of wordings that are open; None for our own words.
+        identity: the wordings that are wanted; None for those of the file.
+
+    Raises:
+        InvalidValueError: the file cannot be read, or holds other wordings.
+    """
+    if identity in _OPEN:
+        return identity
+    if str(path) in _OPEN:
+        return str(path)
+    if path is None:
+        if identity is not None:
+            raise InvalidValueError(f"The wordings {identity} need their file; none was given.")
+        return None
+    wordings = read_wordings(path)
+    if identity not in (None, wordings.identity):
+        raise InvalidValueError(
+            f"The wording file {str(path)!r} holds {wordings.identity}, but the episodes need "
+            f"{identity}; put the file back, or start again in another folder."
+        )
+    return register_wordings(wordings)
+
+
+def register_wordings(wordings: Wordings) -> str:
+    """Make wordings known to this process; return their identity."""
+    _OPEN[wordings.identity] = wordings
+    return wordings.identity
+
+
+def find_wordings(identity: str) -> Wordings:
+    """Return wordings that this process has opened.
+
+    Raises:
+        InvalidValueError: it has not.
+    """
+    if identity not in _OPEN:
+        raise InvalidValueError(
+            f"The wordings {identity!r} are not open; call open_wordings with their file first."
+        )
+    return _OPEN[identity]

@@ -1,0 +1,135 @@
+"""Runs in words from outside: plans, jobs, and a real run with worker processes."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.plan import Plan, instruct_job, make_plan, read_plan, write_plan
+from roboirg.evaluation.plan_file import read_plan_file
+from roboirg.language.wordings import wording_store
+from roboirg.records.record import Job
+from roboirg.records.record_codec import identity_key
+from roboirg.records.store import read_records
+
+FILE = """\
+name = "test"
+[PickXtimes.phrases]
+color = { red = "the red cube", green = "the green cube", blue = "the blue cube" }
+repeats = { 1 = "once", 2 = "twice", 3 = "three times", 4 = "four times", 5 = "five times" }
+[[PickXtimes.commands]]
+text = "pick up {color} and set it on the target {repeats}, then press the button"
+"""
+
+
+@pytest.fixture
+def wording_file(tmp_path: Path) -> Path:
+    path = tmp_path / "test.toml"
+    path.write_text(FILE)
+    return path
+
+
+@pytest.fixture
+def forgetful(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A process that has opened no file yet, like a worker's."""
+    monkeypatch.setattr(wording_store, "_OPEN", {})
+
+
+def a_plan(path: Path, **options: object) -> Plan:
+    chosen = read_plan_file("robomme") | {"tasks": "PickXtimes", "episodes": "2"}
+    return make_plan(["random"], **(chosen | {"wordings": str(path)} | options))
+
+
+def test_jobs_name_the_wordings_and_their_file(wording_file: Path) -> None:
+    plan = a_plan(wording_file)
+    jobs = plan.jobs()
+    assert len(jobs) == 2 * 3
+    (identity,) = {job.wordings for job in jobs}
+    assert identity is not None
+    assert identity.startswith("test@")
+    assert {job.wordings_file for job in jobs} == {str(wording_file)}
+    own = make_plan(["random"], tasks="PickXtimes", settings="explicit", episodes="2")
+    assert {(job.wordings, job.wordings_file) for job in own.jobs()} == {(None, None)}
+    # The same episodes in other words are other episodes; a file may be moved.
+    assert identity_key(jobs[0]) != identity_key(own.jobs()[0])
+    moved = jobs[0].model_copy(update={"wordings_file": "elsewhere.toml"})
+    assert identity_key(moved) == identity_key(jobs[0])
+    assert moved.slug == jobs[0].slug != own.jobs()[0].slug
+
+
+def test_a_stored_plan_does_not_need_the_file(wording_file: Path, tmp_path: Path) -> None:
+    plan = a_plan(wording_file)
+    write_plan(plan, tmp_path)
+    wording_file.unlink()
+    stored = read_plan(tmp_path)
+    assert stored == plan
+    assert stored is not None
+    assert stored.jobs() == plan.jobs()
+
+
+def test_a_relative_path_is_made_absolute(
+    wording_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(wording_file.parent)
+    assert a_plan(Path("test.toml")).wordings == str(wording_file)
+
+
+@pytest.mark.usefixtures("forgetful")
+def test_a_job_opens_its_file_and_checks_it(
+    wording_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job = a_plan(wording_file).jobs()[0]
+    monkeypatch.setattr(wording_store, "_OPEN", {})
+    assert instruct_job(job).text.startswith("pick up the ")
+    monkeypatch.setattr(wording_store, "_OPEN", {})
+    wording_file.write_text(FILE.replace("pick up", "grab"))
+    with pytest.raises(InvalidValueError, match=rf"but the episodes need {job.wordings}; put"):
+        instruct_job(job)
+
+
+def test_what_the_wordings_lack_stops_a_plan(wording_file: Path) -> None:
+    with pytest.raises(InvalidValueError, match=r"have no commands of StopCube\.$"):
+        a_plan(wording_file, tasks="StopCube")
+    wording_file.write_text(FILE.replace("1 = ", "6 = "))
+    with pytest.raises(InvalidValueError, match="have no command of PickXtimes for the goal"):
+        a_plan(wording_file, episodes="20")
+    with pytest.raises(InvalidValueError, match="cannot be read"):
+        a_plan(wording_file.with_name("missing.toml"))
+
+
+@pytest.mark.sim
+def test_two_workers_play_in_the_words_of_a_file(wording_file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+
+    def play(*words: str) -> subprocess.CompletedProcess[str]:
+        command = [
+            *(sys.executable, "-m", "roboirg", "run", "--policy", "random", "--out", str(out)),
+            *("--tasks", "PickXtimes", "--episodes", "2", "--max-steps", "3", "--workers", "2"),
+        ]
+        return subprocess.run(
+            [*command, *words], cwd=tmp_path, env=os.environ, capture_output=True, text=True,
+            check=False,
+        )  # fmt: skip
+
+    said = play("--plan", "robomme", "--wordings", "test.toml", "--policy-seeds", "0")
+    assert said.returncode == 0, said.stderr
+    records = list(read_records(out))
+    assert len(records) == 2
+    for record in records:
+        assert record.wordings is not None
+        assert record.wordings.startswith("test@")
+        assert record.instruction[0].text == record.command
+        assert record.command.startswith("pick up the ")
+        assert record.metadata["wordings"] == record.wordings
+    # The same episodes in our own words are played beside them, and none twice.
+    said = play("--settings", "explicit")
+    assert said.returncode == 0, said.stderr
+    assert [record.wordings is None for record in read_records(out)] == [False, False, True, True]
+    assert "2 already" in play("--settings", "explicit", "--dry-run").stdout.replace(",", "")
+    assert isinstance(Job(**json.loads(records[0].identity.model_dump_json())), Job)

@@ -1,0 +1,309 @@
+"""Words from outside: the import from a repository with RoboMME's interface."""
+
+import functools
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+from wording_stand_ins import STYLES, TASKS, make_clone, sentence, train_episodes, train_goals
+
+from roboirg.cli import app as cli
+from roboirg.core.episode import Goal
+from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.language import FORMS, expressible, instruct_with, interpret
+from roboirg.language.validation.episode_checks import check_episode
+from roboirg.language.wordings import goal_sentences, robomme_import
+from roboirg.language.wordings.template_search import find_templates
+from roboirg.language.wordings.worded_command import TaskWordings, Wordings, goal_fields
+from roboirg.language.wordings.wording_store import register_wordings
+from roboirg.tasks import all_tasks
+
+
+@functools.cache
+def imported(style: str) -> robomme_import.ImportedWordings:
+    """The import of a stand-in; its wordings are open."""
+    with tempfile.TemporaryDirectory() as folder:
+        found = robomme_import.import_robomme(make_clone(Path(folder), style))
+    register_wordings(found.wordings)
+    return found
+
+
+def import_task(task: str, say) -> tuple[TaskWordings | None, list]:
+    """The import of one task from a function, with what it refused."""
+    importer = robomme_import._TaskImport(all_tasks()[task], lambda self, _env: say(self))
+    return importer.run(), importer.refused
+
+
+def opened(task: str, commands: TaskWordings) -> str:
+    """The identity of open wordings with one task."""
+    return register_wordings(Wordings("own", task, {task: commands}))
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_every_task_is_imported_with_all_settings(style):
+    found = imported(style)
+    assert not found.refused
+    assert tuple(found.wordings.tasks) == TASKS
+    assert not any(one.own for one in found.wordings.tasks.values())
+
+
+@pytest.mark.parametrize("style", STYLES)
+@pytest.mark.parametrize("task", TASKS)
+def test_every_goal_has_the_sentence_of_the_source(style, task):
+    wordings = imported(style).wordings.tasks[task]
+    for goal in train_goals(task):
+        command = wordings.find(goal)
+        assert command is not None, goal
+        assert command.state(goal) == sentence(style, task, goal)
+
+
+@pytest.mark.parametrize("style", STYLES)
+@pytest.mark.parametrize("task", TASKS)
+def test_every_instruction_is_valid(style, task):
+    identity = imported(style).wordings.identity
+    for episode in train_episodes(task, 40, 52):  # the import looked at others
+        found = check_episode(episode, wordings=identity)
+        assert not found.failures
+        for setting in expressible(episode):
+            for form in FORMS:
+                options = InstructionOptions(setting, form, wordings=identity)
+                said = instruct_with(episode, options)
+                read = interpret(said.text, episode.scene, task)
+                assert (read.goals, read.not_understood) == ((episode.goal,), ()), said.text
+                assert said.metadata["wordings"] == identity
+                assert said.metadata["command"] in {
+                    one.text for one in imported(style).wordings.tasks[task].commands
+                }
+        explicit = instruct_with(episode, InstructionOptions(wordings=identity))
+        assert explicit.text == sentence(style, task, episode.goal, episode.difficulty)
+
+
+def test_referring_expressions_take_the_place_of_the_phrases():
+    identity = imported("sentences_in_words").wordings.identity
+
+    def command(task: str, setting: str, **wanted) -> str:
+        episode = next(
+            one
+            for one in train_episodes(task, 0, 100)
+            if wanted.items() <= one.goal.as_mapping().items()
+        )
+        return instruct_with(episode, InstructionOptions(setting, wordings=identity)).command
+
+    assert command("PickXtimes", "direct", repeats=1) == (
+        "grab it and set it on the target, repeating this action that many times, "
+        "then press the button to stop"
+    )
+    assert command("PickXtimes", "spatial", repeats=3) == (
+        "grab the cube there and set it on the target, repeating this action three times, "
+        "then press the button to stop"
+    )
+    assert command("StopCube", "direct") == (
+        "press the button so that the cube stops on the target when it arrives that time"
+    )
+    assert command("VideoUnmask", "direct", colors=("red",)) == (
+        "watch the video, then pick up the container that hides it"
+    )
+    assert command("BinFill", "direct", counts=(1, 1)) == (
+        "drop that many of the former and that many of the latter into the bin, "
+        "then press the button to stop"
+    )
+    identity = imported("sentences_in_digits").wordings.identity
+    assert command("VideoUnmask", "spatial", colors=("red",)) == "Lift the container there"
+    assert "on the target of that placement it was placed" in command("VideoPlaceOrder", "direct")
+
+
+def test_a_pronoun_stands_between_verb_and_particle():
+    found, refused = import_task(
+        "PickXtimes",
+        lambda self: (
+            f"pick up the {self.target_color_name} cube, place it on the target "
+            f"{self.num_repeats} times, then press the button"
+        ),
+    )
+    assert found is not None
+    assert (refused, found.own) == ([], frozenset())
+    identity = opened("PickXtimes", found)
+    (episode,) = train_episodes("PickXtimes", 0, 1)
+    said = instruct_with(episode, InstructionOptions("direct", wordings=identity))
+    assert said.command == (
+        "pick it up, place it on the target that many times, then press the button"
+    )
+    assert [said.span(one) for one in said.mentions if one.utterance == 1] == [
+        "it",
+        "that many times",
+    ]
+
+
+def test_an_unreadable_template_is_refused_with_its_reason(tmp_path):
+    clone = make_clone(tmp_path, "sentences_in_words")
+    file = clone / goal_sentences.FILE
+    text = file.read_text()
+    assert "press the button so that the cube stops" in text
+    file.write_text(text.replace("press the button so that the cube stops", "juggle the cube"))
+    out = tmp_path / "out.toml"
+    call = CliRunner().invoke(
+        cli.app, ["wordings", "import-robomme", str(clone), "--out", str(out)]
+    )
+    assert isinstance(call.exception, RoboIRGError)  # main() prints it, exit code 2
+    assert str(call.exception) == f"1 template could not be read back; {out} has the rest."
+    assert 'does not know the verb "juggle"' in call.stderr
+    assert "Refused StopCube (any visit)" in call.stderr
+    lines = out.read_text().splitlines()
+    assert "[StopCube]" not in lines
+    assert {f"[{task}]" for task in TASKS} - set(lines) == {"[StopCube]"}
+
+
+def test_words_that_no_expression_can_replace_leave_our_own_commands():
+    ordinals = ["", "first", "second", "third", "fourth"]
+    found, refused = import_task(
+        "VideoPlaceOrder",
+        lambda self: (
+            f"watch the video and put the {self.target_color_name} cube on the target "
+            f"where it was placed {ordinals[self.which_in_subset]}"
+        ),
+    )
+    assert found is not None
+    assert not refused
+    assert found.own == {"direct", "contextual", "reasoning"}
+    identity = opened("VideoPlaceOrder", found)
+    (episode,) = train_episodes("VideoPlaceOrder", 3, 4)
+    direct = InstructionOptions("direct", wordings=identity)
+    said = instruct_with(episode, direct)
+    assert said.metadata["command"] == "own"
+    assert said.metadata["wordings"] == identity
+    assert said.text == instruct_with(episode, InstructionOptions("direct")).text
+    assert instruct_with(episode, direct._replace(setting="explicit")).metadata["command"] != "own"
+
+
+def test_a_form_of_its_own_for_once_is_a_case_of_its_own():
+    def say(self) -> str:
+        if self.num_repeats == 1:
+            return "press the button after you lift the cube of the video and put it down"
+        return f"lift the cube of the video and put it down {self.num_repeats} times, then stop"
+
+    found, refused = import_task("VideoRepick", say)
+    assert found is not None
+    assert not refused
+    assert [dict(one.when) for one in found.commands] == [{"repeats": 1}, {}]
+
+
+def test_a_count_that_is_spread_over_the_sentence_has_no_implicit_form():
+    spread = {
+        1: "lift the cube of the video once and put it down",
+        2: "lift and put down the cube of the video twice",
+        3: "three times, lift it, the cube of the video, and put it down",
+    }
+    found, refused = import_task("VideoRepick", lambda self: spread[self.num_repeats])
+    assert found is not None
+    assert not refused
+    assert [(dict(one.when), one.text) for one in found.commands] == [
+        ({"repeats": repeats}, text) for repeats, text in spread.items()
+    ]
+    identity = opened("VideoRepick", found)
+    for episode in train_episodes("VideoRepick", 0, 4):
+        explicit = instruct_with(episode, InstructionOptions(wordings=identity))
+        assert explicit.text == spread[episode.goal.number("repeats")]
+        said = instruct_with(episode, InstructionOptions("direct", wordings=identity))
+        assert said.metadata["command"] == "own"
+        assert said.text == instruct_with(episode, InstructionOptions("direct")).text
+
+
+@pytest.mark.parametrize(
+    ("say", "reason"),
+    [
+        (lambda self: self.unheard_of, "get_language_goal raised AttributeError"),
+        (lambda _self: None, "get_language_goal returned [None], not a list of sentences"),
+        (lambda _self: "put {it} there", "has brackets"),
+        (lambda _self: "", "is empty"),
+        (lambda self: f"lift it, this is {self.difficulty}", "depends on the difficulty"),
+    ],
+)
+def test_an_unusable_sentence_refuses_the_task(say, reason):
+    found, refused = import_task("VideoRepick", lambda self: [say(self)])
+    assert found is None
+    assert [(one.task, one.case) for one in refused] == [("VideoRepick", "all goals")]
+    assert reason in refused[0].reason
+
+
+def test_a_sentence_that_does_not_tell_the_goal_is_refused():
+    found, refused = import_task("VideoRepick", lambda _self: "lift the cube of the video")
+    # It is read as once.
+    assert found is not None
+    assert [dict(one.when) for one in found.commands] == [{"repeats": 1}]
+    assert len(refused) == 2
+
+
+def test_only_one_file_is_loaded_and_nothing_is_left_behind(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    clone = make_clone(tmp_path, "sentences_in_words")
+    (clone / "src/robomme/__init__.py").write_text("raise SystemExit")
+    before, modules = list(sys.path), set(sys.modules)
+    assert callable(goal_sentences.load_function(clone))
+    assert sys.path == before
+    assert not [name for name in set(sys.modules) - modules if "robomme" in name]
+    assert not list(clone.rglob("__pycache__"))
+    assert not sys.dont_write_bytecode
+
+
+@pytest.mark.parametrize(
+    ("content", "complaint"),
+    [
+        (None, "name the folder of a clone"),
+        ("import no_such_module_anywhere", "cannot be loaded: ModuleNotFoundError"),
+        ("this is no Python", "cannot be loaded: SyntaxError"),
+        ("get_language_goal = 3", "has no function get_language_goal"),
+    ],
+)
+def test_a_folder_without_the_function_is_told(tmp_path, content, complaint):
+    if content is not None:
+        file = tmp_path / goal_sentences.FILE
+        file.parent.mkdir(parents=True)
+        file.write_text(content)
+    with pytest.raises(InvalidValueError, match=complaint):
+        robomme_import.import_robomme(tmp_path)
+
+
+COLORED = [
+    Goal.of(color=color, repeats=repeats)
+    for color in ("red", "green", "blue")
+    for repeats in range(1, 6)
+]
+WORDS = st.lists(st.text("abcde", min_size=1, max_size=3), max_size=3).map(
+    lambda words: " ".join(["", *words, ""])
+)
+
+
+@given(WORDS, WORDS, WORDS, st.permutations(range(5)), st.booleans(), st.booleans(), st.booleans())
+def test_templates_give_every_sentence_back(before, between, after, names, swapped, once, merged):
+    """Whatever the sentences look like, and however values and words depend on each other."""
+
+    def say(goal: Goal) -> str:
+        parts = [str(goal["color"]), f"x{names[goal.number('repeats') - 1]}"]
+        if swapped:
+            parts.reverse()
+        if once and goal["repeats"] == 1:
+            return f"{before}only {goal['color']}"
+        if merged and goal["color"] == "red":
+            return f"{after}{''.join(parts)}"
+        return f"{before}{parts[0]}{between}{parts[1]}{after}"
+
+    sentences = {goal: say(goal) for goal in COLORED}
+    drafts = find_templates(sentences)
+    told = [goal for draft in drafts for goal in draft.sentences]
+    assert sorted(map(repr, told)) == sorted(map(repr, COLORED))
+    for draft in drafts:
+        for goal in draft.sentences:
+            assert draft.when.items() <= goal.as_mapping().items()
+            values = goal_fields(goal)
+            words = [draft.tables[name][values[name]] for name in draft.fields]
+            pieces = [draft.literals[0]]
+            for word, literal in zip(words, draft.literals[1:], strict=True):
+                pieces += [word, literal]
+            assert "".join(pieces) == sentences[goal]
+    if not once and not merged:
+        assert len(drafts) == 1
