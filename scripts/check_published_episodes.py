@@ -26,7 +26,7 @@ from rich.table import Table
 
 from roboirg.core.episode import Episode, Split
 from roboirg.core.errors import MotionPlanningError
-from roboirg.core.motions import Swap
+from roboirg.core.motions import Shuttle, Swap
 from roboirg.core.observations import Demonstration
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.envs.factory import make
@@ -35,6 +35,7 @@ from roboirg.episodes.splits import get_episode, split_episodes
 from roboirg.evaluation.plan_parsing import parse_names, parse_splits
 from roboirg.policies import play
 from roboirg.policies.builtin.oracle_policy import OraclePolicy
+from roboirg.simulation.motion_player import shuttle_position
 from roboirg.tasks import find_tasks
 from roboirg.util.parallel_map import parallel_map
 
@@ -150,6 +151,10 @@ def _distances(env: RoboIRGEnv, row: Row, names: Mapping[str, str]) -> Iterator[
     for theirs, ours in names.items():
         place = _place(row["ready"][theirs])
         here = env.session.world.bodies[ours].position
+        for motion in env.episode.scene.motions:
+            if isinstance(motion, Shuttle) and motion.subject == ours:
+                # RoboMME moves it at the end of a step, after the picture; here the next one does.
+                here = shuttle_position(motion, env.session.world.elapsed)
         if max(math.hypot(*place[:2]), math.hypot(here.x, here.y)) < TABLE_REACH:
             yield ours, math.dist(place, here)
         elif min(math.hypot(*place[:2]), math.hypot(here.x, here.y)) < TABLE_REACH:
