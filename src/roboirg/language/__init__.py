@@ -8,6 +8,7 @@ from roboirg.language.interpreter import Interpretation, interpret
 from roboirg.language.request import STAGE_SETS
 from roboirg.language.settings import setting_names, settings_of
 from roboirg.language.templates import LANGUAGE_VERSION
+from roboirg.language.wordings.wording_store import open_wordings
 
 __all__ = [
     "FORMS",
@@ -22,6 +23,7 @@ __all__ = [
     "instruct",
     "instruct_with",
     "interpret",
+    "open_wordings",
     "setting_names",
     "settings_of",
 ]
