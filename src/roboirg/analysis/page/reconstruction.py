@@ -1,7 +1,7 @@
 """Parts of an episode that a record leaves out because they follow from it: resolved form, stages.
 
-Both are derived by the installed package, so only for records of the same versions, the resolved
-form only in our own words; the page omits them for others.
+Both are derived by the installed package, so only for records of the same versions; the page
+omits them for others.
 """
 
 from __future__ import annotations
@@ -30,17 +30,18 @@ class StageMark(NamedTuple):
 def resolved_form(record: Record) -> str | None:
     """Return the same instruction with every reference resolved.
 
-    None if the record has this form already, words of a wording file, or another language or
-    environment version.
+    None if the record has this form already, another language or environment version, or words of
+    a wording file that is gone.
     """
-    if record.setting == EXPLICIT or record.form == "resolved" or record.wordings is not None:
+    if record.setting == EXPLICIT or record.form == "resolved":
         return None
     if record.language_version != language.LANGUAGE_VERSION or not _has_this_environment(record):
         return None
     try:
-        return instruct_job(record.identity.model_copy(update={"form": "resolved"})).text
+        changes = {"form": "resolved", "wordings_file": record.wordings_file}
+        return instruct_job(record.identity.model_copy(update=changes)).text
     except RoboIRGError:
-        return None  # a task that is no longer installed
+        return None  # a task or a wording file that is no longer there
 
 
 def stages_of(record: Record) -> tuple[StageMark, ...]:

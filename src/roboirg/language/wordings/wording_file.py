@@ -93,9 +93,10 @@ class _TaskReader:
         own, commands = table.get("own", []), table.get("commands", [])
         if not isinstance(own, list) or not isinstance(commands, list) or not commands:
             self._fail("needs [[TASK.commands]], and own, if given, must be a list")
+        implicit = [name for name, rule in all_settings().items() if rule.implicit]
         for setting in own:
-            if setting not in all_settings():
-                raise UnknownNameError(f"setting ({self._where})", setting, all_settings())
+            if setting not in implicit:
+                raise UnknownNameError(f"implicit setting ({self._where})", setting, implicit)
         shared = self._phrases(table.get("phrases", {}))
         return TaskWordings(tuple(self._command(one, shared) for one in commands), frozenset(own))
 
