@@ -85,6 +85,13 @@ def test_errors_and_unplayed_trials_are_named(result) -> None:
     assert differences(rest, planned) == ("1 error", "2 trials still to be played")
 
 
+def test_a_trial_is_played_wherever_policy_and_wordings_come_from(result) -> None:
+    played = play(result)
+    elsewhere = {"spec": "openpi://other:1", "wordings_file": "elsewhere.toml"}
+    planned = [one.identity.model_copy(update=elsewhere) for one in played]
+    assert differences(played, planned) == ()
+
+
 def test_other_settings_other_robots_and_other_tasks_are_not_comparable(result) -> None:
     assert differences(play(result, settings=("direct",))) == IMPLICIT
     assert differences(play(result, tasks=("PutInBox",))) == REAL

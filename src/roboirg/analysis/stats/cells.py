@@ -27,6 +27,7 @@ from roboirg.analysis.stats.option_labels import options_sort_key, words_label
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import DemonstrationFrames
 from roboirg.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, Job, Result
+from roboirg.records.record_codec import RecordKey, identity_key
 from roboirg.tasks import all_tasks
 
 
@@ -201,26 +202,27 @@ def gather(runs: Sequence[tuple[str, Sequence[Result]]], planned: Iterable[Job] 
             the same episodes of a policy stay apart; others complete each other.
         planned: jobs that should have a result; those without one are counted as missing.
     """
-    jobs = set(planned)
+    jobs = {identity_key(job): job for job in planned}
     apart = _played_twice(runs) if len(runs) > 1 else set()
     verdicts: dict[CellKey, dict[Trial, bool]] = defaultdict(dict)
     errors: dict[CellKey, int] = defaultdict(int)
     missing: dict[CellKey, int] = defaultdict(int)
     policy_runs: dict[tuple[str, EvalConditions], PolicyRun] = {}
-    played: set[Job] = set()
+    played: set[RecordKey] = set()
     for name, results in runs:
         for result in results:
             policy_run = PolicyRun.of(result, name if result.policy in apart else "")
             policy_runs.setdefault((result.policy, policy_run.conditions), policy_run)
             if jobs:
-                played.add(result.identity)
+                played.add(identity_key(result))
             key = CellKey(policy_run, result.task, result.options)
             if result.outcome == "error":
                 errors[key] += 1
             else:
                 trial = Trial(result.episode, result.policy_seed)
                 verdicts[key][trial] = result.outcome == "success"
-    for job in sorted(jobs - played, key=lambda job: job.slug):
+    unplayed_jobs = (job for key, job in jobs.items() if key not in played)
+    for job in sorted(unplayed_jobs, key=lambda job: job.slug):
         conditions = EvalConditions.of(job)
         unplayed = PolicyRun(job.policy, conditions, None)
         policy_run = policy_runs.get((job.policy, conditions), unplayed)
