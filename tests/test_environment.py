@@ -171,6 +171,15 @@ def test_an_environment_of_another_action_space_is_refused():
         play(env, make_policy("oracle", 0))
 
 
+@pytest.mark.parametrize("attribute", ["depth", "calibration"])
+def test_an_environment_without_what_a_policy_looks_at_is_refused(attribute):
+    policy = make_policy("random", 0)
+    setattr(policy, attribute, True)
+    policy.cameras = ("front",)
+    with pytest.raises(InvalidValueError, match=f"make it with {attribute}=True"):
+        play(roboirg.make("PickXtimes", cameras=()), policy)
+
+
 def test_runs_give_policies_their_action_space():
     job = Job(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
     for space in ACTION_SPACES.values():

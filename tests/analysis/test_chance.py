@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,10 +12,14 @@ import pytest
 from roboirg.analysis.stats.chance import chance_level
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.plan import instruct_job
+from roboirg.language.settings import settings_of
 from roboirg.language.variants import all_variants
 from roboirg.policies.builtin.listeners import ForgetfulPolicy
 from roboirg.records.record import Job
 from roboirg.tasks import all_tasks, get_task
+
+
+DOCS = Path(__file__).parents[2] / "docs" / "statistics.md"
 
 
 def job(task: str, setting: str, episode: int = 2, **fields: object) -> Job:
@@ -42,6 +47,24 @@ def test_by_hand() -> None:
     """StopCube has the second to the fifth visit, VideoRepick one to three repeats."""
     assert chance_level([job("StopCube", "direct")]) == Fraction(1, 4)
     assert chance_level([job("VideoRepick", "direct")]) == Fraction(1, 3)
+
+
+@pytest.mark.parametrize(
+    ("setting", "text"),
+    [
+        ("direct", "direct and contextual {}"),
+        ("reasoning", "reasoning {}"),
+        ("spatial", "spatial {} (7 tasks)"),
+    ],
+)
+def test_the_docs_state_the_level_of_the_test_split(setting: str, text: str) -> None:
+    levels = [
+        float(chance_level([job(task, setting, episode) for episode in range(50)]) or 0)
+        for task in all_tasks()
+        if setting in settings_of(get_task(task))
+    ]
+    expected = text.format(f"{100 * float(np.mean(levels)):.1f}")
+    assert expected in DOCS.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("task", ["PickXtimes", "VideoUnmask", "BinFill"])

@@ -58,7 +58,12 @@ class PaperWorld:
             self.hook(self, True)
         first = {"step": 3, "kind": "still", "subject": "robot", "place": None, "holds": True}
         shown = {"joint_positions": np.zeros((3, 7))}
-        return {}, {"demonstration": shown, "elapsed_steps": 4, "events": [first]}
+        return {}, {
+            "demonstration": shown,
+            "demonstration_source": "planned",
+            "elapsed_steps": 4,
+            "events": [first],
+        }
 
     def step_chunk(self, actions: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         assert actions.shape[1:] == (8,)

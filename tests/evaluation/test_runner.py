@@ -167,7 +167,7 @@ def test_words_of_two_versions_are_not_mixed(
     ("name", "value", "sentence"),
     [
         ("seed", 7, r"PickXtimes test/0 with scene seed 7, but .* has \d+; choose another"),
-        ("environment_version", 99, "of environment version 99, but this roboirg has version 0;"),
+        ("environment_version", 99, "of environment version 99, but this roboirg has version 1;"),
         ("task", "Gone", r"Gone test/0 .* no such episode"),
         ("policy_version", "old", r"version old, but the policy is now version built-in"),
     ],

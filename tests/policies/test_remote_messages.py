@@ -101,7 +101,7 @@ def test_depth_and_matrices_are_asked_for_one_by_one(option, kind, others):
     with ChallengeServer() as server:
         policy = make_policy(f"challenge://{server.place}?{option}=yes", 0)
         policy.reset(INSTRUCTION, video(0))
-        with pytest.raises(InvalidValueError, match=r"lack 'front_\w+', .* ask for"):
+        with pytest.raises(InvalidValueError, match=rf"lack 'front_\w+'; .*{option}=True"):
             policy.act(moment(0, history=()))
         policy.reset(INSTRUCTION, video(0))
         policy.act(moment(0, history=(), sensors=True))

@@ -239,8 +239,9 @@ def test_cold_warm_or_off_the_cache_changes_nothing(cache, monkeypatch, drawn, u
 @pytest.mark.parametrize("task", VIDEO_TASKS)
 def test_a_warm_reset_is_a_cold_one(task, cache, unplanned):
     _, observation, info = reset(task)
-    (entry,) = cache.glob("actions/*")
-    assert entry.stat().st_size < 200_000
+    small = [entry.stat().st_size < 200_000 for entry in cache.glob("actions/*")]
+    # A shipped recording needs no cache.
+    assert small == ([] if info["demonstration_source"] == "recorded" else [True])
     unplanned()
     env, again, warm = reset(task)
     same(dict(info.pop("demonstration")), dict(warm.pop("demonstration")))

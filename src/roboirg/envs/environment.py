@@ -16,7 +16,7 @@ from roboirg.core.episode import Episode, Stage
 from roboirg.core.errors import InvalidValueError, MotionPlanningError, UnknownNameError
 from roboirg.core.instruction_options import ALL_STAGES, InstructionOptions
 from roboirg.core.observations import CAMERAS, DemonstrationFrames
-from roboirg.episodes.recordings import recorded_actions
+from roboirg.episodes.recordings import is_recorded, recorded_actions
 from roboirg.episodes.splits import get_episode
 from roboirg.judging import Event, Status, plain_subgoal
 from roboirg.language import instruct_with
@@ -136,6 +136,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
             find_render_settings(meshes),
         ).validated()
         self.cameras = tuple(self._spec.cameras)
+        self.depth, self.calibration = depth, calibration
         self.demonstration_frames, self.observe_every = demonstration_frames, observe_every
         self.history_cameras = tuple(self._spec.for_history.cameras)
         if not isinstance(max_steps, int) or max_steps < 1:
@@ -377,6 +378,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
 
 def _shipped_recording(episode: Episode) -> Recording | None:
     """Return RoboMME's recording of the demonstration; None if there is none."""
-    if not episode.recorded:
+    slot = (episode.task, episode.split, episode.index)
+    if not episode.recorded or not is_recorded(*slot):
         return None
-    return Recording(*recorded_actions(episode.task, episode.split, episode.index), end="")
+    return Recording(*recorded_actions(*slot), end="")

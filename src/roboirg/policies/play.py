@@ -50,3 +50,9 @@ def _check(env: RoboIRGEnv, policy: Policy) -> None:
                 f"{type(policy).__name__} needs {attribute}={value!r}, but the environment has "
                 f"{given!r}; make it with {attribute}={value!r}."
             )
+    for attribute in ("depth", "calibration"):
+        if REQUIREMENTS[attribute](policy) and not getattr(env, attribute):
+            raise InvalidValueError(
+                f"{type(policy).__name__} needs {attribute}=True, but the environment has none; "
+                f"make it with {attribute}=True."
+            )

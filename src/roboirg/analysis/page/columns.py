@@ -15,12 +15,12 @@ from typing import NamedTuple, get_args
 from roboirg.analysis.page.details import Strings, details_of, searched_texts
 from roboirg.analysis.page.entries import EpisodeEntries, EpisodeEntry
 from roboirg.analysis.page.episode_videos import EpisodeVideo, EpisodeVideos
-from roboirg.analysis.stats.cells import task_order
+from roboirg.analysis.stats.cells import FAIRNESS, task_order
 from roboirg.analysis.stats.option_labels import options_label, options_sort_key
 from roboirg.core.episode import DIFFICULTIES
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
-from roboirg.records.record import ERROR_KINDS, FailureKind, Outcome
+from roboirg.records.record import ERROR_KINDS, FailureKind, Outcome, Record
 from roboirg.tasks import all_tasks
 
 NO_FAILURE = -1
@@ -174,8 +174,15 @@ def _row(
         "steps": record.steps,
         # Episodes of the same scene, and among them those that can be compared.
         "scene": numbers.setdefault(scene, len(numbers)),
-        "pair": numbers.setdefault((*scene, record.policy_seed, entry.options), len(numbers)),
+        "pair": numbers.setdefault(
+            (*scene, record.policy_seed, entry.options, _fairness(record)), len(numbers)
+        ),
     }
+
+
+def _fairness(record: Record) -> tuple[object, ...]:
+    """Return what two episodes must share to be compared, besides scene and instruction."""
+    return tuple(getattr(record, name) for name in FAIRNESS)
 
 
 def setting_label(options: InstructionOptions) -> str:

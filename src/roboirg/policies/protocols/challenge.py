@@ -89,14 +89,15 @@ class ChallengePolicy(RemotePolicy):
         """Send everything seen since the last call; return all actions of the reply.
 
         Raises:
-            InvalidValueError: there is no depth or calibration, but the URL's options ask for it.
+            InvalidValueError: pictures, or the depth or calibration that the URL's options ask for,
+                are missing.
         """
         intrinsic = INTRINSIC_FIELDS if self.calibration else {}
         for field in (*self._fields.values(), *intrinsic.values()):
             if field not in observation:
                 raise InvalidValueError(
-                    f"Observations lack {field!r}, which the options of challenge:// ask for; make "
-                    "the environment with depth=True or calibration=True, or leave the option out."
+                    f"Observations lack {field!r}; make the environment with cameras={CAMERAS}, "
+                    f"depth={self.depth} and calibration={self.calibration}."
                 )
         demonstration, self._demonstration = self._demonstration, None
         first = demonstration is not None

@@ -46,8 +46,8 @@ def replay_or_plan(
         play: plays the demonstration; called again if a replay ends in another state.
         shipped: RoboMME's recording, if there is one. If it does not complete the stages, which
             no shipped one does where it was checked, the demonstration is planned.
-        watched: whether a frame hook observes the steps. If so, the demonstration is planned,
-            because a wrong replay would be noticed only at its end.
+        watched: whether a frame hook observes the steps. If so, no cached replay is used, because
+            a wrong one would be noticed only at its end.
 
     Raises:
         MotionPlanningError: the demonstration cannot be executed; the scene cannot be used.
