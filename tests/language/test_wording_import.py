@@ -1,6 +1,7 @@
 """Words from outside: the import from a repository with RoboMME's interface."""
 
 import functools
+import re
 import sys
 import tempfile
 from pathlib import Path
@@ -12,15 +13,17 @@ from typer.testing import CliRunner
 from wording_stand_ins import STYLES, TASKS, make_clone, sentence, train_episodes, train_goals
 
 from roboirg.cli import app as cli
-from roboirg.core.episode import Goal
+from roboirg.core.episode import COLORS, Goal
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import FORMS, expressible, instruct_with, interpret
 from roboirg.language.validation.episode_checks import check_episode
-from roboirg.language.wordings import goal_sentences, robomme_import
+from roboirg.language.wordings import goal_sentences, robomme_import, wording_store
 from roboirg.language.wordings.template_search import find_templates
 from roboirg.language.wordings.worded_command import TaskWordings, Wordings, goal_fields
+from roboirg.language.wordings.wording_file import parse_wordings
 from roboirg.language.wordings.wording_store import register_wordings
+from roboirg.language.wordings.wording_writer import wording_text
 from roboirg.tasks import all_tasks
 
 
@@ -220,6 +223,7 @@ def test_a_count_that_is_spread_over_the_sentence_has_no_implicit_form():
         (lambda _self: None, "get_language_goal returned [None], not a list of sentences"),
         (lambda _self: "put {it} there", "has brackets"),
         (lambda _self: "", "is empty"),
+        (lambda _self: "soulève-le", "is not printable ASCII on one line"),
         (lambda self: f"lift it, this is {self.difficulty}", "depends on the difficulty"),
     ],
 )
@@ -235,7 +239,85 @@ def test_a_sentence_that_does_not_tell_the_goal_is_refused():
     # It is read as once.
     assert found is not None
     assert [dict(one.when) for one in found.commands] == [{"repeats": 1}]
-    assert len(refused) == 2
+    assert [(one.case, one.reason) for one in refused] == [
+        (
+            f"repeats {repeats}",
+            "'lift the cube of the video': the interpreter finds 1 goal: repeats 1",
+        )
+        for repeats in (2, 3)
+    ]
+
+
+def test_reasons_come_in_the_order_of_goals_and_once():
+    def say(self) -> str:
+        places = ["", "first", "second", "third", "fourth"]
+        target = f"the {places[self.which_in_subset]} target of the video"
+        word = "drop" if self.target_color_name == "red" and self.which_in_subset == 2 else "put"
+        return f"{word} the {self.target_color_name} cube on {target}, juggle"
+
+    _, refused = import_task("VideoPlaceOrder", say)
+    assert refused
+    assert len(set(refused)) == len(refused)
+    assert refused == import_task("VideoPlaceOrder", say)[1]
+    assert all("the interpreter: does not know" in one.reason for one in refused)
+
+
+def test_a_verb_may_depend_on_the_count():
+    def say(self) -> str:
+        counts = {color: getattr(self, f"{color}_cubes_target_number") for color in COLORS}
+        items = " and ".join(f"{count} {color} cubes" for color, count in counts.items() if count)
+        verb = "put" if sum(counts.values()) <= 2 else "drop"
+        return f"{verb} {items} into the bin, then press the button"
+
+    found, refused = import_task("BinFill", say)
+    assert found is not None
+    assert not refused
+    read = parse_wordings(wording_text("a", "", {"BinFill": found}), "file").tasks["BinFill"]
+    told = [goal for goal in train_goals("BinFill") if found.find(goal) is not None]
+    assert told
+    for goal in told:
+        wanted = say(goal_sentences.StandIn(goal_sentences.attributes_of(goal, "hard")))
+        assert found.find(goal).state(goal) == read.find(goal).state(goal) == wanted
+
+
+def test_templates_that_a_file_cannot_keep_apart_are_refused(monkeypatch):
+    monkeypatch.setattr(
+        robomme_import, "wording_text", lambda *args: wording_text(*args).replace("lift", "grab")
+    )
+    found, refused = import_task(
+        "VideoRepick",
+        lambda self: f"lift and put down the cube of the video {self.num_repeats} times",
+    )
+    assert found is None
+    (one,) = refused
+    assert (one.task, one.case) == ("VideoRepick", "all goals")
+    assert re.fullmatch("the file would give 'grab .*' instead of 'lift .*'", one.reason)
+
+
+def test_an_import_leaves_no_wordings_open():
+    before = set(wording_store._OPEN)
+    found, _ = import_task(
+        "VideoRepick",
+        lambda self: f"lift and put down the cube of the video {self.num_repeats} times",
+    )
+    assert found is not None
+    assert set(wording_store._OPEN) == before
+
+
+def test_all_reasons_are_told_if_nothing_can_be_used(tmp_path):
+    clone = make_clone(tmp_path, "sentences_in_words")
+    (clone / goal_sentences.FILE).write_text("def get_language_goal(self, env):\n    return ['']")
+    out = tmp_path / "out.toml"
+    words = ["wordings", "import-robomme", str(clone), "--out", str(out)]
+    call = CliRunner().invoke(cli.app, words)
+    assert isinstance(call.exception, RoboIRGError)
+    assert str(call.exception).startswith(f"No sentence of {str(clone)!r} can be used")
+    assert call.stderr.count("Refused ") == len(TASKS)
+    assert not out.exists()
+    # A bad name is told before the work.
+    monkey = CliRunner().invoke(cli.app, [*words, "--name", "a b"])
+    assert "has the name 'a b'" in str(monkey.exception)
+    assert "Refused" not in monkey.stderr
 
 
 def test_only_one_file_is_loaded_and_nothing_is_left_behind(tmp_path, monkeypatch):
