@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from roboirg.core.errors import InvalidValueError
+from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.plan import Plan, instruct_job, make_plan, read_plan, write_plan
 from roboirg.evaluation.plan_file import read_plan_file
 from roboirg.language.wordings import wording_store
@@ -99,8 +99,24 @@ def test_what_the_wordings_lack_stops_a_plan(wording_file: Path) -> None:
     wording_file.write_text(FILE.replace("1 = ", "6 = "))
     with pytest.raises(InvalidValueError, match="have no command of PickXtimes for the goal"):
         a_plan(wording_file, episodes="20")
-    with pytest.raises(InvalidValueError, match="cannot be read"):
+    with pytest.raises(InvalidValueError, match=r"^The wording file '.*missing.toml' cannot be "):
         a_plan(wording_file.with_name("missing.toml"))
+    wording_file.write_text("name = 3")
+    with pytest.raises(InvalidValueError) as caught:
+        a_plan(wording_file)
+    assert str(caught.value).startswith(f"The wording file {str(wording_file)!r} has the name 3;")
+    wording_file.write_text("name = 'a'\n[PickXtime]")
+    with pytest.raises(UnknownNameError, match=r"^There is no task \(in the wording file '"):
+        a_plan(wording_file)
+
+
+@pytest.mark.usefixtures("forgetful")
+def test_a_job_in_our_own_words_opens_no_file(wording_file: Path) -> None:
+    job = a_plan(wording_file).jobs()[0].model_copy(update={"wordings": None})
+    own = instruct_job(job)
+    assert own.metadata["wordings"] is None
+    missing = job.model_copy(update={"wordings_file": "missing.toml"})
+    assert instruct_job(missing) == own
 
 
 @pytest.mark.sim

@@ -43,6 +43,16 @@ TAKE = "Take the red cube and put it on the target once"
         ("Take the cube beside the button and put it on the target three times.",
          'place "beside the button"', ["beside"]),
         ("Take the cube next to the target.", 'place "next to the target"', ["next"]),
+        ("Take the cube between the target and the button and put it on the target once.",
+         'place "between the target"', ["between"]),
+        ("Swing the red cube between the target and the button.", "between the target",
+         ["between"]),
+        ("Take the cube between both targets.", "between both targets", ["between"]),
+        ("Take the cube under and put it on the target once.", 'place "under and"', ["under"]),
+        ("Take the cube below, and put it on the target once.", 'place "below ,"', ["below"]),
+        ("Take the cube that is under, and stop.", 'place "under ,"', ["under"]),
+        ("Take the cube in the middle and put it on the target once.",
+         'place "in the middle"', ["middle"]),
         ("Take the cube and put it on the plate.", 'place "on the plate"', ["plate"]),
         ("Take the red cube and put it on the target a dozen times.", "dozen", ["dozen"]),
         ("Take the red cube or the blue cube.", 'word "or"', ["or"]),
@@ -198,3 +208,22 @@ def test_a_word_more_is_harmless_or_named(case, word, data):
         assert word in found.unknown_words
         assert not found.goals
         assert any(f'"{word}"' in one or f" {word}" in one for one in found.not_understood)
+
+
+@pytest.mark.parametrize(
+    ("task", "text"),
+    [
+        ("SwingXtimes", "Swing the red cube between the left target and the right target twice."),
+        ("SwingXtimes", "Move the red cube back and forth between both targets twice."),
+        ("SwingXtimes", "Swing the red cube between the left and right targets twice."),
+        ("SwingXtimes", ("Move the red cube to the top of the right target, then to the top of the "
+         "left target, two times.")),
+        ("VideoUnmask", "Lift the container that the red cube is hidden under."),
+        ("VideoUnmask", "Lift the container the red cube is under, please."),
+        ("VideoUnmask", "Lift the container under which the red cube is hidden."),
+    ],
+)  # fmt: skip
+def test_what_is_between_or_under_may_be_a_way_or_a_hiding_place(task, text):
+    found = interpret(text, get_episode(task, "test", 2).scene, task)
+    assert found.not_understood == ()
+    assert len(found.goals) == 1

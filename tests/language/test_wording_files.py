@@ -1,6 +1,7 @@
 """Wording files: by hand, bad ones, their identity, and writing them."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,13 +12,22 @@ from wording_stand_ins import train_episodes
 from roboirg.core.episode import Goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.language import instruct, instruct_with, interpret
+from roboirg.language import FORMS, generator, instruct, instruct_with, interpret
 from roboirg.language.export import row
+from roboirg.language.generator import find_refusal
+from roboirg.language.phrases import plain
+from roboirg.language.request import InstructionSpec, UtteranceSpec
+from roboirg.language.settings import get_setting
+from roboirg.language.validation import pairing
 from roboirg.language.validation.episode_checks import check_episode
+from roboirg.language.validation.leaks import find_leaks
+from roboirg.language.validation.pairing import unpaired
+from roboirg.language.variants import instructions
 from roboirg.language.wordings.worded_command import StatedPhrase, TaskWordings, WordedCommand
 from roboirg.language.wordings.wording_file import parse_wordings, read_wordings
 from roboirg.language.wordings.wording_store import find_wordings, open_wordings, register_wordings
 from roboirg.language.wordings.wording_writer import wording_text
+from roboirg.tasks import get_task
 
 HAND = """\
 name = "by-hand"
@@ -50,6 +60,11 @@ def write(folder: Path, text: str = HAND) -> Path:
     path = folder / "hand.toml"
     path.write_text(text)
     return path
+
+
+def opened(tables: str) -> str:
+    """The identity of open wordings with these tables."""
+    return register_wordings(parse_wordings(f"name = 'hand'\n{tables}", "file"))
 
 
 def episode_with(task: str, **slots):
@@ -148,6 +163,42 @@ def test_a_goal_or_task_without_a_command_is_told(tmp_path):
             "has the phrase 'a [b] [c]' for colors red",
         ),
         ('name = "a"\n' + UNMASK + "phrases.shade = {}", "There is no key of phrases"),
+        (
+            'name = "a"\n' + UNMASK + "when = { colors = 'red' }",
+            "has the condition colors = 'red'; it must be a list of words.",
+        ),
+        (
+            'name = "a"\n' + UNMASK + "when = { counts = [1, 'a'] }",
+            "has the condition counts = [1, 'a']; it must be a list of numbers.",
+        ),
+        (
+            'name = "a"\n' + UNMASK + "when = { repeats = '1' }",
+            "has the condition repeats = '1'; it must be a number.",
+        ),
+        (
+            'name = "a"\n' + UNMASK + "when = { color = ['red'] }",
+            "has the condition color = ['red']; it must be a word.",
+        ),
+        (
+            'name = "a"\n' + UNMASK.replace("lift", "soulève"),
+            "has the words 'soulève {colors.0}'; they must be printable ASCII on one line",
+        ),
+        (
+            'name = "a"\n' + UNMASK + 'phrases.colors = { red = "a\\nb" }',
+            "has the words 'a\\nb'; they must be printable ASCII on one line",
+        ),
+        (
+            'name = "a"\n' + UNMASK + 'phrases.colors = { red = "the [red] container" }',
+            "the brackets must hold a whole phrase with its article, such as [the red cube].",
+        ),
+        (
+            'name = "a"\n' + UNMASK + 'phrases.colors = { red = "  " }',
+            "has the phrase '  ' for colors red; it must be words",
+        ),
+        (
+            'name = "a"\n' + UNMASK + 'phrases.colors = { red = "the [ ] cube" }',
+            "has the phrase 'the [ ] cube' for colors red; it must be words",
+        ),
     ],
 )
 def test_a_bad_file_is_told_in_one_sentence(tmp_path, text, complaint):
@@ -179,6 +230,9 @@ def test_a_changed_file_is_other_wordings(tmp_path):
     gone = "by-hand@00000000"
     with pytest.raises(InvalidValueError, match=f"holds {changed}, but the episodes need {gone}"):
         open_wordings(path, gone)
+    with pytest.raises(InvalidValueError, match=f"holds {changed}, but the episodes need {gone}"):
+        open_wordings(changed, gone)
+    assert open_wordings(changed) == changed
     with pytest.raises(InvalidValueError, match="need their file; none was given"):
         open_wordings(None, gone)
     with pytest.raises(InvalidValueError, match="are not open"):
@@ -188,16 +242,18 @@ def test_a_changed_file_is_other_wordings(tmp_path):
     assert open_wordings(None) is None
 
 
-TEXT = st.text(st.characters(codec="utf-8", exclude_characters="[]{}", exclude_categories=["C"]))
-PHRASES = st.builds(StatedPhrase, TEXT, TEXT.filter(bool), TEXT)
+TEXT = st.text(st.characters(min_codepoint=32, max_codepoint=126, exclude_characters="[]{}"))
+WORDS = TEXT.filter(str.strip)
+BEFORE = TEXT.filter(lambda text: not text.endswith(" "))
+PHRASES = st.builds(StatedPhrase, BEFORE, WORDS, TEXT)
 
 
 @given(
-    TEXT.filter(str.strip),
+    WORDS,
     st.dictionaries(st.sampled_from(["red", "green", "blue"]), PHRASES, min_size=1),
     st.dictionaries(st.sampled_from(["red", "green", "blue"]), PHRASES, min_size=1),
     st.sets(st.sampled_from(["direct", "spatial"])),
-    TEXT,
+    st.text(st.characters(codec="utf-8", exclude_categories=["C"])),
 )
 def test_what_is_written_is_read_again(words, first, second, own, source):
     commands = (
@@ -218,6 +274,185 @@ def test_what_is_written_is_read_again(words, first, second, own, source):
         for field, table in before.phrases.items():
             for value, phrase in table.items():
                 assert after.phrase(field, value) == phrase
+
+
+def test_a_count_and_a_cube_may_be_one_phrase():
+    identity = opened(
+        """
+        [BinFill.phrases]
+        cubes = { "2 red" = "2 red cubes", "1 red" = "1 red cube" }
+        [[BinFill.commands]]
+        text = "put {cubes.0} into the bin, then press the button"
+        """
+    )
+    episode = replace(episode_with("BinFill"), goal=Goal.of(colors=("red",), counts=(2,)))
+    explicit = instruct(episode, wordings=identity)
+    assert explicit.text == "put 2 red cubes into the bin, then press the button"
+    assert [explicit.span(one) for one in explicit.mentions] == ["2 red cubes"]
+    for form in FORMS:
+        assert instruct(episode, "direct", form, wordings=identity).metadata["command"] != "own"
+
+
+OWN_SENTENCES = """
+[PickXtimes.phrases]
+color = { red = "the red cube", green = "the green cube", blue = "the blue cube" }
+[[PickXtimes.commands]]
+when = { repeats = 1 }
+text = "put {color} on the target once, then press the button"
+[[PickXtimes.commands]]
+when = { repeats = 2 }
+text = "twice, put {color} on the target, then press the button"
+"""
+
+
+@pytest.mark.parametrize("setting", ["direct", "contextual"])
+def test_both_forms_have_our_command_or_none(setting):
+    identity = opened(OWN_SENTENCES)
+    episode = episode_with("PickXtimes", repeats=2)
+    for form in FORMS:
+        said = instruct(episode, setting, form, wordings=identity)
+        assert said.metadata["command"] == "own"
+        assert said.text == instruct(episode, setting, form).text
+    assert not list(unpaired(episode, [setting], identity))
+    # The number is stated in both.
+    for form in FORMS:
+        said = instruct(episode, "spatial", form, wordings=identity)
+        assert said.metadata["command"].startswith("twice, put")
+
+
+def test_a_pair_with_our_command_in_one_form_is_no_pair(monkeypatch):
+    episode = episode_with("PickXtimes", repeats=2)
+    identity = opened(OWN_SENTENCES)
+
+    def say(one, options):
+        outside = identity if options.form == "resolved" else None
+        setting = "explicit" if outside else "direct"
+        return instruct_with(one, options._replace(setting=setting, wordings=outside))
+
+    monkeypatch.setattr(pairing, "instruct_with", say)
+    assert ("direct", "resolved, more than its references differ") in unpaired(episode, ["direct"])
+
+
+BRACKETS = """
+[PickXtimes.phrases]
+color = { red = "our friend [the red cube] on the table" }
+repeats = { 2 = "[twice] please", 3 = "exactly [three times]" }
+[[PickXtimes.commands]]
+text = "put {color} on the target {repeats}, then press the button"
+
+[BinFill.phrases]
+cubes = { "2 red" = "two [red cubes] of the table" }
+[[BinFill.commands]]
+text = "put {cubes.0} into the bin, then press the button"
+"""
+
+
+def test_words_around_brackets_stay():
+    identity = opened(BRACKETS)
+    red = [episode_with("PickXtimes", color="red", repeats=repeats) for repeats in (2, 3)]
+    assert [instruct(one, "direct", wordings=identity).command for one in red] == [
+        (
+            "put our friend it on the table on the target that many times please, "
+            "then press the button"
+        ),
+        (
+            "put our friend it on the table on the target exactly that many times, "
+            "then press the button"
+        ),
+    ]
+    said = instruct(red[0], "spatial", wordings=identity).command
+    assert re.search(r"put our friend the cube .* on the table on the target twice please", said)
+    said = next(
+        instruct(one, "reasoning", wordings=identity)
+        for one in train_episodes("PickXtimes", 0, 100)
+        if one.goal["color"] == "red" and one.goal["repeats"] == 2
+        and instruct(one, "reasoning").metadata["pattern"] == "number deduction"
+    ).command  # fmt: skip
+    assert said.startswith("put our friend the red cube on the table on the target ")
+    assert said.endswith(" please, then press the button")
+    cubes = replace(episode_with("BinFill"), goal=Goal.of(colors=("red",), counts=(2,)))
+    said = instruct(cubes, "direct", wordings=identity).command
+    assert said == "put that many of them of the table into the bin, then press the button"
+
+
+def test_the_phrases_of_a_command_stay_with_it():
+    identity = opened(
+        """
+        [PickXtimes.phrases]
+        color = { red = "the red cube" }
+        repeats = { 1 = "one time", 2 = "twice" }
+        [[PickXtimes.commands]]
+        when = { color = "red" }
+        phrases.repeats = { 1 = "just [once]" }
+        text = "put our cube on the target {repeats}, then press the button"
+        [[PickXtimes.commands]]
+        when = { repeats = 1 }
+        phrases.color = { red = "our [red cube]" }
+        text = "put {color} on the target, then press the button"
+        [[PickXtimes.commands]]
+        text = "take {color}, put it on the target {repeats}, then press the button"
+        """
+    )
+    episode = episode_with("PickXtimes", color="red", repeats=1)
+    direct = instruct(episode, "direct", wordings=identity).command
+    assert direct == "take it, put it on the target that many times, then press the button"
+    spatial = instruct(episode, "spatial", wordings=identity).command
+    assert re.fullmatch("put our the cube .* on the target, then press the button", spatial)
+    wordings = find_wordings(identity).tasks["PickXtimes"]
+    third = wordings.commands[2]
+    assert wordings.phrase(episode.goal, "repeats").text == "just once"
+    assert wordings.phrase(episode.goal, "repeats", third).text == "one time"
+
+
+@pytest.mark.parametrize(
+    ("when", "text", "leaked"),
+    [
+        ("", "put {cubes.0} and {cubes.1} in", set()),
+        ("", "put {cubes.0} and {cubes.1} in, 2 kinds", set()),  # every goal has it
+        ("", "put {cubes.0} and {cubes.1} in", {"1"}),
+        ("when = { counts = [2, 1] }", "put {cubes.0} and {cubes.1} in, 2 and 1", {"1", "2"}),
+    ],
+)
+def test_a_count_in_a_command_is_a_leak_unless_every_goal_has_it(when, text, leaked):
+    after = ", 1 by 1" if leaked == {"1"} else ""
+    identity = opened(
+        f"""
+        [BinFill.phrases]
+        cubes = {{ "2 red" = "two [red cubes]", "1 blue" = "one [blue cube]{after}" }}
+        [[BinFill.commands]]
+        {when}
+        text = "{text}"
+        """
+    )
+    goal = Goal.of(colors=("red", "blue"), counts=(2, 1))
+    said = instruct(replace(episode_with("BinFill"), goal=goal), "direct", wordings=identity)
+    assert find_leaks(said, goal) == leaked
+
+
+def test_a_goal_without_a_command_is_a_refusal_with_a_reason():
+    identity = opened(OWN_SENTENCES)
+    missing = episode_with("PickXtimes", repeats=3)
+    options = InstructionOptions("direct", wordings=identity)
+    assert find_refusal(missing, options) == (
+        f"wordings {identity} have no command of PickXtimes for the goal of episode "
+        f"{missing.key}: color {missing.goal['color']}, repeats 3"
+    )
+    with pytest.raises(InvalidValueError, match=r"^The wordings hand@.* repeats 3\.$"):
+        instruct_with(missing, options)
+    told = episode_with("PickXtimes", repeats=1)
+    said = list(instructions([missing, told], ["explicit"], ["implicit"], options))
+    assert [episode for episode, _ in said] == [told]
+    found = check_episode(missing, wordings=identity)
+    assert not found.texts
+    assert not found.failures
+
+
+def test_a_setting_may_speak_without_the_command(monkeypatch):
+    spec = InstructionSpec((UtteranceSpec("command", plain("do as before")),))
+    setting = replace(get_setting("direct", get_task("PickXtimes")), say=lambda _request: spec)
+    monkeypatch.setattr(generator, "get_setting", lambda _name, _task: setting)
+    said = instruct(episode_with("PickXtimes", repeats=1), "direct", wordings=opened(OWN_SENTENCES))
+    assert (said.text, said.metadata["command"]) == ("Do as before", "own")
 
 
 def test_the_first_command_that_fits_is_used():

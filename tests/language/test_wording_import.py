@@ -1,6 +1,7 @@
 """Words from outside: the import from a repository with RoboMME's interface."""
 
 import functools
+import re
 import sys
 import tempfile
 from pathlib import Path
@@ -12,16 +13,18 @@ from typer.testing import CliRunner
 from wording_stand_ins import STYLES, TASKS, make_clone, sentence, train_episodes, train_goals
 
 from roboirg.cli import app as cli
-from roboirg.core.episode import Goal
+from roboirg.core.episode import COLORS, Goal
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import FORMS, expressible, instruct_with, interpret
 from roboirg.language.validation.episode_checks import check_episode
-from roboirg.language.wordings import goal_sentences, robomme_import
+from roboirg.language.wordings import goal_sentences, robomme_import, wording_store
 from roboirg.language.wordings.template_search import find_templates
 from roboirg.language.wordings.worded_command import TaskWordings, Wordings, goal_fields
+from roboirg.language.wordings.wording_file import parse_wordings
 from roboirg.language.wordings.wording_store import register_wordings
-from roboirg.tasks import all_tasks
+from roboirg.language.wordings.wording_writer import wording_text
+from roboirg.tasks import all_tasks, get_task
 
 
 @functools.cache
@@ -220,6 +223,7 @@ def test_a_count_that_is_spread_over_the_sentence_has_no_implicit_form():
         (lambda _self: None, "get_language_goal returned [None], not a list of sentences"),
         (lambda _self: "put {it} there", "has brackets"),
         (lambda _self: "", "is empty"),
+        (lambda _self: "soulève-le", "is not printable ASCII on one line"),
         (lambda self: f"lift it, this is {self.difficulty}", "depends on the difficulty"),
     ],
 )
@@ -235,7 +239,93 @@ def test_a_sentence_that_does_not_tell_the_goal_is_refused():
     # It is read as once.
     assert found is not None
     assert [dict(one.when) for one in found.commands] == [{"repeats": 1}]
-    assert len(refused) == 2
+    assert [(one.case, one.reason) for one in refused] == [
+        (
+            f"repeats {repeats}",
+            "'lift the cube of the video': the interpreter finds 1 goal: repeats 1",
+        )
+        for repeats in (2, 3)
+    ]
+
+
+def test_the_reason_is_of_the_first_goal():
+    def say(self) -> str:
+        return f"juggle the {self.target_color_name} cube {self.num_repeats} times"
+
+    found, refused = import_task("PickXtimes", say)
+    assert found is None
+    (episode,) = train_episodes("PickXtimes", 0, 1)
+    first = get_task("PickXtimes").goals(episode.scene)[0]
+    sentence = f"juggle the {first['color']} cube {first['repeats']} times"
+    (one,) = refused
+    assert one.case == "any color, any repeats"
+    assert one.reason == f'{sentence!r}: the interpreter: does not know the verb "juggle"'
+
+
+def test_a_goal_without_a_template_is_refused_once(monkeypatch):
+    spread = ["lift the cube of the video once", "lift the cube of the video twice",
+              "three times, lift the cube of the video"]  # fmt: skip
+    monkeypatch.setattr(robomme_import, "find_templates", lambda told: find_templates(told)[:-1])
+    found, refused = import_task("VideoRepick", lambda self: spread[self.num_repeats - 1])
+    assert found is not None
+    assert refused == [("VideoRepick", "repeats 3", "no template fits")]
+
+
+def test_a_verb_may_depend_on_the_count():
+    def say(self) -> str:
+        counts = {color: getattr(self, f"{color}_cubes_target_number") for color in COLORS}
+        items = " and ".join(f"{count} {color} cubes" for color, count in counts.items() if count)
+        verb = "put" if sum(counts.values()) <= 2 else "drop"
+        return f"{verb} {items} into the bin, then press the button"
+
+    found, refused = import_task("BinFill", say)
+    assert found is not None
+    assert not refused
+    read = parse_wordings(wording_text("a", "", {"BinFill": found}), "file").tasks["BinFill"]
+    told = [goal for goal in train_goals("BinFill") if found.find(goal) is not None]
+    assert told
+    for goal in told:
+        wanted = say(goal_sentences.StandIn(goal_sentences.attributes_of(goal, "hard")))
+        assert found.find(goal).state(goal) == read.find(goal).state(goal) == wanted
+
+
+def test_templates_that_a_file_cannot_keep_apart_are_refused(monkeypatch):
+    monkeypatch.setattr(
+        robomme_import, "wording_text", lambda *args: wording_text(*args).replace("lift", "grab")
+    )
+    found, refused = import_task(
+        "VideoRepick",
+        lambda self: f"lift and put down the cube of the video {self.num_repeats} times",
+    )
+    assert found is None
+    (one,) = refused
+    assert (one.task, one.case) == ("VideoRepick", "all goals")
+    assert re.fullmatch("the file would give 'grab .*' instead of 'lift .*'", one.reason)
+
+
+def test_an_import_leaves_no_wordings_open():
+    found, _ = import_task(
+        "VideoRepick",
+        lambda self: f"lift and put down the cube of the video {self.num_repeats} times",
+    )
+    assert found is not None
+    assert not [one for one in wording_store._OPEN if one.startswith("import@")]
+
+
+def test_all_reasons_are_told_if_nothing_can_be_used(tmp_path):
+    clone = make_clone(tmp_path, "sentences_in_words")
+    (clone / goal_sentences.FILE).write_text("def get_language_goal(self, env):\n    return ['']")
+    out = tmp_path / "out.toml"
+    words = ["wordings", "import-robomme", str(clone), "--out", str(out)]
+    call = CliRunner().invoke(cli.app, words)
+    assert isinstance(call.exception, RoboIRGError)
+    assert str(call.exception).startswith(f"No sentence of {str(clone)!r} can be used")
+    assert call.stderr.count("Refused ") == len(TASKS)
+    assert not out.exists()
+    # A bad name is told before the work.
+    call = CliRunner().invoke(cli.app, [*words, "--name", "a b"])
+    assert "has the name 'a b'" in str(call.exception)
+    assert "Refused" not in call.stderr
 
 
 def test_only_one_file_is_loaded_and_nothing_is_left_behind(tmp_path, monkeypatch):

@@ -35,12 +35,14 @@ def import_robomme(
     if out.is_dir() or not out.parent.is_dir():
         raise InvalidValueError(f"{str(out)!r} is not a file in an existing folder.")
     found = make_wordings(path, name)
-    write_atomically(out, found.text)
-    for line in summary(found):
-        typer.echo(line)
-    typer.echo(f"Wrote {found.wordings.identity}: {out}")
     for task, case, reason in found.refused:
         typer.echo(f"Refused {task} ({case}): {reason}", err=True)
+    if found.wordings is None:
+        raise RoboIRGError(f"No sentence of {str(path)!r} can be used; {out} was not written.")
+    write_atomically(out, found.text)
+    for line in summary(found.wordings):
+        typer.echo(line)
+    typer.echo(f"Wrote {found.wordings.identity}: {out}")
     if found.refused:
         count = counted(len(found.refused), "template")
         raise RoboIRGError(f"{count} could not be read back; {out} has the rest.")

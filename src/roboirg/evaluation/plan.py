@@ -307,6 +307,9 @@ def make_plan(
         )
     except ValidationError as error:
         first = error.errors()[0]
+        cause = first.get("ctx", {}).get("error")
+        if isinstance(cause, InvalidValueError):
+            raise cause from None
         name = ".".join(str(part) for part in first["loc"])
         raise InvalidValueError(f"{name} is {first['input']!r}: {first['msg']}.") from error
     return plan.checked()
@@ -333,8 +336,9 @@ def instruct_job(job: Job) -> Instruction:
             wording file is missing or has changed.
     """
     episode = splits.get_episode(job.task, job.split, job.episode)
-    identity = open_wordings(job.wordings_file, job.wordings)
-    return language.instruct_with(episode, job.options._replace(wordings=identity))
+    if job.wordings is not None:
+        open_wordings(job.wordings_file, job.wordings)
+    return language.instruct_with(episode, job.options._replace(wordings=job.wordings))
 
 
 def _task_names(text: str) -> tuple[str, ...]:

@@ -189,7 +189,8 @@ def play_episode(
         MissingDependencyError: a package has to be installed first.
         InvalidValueError: the job's wording file is missing or has changed.
     """
-    open_wordings(job.wordings_file, job.wordings)
+    if job.wordings is not None:
+        open_wordings(job.wordings_file, job.wordings)
     result = RolloutResult()
     guard = _CallGuard(result, policy_timeout_s)
     policy, env = None, None

@@ -25,6 +25,7 @@ from roboirg.language.request import (
     InstructionSpec,
     NoCommandError,
 )
+from roboirg.language.setting import Setting
 from roboirg.language.settings import get_setting, settings_of
 from roboirg.language.template_sampler import TemplateSampler
 from roboirg.language.templates import LANGUAGE_VERSION
@@ -90,6 +91,9 @@ def instruct_with(episode: Episode, options: InstructionOptions) -> Instruction:
     """Return the instruction of an episode; like `instruct`, with all options in one value."""
     setting = get_setting(options.setting, get_task(episode.task))
     request = _request(episode, options)
+    missing = _missing(request)
+    if missing is not None:
+        raise InvalidValueError(f"The {missing}.")
     reason = setting.refusal(request)
     if reason is not None:
         raise InvalidValueError(
@@ -98,61 +102,90 @@ def instruct_with(episode: Episode, options: InstructionOptions) -> Instruction:
         )
     if request.wordings is not None and setting.name not in request.wordings.own:
         with contextlib.suppress(NoCommandError):
-            return _instruction(request, setting.say(request))
-    own = replace(request, wordings=None, sampler=TemplateSampler(request.sampler.key))
+            # Both forms have a command from outside, or none of them.
+            forms = {str(form): _say_outside(request, setting, form) for form in FORMS}
+            return _instruction(*forms[options.form])
+    own = replace(request, wordings=None, sampler=_sampler(episode))
     return _instruction(own, setting.say(own))
+
+
+def _say_outside(
+    request: InstructionRequest, setting: Setting, form: str
+) -> tuple[InstructionRequest, InstructionSpec]:
+    """Return what a setting says in words from outside, and the request that it answers.
+
+    Which command the setting fills is known only then, so it is said again with its phrases.
+    """
+    options = request.options._replace(form=form)
+    request = replace(request, options=options, sampler=_sampler(request.episode), filled=[])
+    spec = setting.say(request)
+    if request.phrases_of is None and request.filled:
+        return _say_outside(replace(request, phrases_of=request.filled[-1]), setting, form)
+    return request, spec
 
 
 def find_refusal(episode: Episode, options: InstructionOptions) -> str | None:
     """Return why a setting of the task cannot express an episode; None if it can."""
     setting = get_setting(options.setting, get_task(episode.task))
-    return setting.refusal(_request(episode, options))
+    request = _request(episode, options)
+    return _missing(request) or setting.refusal(request)
 
 
-def find_refusals(episode: Episode, *, frame: str = DEFAULT_FRAME) -> Mapping[str, str]:
+def find_refusals(
+    episode: Episode, *, frame: str = DEFAULT_FRAME, wordings: str | None = None
+) -> Mapping[str, str]:
     """Return the settings of the task that cannot express an episode, each with the reason.
 
     Args:
         episode: what to say.
         frame: of left and right, ``robot`` or ``camera``.
+        wordings: identity of an open wording file; None for our own words.
     """
     reasons = {
-        name: find_refusal(episode, InstructionOptions(name, frame=frame))
+        name: find_refusal(episode, InstructionOptions(name, frame=frame, wordings=wordings))
         for name in settings_of(get_task(episode.task))
     }
     return {name: reason for name, reason in reasons.items() if reason is not None}
 
 
-def expressible(episode: Episode, *, frame: str = DEFAULT_FRAME) -> tuple[str, ...]:
+def expressible(
+    episode: Episode, *, frame: str = DEFAULT_FRAME, wordings: str | None = None
+) -> tuple[str, ...]:
     """Return the settings of the task that can express an episode.
 
     Args:
         episode: what to say.
         frame: of left and right, ``robot`` or ``camera``.
+        wordings: identity of an open wording file; None for our own words.
     """
-    refused = find_refusals(episode, frame=frame)
+    refused = find_refusals(episode, frame=frame, wordings=wordings)
     return tuple(name for name in settings_of(get_task(episode.task)) if name not in refused)
 
 
 def _request(episode: Episode, options: InstructionOptions) -> InstructionRequest:
     _check_options(options)
     task = get_task(episode.task)
-    sampler = TemplateSampler(f"{LANGUAGE_VERSION}|{task.name}|{episode.seed}")
-    wordings = None if options.wordings is None else _outside(episode, options.wordings)
-    return InstructionRequest(episode, task, options, sampler, wordings)
+    wordings = None
+    if options.wordings is not None:
+        wordings = find_wordings(options.wordings).tasks.get(task.name, TaskWordings(()))
+    return InstructionRequest(episode, task, options, _sampler(episode), wordings)
 
 
-def _outside(episode: Episode, identity: str) -> TaskWordings:
-    """Return the commands of an open wording file for an episode's task."""
-    found = find_wordings(identity).tasks.get(episode.task)
-    if found is None:
-        raise InvalidValueError(f"The wordings {identity} have no commands of {episode.task}.")
-    if found.find(episode.goal) is None:
-        raise InvalidValueError(
-            f"The wordings {identity} have no command of {episode.task} for the goal of episode "
-            f"{episode.key}: {describe_goal(episode.goal)}."
-        )
-    return found
+def _sampler(episode: Episode) -> TemplateSampler:
+    return TemplateSampler(f"{LANGUAGE_VERSION}|{episode.task}|{episode.seed}")
+
+
+def _missing(request: InstructionRequest) -> str | None:
+    """Return what the words from outside lack for an episode; None if they have a command."""
+    identity, episode, wordings = request.options.wordings, request.episode, request.wordings
+    if wordings is None or wordings.find(episode.goal) is not None:
+        return None
+    if not wordings.commands:
+        return f"wordings {identity} have no commands of {episode.task}"
+    return (
+        f"wordings {identity} have no command of {episode.task} for the goal of episode "
+        f"{episode.key}: {describe_goal(episode.goal)}"
+    )
 
 
 def _check_options(options: InstructionOptions) -> None:
@@ -172,11 +205,10 @@ def _check_options(options: InstructionOptions) -> None:
 
 
 def _instruction(request: InstructionRequest, spec: InstructionSpec) -> Instruction:
-    outside = request.wordings is not None
-    utterances, mentions = _spoken(spec, as_written=outside)
+    utterances, mentions = _spoken(spec, as_written=bool(request.filled))
     notes: dict[str, object] = {"wordings": request.options.wordings}
-    if request.wordings is not None:
-        notes["command"] = request.wordings.commands[request.outside_index].text
+    if request.filled:
+        notes["command"] = request.filled[-1].text
     return Instruction(
         task=request.task.name,
         episode=request.episode.key,

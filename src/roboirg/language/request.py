@@ -14,7 +14,12 @@ from roboirg.language.instruction import UtteranceStage
 from roboirg.language.landmarks import Frame
 from roboirg.language.phrases import Phrase, antecedent, fill, plain, swap_particles
 from roboirg.language.template_sampler import TemplateSampler
-from roboirg.language.wordings.worded_command import StatedPhrase, TaskWordings, goal_fields
+from roboirg.language.wordings.worded_command import (
+    StatedPhrase,
+    TaskWordings,
+    WordedCommand,
+    goal_fields,
+)
 from roboirg.tasks import Task, get_task
 
 Distractor = Literal["neutral", "competing"]
@@ -38,9 +43,6 @@ AMOUNT_FIELD = "cubes"
 
 Those of others have ``cubes.0``, ``cubes.1`` and ``cubes.2``.
 """
-
-_OUTSIDE = "wordings"
-"""Purpose of the commands from outside in the metadata."""
 
 
 class NoCommandError(Exception):
@@ -83,6 +85,9 @@ class InstructionRequest:
         options: valid ones; see `roboirg.language.instruct`.
         sampler: picks the wordings.
         wordings: commands from outside; None for our own.
+        phrases_of: the command from outside whose phrases are used; None for the one that states
+            the goal, and where it has none, the others.
+        filled: the commands from outside that `command` has filled.
     """
 
     episode: Episode
@@ -90,6 +95,8 @@ class InstructionRequest:
     options: InstructionOptions
     sampler: TemplateSampler
     wordings: TaskWordings | None = None
+    phrases_of: WordedCommand | None = None
+    filled: list[WordedCommand] = field(default_factory=list)
 
     @property
     def resolved(self) -> bool:
@@ -142,14 +149,24 @@ class InstructionRequest:
         """Return the words from outside for a field of the command; None for our own."""
         if self.wordings is None:
             return None
-        return self.wordings.phrase(self.episode.goal, field)
+        return self.wordings.phrase(self.episode.goal, field, self.phrases_of)
+
+    def around(self, field: str, words: Phrase) -> Phrase:
+        """Return words for a field between those from outside that stay, if there are any."""
+        outside = self.outside_phrase(field)
+        if outside is None:
+            return words
+        return (*plain(outside.before), *words, *plain(outside.after))
+
+    def _names_thing(self, outside: StatedPhrase | None) -> bool:
+        """Return whether the replaced words name the object to handle, not just its cube."""
+        return outside is None or self.task.commands.thing in outside.core
 
     def by_color(self, color: GoalValue, cube: Phrase) -> Phrase:
         """Return words for the object to handle, given words for its cube."""
-        outside = self.outside_phrase(color.field)
-        if outside is not None and self.task.commands.thing not in outside.core:
-            return (*plain(outside.before), *cube, *plain(outside.after))
-        return fill(self.task.commands.by_color, {"cube": cube})
+        if self._names_thing(self.outside_phrase(color.field)):
+            cube = fill(self.task.commands.by_color, {"cube": cube})
+        return self.around(color.field, cube)
 
     def by_place(self, color: GoalValue, place: Phrase, *, plural: bool = False) -> Phrase:
         """Return words for the object to handle, given words for its place.
@@ -161,7 +178,10 @@ class InstructionRequest:
         covered = commands.thing != commands.colored
         if covered and outside is not None and commands.thing not in outside.text:
             raise NoCommandError
-        return fill(self.task.commands.by_place, {"place": place}, plural=plural)
+        words = fill(commands.by_place, {"place": place}, plural=plural)
+        if covered and not self._names_thing(outside):
+            return words
+        return self.around(color.field, words)
 
     def targets(self, color: GoalValue) -> tuple[SceneObject, ...]:
         """Return the objects to handle for a color: the cubes, or the containers over them."""
@@ -189,15 +209,12 @@ class InstructionRequest:
         command = wordings.find(goal, pointed)
         if command is None:
             raise NoCommandError
-        self.sampler.log.append(f"{_OUTSIDE}/{wordings.commands.index(command)}")
-        words = {name: fields[name] if name in pointed else stated[name] for name in names}
+        self.filled.append(command)
+        self.sampler.log.append(f"wordings/{wordings.commands.index(command)}")
+        words = stated | {name: fields[name] for name in pointed}
+        for number in {one.field for one in self.values_of("number")} & pointed:
+            words[number] = self.around(number, words[number])
         return swap_particles(fill(command.text, words))
-
-    @property
-    def outside_index(self) -> int:
-        """Index of the command from outside that `command` has filled."""
-        used = [one for one in self.sampler.log if one.startswith(f"{_OUTSIDE}/")]
-        return int(used[-1].partition("/")[2])
 
     def outside_stated(self, field: str) -> Phrase:
         """Return the words from outside for a field, with the value that they name."""
@@ -221,6 +238,8 @@ class InstructionRequest:
 def _tagged_words(text: str, value: GoalValue) -> Phrase:
     """Return words that name a value, with the spaces around them outside the mention."""
     words = text.strip()
+    if not words:
+        return plain(text)
     before, _, after = text.partition(words)
     return (*plain(before), *antecedent(words, value.slot, value.value), *plain(after))
 

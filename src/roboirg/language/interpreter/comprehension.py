@@ -39,9 +39,15 @@ _UNKNOWN_COMMAND = re.compile(
 _AFTER_VERB = re.compile(rf"{OBJECT}|[,;:]|up\b|down\b|$")
 _BEFORE_UNKNOWN_VERB = BEFORE_VERB | {"you"}
 _COMPARISON = re.compile(r"\b(?P<word>more|fewer|less)\b(?: than \w+)?")
-_FIXED_GOALS = word_set("target targets disc discs")
+_SWINGING = word_set("swing swinging forth")
+_BOTH_TARGETS = re.compile(
+    r"(?:(?:the|both|two|these|those) )*"
+    r"(?:(?:target|disc)s\b|(?:left|right)\b.{,20}? and (?:the )?(?:left|right)\b"
+    r"|(?:target|disc) .{,20}? and the .{,20}?(?:target|disc)\b)"
+)
+_HIDDEN = re.compile(r"(?:^| )(?!(?:that|which) )\w+ (?:is|was|are|were)(?: hidden)?$")
 _BELOW = word_set("under below beneath underneath")
-_AFTER_BELOW = ((), (",",), (";",), ("and",), ("then",), ("which",))
+_AFTER_BELOW = ((), (",",), (";",), ("and",), ("then",))
 _LOCATING = PREPOSITIONS | PLACE_WORDS
 
 
@@ -156,10 +162,13 @@ def _locates(words: Sentence, at: int) -> bool:
     following = words[at + 1 : at + 2]
     if words[at] in ("left", "right"):
         return following == ("of",)
-    if words[at] == "between" and not _FIXED_GOALS.isdisjoint(words[at + 1 : at + 6]):
-        return False  # the way of a cube
+    if words[at] == "between" and not _SWINGING.isdisjoint(words):
+        return _BOTH_TARGETS.match(" ".join(words[at + 1 :])) is None  # the way of a cube
+    if words[at] in _BELOW and following == ("which",):
+        return False  # the container under which the red cube is
     if words[at] in _BELOW and following in _AFTER_BELOW:
-        return False  # the container that the red cube is hidden under
+        # The container that the red cube is hidden under.
+        return _HIDDEN.search(" ".join(words[:at])) is None
     if words[at] == "next":
         return following == ("to",)
     return words[at] in PLACE_WORDS

@@ -51,7 +51,7 @@ _NOUNS = word_set(
     "table robot video camera picture beginning start outset end pair couple color colors amount "
     "place places spot position location press presses swaps swap order way hand mind "
     "neighbor neighbors action actions motion motions movement task process steps sequence "
-    "demonstration side top middle total object objects cycle cycles"
+    "demonstration side total object objects cycle cycles"
 )
 _PRONOUNS = word_set(
     "it them they you yourself i me us we what when where which who whichever there here then "

@@ -51,7 +51,7 @@ def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> 
     return _described(request, goal_values, things)
 
 
-def _reduced(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
     """Return ``that many of them``, or ``that many of the former and that many of the latter``."""
     matched = pairs(goal_values)
     them: tuple[tuple[str, Expression], ...] = (("them", "them"),)
@@ -63,7 +63,13 @@ def _reduced(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -
         )
         for (shade, count), (words, expression) in zip(matched, pointers, strict=True)
     ]
-    return amounts(items)
+    return amounts([(*item, *_after(request, at)) for at, item in enumerate(items)])
+
+
+def _after(request: InstructionRequest, index: int) -> Phrase:
+    """Return the words from outside that stay after the words for an amount."""
+    outside = request.outside_phrase(f"{AMOUNT_FIELD}.{index}")
+    return () if outside is None else plain(outside.after)
 
 
 def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
@@ -106,9 +112,10 @@ def _described(
     for index, ((_, count), thing) in enumerate(zip(pairs(goal_values), things, strict=True)):
         outside = request.outside_phrase(f"{AMOUNT_FIELD}.{index}")
         if outside is not None and outside.before:
-            items.append((*plain(outside.before), *thing, *plain(outside.after)))
+            item = (*plain(outside.before), *thing)
         else:
-            items.append(amount(_count(count), thing))
+            item = amount(_count(count), thing)
+        items.append((*item, *_after(request, index)))
     return amounts(items)
 
 

@@ -43,10 +43,7 @@ def series_noun(request: InstructionRequest, goal_value: GoalValue) -> str:
 def wrapped(request: InstructionRequest, goal_value: GoalValue, which: Phrase) -> Fields:
     """Return the command's field, given the words for the visit or placement."""
     words = fill(_wrapping(request, goal_value), {"which": which})
-    outside = request.outside_phrase(goal_value.field)
-    if outside is not None:
-        words = (*plain(outside.before), *words, *plain(outside.after))
-    return {goal_value.field: words}
+    return {goal_value.field: request.around(goal_value.field, words)}
 
 
 def _wrapping(request: InstructionRequest, goal_value: GoalValue) -> str:
@@ -75,7 +72,7 @@ def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) ->
     # All of it takes the place of "the second target".
     words = _wrapping(request, goal_value).format(which=words)
     pointing = anaphor(words, "that", slot, value)
-    return {goal_value.field: (*plain(outside.before), *pointing, *plain(outside.after))}
+    return {goal_value.field: request.around(goal_value.field, pointing)}
 
 
 def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:

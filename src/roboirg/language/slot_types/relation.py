@@ -16,10 +16,9 @@ def placed(request: InstructionRequest, goal_value: GoalValue, moment: Phrase) -
 
     Not *it*: only one cube is placed in the video, so *it* would give the cube away.
     """
-    outside = request.outside_phrase(goal_value.field)
-    if outside is not None:
-        return {goal_value.field: (*plain(outside.before), *moment, *plain(outside.after))}
-    return {goal_value.field: (*plain("the target where a cube was placed "), *moment)}
+    if request.outside_phrase(goal_value.field) is None:
+        moment = (*plain("the target where a cube was placed "), *moment)
+    return {goal_value.field: request.around(goal_value.field, moment)}
 
 
 def named(goal_value: GoalValue) -> Phrase:

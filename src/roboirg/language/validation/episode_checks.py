@@ -64,7 +64,7 @@ def check_episode(
             # The introduction alone says that left and right are the camera's: no reference.
             violations += not_self_contained(instruction, episode, read)
         _add_violations(results, episode, setting, violations)
-    for setting, words in unpaired(episode, expressible(episode), wordings):
+    for setting, words in unpaired(episode, expressible(episode, wordings=wordings), wordings):
         _add_violations(results, episode, setting, [("pairing", words)])
     for setting in settings_of(get_task(episode.task)):
         _count_refusals(all_settings()[setting], episode, results)

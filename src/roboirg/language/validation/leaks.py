@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from typing import cast
 
 from roboirg.core.episode import ALL_COLORS, Goal, SlotValue
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import all_settings
+from roboirg.language.wordings.worded_command import FIELD
+from roboirg.language.wordings.wording_store import find_wordings
 
 _NUMBERS = {
     1: frozenset(("1", "one", "ones", "once", "first", "single", "1st")),
@@ -29,14 +32,23 @@ def find_leaks(instruction: Instruction, goal: Goal) -> frozenset[str]:
     """Return the words and landmarks of an implicit command that give a hidden value away."""
     words = frozenset(re.findall(r"[a-z0-9]+", _without_ranks(instruction).lower()))
     hidden = all_settings()[instruction.setting].hidden_slots(instruction, goal)
-    # The words of a template are the same for all goals.
-    template = instruction.metadata["command"]
-    if template != "own":
-        words -= frozenset(re.findall(r"[a-z0-9]+", str(template).lower()))
+    words -= _template_words(instruction, hidden)
     found = [words & _spellings(goal[slot]) for slot in hidden]
     places = cast("list[str]", instruction.metadata["landmarks"])
     named = [place for place in places if place in instruction.command]
     return frozenset(named).union(*found)
+
+
+def _template_words(instruction: Instruction, hidden: Collection[str]) -> frozenset[str]:
+    """Return the words of a template from outside that every hidden value has."""
+    text = str(instruction.metadata["command"])
+    if text == "own":
+        return frozenset()
+    wordings = find_wordings(str(instruction.metadata["wordings"])).tasks[instruction.task]
+    conditions = {slot for one in wordings.commands if one.text == text for slot in one.when}
+    if not conditions.isdisjoint(hidden):
+        return frozenset()
+    return frozenset(re.findall(r"[a-z0-9]+", FIELD.sub("", text).lower()))
 
 
 def _spellings(value: SlotValue) -> frozenset[str]:

@@ -35,8 +35,10 @@ def unpaired(
         )
         if implicit.turns[:-1] != resolved.turns[:-1]:
             yield name, "resolved, its context differs"
-        # In words from outside, one time may have a sentence of its own, without a number.
-        same = implicit.metadata["command"] == resolved.metadata["command"]
+        # In words from outside, one time may have a sentence of its own, without a number; but
+        # both forms have our own command, or none of them.
+        templates = {str(one.metadata["command"]) for one in (implicit, resolved)}
+        same = len(templates) == 1 or "own" in templates
         if same and without_references(implicit) != without_references(resolved):
             yield name, "resolved, more than its references differ"
         if setting.implicit and implicit.command == resolved.command:

@@ -92,8 +92,10 @@ def ask(function: SentenceFunction, task: str, goal: Goal, difficulties: Iterabl
     if len(said) > 1:
         raise SentenceError(f"the sentence depends on the difficulty: {' / '.join(sorted(said))}")
     (sentence,) = said
-    if not sentence.strip() or set(sentence) & set("{}[]\n"):
+    if not sentence.strip() or set(sentence) & set("{}[]"):
         raise SentenceError(f"{sentence!r} is empty or has brackets")
+    if not (sentence.isascii() and sentence.isprintable()):
+        raise SentenceError(f"{sentence!r} is not printable ASCII on one line")
     return sentence
 
 

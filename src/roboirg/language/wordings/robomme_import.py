@@ -32,12 +32,14 @@ from roboirg.language.wordings.worded_command import (
     TaskWordings,
     WordedCommand,
     Wordings,
+    describe_goal,
     goal_fields,
 )
-from roboirg.language.wordings.wording_file import parse_wordings
-from roboirg.language.wordings.wording_store import register_wordings
+from roboirg.language.wordings.wording_file import check_name, parse_wordings
+from roboirg.language.wordings.wording_store import forget_wordings, register_wordings
 from roboirg.language.wordings.wording_writer import wording_text
 from roboirg.tasks import Task, all_tasks
+from roboirg.util.plurals import counted
 
 NAME = "robomme"
 SPLIT: Split = "train"
@@ -66,12 +68,12 @@ class ImportedWordings(NamedTuple):
 
     Attributes:
         text: of the wording file.
-        wordings: its content.
+        wordings: its content; None if no sentence can be used.
         refused: what it lacks.
     """
 
     text: str
-    wordings: Wordings
+    wordings: Wordings | None
     refused: tuple[Refused, ...]
 
 
@@ -83,8 +85,10 @@ def import_robomme(root: Path, name: str = NAME) -> ImportedWordings:
         name: of the wordings.
 
     Raises:
-        InvalidValueError: the folder lacks the sentences, or none can be used.
+        InvalidValueError: the folder lacks the sentences, or the name is no word.
     """
+    where = "imported wording file"
+    check_name(name, where)
     function = load_function(root)
     tasks: dict[str, TaskWordings] = {}
     refused: list[Refused] = []
@@ -96,7 +100,8 @@ def import_robomme(root: Path, name: str = NAME) -> ImportedWordings:
             tasks[task.name] = found
     source = f"The first sentences of {FUNCTION} in RoboMME's repository."
     text = wording_text(name, source, tasks)
-    return ImportedWordings(text, parse_wordings(text, "imported wording file"), tuple(refused))
+    wordings = parse_wordings(text, where) if tasks else None
+    return ImportedWordings(text, wordings, tuple(refused))
 
 
 class _TaskImport:
@@ -121,7 +126,7 @@ class _TaskImport:
             return None
         commands, stuck = self._commands(sentences)
         wordings = self._readable(TaskWordings(tuple(commands)), sentences)
-        if not wordings.commands:
+        if not wordings.commands or not self._kept_in_file(wordings, sentences):
             return None
         own = {setting for setting in settings_of(self._task) if self._needs_own(setting, stuck)}
         wordings = replace(wordings, own=frozenset(own))
@@ -163,17 +168,20 @@ class _TaskImport:
         """Return the templates that give their sentences, which read as the goals."""
         reasons: dict[int, str] = {}
         unread = set(sentences)
+        without: dict[Goal, None] = {}
         for number, episode in enumerate(self._episodes):
-            goals = set(self._task.goals(episode.scene))
-            for goal in goals if number < READ_SCENES else goals & unread:
+            goals = self._task.goals(episode.scene)
+            for goal in goals if number < READ_SCENES else [one for one in goals if one in unread]:
                 unread.discard(goal)
                 command = wordings.find(goal)
                 if command is None:
-                    self._refuse(", ".join(goal_fields(goal).values()), "no template fits")
+                    without[goal] = None
                     continue
                 reason = self._misread(command, goal, sentences[goal], episode)
                 if reason is not None:
                     reasons.setdefault(wordings.commands.index(command), reason)
+        for goal in without:
+            self._refuse(describe_goal(goal), "no template fits")
         for index, reason in sorted(reasons.items()):
             self._refuse(_case(wordings.commands[index]), reason)
         kept = (one for index, one in enumerate(wordings.commands) if index not in reasons)
@@ -188,10 +196,27 @@ class _TaskImport:
             return f"it gives {stated!r} instead of {sentence!r}"
         found = interpret(stated, episode.scene, self._task.name)
         if found.not_understood:
-            return f"{stated!r}: the interpreter {found.not_understood[0]}"
+            return f"{stated!r}: the interpreter: {found.not_understood[0]}"
         if found.goals != (goal,):
-            return f"{stated!r}: the interpreter finds {len(found.goals)} goals"
+            read = "; ".join(map(describe_goal, found.goals))
+            return f"{stated!r}: the interpreter finds {counted(len(found.goals), 'goal')}: {read}"
         return None
+
+    def _kept_in_file(self, wordings: TaskWordings, sentences: Mapping[Goal, str]) -> bool:
+        """Return whether a file with these templates gives the sentences; refuse the task if not.
+
+        A file has common phrases in one table, so that a template may fit further goals.
+        """
+        name = self._task.name
+        read = parse_wordings(wording_text("a", "", {name: wordings}), "file").tasks[name]
+        for goal in sentences:
+            command, written = wordings.find(goal), read.find(goal)
+            wanted = None if command is None else command.state(goal)
+            said = None if written is None else written.state(goal)
+            if said != wanted:
+                self._refuse("all goals", f"the file would give {said!r} instead of {wanted!r}")
+                return False
+        return True
 
     def _needs_own(self, setting: str, stuck: set[str]) -> bool:
         """Return whether a setting would replace words that are no whole phrase."""
@@ -204,9 +229,12 @@ class _TaskImport:
             Wordings("import", self._task.name, {self._task.name: wordings})
         )
         broken: set[str] = set()
-        for episode in self._checked(wordings):
-            found = check_episode(episode, wordings=identity)
-            broken |= {failure.setting for failure in found.failures}
+        try:
+            for episode in self._checked(wordings):
+                found = check_episode(episode, wordings=identity)
+                broken |= {failure.setting for failure in found.failures}
+        finally:
+            forget_wordings(identity)
         # Both have the same command.
         pair = {"direct", "contextual"}
         return (broken | pair if broken & pair else broken) - {EXPLICIT}
@@ -260,11 +288,10 @@ def _case(command: WordedCommand) -> str:
     return ", ".join([*conditions, *(f"any {name}" for name in command.fields)])
 
 
-def summary(found: ImportedWordings) -> Sequence[str]:
+def summary(found: Wordings) -> Sequence[str]:
     """Return what was imported, one line for each task."""
     lines: list[str] = []
-    for task, wordings in found.wordings.tasks.items():
+    for task, wordings in found.tasks.items():
         own = f"; own commands in {', '.join(sorted(wordings.own))}" if wordings.own else ""
-        count = len(wordings.commands)
-        lines.append(f"{task}: {count} command{'s' if count > 1 else ''}{own}")
+        lines.append(f"{task}: {counted(len(wordings.commands), 'command')}{own}")
     return lines

@@ -105,11 +105,23 @@ class TaskWordings:
         """Return the template for a goal; None if there is none. See `WordedCommand.fits`."""
         return next((one for one in self.commands if one.fits(goal, pointed)), None)
 
-    def phrase(self, goal: Goal, name: str) -> StatedPhrase | None:
-        """Return the words for the value of a field, from the first template that has some."""
+    def phrase(
+        self, goal: Goal, name: str, only: WordedCommand | None = None
+    ) -> StatedPhrase | None:
+        """Return the words for the value of a field.
+
+        Args:
+            goal: the goal.
+            name: of the field.
+            only: the template whose words they are; None for the one that states the goal, and
+                if it has none for the field, the first one that has some.
+        """
         value = goal_fields(goal).get(name, "")
         stated = self.find(goal)
-        for command in (*([] if stated is None else [stated]), *self.commands):
+        commands = self.commands if stated is None else (stated, *self.commands)
+        if only is not None:
+            commands = (only,)
+        for command in commands:
             found = command.phrase(name, value)
             if name in command.fields and found is not None:
                 return found

@@ -9,7 +9,7 @@ import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from roboirg.core.episode import SlotValue
 from roboirg.core.errors import InvalidValueError, UnknownNameError
@@ -29,9 +29,15 @@ FIELDS: tuple[str, ...] = (
     "cubes.0", "cubes.1", "cubes.2",
 )  # fmt: skip
 """The fields that a command may have."""
-SLOTS = ("color", "colors", "counts", "repeats", "visit", "placement", "relation")
+SLOTS: Mapping[str, tuple[type, bool]] = {
+    "color": (str, False), "colors": (str, True), "counts": (int, True), "repeats": (int, False),
+    "visit": (int, False), "placement": (int, False), "relation": (str, False),
+}  # fmt: skip
+"""The slots that a condition may have: the type of their values, and whether it is a list."""
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 _PHRASE = re.compile(r"([^\[\]{}]*)\[([^\[\]{}]+)\]([^\[\]{}]*)|([^\[\]{}]+)")
+
+_ARTICLE = re.compile(r"\b(?:the|an?) $", re.IGNORECASE)
 
 
 def read_wordings(path: str | Path) -> Wordings:
@@ -65,11 +71,7 @@ def parse_wordings(text: str, where: str) -> Wordings:
     except tomllib.TOMLDecodeError as error:
         raise InvalidValueError(f"The {where} is not valid TOML: {error}.") from error
     name, source = data.pop("name", None), data.pop("source", "")
-    if not isinstance(name, str) or not _NAME.fullmatch(name):
-        raise InvalidValueError(
-            f"The {where} has the name {name!r}; it must begin with a line such as "
-            "name = \"robomme\", a word of letters, digits, '-' and '_'."
-        )
+    name = check_name(name, where)
     if not isinstance(source, str):
         raise InvalidValueError(f"The {where} has the source {source!r}; it must be a text.")
     for task in data:
@@ -79,6 +81,20 @@ def parse_wordings(text: str, where: str) -> Wordings:
     if not tasks:
         raise InvalidValueError(f"The {where} has no task; add one such as [PickXtimes].")
     return Wordings(name, short_hash(text)[:8], tasks, source)
+
+
+def check_name(name: object, where: str) -> str:
+    """Return the name of wordings if it can be one.
+
+    Raises:
+        InvalidValueError: it is not a word.
+    """
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        raise InvalidValueError(
+            f"The {where} has the name {name!r}; it must begin with a line such as "
+            "name = \"robomme\", a word of letters, digits, '-' and '_'."
+        )
+    return name
 
 
 class _TaskReader:
@@ -107,10 +123,11 @@ class _TaskReader:
         text = table.get("text")
         if not isinstance(text, str) or not text.strip():
             self._fail(f"has a command with the text {text!r}; it must be a sentence")
+        self._check_printable(text)
         if set("{}[]") & set(FIELD.sub("", text)):
             self._fail(f"has a bracket that is no field in the command {text!r}")
         when = {slot: self._condition(slot, value) for slot, value in
-                self._table(table.get("when", {}), "when", SLOTS).items()}  # fmt: skip
+                self._table(table.get("when", {}), "when", list(SLOTS)).items()}  # fmt: skip
         phrases = {**shared, **self._phrases(table.get("phrases", {}))}
         names = FIELD.findall(text)
         for at, name in enumerate(names):
@@ -123,15 +140,13 @@ class _TaskReader:
         return WordedCommand(text, when, phrases)
 
     def _condition(self, slot: str, value: object) -> SlotValue:
-        if isinstance(value, str) or (isinstance(value, int) and not isinstance(value, bool)):
-            return value
-        if isinstance(value, list) and value and len({type(one) for one in value}) == 1:
-            if isinstance(value[0], str):
-                return tuple(str(one) for one in value)
-            if type(value[0]) is int:
-                return tuple(int(one) for one in value)
-        return self._fail(f"has the condition {slot} = {value!r}; it must be a word, a number or "
-                          "a list of them")  # fmt: skip
+        kind, several = SLOTS[slot]
+        values: list[Any] = value if several and isinstance(value, list) else [value]
+        if several != isinstance(value, list) or any(type(one) is not kind for one in values):
+            noun = "word" if kind is str else "number"
+            wanted = f"a list of {noun}s" if several else f"a {noun}"
+            self._fail(f"has the condition {slot} = {value!r}; it must be {wanted}")
+        return tuple(values) if several else values[0]
 
     def _phrases(self, content: object) -> dict[str, dict[str, StatedPhrase]]:
         names = {name for field in FIELDS for name in (field, field.partition(".")[0])}
@@ -145,10 +160,20 @@ class _TaskReader:
 
     def _phrase(self, name: str, value: str, text: object) -> StatedPhrase:
         found = _PHRASE.fullmatch(text) if isinstance(text, str) else None
-        if found is None:
+        core = "" if found is None else found[2] or found[4]
+        if found is None or not core.strip():
             self._fail(f"has the phrase {text!r} for {name} {value}; it must be words, with at "
                        "most one part in [brackets]")  # fmt: skip
-        return StatedPhrase(found[1] or "", found[2] or found[4], found[3] or "")
+        if name.partition(".")[0] != "cubes" and _ARTICLE.search(found[1] or ""):
+            self._fail(f"has the phrase {text!r} for {name} {value}; the brackets must hold a "
+                       "whole phrase with its article, such as [the red cube]")  # fmt: skip
+        self._check_printable(found[0])
+        return StatedPhrase(found[1] or "", core, found[3] or "")
+
+    def _check_printable(self, text: str) -> None:
+        if not (text.isascii() and text.isprintable()):
+            self._fail(f"has the words {text!r}; they must be printable ASCII on one line, as all "
+                       "instructions are")  # fmt: skip
 
     def _table(
         self, content: object, what: str, known: tuple[str, ...] | list[str]

@@ -28,13 +28,11 @@ def open_wordings(path: str | Path | None, identity: str | None = None) -> str |
     """
     if identity in _OPEN:
         return identity
-    if str(path) in _OPEN:
-        return str(path)
     if path is None:
         if identity is not None:
             raise InvalidValueError(f"The wordings {identity} need their file; none was given.")
         return None
-    wordings = read_wordings(path)
+    wordings = _OPEN.get(str(path)) or read_wordings(path)
     if identity not in (None, wordings.identity):
         raise InvalidValueError(
             f"The wording file {str(path)!r} holds {wordings.identity}, but the episodes need "
@@ -47,6 +45,11 @@ def register_wordings(wordings: Wordings) -> str:
     """Make wordings known to this process; return their identity."""
     _OPEN[wordings.identity] = wordings
     return wordings.identity
+
+
+def forget_wordings(identity: str) -> None:
+    """Make wordings unknown to this process again."""
+    _OPEN.pop(identity, None)
 
 
 def find_wordings(identity: str) -> Wordings:

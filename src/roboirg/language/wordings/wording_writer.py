@@ -33,10 +33,13 @@ def _task_lines(task: str, wordings: TaskWordings) -> Iterator[str]:
             conditions = (f"{slot} = {_value(value)}" for slot, value in command.when.items())
             yield f"when = {{ {', '.join(conditions)} }}"
         yield f"text = {_quoted(command.text)}"
+        rivaled = any(_both_may_fit(command, one) for one in wordings.commands)
         special = {
             field: table
             for field in command.fields
             if (table := command.phrases[field]).items() - shared[_base(field)].items()
+            # With phrases of others, it would also fit goals that are for its rivals.
+            or (rivaled and table != shared[_base(field)])
         }
         yield from _phrase_lines(f"{task}.commands.phrases", special)
 
@@ -58,6 +61,13 @@ def _shared(commands: tuple[WordedCommand, ...]) -> dict[str, dict[str, StatedPh
             if all(known.get(value, phrase) == phrase for value, phrase in table.items()):
                 known.update(table)
     return {base: dict(sorted(table.items())) for base, table in shared.items()}
+
+
+def _both_may_fit(first: WordedCommand, second: WordedCommand) -> bool:
+    """Return whether two templates are told apart by their phrases only."""
+    if first is second or set(first.fields) != set(second.fields):
+        return False
+    return all(second.when.get(slot, value) == value for slot, value in first.when.items())
 
 
 def _base(field: str) -> str:
