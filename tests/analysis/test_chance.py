@@ -18,7 +18,6 @@ from roboirg.policies.builtin.listeners import ForgetfulPolicy
 from roboirg.records.record import Job
 from roboirg.tasks import all_tasks, get_task
 
-
 DOCS = Path(__file__).parents[2] / "docs" / "statistics.md"
 
 
