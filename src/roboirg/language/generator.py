@@ -25,7 +25,7 @@ from roboirg.language.request import (
     InstructionSpec,
     NoCommandError,
 )
-from roboirg.language.settings import get_setting, settings_of
+from roboirg.language.settings import all_settings, get_setting, settings_of
 from roboirg.language.template_sampler import TemplateSampler
 from roboirg.language.templates import LANGUAGE_VERSION
 from roboirg.language.wordings.worded_command import TaskWordings, describe_goal
@@ -40,6 +40,7 @@ _DEFAULT_METADATA: dict[str, object] = {
     "stages": [],
     "distractor": None,
     "distractors": 0,
+    "recency_rival": None,
     "landmarks": [],
     "landmark_classes": [],
     "frame": None,
@@ -177,7 +178,7 @@ def _instruction(request: InstructionRequest, spec: InstructionSpec) -> Instruct
     notes: dict[str, object] = {"wordings": request.options.wordings}
     if request.wordings is not None:
         notes["command"] = request.wordings.commands[request.outside_index].text
-    return Instruction(
+    found = Instruction(
         task=request.task.name,
         episode=request.episode.key,
         setting=request.options.setting,
@@ -192,6 +193,17 @@ def _instruction(request: InstructionRequest, spec: InstructionSpec) -> Instruct
             "templates": list(request.sampler.log),
         },
     )
+    hidden = _hidden_slots(request, found)
+    return replace(found, metadata={**found.metadata, "hidden_slots": hidden})
+
+
+def _hidden_slots(request: InstructionRequest, instruction: Instruction) -> int:
+    """Return how many values of the goal the command leaves to its context."""
+    setting = all_settings()[instruction.setting]
+    if request.resolved or not setting.implicit:
+        return 0
+    hidden = setting.hidden_slots(instruction, request.episode.goal)
+    return sum(value.slot in hidden for value in request.goal_values)
 
 
 def _spoken(
