@@ -375,6 +375,24 @@ def test_the_page_has_the_same_tables(records: tuple[Record, ...]) -> None:
     assert "Gap to explicit by kind of words" not in render(explicit)
 
 
+@pytest.mark.browser
+def test_tables_open_with_the_keyboard_and_fit_a_telephone(
+    records: tuple[Record, ...], open_page: Any, tmp_path: Path
+) -> None:
+    pytest.importorskip("jinja2")
+    path = tmp_path / "page.html"
+    path.write_text(render(records))
+    with open_page(path.as_uri()) as page:
+        heads = page.locator("#kinds summary")
+        assert heads.count() == len(BREAKDOWNS)
+        assert page.locator("#kinds table:visible").count() == 0
+        for number in range(heads.count()):
+            heads.nth(number).press("Enter")
+            assert page.locator("#kinds table:visible").count() == number + 1
+        page.set_viewport_size({"width": 400, "height": 800})
+        assert page.evaluate("document.documentElement.scrollWidth") == 400
+
+
 # Memory
 
 
