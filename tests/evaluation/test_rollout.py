@@ -23,7 +23,7 @@ from roboirg.evaluation.plan import instruct_job
 from roboirg.evaluation.rollout import EpisodeRunner, load_policy, play_episode
 from roboirg.evaluation.rollout_result import RolloutResult
 from roboirg.evaluation.video_writer import VideoOptions, VideoWriter
-from roboirg.records.record import Job
+from roboirg.records.record import EventRecord, Job
 
 JOB = Job(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
 
@@ -317,3 +317,24 @@ def test_a_record_has_the_words_that_were_spoken() -> None:
     # An episode that did not begin has the words that it would have had.
     record = rollout.make_record(JOB, RolloutResult(), started_at="now")
     assert record.instruction[-1].text == instruct_job(JOB).utterances[-1].text != record.command
+
+
+@pytest.mark.parametrize(
+    ("setting", "frame", "failure"),
+    [
+        ("spatial", "robot", "mirrored_pick"),
+        ("spatial", "camera", "mirrored_pick"),
+        ("direct", "robot", "wrong_object"),
+    ],
+)
+def test_a_record_tells_a_mirrored_pick_where_the_words_name_a_side(
+    setting: str, frame: str, failure: str
+) -> None:
+    job = Job(policy="p", task="PickXtimes", split="test", episode=2, setting=setting, frame=frame)
+    events = [EventRecord(step=9, kind="picked", subject="cube_red")]
+    result = RolloutResult(
+        "failure", None, "picked up the red cube", elapsed_steps=9, events=events
+    )
+    record = rollout.make_record(job, result, started_at="now")
+    assert record.attribution is not None
+    assert (record.attribution.failure, record.attribution.subject) == (failure, "cube_red")

@@ -13,6 +13,7 @@ from staged import Staged
 
 from roboirg.core.conditions import Fact
 from roboirg.core.motions import Shuttle
+from roboirg.language import instruct, mirrored_objects
 
 Play = Callable[[Staged], bool | None]
 
@@ -615,6 +616,76 @@ def puts_another_color_back(staged: Staged) -> bool | None:
 def picks_a_dropped_cube_up_again(staged: Staged) -> None:
     target = first_pick(staged)
     staged.lift(target).drop(target).lift(target).tick(50)
+
+
+# The right words on the wrong side
+
+
+def exchange_sides(staged: Staged) -> dict[str, str]:
+    """Words that name a side; one of the objects that they would mean with left for right."""
+    said = instruct(staged.episode, "spatial")
+    staged.mirrored = mirrored_objects(staged.episode, said)
+    return {meant: min(others) for meant, others in staged.mirrored.items()}
+
+
+@case("mirrored_pick", "PickXtimes", "SwingXtimes", "PickByCount", *UNMASK)
+def takes_the_object_on_the_other_side(staged: Staged) -> bool | None:
+    sides, target = exchange_sides(staged), first_pick(staged)
+    if target not in sides:
+        return False
+    staged.lift(sides[target])
+    return None
+
+
+@case("mirrored_pick", *UNMASK)
+def lifts_the_container_on_the_other_side_second(staged: Staged) -> bool | None:
+    if kinds(staged).count(PICK) < 2:
+        return False
+    sides, index = exchange_sides(staged), until(staged, PICK, 2)
+    target = staged.episode.stages[index].primitive.subject
+    if target not in sides:
+        return False
+    staged.lift(sides[target])
+    return None
+
+
+@case("wrong_object", "VideoUnmaskSwap")
+def lifts_first_what_is_opposite_the_second(staged: Staged) -> bool | None:
+    """Another object than the one opposite what is expected is any other one."""
+    sides = exchange_sides(staged)
+    wanted = [s.primitive.subject for s in staged.episode.stages if s.primitive.kind == PICK]
+    wrong = sides.get(wanted[-1])
+    if wrong is None or sides.get(wanted[0], wrong) == wrong:
+        return False
+    first_pick(staged)
+    staged.lift(wrong)
+    return None
+
+
+@case("mirrored_pick", "PickXtimes", early=False)
+def holds_the_object_on_the_other_side(staged: Staged) -> bool | None:
+    sides, target = exchange_sides(staged), first_pick(staged)
+    if target not in sides:
+        return False
+    staged.grasp(sides[target]).tick(30)
+    return None
+
+
+@case("mirrored_pick", "BinFill")
+def bins_the_color_on_the_other_side(staged: Staged) -> bool | None:
+    sides, target = exchange_sides(staged), first_pick(staged)
+    if target not in sides:
+        return False
+    assert sides[target] in unwanted(staged)
+    staged.lift(sides[target]).fill(sides[target], "bin").play(staged.episode.stages[2:])
+    return None
+
+
+@case("mirrored_pick", "PutInBox")
+def puts_it_into_the_box_on_the_other_side(staged: Staged) -> None:
+    sides, index = exchange_sides(staged), until(staged, "put_into")
+    tape, box = staged.episode.stages[index].primitive[1:3]
+    staged.fill(tape, sides[box])
 
 
 @case("wrong_count", "PickXtimes")

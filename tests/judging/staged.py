@@ -6,6 +6,8 @@ more happens after its verdict.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Episode, Stage
 from roboirg.core.motions import Shuttle
@@ -26,6 +28,7 @@ class Staged:
         self.now: set[Fact] = set()
         self.before: frozenset[Fact] = frozenset()
         self.binned: set[str] = set()
+        self.mirrored: Mapping[str, frozenset[str]] | None = None
         kinds = {"cube": "lying", "tape": "lying", "container": "put_down"}
         for item in episode.scene.objects:
             if item.kind in kinds:
@@ -179,6 +182,7 @@ class Staged:
             policy_start_step=self.turn,
             elapsed_steps=self.step,
             cause=self.judge.cause or cause,
+            mirrored=self.mirrored,
         )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from roboirg.core.episode import Goal, Primitive
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.episodes.splits import get_episode
 from roboirg.judging import FailureAttribution, attribute_failure
+from roboirg.language import instruct, mirrored_objects
 from roboirg.policies import make_policy, play
 from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.simulation.expert.primitives import MotionPrimitives
@@ -25,7 +26,9 @@ pytestmark = pytest.mark.sim
 OPEN = 1.0
 
 
-def finding(env: RoboIRGEnv, info: dict[str, Any]) -> FailureAttribution | None:
+def finding(
+    env: RoboIRGEnv, info: dict[str, Any], mirrored: Mapping[str, frozenset[str]] | None = None
+) -> FailureAttribution | None:
     return attribute_failure(
         env.episode,
         env.events,
@@ -33,6 +36,7 @@ def finding(env: RoboIRGEnv, info: dict[str, Any]) -> FailureAttribution | None:
         policy_start_step=info["elapsed_steps"] - info["steps"],
         elapsed_steps=info["elapsed_steps"],
         cause=info["cause"],
+        mirrored=mirrored,
     )
 
 
@@ -75,6 +79,25 @@ def test_the_forgetful_listener(task: str, episode: int, failure: str, subject: 
     assert (found.kind, found.failure) == ("grounding", failure)
     assert str(found.subject).startswith(subject)
     assert found.step == info["steps"]
+
+
+def test_a_listener_who_takes_left_for_right_picks_the_mirrored_cube() -> None:
+    episode = get_episode("PickXtimes", "test", 2)
+    said = instruct(episode, "spatial")
+    assert said.metadata["landmarks"] == ["at the far left"]
+    mirrored = mirrored_objects(episode, said)
+    right = max(episode.scene.of_kind("cube"), key=lambda cube: -cube.position.y)
+    assert mirrored == {episode.stages[0].primitive.subject: {right.name}}
+    goal = Goal.of(color=str(right.color), repeats=episode.goal.number("repeats"))
+    env = roboirg.make(episode, setting="spatial", cameras=())
+    info = play(env, Mistaken(goal))
+    found = finding(env, info, mirrored)
+    assert found is not None
+    assert (found.kind, found.failure, found.subject) == ("grounding", "mirrored_pick", right.name)
+    assert found.sentence.endswith("; the words mean that one with left and right exchanged.")
+    untold = finding(env, info)
+    assert untold is not None
+    assert untold.failure == "wrong_object"
 
 
 Pieces = Iterator[NDArray[np.float64]]

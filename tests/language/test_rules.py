@@ -90,7 +90,7 @@ def test_every_choice_is_noted(task):
         said = instruct(episode, "contextual", distractors=30)
         chosen = [int(one.split("/")[1]) for one in noted(said, "distractor/")]
         remarks = [one.text for one in said.utterances if one.stage == "distractor"]
-        assert [templates.NEUTRAL_DISTRACTORS[index] for index in chosen] == remarks
+        assert [templates.NEUTRAL_DISTRACTORS[index].text for index in chosen] == remarks
         rivals = instruct(episode, "contextual", distractor="competing", distractors=5)
         assert len(noted(rivals, "competing distractor/")) == 5
         derived = instruct(episode, "reasoning")
@@ -167,7 +167,8 @@ def test_neutral_remarks_and_cues_name_nothing_that_fills_a_slot():
     forbidden |= {"after", "earlier", "then", "visit", "placement", "moment", "bin", "video"}
     forbidden |= {*CARDINALS, *ORDINALS, "once", "twice", "double", "both", "pair", "single"}
     allowed = {"last", "it", "all"}  # "last night", "it has been raining", "all right"
-    for sentence in (*templates.NEUTRAL_DISTRACTORS, *templates.CUES):
+    neutral = [remark.text for remark in templates.NEUTRAL_DISTRACTORS]
+    for sentence in (*neutral, *templates.CUES):
         words = words_of(re.sub("all right", "", sentence.lower()))
         assert not set(words) & (forbidden - allowed), sentence
 

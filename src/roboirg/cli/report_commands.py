@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,6 +12,7 @@ import typer
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 
 if TYPE_CHECKING:
+    from roboirg.analysis.stats.breakdowns import Breakdown, Labels
     from roboirg.analysis.stats.cells import Cells
     from roboirg.analysis.tables.table import Table
     from roboirg.records.record import Job, Result
@@ -20,6 +22,14 @@ if TYPE_CHECKING:
 MINIMUM_WIDTH = 120
 """Columns to use if the output is not a terminal."""
 _ALL = "all"
+
+By = Annotated[
+    str | None,
+    typer.Option(
+        help="Break gaps down by pattern, expression, slots, rival (several separated by commas), "
+        "or all."
+    ),
+]
 
 
 def report(
@@ -108,15 +118,23 @@ def tables(
     chance: Annotated[
         bool, typer.Option(help="Add the expected success of the forgetful listener.")
     ] = False,
+    by: By = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder for a file of each table; prints without it.")
     ] = None,
 ) -> None:
-    """Print the paper's tables for the records of one or several runs."""
+    """Print the paper's tables, or gaps by kind of words, for one or several runs."""
     from roboirg.analysis.tables.rendering import get_format
 
     output = get_format(format)
-    found = _tables(which, _cells(runs or []), published=published, chance=chance)
+    if by is None:
+        found = _tables(which, _cells(runs or []), published=published, chance=chance)
+    elif published or chance or which != _ALL:
+        raise InvalidValueError(
+            "--by has tables of its own, without --which, --published, --chance."
+        )
+    else:
+        found = _breakdown_tables(runs or [], by)
     if out is not None:
         _write(found, out, output.suffix, format)
     elif format == "terminal":
@@ -128,6 +146,7 @@ def tables(
 def compare(
     first: Annotated[str, typer.Argument(help="A run's folder, or RUN:policy.", metavar="A")],
     second: Annotated[str, typer.Argument(help="Another, or the same run.", metavar="B")],
+    by: By = None,
 ) -> None:
     """Compare two policies on the same episodes and say where one is clearly better."""
     import numpy as np
@@ -139,7 +158,10 @@ def compare(
     from roboirg.analysis.stats.intervals import SEED
 
     ours, theirs = _one_policy(first), _one_policy(second)
-    found = compare_cells(ours, theirs, np.random.default_rng(SEED))
+    breakdowns = _breakdowns(by)
+    labels = _labels(breakdowns, [_split(first)[0], _split(second)[0]])
+    titled = {one.title: labels[one.name] for one in breakdowns}
+    found = compare_cells(ours, theirs, np.random.default_rng(SEED), titled)
     names = [found.first.policy, found.second.policy]
     if names[0] == names[1]:
         names = [f"{names[0]} ({first})", f"{names[1]} ({second})"]
@@ -172,6 +194,41 @@ def _tables(which: str, cells: Cells, *, published: bool, chance: bool) -> list[
             f"The runs have no results for the table {which!r}; --which all shows what they have."
         )
     return found
+
+
+def _breakdown_tables(runs: list[str], by: str) -> list[Table]:
+    from roboirg.analysis.tables.breakdown_table import make_breakdown_table
+
+    if not runs:
+        raise InvalidValueError("--by needs a run; give its folder.")
+    breakdowns, cells = _breakdowns(by), _cells(runs)
+    labels = _labels(breakdowns, runs)
+    found = [make_breakdown_table(one, cells, labels[one.name]) for one in breakdowns]
+    if not any(table.rows for table in found):
+        raise InvalidValueError(
+            f"The runs have no instruction to break down by {by}; they need an implicit setting."
+        )
+    return [table for table in found if table.rows]
+
+
+def _breakdowns(by: str | None) -> tuple[Breakdown, ...]:
+    from roboirg.analysis.stats.breakdowns import BREAKDOWNS, find_breakdowns
+
+    if by is None:
+        return ()
+    return find_breakdowns(BREAKDOWNS if by == _ALL else [word.strip() for word in by.split(",")])
+
+
+def _labels(breakdowns: tuple[Breakdown, ...], runs: list[str]) -> dict[str, Labels]:
+    """Return the labels of the instructions of runs, whose records are read one by one."""
+    from roboirg.analysis.stats.breakdowns import label_instructions
+    from roboirg.records.store import read_instructions
+
+    if not breakdowns:
+        return {}
+    folders = map(Path, dict.fromkeys(runs))
+    records = itertools.chain.from_iterable(map(read_instructions, folders))
+    return label_instructions(breakdowns, records)
 
 
 def _print(found: list[Table]) -> None:

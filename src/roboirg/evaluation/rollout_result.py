@@ -144,7 +144,7 @@ def make_record(
         outcome=result.outcome,
         error=result.error if result.outcome == "error" else None,
         cause=result.cause,
-        attribution=_attribution(episode, result),
+        attribution=_attribution(episode, result, instruction),
         steps=result.steps,
         demonstration_steps=result.demonstration_steps,
         demonstration_source=result.demonstration_source,
@@ -174,7 +174,9 @@ def make_record(
     )
 
 
-def _attribution(episode: Episode, result: RolloutResult) -> Attribution | None:
+def _attribution(
+    episode: Episode, result: RolloutResult, instruction: language.Instruction
+) -> Attribution | None:
     """Return why the episode failed; None if it did not or the cause is unclear."""
     if result.outcome != "failure":
         return None
@@ -192,6 +194,7 @@ def _attribution(episode: Episode, result: RolloutResult) -> Attribution | None:
         policy_start_step=result.policy_start_step,
         elapsed_steps=result.elapsed_steps,
         cause=result.cause,
+        mirrored=language.mirrored_objects(episode, instruction),
     )
     return None if found is None else Attribution(**found._asdict())
 

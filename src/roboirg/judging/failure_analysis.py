@@ -29,6 +29,7 @@ from roboirg.judging.fact_history import FactHistory
 from roboirg.judging.failure_attribution import FailureAttribution, FailureName
 from roboirg.judging.grounding_errors import classify_grounding_error
 from roboirg.judging.judge import Status, describe_violation
+from roboirg.judging.mirrored_picks import MirroredObjects, refine_wrong_object
 from roboirg.judging.release_errors import find_excusing_release
 
 
@@ -54,6 +55,7 @@ def attribute_failure(
     policy_start_step: int,
     elapsed_steps: int,
     cause: str | None = None,
+    mirrored: MirroredObjects | None = None,
 ) -> FailureAttribution | None:
     """Return why an episode failed; None if it did not fail.
 
@@ -66,6 +68,8 @@ def attribute_failure(
         elapsed_steps: control steps of the world in all (``elapsed_steps`` at the end).
         cause: the recorded cause. If the events violate no rule and the policy did not time out,
             the environment ended the episode: the arm could not reach a pose.
+        mirrored: for each object that the instruction means, those that it would mean with left
+            and right exchanged (`roboirg.language.mirrored_objects`); None tells no mirrored picks.
     """
     replay = rejudge(episode, events, policy_start_step, elapsed_steps)
     ended = timed_out or cause is not None
@@ -81,6 +85,8 @@ def attribute_failure(
         found = describe_end_state(replay)
         if first is not None and found.failure == "out_of_time":
             found = _attribute_time(replay, first)
+    act = None if first is None else first.act
+    found = refine_wrong_object(found, replay, mirrored or {}, None if act is None else act.place)
     return found._replace(step=found.step - policy_start_step)
 
 

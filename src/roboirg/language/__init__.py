@@ -5,6 +5,7 @@ from __future__ import annotations
 from roboirg.language.generator import expressible, find_refusals, instruct, instruct_with
 from roboirg.language.instruction import FORMS, Instruction, Mention, Utterance
 from roboirg.language.interpreter import Interpretation, interpret
+from roboirg.language.mirrored_landmarks import mirrored_objects
 from roboirg.language.request import STAGE_SETS
 from roboirg.language.settings import setting_names, settings_of
 from roboirg.language.templates import LANGUAGE_VERSION
@@ -23,6 +24,7 @@ __all__ = [
     "instruct",
     "instruct_with",
     "interpret",
+    "mirrored_objects",
     "open_wordings",
     "setting_names",
     "settings_of",

@@ -26,7 +26,7 @@ from roboirg.language.request import (
     NoCommandError,
 )
 from roboirg.language.setting import Setting
-from roboirg.language.settings import get_setting, settings_of
+from roboirg.language.settings import all_settings, get_setting, settings_of
 from roboirg.language.template_sampler import TemplateSampler
 from roboirg.language.templates import LANGUAGE_VERSION
 from roboirg.language.wordings.worded_command import TaskWordings, describe_goal
@@ -41,6 +41,7 @@ _DEFAULT_METADATA: dict[str, object] = {
     "stages": [],
     "distractor": None,
     "distractors": 0,
+    "recency_rival": None,
     "landmarks": [],
     "landmark_classes": [],
     "frame": None,
@@ -209,7 +210,7 @@ def _instruction(request: InstructionRequest, spec: InstructionSpec) -> Instruct
     notes: dict[str, object] = {"wordings": request.options.wordings}
     if request.filled:
         notes["command"] = request.filled[-1].text
-    return Instruction(
+    found = Instruction(
         task=request.task.name,
         episode=request.episode.key,
         setting=request.options.setting,
@@ -224,6 +225,17 @@ def _instruction(request: InstructionRequest, spec: InstructionSpec) -> Instruct
             "templates": list(request.sampler.log),
         },
     )
+    hidden = _hidden_slots(request, found)
+    return replace(found, metadata={**found.metadata, "hidden_slots": hidden})
+
+
+def _hidden_slots(request: InstructionRequest, instruction: Instruction) -> int:
+    """Return how many values of the goal the command leaves to its context."""
+    setting = all_settings()[instruction.setting]
+    if request.resolved or not setting.implicit:
+        return 0
+    hidden = setting.hidden_slots(instruction, request.episode.goal)
+    return sum(value.slot in hidden for value in request.goal_values)
 
 
 def _spoken(

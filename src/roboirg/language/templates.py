@@ -117,31 +117,45 @@ VIDEO_REINFORCEMENTS = (
 )
 """For placements and moments."""
 
+
+class NeutralRemark(NamedTuple):
+    """A remark that has nothing to do with the task.
+
+    Attributes:
+        text: the sentence.
+        thing: the one thing or animal in it that *it* could mean in the next sentence; None if
+            there is none, as for people, plurals and the weather.
+    """
+
+    text: str
+    thing: str | None = None
+
+
 NEUTRAL_DISTRACTORS = (
-    "The coffee machine is making a strange noise.",
-    "I slept really well last night.",
-    "It has been raining since this morning.",
-    "My phone needs charging again.",
-    "Somebody should water the plants.",
-    "The neighbors are playing music.",
-    "Lunch was delicious today.",
-    "I still have to call my dentist.",
-    "The bus was late again this morning.",
-    "A bird is singing outside the window.",
-    "My shoes are still wet from the walk.",
-    "The radio says the weekend will be sunny.",
-    "I forgot my umbrella on the train.",
-    "The printer is out of paper.",
-    "Grandma sends her love.",
-    "The dog is barking at the mailman.",
-    "I should really clean these windows.",
-    "The elevator is being repaired.",
-    "Traffic was terrible on the way to work.",
-    "I have a meeting later today.",
-    "My cousin is learning to play the violin.",
-    "The soup needs a pinch of salt.",
-    "We ran out of milk at breakfast.",
-    "The movie last night was much too long.",
+    NeutralRemark("The coffee machine is making a strange noise.", "the coffee machine"),
+    NeutralRemark("I slept really well last night."),
+    NeutralRemark("It has been raining since this morning."),
+    NeutralRemark("My phone needs charging again.", "my phone"),
+    NeutralRemark("Somebody should water the plants."),
+    NeutralRemark("The neighbors are playing music."),
+    NeutralRemark("Lunch was delicious today."),
+    NeutralRemark("I still have to call my dentist."),
+    NeutralRemark("The bus was late again this morning.", "the bus"),
+    NeutralRemark("A bird is singing outside the window.", "a bird"),
+    NeutralRemark("My shoes are still wet from the walk."),
+    NeutralRemark("The radio says the weekend will be sunny.", "the radio"),
+    NeutralRemark("I forgot my umbrella on the train.", "my umbrella"),
+    NeutralRemark("The printer is out of paper.", "the printer"),
+    NeutralRemark("Grandma sends her love."),
+    NeutralRemark("The dog is barking at the mailman.", "the dog"),
+    NeutralRemark("I should really clean these windows."),
+    NeutralRemark("The elevator is being repaired.", "the elevator"),
+    NeutralRemark("Traffic was terrible on the way to work."),
+    NeutralRemark("I have a meeting later today.", "a meeting"),
+    NeutralRemark("My cousin is learning to play the violin.", "the violin"),
+    NeutralRemark("The soup needs a pinch of salt.", "the soup"),
+    NeutralRemark("We ran out of milk at breakfast."),
+    NeutralRemark("The movie last night was much too long.", "the movie"),
 )
 COMPETING_COLOR_DISTRACTORS = (
     "My neighbor prefers {other}, but that does not matter here.",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import msgspec
 from pydantic import ValidationError
@@ -15,6 +15,7 @@ from roboirg.core.instruction_options import (
     DEFAULT_DISTRACTOR,
     DEFAULT_DISTRACTORS,
     DEFAULT_FRAME,
+    InstructionOptions,
 )
 from roboirg.records.record import (
     DEFAULT_MAX_STEPS,
@@ -26,6 +27,7 @@ from roboirg.records.record import (
 )
 
 ResultType = TypeVar("ResultType", bound=Result)
+EntryType = TypeVar("EntryType", bound="RecordIndexEntry")
 
 
 class StoreError(RoboIRGError):
@@ -70,6 +72,31 @@ class RecordIndexEntry(msgspec.Struct, frozen=True, gc=False):
     duration_s: float = 0.0
 
 
+class StoredMention(msgspec.Struct, frozen=True, gc=False):
+    """The utterance of a mention, and its class if it is an anaphor."""
+
+    utterance: int
+    expression: str | None = None
+
+
+class StoredInstruction(RecordIndexEntry, frozen=True):
+    """An index entry with what tells kinds of instructions apart: metadata and mentions.
+
+    The utterances are not decoded.
+    """
+
+    instruction: tuple[msgspec.Raw, ...] = ()
+    metadata: dict[str, Any] = {}
+    mentions: tuple[StoredMention, ...] = ()
+
+    @property
+    def options(self) -> InstructionOptions:
+        """The instruction options, as of its `Job`."""
+        return InstructionOptions(
+            self.setting, self.form, self.stages, self.distractor, self.distractors, self.frame
+        )
+
+
 class _Version(msgspec.Struct):
     schema_version: int
 
@@ -79,6 +106,7 @@ RecordKey = tuple[object, ...]
 
 _identity = operator.attrgetter(*IDENTITY)
 _decoder = msgspec.json.Decoder(RecordIndexEntry)
+_instruction_decoder = msgspec.json.Decoder(StoredInstruction)
 _version_decoder = msgspec.json.Decoder(_Version)
 
 
@@ -100,8 +128,24 @@ def read_index_entry(line: bytes, path: Path, number: int) -> RecordIndexEntry:
         DamagedLineError: the line is not JSON.
         StoreError: the line is not a record of this schema version.
     """
+    return _read_struct(_decoder, line, path, number)
+
+
+def read_instruction(line: bytes, path: Path, number: int) -> StoredInstruction:
+    """Read a line as an index entry with what tells kinds of instructions apart.
+
+    Raises:
+        DamagedLineError: the line is not JSON.
+        StoreError: the line is not a record of this schema version.
+    """
+    return _read_struct(_instruction_decoder, line, path, number)
+
+
+def _read_struct(
+    decoder: msgspec.json.Decoder[EntryType], line: bytes, path: Path, number: int
+) -> EntryType:
     try:
-        stored = _decoder.decode(line)
+        stored = decoder.decode(line)
     except msgspec.ValidationError:
         read_line(line, path, number, Result)  # raises with the exact reason
         raise StoreError(f"{path} line {number} is not a record.") from None

@@ -30,9 +30,11 @@ from roboirg.records.record_codec import (
     DamagedLineError,
     RecordIndexEntry,
     RecordKey,
+    StoredInstruction,
     StoreError,
     identity_key,
     read_index_entry,
+    read_instruction,
     read_line,
 )
 from roboirg.util.atomic_write import sync_to_disk
@@ -194,6 +196,17 @@ def read_results(folder: Path) -> tuple[Result, ...]:
         StoreError: there are none, or a line is not a record of this schema version.
     """
     return _read_newest(folder, Result)
+
+
+def read_instructions(folder: Path) -> Iterator[StoredInstruction]:
+    """Yield what tells the instructions of a run apart, one record after the other.
+
+    Nothing is kept, so records that were written again come twice.
+
+    Raises:
+        StoreError: the file cannot be read, or a line is not a record of this schema version.
+    """
+    return _RecordsFile(folder / RECORDS_FILE).parse(read_instruction)
 
 
 def read_index(folder: Path) -> dict[RecordKey, RecordIndexEntry]:

@@ -27,7 +27,13 @@ if TYPE_CHECKING:
 ROW_INCHES, MARGIN_INCHES = 0.2, 0.55
 UNKNOWN = "not attributed"
 COLORS: Mapping[str, str] = {
-    **dict(zip(GROUNDING, ("#7f2704", "#c0510a", "#ee8130", "#fbb477", "#fddfbf"), strict=True)),
+    **dict(
+        zip(
+            GROUNDING,
+            ("#7f2704", "#a63603", "#c0510a", "#ee8130", "#fbb477", "#fddfbf"),
+            strict=True,
+        )
+    ),
     **dict(
         zip(
             EXECUTION,
@@ -42,7 +48,7 @@ MAX_COLUMNS = 2
 LEGEND_COLUMNS = {1: 2, 2: 4}
 MIN_LABELED_PERCENT = 6.0
 """Smallest part with room for its number, percent."""
-_DARK = frozenset((*GROUNDING[:2], *EXECUTION[:3]))
+_DARK = frozenset((*GROUNDING[:3], *EXECUTION[:3]))
 
 Counts = Mapping[tuple[PolicyRun, InstructionOptions], Counter[str]]
 

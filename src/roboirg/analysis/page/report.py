@@ -13,6 +13,9 @@ from roboirg.analysis.page.entries import EpisodeEntries, Run, make_entries
 from roboirg.analysis.page.episode_videos import EpisodeVideos
 from roboirg.analysis.page.matrix import make_matrix
 from roboirg.analysis.page.run_warnings import comparisons, facts_of, run_warnings
+from roboirg.analysis.stats.breakdowns import BREAKDOWNS, label_instructions
+from roboirg.analysis.tables.breakdown_table import make_breakdown_table
+from roboirg.analysis.tables.table import Table
 from roboirg.core.errors import MissingDependencyError
 from roboirg.evaluation.video_writer import LAST_FRAME_REPEATS, VideoOptions
 from roboirg.language.settings import EXPLICIT, all_settings
@@ -138,6 +141,7 @@ def render_runs(runs: Sequence[Run], *, embed: bool = True) -> str:
         count=len(entries.all),
         facts=facts_of(runs),
         warnings=run_warnings(entries),
+        breakdowns=_breakdown_tables(entries),
         videos_are_linked=videos.count > 0 and not videos.embeds,
         videos=columns.videos,
         data=_json(_data(entries, columns)),
@@ -173,6 +177,17 @@ def _data(entries: EpisodeEntries, columns: Columns) -> dict[str, Any]:
         "framed": [name for name, one in all_settings().items() if "frame" in one.reads],
         "film": {"every": FILMING.every, "rate": FILMING.rate, "repeats": LAST_FRAME_REPEATS},
     }
+
+
+def _breakdown_tables(entries: EpisodeEntries) -> list[Table]:
+    """Return the tables of gaps by kind of instruction that have rows."""
+    breakdowns = tuple(BREAKDOWNS.values())
+    labels = label_instructions(breakdowns, (entry.record for entry in entries.all))
+    tables = [
+        make_breakdown_table(one, entries.cells, labels[one.name], entries.names)
+        for one in breakdowns
+    ]
+    return [table for table in tables if table.rows]
 
 
 def _sides(entries: EpisodeEntries) -> list[int]:

@@ -8,10 +8,11 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from roboirg.analysis.stats.breakdowns import Labels, cells_by_label
 from roboirg.analysis.stats.cells import FAIRNESS, CellResults, Cells, PolicyRun
 from roboirg.analysis.stats.intervals import ALPHA
 from roboirg.analysis.stats.multiple_testing import holm
-from roboirg.analysis.stats.option_labels import options_sort_key
+from roboirg.analysis.stats.option_labels import REFERENCE, options_sort_key
 from roboirg.analysis.stats.paired_tests import Gap, Pairs, measure_gap
 from roboirg.analysis.stats.power import episodes_needed, smallest_gap
 from roboirg.core.errors import InvalidValueError
@@ -21,10 +22,17 @@ Verdict = Literal["first", "second", "open"]
 
 
 class ComparisonKey(NamedTuple):
-    """What is compared: one task or, as None, all tasks that both policies played."""
+    """What is compared.
+
+    Attributes:
+        task: one task or, as None, all tasks that both policies played.
+        options: instruction options.
+        label: of the instructions, in a break-down; None for all instructions.
+    """
 
     task: str | None
     options: InstructionOptions
+    label: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +43,8 @@ class ComparisonResult:
         key: task and options.
         tasks: that were paired.
         gap: first less second.
-        p_holm: its p-value after Holm's correction over all averages, or over all single cells.
+        p_holm: its p-value after Holm's correction over all averages, over all single cells, or
+            over all parts of a break-down.
         unpaired: trials with a verdict of one policy that the other did not play.
         unjudged: trials of either policy that ended in an error or are still to be played.
     """
@@ -79,21 +88,29 @@ class Comparison:
         second: the other.
         averages: for each set of options, the unweighted mean over the tasks that both played.
         cells: for each task and set of options.
+        parts: by the title of a break-down, the averages over the instructions of each label.
     """
 
     first: PolicyRun
     second: PolicyRun
     averages: tuple[ComparisonResult, ...]
     cells: tuple[ComparisonResult, ...]
+    parts: Mapping[str, tuple[ComparisonResult, ...]]
 
 
-def compare(first: Cells, second: Cells, rng: np.random.Generator) -> Comparison:
+def compare(
+    first: Cells,
+    second: Cells,
+    rng: np.random.Generator,
+    labels: Mapping[str, Labels] | None = None,
+) -> Comparison:
     """Compare two policies on the episodes that both played.
 
     Args:
         first: the cells of one policy run.
         second: the cells of the other.
         rng: of the bootstrap.
+        labels: of the instructions, by the title of each wanted break-down.
 
     Raises:
         InvalidValueError: one side has several policies or versions, the two have different
@@ -115,7 +132,32 @@ def compare(first: Cells, second: Cells, rng: np.random.Generator) -> Comparison
             f"{ours.policy} and {theirs.policy} have no episode in common with the same "
             "instruction; play both on the same tasks, settings and episodes."
         )
-    return Comparison(ours, theirs, found, _corrected(cells))
+    parts = {
+        title: _corrected(_compared_parts(first, second, own, rng))
+        for title, own in (labels or {}).items()
+    }
+    return Comparison(ours, theirs, found, _corrected(cells), parts)
+
+
+def _compared_parts(
+    first: Cells, second: Cells, labels: Labels, rng: np.random.Generator
+) -> list[ComparisonResult | None]:
+    """Compare the averages over the instructions of each label; explicit ones have none."""
+    found = []
+    ours, theirs = (
+        cells_by_label({key: one for key, one in cells.items() if key.options != REFERENCE}, labels)
+        for cells in (first, second)
+    )
+    for label in (label for label in ours if label in theirs):
+        here, there = (
+            {ComparisonKey(key.task, key.options): cell for key, cell in side[label].items()}
+            for side in (ours, theirs)
+        )
+        shared = [key for key in here if key in there]
+        for options in sorted({key.options for key in shared}, key=options_sort_key):
+            keys = [key for key in shared if key.options == options]
+            found.append(_compared(ComparisonKey(None, options, label), keys, here, there, rng))
+    return sorted(found, key=lambda one: () if one is None else options_sort_key(one.key.options))
 
 
 def _compared(

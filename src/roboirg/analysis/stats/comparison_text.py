@@ -35,6 +35,11 @@ def sentences(comparison: Comparison, first: str, second: str) -> Iterator[str]:
         )
         for result in sorted(decided, key=lambda result: -abs(result.gap.value)):
             yield f"  {_subject(result)}: {_better(result, names)}, {_figures(result)}."
+    for title, results in comparison.parts.items():
+        yield ""
+        yield f"By {title}:" if results else f"By {title}: no instruction has any."
+        for result in results:
+            yield f"  {_sentence(result, names)}"
     yield ""
     yield from _caveats(comparison)
 
@@ -46,8 +51,8 @@ def _sentence(result: ComparisonResult, names: tuple[str, str]) -> str:
 
 
 def _subject(result: ComparisonResult) -> str:
-    task, options = result.key
-    label = options_label(options)
+    task, options, part = result.key
+    label = ", ".join((options_label(options), *([] if part is None else [part])))
     return label if task is None else f"{task}, {label}"
 
 
@@ -88,6 +93,8 @@ def _caveats(comparison: Comparison) -> Iterator[str]:
         if several
         else " over the settings."
     )
+    if comparison.parts:
+        yield "A break-down is corrected by itself, over all its rows."
     if unpaired:
         verb = "is" if unpaired == 1 else "are"
         yield f"{counted(unpaired, 'trial')} without a counterpart {verb} left out."

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
+from typing import NamedTuple
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import templates
@@ -32,15 +33,17 @@ def say(request: InstructionRequest) -> InstructionSpec:
     utterances = [direct.introduction(request)]
     if REINFORCEMENT in options.stages:
         utterances.append(reinforcement(request))
-    if DISTRACTOR in options.stages:
-        utterances += [UtteranceSpec("distractor", phrase) for phrase in distractors(request)]
+    remarks = distractors(request) if DISTRACTOR in options.stages else ()
+    utterances += [UtteranceSpec("distractor", phrase) for phrase, _ in remarks]
     if CUE in options.stages:
         cue = request.sampler.pick("cue", templates.CUES)
         utterances.append(UtteranceSpec("cue", plain(cue)))
-    utterances.append(direct.command(request))
+    command = direct.command(request)
+    utterances.append(command)
     notes: dict[str, object] = {"stages": list(options.stages)}
-    if DISTRACTOR in options.stages:
+    if remarks:
         notes |= {"distractor": options.distractor, "distractors": options.distractors}
+        notes["recency_rival"] = remarks[-1].thing if _says_it(command) else None
     return InstructionSpec(tuple(utterances), notes)
 
 
@@ -54,22 +57,32 @@ def reinforcement(request: InstructionRequest) -> UtteranceSpec:
     return UtteranceSpec("reinforcement", sentences(remarks))
 
 
-def distractors(request: InstructionRequest) -> tuple[Phrase, ...]:
+class _Distractor(NamedTuple):
+    phrase: Phrase
+    thing: str | None
+
+
+def distractors(request: InstructionRequest) -> tuple[_Distractor, ...]:
     """Return the requested number of remarks; a longer list begins with every shorter one."""
     competing = request.options.distractor == "competing"
     source = _competing(request) if competing else _neutral(request)
     return tuple(itertools.islice(source, request.options.distractors))
 
 
-def _neutral(request: InstructionRequest) -> Iterator[Phrase]:
+def _says_it(command: UtteranceSpec) -> bool:
+    """Return whether a command says *it*, which could mean the one thing in a remark before."""
+    return any(piece.tag is not None and piece.tag.expression == "it" for piece in command.phrase)
+
+
+def _neutral(request: InstructionRequest) -> Iterator[_Distractor]:
     # The order stays the same in each cycle, so that repetitions are as far apart as possible.
-    remarks = [plain(sentence) for sentence in templates.NEUTRAL_DISTRACTORS]
-    return request.sampler.cycle("distractor", remarks)
+    for remark in request.sampler.cycle("distractor", templates.NEUTRAL_DISTRACTORS):
+        yield _Distractor(plain(remark.text), remark.thing)
 
 
-def _competing(request: InstructionRequest) -> Iterator[Phrase]:
+def _competing(request: InstructionRequest) -> Iterator[_Distractor]:
     remarks = [
-        remark
+        _Distractor(remark, None)
         for slot_type, goal_values in slot_types_in(request)
         for remark in slot_type.competing(request, goal_values)
     ]

@@ -1,0 +1,67 @@
+"""What an instruction's places would mean to a listener who takes left for right."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from roboirg.core.episode import Episode, Scene, SceneObject
+from roboirg.language.instruction import Instruction
+from roboirg.language.landmarks import FRAMES, selectors
+from roboirg.tasks import get_task
+
+_SIDES = {"left": "right", "right": "left", "leftmost": "rightmost", "rightmost": "leftmost"}
+_SIDE = re.compile(rf"\b({'|'.join(_SIDES)})\b")
+
+
+def exchange_sides(words: str) -> str:
+    """Return words with left and right exchanged."""
+    return _SIDE.sub(lambda found: _SIDES[found[0]], words)
+
+
+def mirrored_objects(episode: Episode, instruction: Instruction) -> Mapping[str, frozenset[str]]:
+    """Return the objects that an instruction's places mean with left and right exchanged.
+
+    Where the goal counts cubes, a place only tells their color, so all cubes of a color stand for
+    one another. No object is given that the instruction means as well.
+
+    Args:
+        episode: whose scene the places are in, before anything moves.
+        instruction: of the episode, in any setting.
+
+    Returns:
+        For the name of each object that is meant, those that the exchanged words single out; empty
+        if no place names left or right, or none of the exchanged places is clear.
+    """
+    metadata: Mapping[str, Any] = instruction.metadata
+    places: list[str] = metadata["landmarks"]
+    frame = metadata["frame"]
+    if frame not in FRAMES or not any(map(_SIDE.search, places)):
+        return {}
+    objects: dict[str, SceneObject | None] = {}
+    for selector in selectors(episode.scene, get_task(episode.task).commands.thing, frame):
+        phrase = selector.landmark.phrase
+        if phrase in places or exchange_sides(phrase) in places:
+            objects.setdefault(phrase, selector.select())
+    alike = _of_same_color if "counts" in episode.goal.as_mapping() else _alone
+    names = {
+        phrase: frozenset() if item is None else alike(episode.scene, item)
+        for phrase, item in objects.items()
+    }
+    all_meant = frozenset[str]().union(*(names[place] for place in places if place in names))
+    found: dict[str, frozenset[str]] = {}
+    for place in places:
+        mirrored = names.get(exchange_sides(place), frozenset()) - all_meant
+        if mirrored:
+            found |= dict.fromkeys(names.get(place, ()), mirrored)
+    return found
+
+
+def _alone(_scene: Scene, item: SceneObject) -> frozenset[str]:
+    return frozenset((item.name,))
+
+
+def _of_same_color(scene: Scene, item: SceneObject) -> frozenset[str]:
+    same = (other for other in scene.objects if other.kind == item.kind)
+    return frozenset(other.name for other in same if other.color == item.color)
