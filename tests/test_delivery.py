@@ -3,9 +3,11 @@
 import itertools
 
 import pytest
+from typer.testing import CliRunner
 
 import roboirg
 from roboirg import language
+from roboirg.cli.app import app
 from roboirg.core.delivery import (
     DELIVERIES,
     LATEST,
@@ -19,6 +21,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.episodes.splits import get_episode
 from roboirg.language.settings import all_settings, settings_of
 from roboirg.policies import make_policy, play
+from roboirg.records.store import read_records
 from roboirg.tasks import all_tasks, get_task
 
 
@@ -157,3 +160,19 @@ def test_the_oracle_does_not_wait_for_words():
         for delivery in DELIVERIES
     ]
     assert steps[0] == steps[1]
+
+
+@pytest.mark.sim
+def test_a_run_in_turns_has_records_and_videos_of_them(tmp_path):
+    words = ["--policy", "listener", "--tasks", "VideoUnmask", "--settings", "explicit,direct"]
+    words += ["--episodes", "1", "--delivery", "turns", "--video", "all", "--workers", "0"]
+    result = CliRunner().invoke(app, ["run", *words, "--out", str(tmp_path)])
+    assert result.exit_code == 0, result.output
+    explicit, direct = read_records(tmp_path)
+    assert (explicit.outcome, direct.outcome) == ("success", "success")
+    assert (explicit.delivery, direct.delivery) == ("prompt", "turns")
+    assert [one.step for one in explicit.instruction] == [0]
+    assert [one.step for one in direct.instruction] == [0, SPACING]
+    assert direct.steps == explicit.steps + SPACING
+    for record in (explicit, direct):
+        assert (tmp_path / record.video).stat().st_size > 1000
