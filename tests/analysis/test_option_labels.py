@@ -21,6 +21,7 @@ def test_labels_name_what_differs_from_the_defaults() -> None:
         "contextual (resolved, stages 1,5, competing distractor, 3 distractors, camera frame)"
     )
     assert options_label(InstructionOptions("direct")) == "direct"
+    assert options_label(InstructionOptions("direct", delivery="turns")) == "direct (in turns)"
 
 
 def test_settings_have_the_order_of_the_language_and_unknown_ones_are_last() -> None:

@@ -23,6 +23,10 @@ def test_a_table_holds_every_field_of_every_record(tmp_path: Path) -> None:
             "error": "connection",
         }
     )
+    records[1] = records[1].model_copy(update={"attribution": None})
+    said = records[1].instruction
+    late = (*said[:-1], said[-1].model_copy(update={"step": 20}))
+    records[1] = records[1].model_copy(update={"delivery": "turns", "instruction": late})
     path = tmp_path / "records.parquet"
     assert write_parquet(iter(records), path) == len(records)
     table = pd.read_parquet(path)
@@ -38,6 +42,8 @@ def test_a_table_holds_every_field_of_every_record(tmp_path: Path) -> None:
         assert list(row["stages"]) == list(record.stages)
     assert table.attribution[0]["failure"] == "wrong_object"
     assert table.attribution[1] is None
+    assert list(table.delivery[:2]) == ["prompt", "turns"]
+    assert [one["step"] for one in table.instruction[1]] == [0] * (len(said) - 1) + [20]
     assert table.demonstration_frames[0] == "4"
     assert json.loads(table.usage[0]) == {"calls": 2.0}
 

@@ -89,6 +89,19 @@ def test_the_same_words_are_one_job() -> None:
         assert (job.frame == "camera") == (job.setting == "spatial")
 
 
+def test_turns_are_other_jobs_where_there_is_more_than_one_utterance() -> None:
+    prompt, turns = (
+        make_plan(["random"], delivery=delivery).jobs() for delivery in ("prompt", "turns")
+    )
+    assert len(prompt) == len(turns)
+    for one, other in zip(prompt, turns, strict=True):
+        same_job = one.setting == "explicit"
+        assert (one == other) == same_job
+        assert (identity_key(one) == identity_key(other)) == same_job
+        assert (one.slug == other.slug) == same_job
+        assert other.options.delivery == ("prompt" if same_job else "turns")
+
+
 def test_jobs_are_ordered_and_named_uniquely() -> None:
     plan = make_plan(["random", "oracle"], policy_seeds="0-2", forms="implicit,resolved")
     assert plan.jobs() == plan.jobs()
@@ -108,6 +121,7 @@ def test_jobs_are_ordered_and_named_uniquely() -> None:
         ({"stages": "2,5"}, r"stages \(2, 5\)"),
         ({"distractor": "loud"}, r"no distractor 'loud'"),
         ({"frame": "world"}, r"no frame 'world'"),
+        ({"settings": "explicit", "delivery": "turn"}, r"no delivery 'turn'.*'turns'"),
         ({"max_steps": 0}, r"max_steps is 0; it must be at least 1"),
         ({"max_steps": "many"}, r"max_steps is 'many'"),
     ],

@@ -42,6 +42,19 @@ def test_records_of_older_schemas_are_refused(tmp_path: Path, version: int) -> N
             read(tmp_path)
 
 
+def test_a_record_from_before_turns_was_told_at_once(tmp_path: Path) -> None:
+    record = FakePlay()(small_plan().jobs()[1])
+    line = record.model_dump(mode="json")
+    del line["delivery"]
+    for utterance in line["instruction"]:
+        del utterance["step"]
+    write(tmp_path, json.dumps(line).encode() + b"\n")
+    assert read_records(tmp_path) == (record,)
+    assert list(read_index(tmp_path)) == [identity_key(record)]
+    turns = record.model_copy(update={"delivery": "turns"})
+    assert identity_key(turns) != identity_key(record)
+
+
 def test_a_damaged_line_loses_only_its_episode(tmp_path: Path) -> None:
     run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
     lines = (tmp_path / RECORDS_FILE).read_bytes().splitlines(keepends=True)

@@ -23,7 +23,7 @@ from roboirg.evaluation.plan import instruct_job
 from roboirg.evaluation.rollout import EpisodeRunner, load_policy, play_episode
 from roboirg.evaluation.rollout_result import RolloutResult
 from roboirg.evaluation.video_writer import VideoOptions, VideoWriter
-from roboirg.records.record import EventRecord, Job
+from roboirg.records.record import EventRecord, Job, Record
 
 JOB = Job(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
 
@@ -58,12 +58,8 @@ class PaperWorld:
             self.hook(self, True)
         first = {"step": 3, "kind": "still", "subject": "robot", "place": None, "holds": True}
         shown = {"joint_positions": np.zeros((3, 7))}
-        return {}, {
-            "demonstration": shown,
-            "demonstration_source": "planned",
-            "elapsed_steps": 4,
-            "events": [first],
-        }
+        info = {"demonstration": shown, "elapsed_steps": 4, "events": [first]}
+        return {}, {**info, "demonstration_source": "planned"}
 
     def step_chunk(self, actions: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         assert actions.shape[1:] == (8,)
@@ -338,3 +334,93 @@ def test_a_record_tells_a_mirrored_pick_where_the_words_name_a_side(
     record = rollout.make_record(job, result, started_at="now")
     assert record.attribution is not None
     assert (record.attribution.failure, record.attribution.subject) == (failure, "cube_red")
+
+
+class TellingWorld(PaperWorld):
+    """Tells its utterances at given steps; what comes after the last step is never told."""
+
+    def __init__(self, steps: tuple[int, ...], length: int) -> None:
+        super().__init__(length)
+        job = JOB.model_copy(update={"setting": "contextual"})
+        self.instruction = instruct_job(job)
+        self.told = list(zip(self.instruction.turns, steps, strict=False))
+
+    def reset(self, seed: int | None = None) -> tuple[dict[str, Any], dict[str, Any]]:
+        observation, info = super().reset(seed)
+        return observation, {**info, "heard": self._fresh(0)}
+
+    def step_chunk(self, actions: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        *others, info = super().step_chunk(actions)
+        return *others, {**info, "heard": self._fresh(self.steps)}  # type: ignore[return-value]
+
+    def _fresh(self, step: int) -> list[dict[str, Any]]:
+        fresh = [{"text": text, "step": at} for text, at in self.told if at <= step]
+        del self.told[: len(fresh)]
+        return fresh
+
+
+class Hearing(PaperPolicy):
+    """Writes down what it hears; its metadata are what it has heard."""
+
+    def hear(self, text: str, step: int) -> None:
+        self.heard += [text, step]
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        return {"heard": len(self.heard)}
+
+
+TURNS = JOB.model_copy(update={"setting": "contextual", "delivery": "turns"})
+
+
+@pytest.mark.parametrize("policy_class", [PaperPolicy, Hearing])
+def test_a_record_holds_what_was_heard_when(
+    policy_class: type[PaperPolicy], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    world, policy = TellingWorld((0, 3, 6, 6), length=10), policy_class()
+    monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: world)
+    monkeypatch.setattr(rollout, "load_policy", lambda _job: policy)
+    turns = world.instruction.turns
+    record = EpisodeRunner(Path())(TURNS)
+    assert record.outcome == "success"
+    assert [(one.text, one.step) for one in record.instruction] == list(
+        zip(turns, (0, 3, 6, 6, None), strict=True)
+    )
+    later = [turns[1], 3, turns[2], 6, turns[3], 6]
+    hears = policy_class is Hearing
+    assert policy.heard == [turns[0], 3, *(later if hears else ())]
+    assert record.policy_metadata == ({"heard": 8} if hears else {})
+    assert Record.model_validate_json(record.model_dump_json()) == record
+
+
+def test_the_caption_grows_as_utterances_are_heard(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    captions: list[str] = []
+
+    class Captions(VideoWriter):
+        def add_frame(self, source: Any, is_demonstration: bool = False) -> None:
+            del source, is_demonstration
+            captions.append(self.caption)
+            assert self.longest_caption == world.instruction.text
+
+    world = TellingWorld((0, 3, 6, 6, 9), length=11)
+    monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: world)
+    monkeypatch.setattr(rollout, "load_policy", lambda _job: PaperPolicy())
+    play_episode(TURNS, Captions(tmp_path / "x.mp4"))
+    counts = [1, 1, *[1] * 3, *[2] * 3, *[4] * 3, *[5] * 2]  # video, first frame, chunks of 3
+    assert captions == [" ".join(world.instruction.turns[:count]) for count in counts]
+
+
+def test_what_a_policy_raises_while_it_hears_is_its_error(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class Deaf(PaperPolicy):
+        def hear(self, text: str, step: int) -> None:
+            raise ValueError(f"no ears for {text} at {step}")
+
+    monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: TellingWorld((0, 3), 9))
+    monkeypatch.setattr(rollout, "load_policy", lambda _job: Deaf())
+    result = play_episode(TURNS)
+    assert (result.outcome, result.error) == ("error", "policy")
+    assert "no ears for" in str(result.cause)

@@ -78,3 +78,21 @@ def test_a_black_line_parts_the_pictures() -> None:
     assert not frame[:, 256 : 256 + GAP].any()
     assert frame[:, :256].min() == frame[:, :256].max() == 90
     assert frame[:, 256 + GAP :].min() == 200
+
+
+def test_a_caption_that_grows_has_room_for_all_of_it(tmp_path: Path) -> None:
+    video = VideoWriter(tmp_path / "x.mp4")
+    first, longest = "This one is red.", "This one is red. " * 20
+    video.caption, video.longest_caption = first, longest
+    video.add_frame(Grey(), True)
+    video.caption = longest
+    video.add_frame(Grey())
+    assert video.finish(), video.error
+    pictures = [Grey().picture("front"), Grey().picture("wrist")]
+    short, long = (
+        compose_frame(pictures, caption, longest_caption=longest) for caption in (first, longest)
+    )
+    assert short.shape == long.shape == compose_frame(pictures, longest).shape
+    assert len(compose_frame(pictures, first)) < len(short)
+    dark = [int((frame[256:] < 128).sum()) for frame in (short, long)]
+    assert 0 < dark[0] < dark[1] / 10

@@ -195,7 +195,7 @@ def words_of(body):
     return "\n".join(texts)
 
 
-def stand_in(episode, setting="explicit", shade=0):
+def stand_in(episode, setting="explicit", shade=0, unheard=0):
     """The part of an environment that a listener reads before it executes the goal."""
     picture = np.full((256, 256, 3), shade, np.uint8)
     return SimpleNamespace(
@@ -203,6 +203,7 @@ def stand_in(episode, setting="explicit", shade=0):
         instruction=instruct(episode, setting),
         picture=lambda camera: picture,
         grounded=True,
+        unheard=unheard,
     )
 
 

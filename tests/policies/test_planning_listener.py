@@ -414,3 +414,18 @@ def test_without_an_answer_the_robot_rests_until_time_is_up():
     assert info["status"] == "timeout"
     assert not [event for event in info["events"] if event["kind"] == "picked"]
     assert policy.usage()["unparsed"] == 1
+
+
+def test_a_model_is_asked_once_the_command_was_heard():
+    episode = get_episode("PickXtimes", "test", 0)
+    said = instruct(episode, "direct").turns
+    with fake_vlm([answer_text(episode.goal, goal_schema("PickXtimes"))]) as server:
+        policy = make_listener(server)
+        policy.attach(stand_in(episode, "direct", unheard=1))
+        policy.reset(said[0], {})
+        assert policy.usage()["calls"] == 0
+        assert policy.metadata["understood"] is None
+        policy.hear(said[1], 20)
+        assert policy.usage()["calls"] == 1
+        assert policy.understood == episode.goal
+        assert " ".join(said) in json.dumps(server.requests[0])

@@ -450,3 +450,20 @@ def test_planners_play_whole_episodes(kind):
         most = info["steps"] // 48 + 1 if kind == "gemini" else len(policy.policy.told)
         assert 1 <= usage["calls"] <= most
         policy.close()
+
+
+@pytest.mark.parametrize("kind", ["qwen", "gemini", "memer"])
+def test_a_query_after_an_utterance_quotes_everything_that_was_said(kind):
+    with fake_vlm([ANSWERS[kind]]) as server:
+        policy = HierarchicalPolicy(make_planner(kind, server), Follower(CHUNK))
+        policy.reset("This one is red.", NO_VIDEO)
+        for step in range(0, 200, CHUNK):
+            policy.act({**moment(step), "history": ()})
+            if step == CHUNK:
+                policy.hear("Take it.", step)
+        first, *_, last = map(json.dumps, server.requests)
+    assert "This one is red." in first
+    assert "Take it." not in first
+    assert "This one is red. Take it." in last
+    if kind == "gemini":  # its conversation says the same thing once
+        assert last.count("Take it.") == 1

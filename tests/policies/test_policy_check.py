@@ -242,3 +242,23 @@ def test_the_command_prints_a_table_and_an_exit_code(name, code, tmp_path, monke
     assert result.exit_code == code, result.output
     assert ("11 checks, none failed." if code == 0 else "1 of 3 checks failed.") in result.output
     assert "Actions joint_angle" in result.output
+
+
+class Attentive(Sound):
+    def hear(self, text, step):
+        assert step > 0
+        self.memory += len(text)
+
+
+class HardOfHearing(Sound):
+    def hear(self, text):
+        self.memory += len(text)
+
+
+def test_a_policy_that_hears_is_checked_for_it():
+    (found,) = [one for one in check_policy(Attentive()) if one.check == "hears"]
+    assert found.verdict == PASS
+    last = check_policy(HardOfHearing())[-1]
+    assert (last.check, last.verdict) == ("hears", FAIL)
+    assert "hear()" in last.message
+    assert "hears" not in {one.check for one in check_policy(Sound())}

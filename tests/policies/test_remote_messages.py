@@ -221,3 +221,26 @@ def test_actions_may_be_poses():
         assert (rows.shape, rows.dtype) == ((2, 7), np.float64)
         rows[0] = 0  # a copy: what is received is read-only
         policy.close()
+
+
+@pytest.mark.parametrize(
+    ("scheme", "server_class", "field"),
+    [
+        ("openpi", WireServer, "prompt"),
+        ("mme-vla", MmeVlaServer, "prompt"),
+        ("challenge", ChallengeServer, "task_goal"),
+        ("challenge+http", ChallengeHttpServer, "task_goal"),
+    ],
+)
+def test_every_request_carries_what_was_said_last(scheme, server_class, field):
+    said = ["this one is red.", "take it."]
+    with server_class() as server:
+        policy = make_policy(f"{scheme}://{server.place}", 0)
+        policy.reset(said[0], video(3))
+        for seen, text in zip((NOW, LATEST), said, strict=True):
+            policy.act({**seen, "instruction": text})
+        policy.close()
+        bodies = [one[1] if isinstance(one, tuple) else one for one in server.messages]
+    messages = [unpack(body) for body in bodies if body]
+    sent = [message[field] for message in messages if field in message]
+    assert sent == ([[text] for text in said] if field == "task_goal" else said)

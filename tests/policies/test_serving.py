@@ -32,6 +32,7 @@ class Recorder:
 
     def __init__(self, seed=0):
         self.seed, self.calls, self.subgoals, self.closed = seed, [], [], False
+        self.heard = []
         self.episodes.append(self)
 
     def reset(self, instruction, demonstration):
@@ -39,6 +40,9 @@ class Recorder:
 
     def follow(self, subgoal):
         self.subgoals.append(subgoal)
+
+    def hear(self, text, step):
+        self.heard.append((text, step))
 
     def act(self, observation):
         if observation["instruction"].startswith("fail"):
@@ -107,6 +111,25 @@ def test_a_served_policy_gets_what_the_client_was_given(protocol):
     assert one.calls[0]["history"][:-1] == ()
     for given, kept in zip(later["history"], one.calls[1]["history"], strict=True):
         same(given, kept, shown)
+
+
+@pytest.mark.parametrize("protocol", protocols_by_scheme())
+def test_a_served_policy_hears_what_the_prompt_says_next(protocol):
+    said = ["this one is red.", "please note.", "take it."]
+    chunks = [(moment(1), moment(2)), (moment(3),), (moment(4), moment(5))]
+    with served(HERE, protocol) as url:
+        client = make_policy(url, 0)
+        client.reset(said[0], video(2))
+        client.act({**moment(0, history=()), "instruction": said[0]})
+        for text, seen in zip([said[1], said[1], said[2]], chunks, strict=True):
+            client.act({**seen[-1], "history": seen, "instruction": text})
+        client.close()
+    (policy,) = Recorder.episodes
+    assert [one["instruction"] for one in policy.calls] == [said[0], said[1], said[1], said[2]]
+    if protocol == "openpi":  # has no reset: a new prompt is a new episode
+        assert (policy.instruction, policy.heard) == (said[2], [])
+    else:
+        assert (policy.instruction, policy.heard) == (said[0], [(said[1], 2), (said[2], 5)])
 
 
 @pytest.mark.parametrize("protocol", ["challenge", "challenge+http"])
@@ -206,7 +229,7 @@ def test_what_a_policy_raises_is_the_clients_error(protocol):
         client = make_policy(url, 0)
         client.reset("fail", video(1))
         with pytest.raises(PolicyReplyError, match="RuntimeError: the weights melted"):
-            client.act(moment(1, history=()))
+            client.act({**moment(1, history=()), "instruction": "fail"})
         client.reset(INSTRUCTION, video(1))
         assert len(client.act(moment(1, history=()))) == 4
         client.close()

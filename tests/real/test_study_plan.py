@@ -24,6 +24,7 @@ from roboirg.real.study.counterbalancing import (
 from roboirg.real.study.failure_choices import failure_choices
 from roboirg.real.study.plan_csv import demonstrations_csv, trials_csv
 from roboirg.real.study.study_plan import StudyPlan, make_study, read_study, write_study
+from roboirg.real.study.study_run import Study
 
 TASKS = ("PutInBox", "PickByCount")
 SETTINGS = setting_names()
@@ -277,3 +278,13 @@ def test_nothing_on_the_sheet_is_cut_off_or_overlaps():
             frame = axes.get_tightbbox(renderer)
             assert not any(frame.y0 < box.y1 - 2 and box.y0 < frame.y1 and
                            frame.x0 < box.x1 and box.x0 < frame.x1 for box in boxes)  # fmt: skip
+
+
+def test_a_trial_in_turns_is_refused_before_a_robot_moves(tmp_path):
+    plan = make_study(["listener"], tasks=["PutInBox"], settings=["direct"], trials=1, seed=0)
+    first, *others = plan.trials
+    turns = first.model_copy(update={"job": first.job.model_copy(update={"delivery": "turns"})})
+    changed = plan.model_copy(update={"trials": (turns, *others)})
+    with pytest.raises(InvalidValueError, match=r"has delivery='turns'.*at once \('prompt'\)"):
+        Study(changed, tmp_path, robot=None).run()
+    assert list(tmp_path.iterdir()) == []

@@ -45,6 +45,12 @@ Frame = Annotated[
     str | None,
     typer.Option(help="Frame of reference of the spatial setting: robot or camera.  (robot)"),
 ]
+Delivery = Annotated[
+    str | None,
+    typer.Option(
+        help="prompt: the whole instruction at once; turns: one utterance after another.  (prompt)"
+    ),
+]
 Wordings = Annotated[
     str | None,
     typer.Option(help="Wording file: use its commands (docs/language.md).  (our own words)"),

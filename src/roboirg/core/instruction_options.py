@@ -8,10 +8,13 @@ ALL_STAGES = (1, 2, 3, 4, 5)
 DEFAULT_DISTRACTOR = "neutral"
 DEFAULT_DISTRACTORS = 1
 DEFAULT_FRAME = "robot"
+DEFAULT_DELIVERY = "prompt"
 
 
 class InstructionOptions(NamedTuple):
     """The options of an instruction. Equal options give the same words for the same episode.
+
+    All but `delivery` select the words.
 
     Attributes:
         setting: name of the setting, for example ``"direct"``.
@@ -24,6 +27,8 @@ class InstructionOptions(NamedTuple):
         frame: of the spatial setting: the frame of left and right, ``robot`` or ``camera``.
         wordings: identity of the wording file whose commands are used, such as
             ``robomme@1a2b3c4d``; None for our own. The process must have opened that file.
+        delivery: ``prompt``, all utterances at once, or ``turns``, one after another
+            (`roboirg.core.delivery`).
     """
 
     setting: str = "explicit"
@@ -33,3 +38,4 @@ class InstructionOptions(NamedTuple):
     distractors: int = DEFAULT_DISTRACTORS
     frame: str = DEFAULT_FRAME
     wordings: str | None = None
+    delivery: str = DEFAULT_DELIVERY

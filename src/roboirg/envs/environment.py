@@ -12,9 +12,14 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from roboirg.core.actions import JOINT_ANGLE, check_action, check_chunk, find_action_space
+from roboirg.core.delivery import SpokenInstruction
 from roboirg.core.episode import Episode, Stage
 from roboirg.core.errors import InvalidValueError, MotionPlanningError, UnknownNameError
-from roboirg.core.instruction_options import ALL_STAGES, InstructionOptions
+from roboirg.core.instruction_options import (
+    ALL_STAGES,
+    DEFAULT_DELIVERY,
+    InstructionOptions,
+)
 from roboirg.core.observations import CAMERAS, DemonstrationFrames
 from roboirg.episodes.recordings import is_recorded, recorded_actions
 from roboirg.episodes.splits import get_episode
@@ -53,9 +58,10 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     Observation: `front_rgb` and `wrist_rgb` uint8 (256, 256, 3) for the requested cameras;
     `joint_positions` float32 (7,) rad; `gripper` float32 (2,) m; `end_effector` float64 (6,)
     position (m) and extrinsic x-y-z angles (rad) of the tool center in the world frame;
-    `instruction` text. With `depth`, `front_depth` and `wrist_depth` int16 (256, 256, 1) mm; with
-    `calibration`, `front_extrinsic` float32 (3, 4), `front_intrinsic` (3, 3), and the same for the
-    wrist. With `observe_every`, `history`: a tuple of such observations.
+    `instruction` the text said last, which is all of it unless `delivery` is ``turns``. With
+    `depth`, `front_depth` and `wrist_depth` int16 (256, 256, 1) mm; with `calibration`,
+    `front_extrinsic` float32 (3, 4), `front_intrinsic` (3, 3), and the same for the wrist. With
+    `observe_every`, `history`: a tuple of such observations.
 
     Action: in the space named by `actions`. `joint_angle` (8,): absolute joint targets in rad and
     the gripper, +1 open to -1 closed; one control step of 0.05 s. `ee_pose` (7,): position (m) and
@@ -69,7 +75,8 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     Episode end: terminated on success or failure, truncated after `max_steps`.
 
     Info: `status` (ongoing, success, failure, timeout), `cause`, `steps` of the policy,
-    `elapsed_steps` since the start of the world, `events` since the last call, `subgoal` in words,
+    `elapsed_steps` since the start of the world, `events` since the last call, utterances `heard`
+    since the last call (`text` and `step`), `subgoal` in words,
     and `grounded_subgoal` with `grounded`. At reset also `demonstration`, arrays as in the
     observation with a leading axis T (pictures are drawn when they are read), and
     `demonstration_subgoals`, T texts, and `demonstration_source`: ``recorded`` (RoboMME's
@@ -101,6 +108,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         distractors: int = 1,
         frame: str = "robot",
         wordings: str | Path | None = None,
+        delivery: str = DEFAULT_DELIVERY,
         actions: str = JOINT_ANGLE.name,
         cameras: Sequence[str] = CAMERAS,
         depth: bool = False,
@@ -122,8 +130,9 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
             distractors,
             frame,
             open_wordings(wordings),
+            delivery,
         )
-        self.instruction = instruct_with(self.episode, options)
+        self.instruction, self.delivery = instruct_with(self.episode, options), delivery
         self._space = find_action_space(actions)
         self.actions = self._space.name
         self._spec = ObservationSpec(
@@ -176,6 +185,15 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         if state.pixel_grounding is not None:
             return state.pixel_grounding.text
         return COMPLETED if stage is None else plain_subgoal(stage)
+
+    @property
+    def unheard(self) -> int:
+        """Number of utterances that the policy has not heard yet.
+
+        Raises:
+            ResetNeeded: `reset` has not been called.
+        """
+        return self._current.spoken.unheard
 
     @property
     def events(self) -> Sequence[Event]:
@@ -310,6 +328,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         world = session.world
         return EpisodeState(
             session,
+            SpokenInstruction(self.instruction.turns, self.delivery),
             ObservationBuilder(world, self._spec),
             make_controller(self._space, world.robot),
             PixelGrounding(world.bodies, world.cameras) if self.grounded else None,
@@ -349,13 +368,14 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         """Append an observation to the history after every n-th control step."""
         if self.observe_every is not None and self._current.steps % self.observe_every == 0:
             entry = self._current.observation_builder.read_history_entry()
-            self._current.history.append({**entry, "instruction": self.instruction.text})
+            said = self._current.spoken.said_at(self._current.steps)
+            self._current.history.append({**entry, "instruction": said})
 
     def _observe(self) -> dict[str, Any]:
-        observation = {
-            **self._current.observation_builder.read(),
-            "instruction": self.instruction.text,
-        }
+        spoken = self._current.spoken
+        if self.status == "ongoing":  # afterwards no policy hears anything
+            spoken.hear(self._current.steps)
+        observation = {**self._current.observation_builder.read(), "instruction": spoken.prompt}
         if self.observe_every is not None:
             observation["history"] = tuple(self._current.history)
             self._current.history.clear()
@@ -369,6 +389,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
             "steps": state.steps,
             "elapsed_steps": self.session.world.elapsed,
             "events": [event.as_dict() for event in state.take_new_events()],
+            "heard": [one._asdict() for one in state.take_new_utterances()],
             "subgoal": COMPLETED if judge.published is None else plain_subgoal(judge.published),
         }
         if state.pixel_grounding is not None:

@@ -27,6 +27,7 @@ class EnvOptions(TypedDict, total=False):
     distractors: int
     frame: str
     wordings: str | Path | None
+    delivery: str
     actions: str
     cameras: Sequence[str]
     depth: bool
@@ -58,6 +59,7 @@ def make(task: str | Episode, **options: Unpack[EnvOptions]) -> RoboIRGEnv:
         distractors: number of distractors in a contextual instruction.
         frame: whose left and right a spatial instruction uses: robot or camera.
         wordings: wording file whose commands are used, or its identity; None for our own words.
+        delivery: prompt, all utterances at once, or turns: one after another while it acts.
         actions: joint_angle, ee_pose or waypoint.
         cameras: cameras whose pictures observations hold; () renders nothing.
         depth: add depth for the same cameras.

@@ -10,9 +10,11 @@ from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from roboirg import language, policies, tasks
 from roboirg.core.actions import find_action_space
+from roboirg.core.delivery import DELIVERIES
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import (
     ALL_STAGES,
+    DEFAULT_DELIVERY,
     DEFAULT_DISTRACTOR,
     DEFAULT_DISTRACTORS,
     DEFAULT_FRAME,
@@ -71,6 +73,7 @@ class Plan(BaseModel):
         distractor: kind of distractor, for settings that read it.
         distractors: number of distractors, for settings that read it.
         frame: frame of reference, for settings that read it.
+        delivery: prompt or turns, for settings with several utterances.
         wordings: path of the wording file whose commands are used; None for our own.
         wordings_identity: name and fingerprint of that file; read from it if it is not given.
         max_steps: the policy's limit, control steps.
@@ -99,6 +102,7 @@ class Plan(BaseModel):
     distractor: str = DEFAULT_DISTRACTOR
     distractors: int = DEFAULT_DISTRACTORS
     frame: str = DEFAULT_FRAME
+    delivery: str = DEFAULT_DELIVERY
     wordings: str | None = None
     wordings_identity: str | None = None
     max_steps: int = DEFAULT_MAX_STEPS
@@ -209,11 +213,7 @@ class Plan(BaseModel):
         An option that the setting does not read keeps its default, so that equal words are one job.
         """
         rule, usual = all_settings()[setting], InstructionOptions(setting)
-        chosen = {
-            option: getattr(self, option)
-            for option in ("distractor", "distractors", "frame")
-            if option in rule.reads
-        }
+        chosen = {option: getattr(self, option) for option in rule.reads - {"stages"}}
         for form in self.forms if rule.implicit else (usual.form,):
             for stages in self.stages if "stages" in rule.reads else (usual.stages,):
                 yield usual._replace(form=form, stages=stages, **chosen)
@@ -228,6 +228,7 @@ class Plan(BaseModel):
 
     def _check_options(self) -> None:
         _check_names("form", self.forms, FORMS)
+        _check_names("delivery", (self.delivery,), DELIVERIES)
         _check_names("kind of meshes", (self.meshes,), MESHES)
         for name, least in (("max_steps", 1), ("tries", 1)):
             if getattr(self, name) < least:

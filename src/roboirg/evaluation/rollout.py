@@ -17,7 +17,7 @@ import contextlib
 import json
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
@@ -28,6 +28,7 @@ from pydantic import JsonValue
 
 from roboirg import policies
 from roboirg.core.actions import ActionSpace, check_chunk
+from roboirg.core.delivery import SpokenInstruction
 from roboirg.core.errors import InvalidActionError, InvalidValueError
 from roboirg.core.observations import DemonstrationFrames, Observation
 from roboirg.episodes.splits import get_episode
@@ -37,7 +38,7 @@ from roboirg.evaluation.plan import VideoMode
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.video_writer import VideoOptions, VideoWriter
 from roboirg.language.wordings.wording_store import open_wordings
-from roboirg.policies.base import Policy, PrivilegedPolicy
+from roboirg.policies.base import Policy, PrivilegedPolicy, tell_policy
 from roboirg.policies.requirements import (
     wanted_actions,
     wanted_calibration,
@@ -200,7 +201,7 @@ def play_episode(
             needs = env_requirements(policy, job)
         with guard.environment("env_reset"):
             env = make_env(job, needs)
-        _play_to_end(env, policy, needs.actions, job.max_steps, writer, result, guard)
+        _play_to_end(env, policy, needs.actions, job, writer, result, guard)
     except EpisodeError as error:
         result.record_error(error.kind, error.cause, error.details)
     finally:
@@ -272,7 +273,7 @@ def _play_to_end(
     env: RoboIRGEnv,
     policy: Policy,
     actions: ActionSpace,
-    max_steps: int,
+    job: Job,
     writer: VideoWriter | None,
     result: RolloutResult,
     guard: _CallGuard,
@@ -280,8 +281,9 @@ def _play_to_end(
     """Play the environment's episode with the policy to its end."""
     with guard.environment("env_reset"):
         result.instruction = env.instruction
+        first = SpokenInstruction(env.instruction.turns, job.delivery).prompt
         if writer is not None:
-            writer.caption = env.instruction.text
+            writer.caption, writer.longest_caption = first, env.instruction.text
             env.set_frame_hook(writer.add_frame, every=writer.options.every)
         observation, info = env.reset()
         if writer is not None:
@@ -292,10 +294,11 @@ def _play_to_end(
         result.demonstration_source = info["demonstration_source"]
         result.policy_start_step = int(info["elapsed_steps"])
         result.add_events(info)
+        result.heard += info.get("heard", ())
     with guard.policy("policy's reset()", "policy_reset"):
         if isinstance(policy, PrivilegedPolicy):
             policy.attach(env)
-        policy.reset(env.instruction.text, info["demonstration"])
+        policy.reset(first, info["demonstration"])
         result.policy_metadata = _policy_metadata(policy)
     status, cause = "ongoing", None
     while status == "ongoing":
@@ -305,9 +308,27 @@ def _play_to_end(
             observation, *_, info = env.step_chunk(rows)
         result.steps = int(info["steps"])
         result.add_events(info)
+        if info.get("heard"):
+            _tell(policy, info["heard"], writer, result, guard)
         status, cause = info["status"], info.get("cause")
-    if not result.record_status(status, cause, max_steps):
+    if not result.record_status(status, cause, job.max_steps):
         result.cause = f"environment: the episode ended with status {status!r}"
+
+
+def _tell(
+    policy: Policy,
+    utterances: Sequence[Mapping[str, Any]],
+    writer: VideoWriter | None,
+    result: RolloutResult,
+    guard: _CallGuard,
+) -> None:
+    """Tell the policy what has just been said, and write it under the video."""
+    result.heard += utterances
+    if writer is not None:
+        writer.caption = " ".join(one["text"] for one in result.heard)
+    with guard.policy("policy's hear()", "policy_hear"):
+        tell_policy(policy, utterances)
+        result.policy_metadata = _policy_metadata(policy)
 
 
 def _next_actions(

@@ -7,12 +7,14 @@ import importlib.metadata
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from itertools import zip_longest
 from typing import Any
 
 from pydantic import JsonValue
 
 from roboirg import language
 from roboirg.core.conditions import Fact
+from roboirg.core.delivery import TURNS
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.observations import DemonstrationSource
 from roboirg.episodes.splits import get_episode
@@ -48,6 +50,7 @@ class RolloutResult:
         policy_start_step: control steps of the episode before the policy's turn.
         elapsed_steps: control steps of the episode in all.
         instruction: what the policy was told; None if the episode did not get that far.
+        heard: what the policy has heard so far, in order: ``text`` and ``step``.
         events: facts that became true or ceased to be.
         render_device: the driver's name; None if nothing was rendered.
         details: traceback of an error.
@@ -66,6 +69,7 @@ class RolloutResult:
     policy_start_step: int = 0
     elapsed_steps: int = 0
     instruction: language.Instruction | None = None
+    heard: list[Mapping[str, Any]] = field(default_factory=list)
     events: list[EventRecord] = field(default_factory=list)
     render_device: str | None = None
     details: str | None = None
@@ -148,7 +152,7 @@ def make_record(
         steps=result.steps,
         demonstration_steps=result.demonstration_steps,
         demonstration_source=result.demonstration_source,
-        instruction=tuple(UtteranceRecord(**asdict(one)) for one in instruction.utterances),
+        instruction=_utterances(job, instruction, result),
         mentions=tuple(MentionSpan(**asdict(one)) for one in instruction.mentions),
         command=explicit.text,
         goal=dict(episode.goal.as_mapping()),
@@ -171,6 +175,19 @@ def make_record(
         timings=result.timings,
         started_at=started_at,
         duration_s=duration_s,
+    )
+
+
+def _utterances(
+    job: Job, instruction: language.Instruction, result: RolloutResult
+) -> tuple[UtteranceRecord, ...]:
+    """Return the utterances with the steps at which the policy heard them."""
+    steps: list[int | None] = [0] * len(instruction.utterances)
+    if job.delivery == TURNS:
+        steps = [int(one["step"]) for one in result.heard]
+    return tuple(
+        UtteranceRecord(**asdict(one), step=step)
+        for one, step in zip_longest(instruction.utterances, steps)
     )
 
 

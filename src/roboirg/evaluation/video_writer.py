@@ -78,7 +78,11 @@ def check_video_support() -> None:
 
 
 def compose_frame(
-    pictures: Sequence[Frame], caption: str = "", *, is_demonstration: bool = False
+    pictures: Sequence[Frame],
+    caption: str = "",
+    *,
+    is_demonstration: bool = False,
+    longest_caption: str = "",
 ) -> Frame:
     """Return one frame with the pictures side by side and a line between them.
 
@@ -86,6 +90,7 @@ def compose_frame(
         pictures: uint8 (height, width, 3), all of one height.
         caption: text below the pictures, wrapped into lines.
         is_demonstration: draw the border that marks the demonstration.
+        longest_caption: text for which there is room, as all frames of a video have one size.
     """
     line = np.zeros((pictures[0].shape[0], GAP, 3), np.uint8)
     parts = [part for picture in pictures for part in (line, picture)][1:]
@@ -94,14 +99,19 @@ def compose_frame(
         color = np.array(DEMONSTRATION_COLOR, np.uint8)
         frame[:BORDER] = frame[-BORDER:] = color
         frame[:, :BORDER] = frame[:, -BORDER:] = color
-    return np.concatenate([frame, _caption_bar(caption, frame.shape[1])]) if caption else frame
+    if not caption:
+        return frame
+    return np.concatenate([frame, _caption_bar(caption, frame.shape[1], longest_caption)])
 
 
 @functools.lru_cache(maxsize=8)
-def _caption_bar(caption: str, width: int) -> Frame:
+def _caption_bar(caption: str, width: int, longest: str) -> Frame:
     """Return a caption as an image; its height is even, because H.264 needs that."""
-    lines = wrap_text(caption, width - 2 * _TEXT_MARGIN, _TEXT_SCALE)[:_MAX_LINES]
-    height = len(lines) * _TEXT_LINE + 2 * _TEXT_MARGIN
+    lines, room = (
+        wrap_text(text, width - 2 * _TEXT_MARGIN, _TEXT_SCALE)[:_MAX_LINES]
+        for text in (caption, longest)
+    )
+    height = max(len(lines), len(room)) * _TEXT_LINE + 2 * _TEXT_MARGIN
     bar: Frame = np.full((height, width, 3), _BACKGROUND, np.uint8)
     for number, text in enumerate(lines, start=1):
         draw_text(bar, text, _TEXT_MARGIN, number * _TEXT_LINE, _TEXT_SCALE, _TEXT_COLOR)
@@ -121,12 +131,14 @@ class VideoWriter:
 
     Attributes:
         caption: text below the pictures; set before the first frame.
+        longest_caption: text for which there is room below the pictures, if the caption grows.
         error: why the video could not be written, or None.
     """
 
     path: Path
     options: VideoOptions = field(default_factory=VideoOptions)
     caption: str = field(default="", init=False)
+    longest_caption: str = field(default="", init=False)
     error: Exception | None = field(default=None, init=False)
     _container: OutputContainer | None = field(default=None, init=False, repr=False)
     _stream: VideoStream | None = field(default=None, init=False, repr=False)
@@ -148,7 +160,13 @@ class VideoWriter:
             return
         try:
             pictures = [source.picture(camera) for camera in self.options.cameras]
-            self._encode(compose_frame(pictures, self.caption, is_demonstration=is_demonstration))
+            frame = compose_frame(
+                pictures,
+                self.caption,
+                is_demonstration=is_demonstration,
+                longest_caption=self.longest_caption,
+            )
+            self._encode(frame)
         except (RenderDeviceError, MissingDependencyError):
             raise
         except Exception as error:  # noqa: BLE001 - see the class

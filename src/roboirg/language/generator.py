@@ -6,6 +6,7 @@ import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from roboirg.core.delivery import DELIVERIES
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import (
@@ -200,6 +201,7 @@ def _check_options(options: InstructionOptions) -> None:
         ("form", options.form, FORMS),
         ("distractor", options.distractor, DISTRACTORS),
         ("frame", options.frame, FRAMES),
+        ("delivery", options.delivery, DELIVERIES),
     ):
         if name not in known:
             raise UnknownNameError(kind, name, known)

@@ -12,8 +12,8 @@ from roboirg.language.instruction import Instruction
 from roboirg.language.request import InstructionRequest, InstructionSpec
 from roboirg.tasks import Task
 
-OptionName = Literal["stages", "distractor", "distractors", "frame"]
-"""An option of `roboirg.language.instruct` that a setting may read."""
+OptionName = Literal["stages", "distractor", "distractors", "frame", "delivery"]
+"""An option of an instruction that a setting may read."""
 
 Instruct = Callable[[InstructionOptions], Instruction]
 """Returns an instruction of the episode at hand."""
@@ -50,8 +50,8 @@ class Setting:
             express the episode:" and name no object of the scene; None if it can.
         hidden_slots: the goal slots that the command of an implicit form must not state.
         implicit: whether the command leaves something to its context.
-        reads: the options of `instruct` that change its words.
-        variants: every combination of those options that validation checks.
+        reads: the options that change its words, and ``delivery`` if it has several utterances.
+        variants: every combination of options that change its words, for validation.
         hides_only_color: whether an instruction states numbers and hides colors, so that the
             command gives the goal away where the scene has one such goal.
         pairing_rules: yields how the words of an episode differ from those of another setting

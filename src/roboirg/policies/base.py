@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -34,10 +35,14 @@ class Policy(Protocol):
     episodes with equal seeds may differ, which `roboirg check-policy` then accepts. With
     ``grounded = True`` the environment gives the pixels of subgoals, for privileged policies that
     pass them on.
+
+    If an instruction is delivered in turns, `reset` gets what is said first, and
+    ``hear(text, step)``, if the policy has it, each later utterance before the next call of `act`;
+    ``observation["instruction"]`` is what was said last.
     """
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Begin an episode."""
+        """Begin an episode; the instruction is complete unless it is delivered in turns."""
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
         """Return the next n >= 1 actions; all are executed before the next call.
@@ -71,3 +76,17 @@ def close_policy(policy: object) -> None:
     close = getattr(policy, "close", None)
     if callable(close):
         close()
+
+
+def tell_policy(policy: object, utterances: Iterable[Mapping[str, Any]]) -> None:
+    """Call the ``hear`` of a policy or planner, if it has one.
+
+    Args:
+        policy: the policy or planner.
+        utterances: ``text`` and ``step`` of what was said after `reset`, in order, as in the info
+            of an environment's step.
+    """
+    hear = getattr(policy, "hear", None)
+    if callable(hear):
+        for one in utterances:
+            hear(one["text"], one["step"])

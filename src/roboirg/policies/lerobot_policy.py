@@ -72,7 +72,6 @@ class LeRobotPolicy:
         parts = split_url(url)
         self.options = read_options(parts, LeRobotPolicyOptions)
         self._place, self._seed = parts.place, seed
-        self._instruction = ""
 
     @property
     def version(self) -> str:
@@ -88,7 +87,6 @@ class LeRobotPolicy:
         """
         import torch
 
-        self._instruction = instruction
         self._loaded = load(self._place, self.options.device)
         self._loaded.model.reset()
         torch.manual_seed(self._seed)
@@ -116,7 +114,7 @@ class LeRobotPolicy:
         state = np.append(observation["joint_positions"], observation["gripper"][0])
         batch: dict[str, Any] = {
             STATE: torch.from_numpy(state.astype(np.float32))[None],
-            "task": [self._instruction],
+            "task": [observation["instruction"]],
         }
         for camera in CAMERAS:
             picture = torch.from_numpy(np.array(observation[f"{camera}_rgb"]))  # type: ignore[literal-required]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Observation
-from roboirg.policies.base import Policy, PrivilegedPolicy
+from roboirg.policies.base import Policy, PrivilegedPolicy, tell_policy
 from roboirg.policies.requirements import REQUIREMENTS, wanted_actions
 
 if TYPE_CHECKING:
@@ -28,10 +28,11 @@ def play(env: RoboIRGEnv, policy: Policy) -> dict[str, Any]:
     observation, info = env.reset()
     if isinstance(policy, PrivilegedPolicy):
         policy.attach(env)
-    policy.reset(env.instruction.text, info["demonstration"])
+    policy.reset(observation["instruction"], info["demonstration"])
     while info["status"] == "ongoing":
         actions = policy.act(cast("Observation", observation))
         observation, *_, info = env.step_chunk(actions)
+        tell_policy(policy, info["heard"])
     return info
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from roboirg.core.actions import ActionSpace, check_chunk
 from roboirg.core.errors import MissingDependencyError, RoboIRGError
-from roboirg.policies.base import Policy, close_policy
+from roboirg.policies.base import Policy, close_policy, tell_policy
 from roboirg.policies.loading import make_policy
 from roboirg.policies.requirements import (
     wanted_actions,
@@ -127,6 +127,7 @@ class _PolicyChecker:
             self._check_inputs(with_video)
             self._check_determinism(policy, with_video, expected)
             self._check_reset(policy, without_video, with_video, expected)
+            self._check_hearing(policy, without_video)
             self._check_broken_sensors(without_video)
         finally:
             self._close()
@@ -252,6 +253,18 @@ class _PolicyChecker:
                 "A second episode with the same object differs by up to "
                 f"{_largest_difference(expected, after)} from the same episode played first.",
             )
+
+    def _check_hearing(self, policy: Policy, episode: SyntheticEpisode) -> None:
+        if not hasattr(policy, "hear"):
+            return
+        policy = self._reset("hears", episode)
+        try:
+            tell_policy(policy, [{"text": _SECOND, "step": 1}])
+            later = episode._replace(instruction=_SECOND)
+            check_chunk(policy.act(self._make_episodes().after(later, 1)), self._space)
+        except Exception as error:
+            raise _CheckAbortedError("hears", FAIL, f"hear(): {_describe_error(error)}") from error
+        self._add("hears", PASS, "It acts after a second utterance.")
 
     def _check_broken_sensors(self, episode: SyntheticEpisode) -> None:
         policy = self._reset("broken sensors", episode)

@@ -23,6 +23,7 @@ _TEXT_COLUMNS = [
     "form",
     "distractor",
     "frame",
+    "delivery",
     "actions",
     "demonstration_frames",
     "meshes",
@@ -132,7 +133,7 @@ def _schema() -> Schema:
         "attribution": pa.struct(
             {"kind": text, "failure": text, "subject": text, "step": number, "sentence": text}
         ),
-        "instruction": pa.list_(pa.struct({"stage": text, "text": text})),
+        "instruction": pa.list_(pa.struct({"stage": text, "text": text, "step": number})),
         "mentions": pa.list_(
             pa.struct(
                 {

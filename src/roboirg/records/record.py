@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, JsonValue
 
 from roboirg.core.instruction_options import (
     ALL_STAGES,
+    DEFAULT_DELIVERY,
     DEFAULT_DISTRACTOR,
     DEFAULT_DISTRACTORS,
     DEFAULT_FRAME,
@@ -77,6 +78,7 @@ class Job(_RecordModel):
         distractor: kind of distractor; the default if the setting does not read it.
         distractors: number of distractors; the default if the setting does not read it.
         frame: frame of reference; the default if the setting does not read it.
+        delivery: ``prompt`` or ``turns``; the default if the setting does not read it.
         policy_seed: seed chosen for the run; the policy's seed is derived from it and the episode.
         max_steps: the policy's limit, control steps.
         actions: required action space; None for the policy's own.
@@ -100,6 +102,7 @@ class Job(_RecordModel):
     distractor: str = DEFAULT_DISTRACTOR
     distractors: int = DEFAULT_DISTRACTORS
     frame: str = DEFAULT_FRAME
+    delivery: str = DEFAULT_DELIVERY
     policy_seed: int = 0
     max_steps: int = DEFAULT_MAX_STEPS
     actions: str | None = None
@@ -117,7 +120,13 @@ class Job(_RecordModel):
         Wordings tell runs apart, as a step limit does: the columns of tables are the same in all.
         """
         return InstructionOptions(
-            self.setting, self.form, self.stages, self.distractor, self.distractors, self.frame
+            self.setting,
+            self.form,
+            self.stages,
+            self.distractor,
+            self.distractors,
+            self.frame,
+            delivery=self.delivery,
         )
 
     @property
@@ -140,10 +149,18 @@ IDENTITY = tuple(name for name in Job.model_fields if name not in {"spec", "word
 
 
 class UtteranceRecord(_RecordModel):
-    """One utterance and its stage in the discourse."""
+    """One utterance and its stage in the discourse.
+
+    Attributes:
+        stage: its part in the discourse.
+        text: its words.
+        step: control step of the policy's turn at which it was heard; 0 is before its first step,
+            and before the video if there is one; None if the episode ended before.
+    """
 
     stage: str
     text: str
+    step: int | None = 0
 
 
 class MentionSpan(_RecordModel):

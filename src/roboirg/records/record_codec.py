@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.instruction_options import (
     ALL_STAGES,
+    DEFAULT_DELIVERY,
     DEFAULT_DISTRACTOR,
     DEFAULT_DISTRACTORS,
     DEFAULT_FRAME,
@@ -59,6 +60,7 @@ class RecordIndexEntry(msgspec.Struct, frozen=True, gc=False):
     distractor: str = DEFAULT_DISTRACTOR
     distractors: int = DEFAULT_DISTRACTORS
     frame: str = DEFAULT_FRAME
+    delivery: str = DEFAULT_DELIVERY
     policy_seed: int = 0
     max_steps: int = DEFAULT_MAX_STEPS
     actions: str | None = None

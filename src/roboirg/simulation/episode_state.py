@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from roboirg.core.delivery import HeardUtterance, SpokenInstruction
 from roboirg.core.episode import Stage
 from roboirg.judging import Event, plain_subgoal
 from roboirg.simulation.controllers import Controller
@@ -20,6 +21,7 @@ class EpisodeState:
 
     Attributes:
         session: the episode.
+        spoken: the instruction and what the policy has heard of it.
         observation_builder: reads observations.
         controller: converts actions to joint actions.
         pixel_grounding: finds the pixels of subgoals; None if not requested.
@@ -28,9 +30,11 @@ class EpisodeState:
         history: observations for ``history`` since the last observation.
         steps: control steps of the policy.
         reported_events: number of events that `take_new_events` has returned.
+        reported_utterances: number of utterances that `take_new_utterances` has returned.
     """
 
     session: EpisodeSession
+    spoken: SpokenInstruction
     observation_builder: ObservationBuilder
     controller: Controller
     pixel_grounding: PixelGrounding | None
@@ -39,6 +43,7 @@ class EpisodeState:
     history: list[dict[str, Any]] = field(default_factory=list)
     steps: int = 0
     reported_events: int = 0
+    reported_utterances: int = 0
 
     def after_step(self, stage: Stage | None) -> None:
         """Update after a control step; call after each one with the published stage."""
@@ -54,4 +59,10 @@ class EpisodeState:
         """Return the events since the last call."""
         fresh = self.session.events[self.reported_events :]
         self.reported_events += len(fresh)
+        return fresh
+
+    def take_new_utterances(self) -> Sequence[HeardUtterance]:
+        """Return the utterances that the policy has heard since the last call."""
+        fresh = self.spoken.heard[self.reported_utterances :]
+        self.reported_utterances += len(fresh)
         return fresh

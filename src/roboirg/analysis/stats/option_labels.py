@@ -28,6 +28,8 @@ def options_label(options: InstructionOptions) -> str:
         changed.append(counted(options.distractors, "distractor"))
     if options.frame != _DEFAULTS.frame:
         changed.append(f"{options.frame} frame")
+    if options.delivery != _DEFAULTS.delivery:
+        changed.append(f"in {options.delivery}")
     return f"{options.setting} ({', '.join(changed)})" if changed else options.setting
 
 

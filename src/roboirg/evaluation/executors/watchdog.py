@@ -18,6 +18,7 @@ Phase = Literal[
     "environment",
     "policy's constructor",
     "policy's reset()",
+    "policy's hear()",
     "policy's act()",
     "policy's close()",
 ]

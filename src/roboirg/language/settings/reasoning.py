@@ -63,6 +63,7 @@ SETTING = Setting(
     summary="the context gives an intermediate reference, from which the goal is derived",
     color="#D55E00",
     say=say,
+    reads=frozenset({"delivery"}),
     hidden_slots=_hidden_slots,
     hides_only_color=lambda instruction: instruction.metadata["pattern"] in _HIDE_ONLY_COLOR,
     example=3,

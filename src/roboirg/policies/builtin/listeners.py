@@ -20,7 +20,8 @@ class ListenerPolicy(ScriptedPolicy):
     """Language oracle: understands the whole instruction with the interpreter.
 
     It knows the scene (for hidden cubes what the video shows) but not the goal. If several goals
-    fit the words, it chooses one of them at random; if none does, one of all goals.
+    fit the words, it chooses one of them at random; if none does, one of all goals. Of an
+    instruction in turns it remembers every utterance.
     """
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
@@ -35,7 +36,7 @@ class ListenerPolicy(ScriptedPolicy):
 
 
 class ForgetfulPolicy(ListenerPolicy):
-    """Command-only baseline: hears the final command and guesses among the goals that fit it.
+    """Command-only baseline: hears the last utterance and guesses among the goals that fit it.
 
     Its success rate is the chance level of a setting: the share that needs no context.
     """

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from roboirg.core.episode import Goal
 from roboirg.policies.builtin.scripted import ScriptedPolicy
@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 class OraclePolicy(ScriptedPolicy):
     """Executes the true goal: the upper bound, and the proof that an episode can be solved."""
+
+    listens: ClassVar[bool] = False
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:  # noqa: ARG002
         """Return the episode's goal; the instruction is ignored."""

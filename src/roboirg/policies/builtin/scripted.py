@@ -18,6 +18,10 @@ from roboirg.tasks import get_task
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
+HOVER = "hover"
+"""A primitive that touches nothing."""
+LISTENING_STEPS = 5
+"""Control steps at rest between two observations while the command has not been heard."""
 MAX_RETRIES = 3
 """Retries of failed primitives per episode."""
 UNDOES_PICK = frozenset({"place_on", "put_down", "drop_into", "put_into", "move_over"})
@@ -25,17 +29,23 @@ UNDOES_PICK = frozenset({"place_on", "put_down", "drop_into", "put_into", "move_
 
 
 class ScriptedPolicy(ABC):
-    """Decides on a goal at reset and executes it with the scripted expert.
+    """Decides on a goal once it has heard the command, and executes it with the scripted expert.
 
-    Privileged: the expert reads the poses of all objects.
+    Privileged: the expert reads the poses of all objects. It remembers everything that is said, and
+    rests until the command; where every goal begins above the same object, it goes there meanwhile.
+
+    Attributes:
+        listens: whether it waits for the command.
     """
 
     cameras: ClassVar[tuple[str, ...]] = ()
+    listens: ClassVar[bool] = True
 
     def __init__(self, seed: int = 0) -> None:
         self.seed = seed
         self._env: RoboIRGEnv | None = None
         self._chunks: Iterator[NDArray[np.float64]] = iter(())
+        self._heard: list[str] = []
 
     @abstractmethod
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
@@ -46,14 +56,29 @@ class ScriptedPolicy(ABC):
         self._env = env
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:  # noqa: ARG002
-        """Decide on a goal and plan its stages."""
+        """Decide on a goal, or listen for the rest of the instruction."""
         env = self._attached()
-        goal = self.decide(env, instruction)
+        self._heard = [instruction]
+        if self.listens and env.unheard:
+            self._chunks = _get_ready(env)
+        else:
+            self.begin(env)
+
+    def hear(self, text: str, step: int) -> None:  # noqa: ARG002
+        """Remember an utterance, and decide on a goal after the last one."""
+        env = self._attached()
+        self._heard.append(text)
+        if self.listens and len(self._heard) == len(env.instruction.utterances):
+            self.begin(env)
+
+    def begin(self, env: RoboIRGEnv) -> None:
+        """Decide on a goal and plan its stages; everything has been heard."""
+        goal = self.decide(env, " ".join(self._heard))
         stages = get_task(env.episode.task).stages(env.episode.scene, goal)
         self._chunks = _execute(env, stages)
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:  # noqa: ARG002
-        """Return the next chunk of the motion; after the last one, actions that hold still."""
+        """Return the next chunk of the motion; without one, actions that hold still."""
         chunk = next(self._chunks, None)
         return chunk if chunk is not None else _hold_still(self._attached())
 
@@ -79,6 +104,18 @@ def _execute(env: RoboIRGEnv, stages: tuple[Stage, ...]) -> Iterator[NDArray[np.
             index -= primitive.kind in UNDOES_PICK and index > 0
         else:
             return
+
+
+def _get_ready(env: RoboIRGEnv) -> Iterator[NDArray[np.float64]]:
+    """Yield the hover with which every goal begins, if there is one, then short rests for ever."""
+    from roboirg.simulation.expert.primitives import MotionPrimitives
+
+    task, scene = get_task(env.episode.task), env.episode.scene
+    first, *others = {task.stages(scene, goal)[0].primitive for goal in task.goals(scene)}
+    if not others and first.kind == HOVER:
+        yield from MotionPrimitives(env.session.world).execute(first)
+    while True:
+        yield _hold_still(env)[:LISTENING_STEPS]
 
 
 class _StageProgress:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from roboirg.core.actions import WAYPOINT
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Demonstration, DemonstrationFrames, Observation
-from roboirg.policies.base import Policy, SubgoalFollower, close_policy
+from roboirg.policies.base import Policy, SubgoalFollower, close_policy, tell_policy
 from roboirg.policies.planning.observation_merging import (
     DemonstrationSubset,
     merge_cameras,
@@ -98,6 +98,11 @@ class HierarchicalPolicy:
         ]
         self.planner.reset(instruction, views[0])
         self.policy.reset(instruction, views[1])
+
+    def hear(self, text: str, step: int) -> None:
+        """Pass an utterance on to both, as far as they remember language."""
+        for one in (self.planner, self.policy):
+            tell_policy(one, [{"text": text, "step": step}])
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
         """Pass the planner's subgoal to the policy, and return the policy's actions."""

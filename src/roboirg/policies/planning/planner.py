@@ -14,7 +14,7 @@ class Planner(Protocol):
     As for policies, the attributes ``cameras`` (default: none), ``demonstration_frames``
     (``"none"``), ``observe_every`` and ``grounded`` are its requirements, ``metadata``, ``usage()``
     and ``version`` go into the records, ``close()`` ends an episode, and ``attach(env)`` makes it
-    privileged; all are optional.
+    privileged, and ``hear(text, step)`` gets what is said after `reset`; all are optional.
     """
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:

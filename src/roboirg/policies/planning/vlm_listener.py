@@ -100,7 +100,7 @@ class VLMListener(ScriptedPolicy):
         }
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Query the goal and begin to execute it.
+        """Query the goal and begin to execute it, or first hear the rest of the instruction.
 
         Raises:
             PolicyConnectionError: the model cannot be reached.
@@ -109,9 +109,13 @@ class VLMListener(ScriptedPolicy):
         """
         self._vlm.start()
         self._demonstration, self.understood, self._impossible = demonstration, None, 0
+        super().reset(instruction, demonstration)
+
+    def begin(self, env: RoboIRGEnv) -> None:
+        """Query the goal and begin to execute it; errors are those of `reset`."""
         self._chunks = iter(())
         try:
-            super().reset(instruction, demonstration)
+            super().begin(env)
         except NotUnderstoodError:
             return
         finally:

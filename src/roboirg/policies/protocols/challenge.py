@@ -25,6 +25,7 @@ from roboirg.policies.serving.service import (
     Message,
     Service,
     act,
+    tell_change,
 )
 from roboirg.policies.transport import HTTP, Transport
 
@@ -123,6 +124,7 @@ class ChallengeService(Service):
     def __init__(self, make_policy: MakePolicy) -> None:
         super().__init__(make_policy)
         self._policy: Policy | None = None
+        self._said, self._steps = "", 0
 
     def new_handler(self) -> Handler:
         """Return the handler that all connections share."""
@@ -138,8 +140,11 @@ class ChallengeService(Service):
         if message.get("is_first_step") or self._policy is None:
             self._policy = self.make_policy()
             self._policy.reset(now["instruction"], _stack(observations))
+            self._said, self._steps = now["instruction"], 0
             now["history"] = ()
         else:
+            self._steps += len(observations)
+            self._said = tell_change(self._policy, self._said, now, self._steps)
             now["history"] = tuple(cast("Observation", dict(seen)) for seen in observations)
         actions, _ = act(self._policy, now)
         return {"actions": actions}

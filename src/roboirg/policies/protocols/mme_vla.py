@@ -35,6 +35,7 @@ from roboirg.policies.serving.service import (
     act,
     read_request,
     read_state,
+    tell_change,
 )
 
 EXECUTED = 16
@@ -194,6 +195,7 @@ class MmeVlaService(Service):
         self._policy = None
         self._frames: list[dict[str, NDArray[Any]]] = []
         self._count = self._turn_start = 0
+        self._said = ""
 
     def _add_frames(self, message: Message) -> None:
         images = np.asarray(message.get("images"))
@@ -220,7 +222,9 @@ class MmeVlaService(Service):
             self._policy = self.make_policy()
             video = self._frames[: self._turn_start]
             self._policy.reset(instruction, _demonstration(video, observation))
-            self._frames = []
+            self._frames, self._said = [], instruction
+        steps = max(self._count - self._turn_start - 1, 0)
+        self._said = tell_change(self._policy, self._said, observation, steps)
         history = tuple({**frame, "instruction": instruction} for frame in self._frames)
         self._frames = []
         observation["history"] = history  # type: ignore[typeddict-item]

@@ -3,7 +3,8 @@
 Such a server remembers nothing: there is no reset, and every request holds all that a reply
 needs. Several episodes may use it at once, and a request whose connection breaks is sent once
 more. Our service has one policy per connection; an episode begins with the connection and when
-the prompt changes.
+the prompt changes. So a policy behind our service cannot be told an instruction in turns: every
+utterance begins an episode that knows nothing of the one before.
 """
 
 from __future__ import annotations

@@ -38,7 +38,8 @@ class RemotePolicy(ABC):
     Attributes:
         options: of the URL; one named ``actions`` selects the action space.
         metadata: of the server, as JSON values, from `reset` on.
-        instruction: of the current episode.
+        instruction: what was said last in the current episode; without `delivery` in turns, the
+            whole instruction. Clients send it with every request if the protocol allows it.
 
     Raises:
         UnknownNameError: the URL has an unknown option.
@@ -93,6 +94,7 @@ class RemotePolicy(ABC):
             PolicyTimeoutError: the server took too long.
             PolicyReplyError: the server replied with an error or with something else.
         """
+        self.instruction = observation["instruction"]
         with self._closed_on_error():
             return self.request_actions(observation)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from roboirg.core.actions import check_chunk
 from roboirg.core.observations import Observation
-from roboirg.policies.base import Policy
+from roboirg.policies.base import Policy, tell_policy
 from roboirg.policies.requirements import wanted_actions
 
 Message = Mapping[str, Any]
@@ -64,6 +64,24 @@ def act(policy: Policy, observation: Observation) -> tuple[NDArray[np.float64], 
     start = time.perf_counter()
     actions = check_chunk(policy.act(observation), wanted_actions(policy))
     return actions, 1000 * (time.perf_counter() - start)
+
+
+def tell_change(policy: Policy, before: str, observation: Observation, step: int) -> str:
+    """Tell a policy what an observation says, if it differs from what was said before it.
+
+    Args:
+        policy: that remembers from one request to the next.
+        before: the instruction of the observation before.
+        observation: now.
+        step: control steps that the client has shown since the policy's turn began.
+
+    Returns:
+        What the observation says.
+    """
+    said = observation["instruction"]
+    if said != before:
+        tell_policy(policy, [{"text": said, "step": step}])
+    return said
 
 
 def read_picture(message: Message, key: str) -> NDArray[np.uint8]:

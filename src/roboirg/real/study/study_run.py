@@ -16,6 +16,7 @@ import numpy as np
 from roboirg.core.actions import JOINT_ANGLE
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.instruction_options import DEFAULT_DELIVERY
 from roboirg.evaluation.plan import instruct_job
 from roboirg.evaluation.plan_parsing import name_and_spec
 from roboirg.evaluation.rollout_result import make_record, utc_now
@@ -75,9 +76,11 @@ class Study:
 
         Raises:
             UnknownNameError: a policy is not in the plan.
-            InvalidValueError: a policy cannot act on this robot, or another process uses it.
+            InvalidValueError: a policy cannot act on this robot, another process uses it, or a
+                trial's instruction is to be delivered in turns.
             StoreError: records cannot be read or written.
         """
+        _check_delivery(self.plan)
         specs = self._selected_specs(policies)
         cameras = {name: self._check_policy(spec or name) for name, spec in specs.items()}
         trial_log = TrialLog.read(self.plan, self.folder)
@@ -168,6 +171,16 @@ class Study:
                 "with --robot twin."
             )
         return wanted_cameras(found)
+
+
+def _check_delivery(plan: StudyPlan) -> None:
+    """Raise if an instruction is to be delivered in turns."""
+    for trial in plan.trials:
+        if trial.job.delivery != DEFAULT_DELIVERY:
+            raise InvalidValueError(
+                f"Trial {trial.name!r} has delivery={trial.job.delivery!r}; in a study with a "
+                f"robot the whole instruction is given at once ({DEFAULT_DELIVERY!r})."
+            )
 
 
 def select_scorer(name: str, robot: Robot) -> Scorer:

@@ -71,11 +71,13 @@ class GeminiPlanner(VLMPlanner):
         self._frames: list[Pixels] = []
         self._turns: list[ChatTurn] = []
         self._periods = 0
+        self._quoted = ""
 
     def begin(self, demonstration: Demonstration) -> None:
         """Begin a new conversation, without frames of the last episode."""
         self._demonstration = demonstration_pictures(demonstration)
         self._frames, self._turns, self._periods = [], [], 0
+        self._quoted = self._instruction
 
     def watch(self, observation: Observation, step: int) -> None:
         """Keep the frames since the last call."""
@@ -106,6 +108,7 @@ class GeminiPlanner(VLMPlanner):
             return None
         text, subgoal = answer
         self._turns += [turn, ChatTurn("model", (text,))]
+        self._quoted = self._instruction
         self._frames = []
         return subgoal
 
@@ -122,6 +125,8 @@ class GeminiPlanner(VLMPlanner):
 
     def _next_query(self) -> Iterator[Part]:
         prompts = self.prompts
+        if self._quoted != self._instruction:  # more has been said since
+            yield prompts.fill("goal", instruction=self._instruction)
         if len(self._frames) < MIN_CLIP_FRAMES:
             yield prompts.fill("next_picture")
             yield Picture(self._frames[-1])

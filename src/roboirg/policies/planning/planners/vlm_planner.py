@@ -86,6 +86,10 @@ class VLMPlanner(ABC):
         self._instruction, self._chunks, self._subgoal = instruction, 0, None
         self.begin(demonstration)
 
+    def hear(self, text: str, step: int) -> None:  # noqa: ARG002
+        """Remember an utterance; the next query quotes everything that was said."""
+        self._instruction = f"{self._instruction} {text}"
+
     def plan(self, observation: Observation, step: int) -> str | None:
         """Return the subgoal from now on: a new one if a query is due, else the last."""
         self.watch(observation, step)

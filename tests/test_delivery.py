@@ -1,0 +1,178 @@
+"""Instructions in turns: when each utterance is heard, and who can use it."""
+
+import itertools
+
+import pytest
+from typer.testing import CliRunner
+
+import roboirg
+from roboirg import language
+from roboirg.cli.app import app
+from roboirg.core.delivery import (
+    DELIVERIES,
+    LATEST,
+    SPACING,
+    HeardUtterance,
+    SpokenInstruction,
+    utterance_steps,
+)
+from roboirg.core.errors import UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.episodes.splits import get_episode
+from roboirg.language.settings import all_settings, settings_of
+from roboirg.policies import make_policy, play
+from roboirg.records.store import read_records
+from roboirg.tasks import all_tasks, get_task
+
+
+def test_a_prompt_is_heard_at_once():
+    spoken = SpokenInstruction(("It is red.", "Take it."), "prompt")
+    assert spoken.heard == [("It is red.", 0), ("Take it.", 0)]
+    assert (spoken.prompt, spoken.unheard) == ("It is red. Take it.", 0)
+    spoken.hear(100)
+    assert len(spoken.heard) == 2
+    assert spoken.said_at(100) == spoken.prompt
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 9, 100])
+def test_turns_begin_at_the_reset_and_end_with_the_command(count):
+    steps = utterance_steps(count, "turns")
+    assert len(steps) == count
+    assert steps[0] == 0
+    assert list(steps) == sorted(steps)
+    assert steps[-1] == (0 if count == 1 else min((count - 1) * SPACING, LATEST))
+    assert all(late - early <= SPACING for early, late in itertools.pairwise(steps))
+    if count <= LATEST:
+        assert len(set(steps)) == count
+
+
+def test_an_utterance_is_heard_at_the_first_observation_after_it():
+    spoken = SpokenInstruction("abcde", "turns")  # said at 0, 10, 20, 30 and 40
+    heard = []
+    for step in (9, 10, 12, 35, 36, 90):
+        spoken.hear(step)
+        heard.append((spoken.prompt, spoken.unheard))
+    assert heard == [("a", 4), ("b", 3), ("b", 3), ("c d", 1), ("c d", 1), ("e", 0)]
+    assert spoken.heard[-2:] == [HeardUtterance("d", 35), HeardUtterance("e", 90)]
+    assert [spoken.said_at(step) for step in (0, 9, 20, 29, 39, 40, 90)] == list("aaccdee")
+
+
+def test_the_settings_with_several_utterances_read_the_delivery():
+    several = set()
+    for name in all_tasks():
+        for index in range(4):
+            episode = get_episode(name, "test", index)
+            for setting in settings_of(get_task(name)):
+                if len(language.instruct(episode, setting).utterances) > 1:
+                    several.add(setting)
+    assert several == {name for name, one in all_settings().items() if "delivery" in one.reads}
+
+
+def test_a_delivery_changes_no_word_and_an_unknown_one_is_told():
+    episode = get_episode("PickXtimes", "test", 1)
+    one, two = (
+        language.instruct_with(episode, InstructionOptions("contextual", delivery=delivery))
+        for delivery in DELIVERIES
+    )
+    assert one == two
+    with pytest.raises(UnknownNameError, match=r"no delivery 'turn'.*Did you mean 'turns'"):
+        language.instruct_with(episode, InstructionOptions(delivery="turn"))
+
+
+class Remembering:
+    """Holds still in chunks of 15 and writes down what it is told."""
+
+    cameras = ()
+    observe_every = 5
+
+    def __init__(self):
+        self.told, self.prompts, self.history = [], [], []
+
+    def reset(self, instruction, demonstration):
+        self.told.append((instruction, 0))
+
+    def hear(self, text, step):
+        self.told.append((text, step))
+
+    def act(self, observation):
+        self.prompts.append(observation["instruction"])
+        self.history += [entry["instruction"] for entry in observation["history"]]
+        return [[*observation["joint_positions"], 1.0]] * 15
+
+
+@pytest.mark.sim
+def test_an_episode_in_turns_tells_them_in_order():
+    env = roboirg.make(
+        "PickXtimes",
+        setting="contextual",
+        cameras=(),
+        observe_every=5,
+        max_steps=70,
+        delivery="turns",
+    )
+    turns = env.instruction.turns
+    policy = Remembering()
+    assert play(env, policy)["status"] == "timeout"
+    # Said at 0, 10, 20, 30 and 40; observed every 15 steps.
+    assert policy.told == list(zip(turns, (0, 15, 30, 30, 45), strict=True))
+    joined = f"{turns[2]} {turns[3]}"
+    assert policy.prompts == [turns[0], turns[1], joined, turns[4], turns[4]]
+    said = [0, 1, 1, 2, 2, 3, 3, 4, 4, 4, 4, 4]  # at 5, 10, ..., 60
+    assert policy.history == [turns[index] for index in said]
+    first, info = env.reset()
+    assert first["instruction"] == turns[0]
+    assert info["heard"] == [{"text": turns[0], "step": 0}]
+    assert first in env.observation_space
+
+
+@pytest.mark.sim
+def test_nothing_is_heard_after_the_end():
+    env = roboirg.make("PickXtimes", setting="direct", cameras=(), max_steps=20, delivery="turns")
+    observation, info = env.reset()
+    action = [*observation["joint_positions"], 1.0]
+    observation, _, _, truncated, info = env.step_chunk([action] * 30)
+    assert truncated
+    assert (info["heard"], env.unheard) == ([], 1)
+    assert observation["instruction"] == env.instruction.turns[0]
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize(
+    ("task", "setting", "index"),
+    [
+        ("VideoUnmask", "contextual", 0),
+        ("PickXtimes", "direct", 0),
+        ("StopCube", "contextual", 3),  # the earliest press: step 60
+    ],
+)
+def test_the_listener_follows_what_it_was_told_in_turns(task, setting, index):
+    env = roboirg.make(task, setting=setting, episode=index, cameras=(), delivery="turns")
+    assert play(env, make_policy("listener", 0))["status"] == "success"
+
+
+@pytest.mark.sim
+def test_the_oracle_does_not_wait_for_words():
+    steps = [
+        play(
+            roboirg.make("VideoUnmask", setting="direct", cameras=(), delivery=delivery),
+            make_policy("oracle", 0),
+        )["steps"]
+        for delivery in DELIVERIES
+    ]
+    assert steps[0] == steps[1]
+
+
+@pytest.mark.sim
+def test_a_run_in_turns_has_records_and_videos_of_them(tmp_path):
+    words = ["--policy", "listener", "--tasks", "VideoUnmask", "--settings", "explicit,direct"]
+    words += ["--episodes", "1", "--delivery", "turns", "--video", "all", "--workers", "0"]
+    result = CliRunner().invoke(app, ["run", *words, "--out", str(tmp_path)])
+    assert result.exit_code == 0, result.output
+    explicit, direct = read_records(tmp_path)
+    assert (explicit.outcome, direct.outcome) == ("success", "success")
+    assert (explicit.delivery, direct.delivery) == ("prompt", "turns")
+    assert [one.step for one in explicit.instruction] == [0]
+    assert [one.step for one in direct.instruction] == [0, SPACING]
+    assert direct.steps == explicit.steps + SPACING
+    for record in (explicit, direct):
+        assert (tmp_path / record.video).stat().st_size > 1000
