@@ -108,6 +108,9 @@ def tables(
     chance: Annotated[
         bool, typer.Option(help="Add the expected success of the forgetful listener.")
     ] = False,
+    floors: Annotated[
+        bool, typer.Option(help="Add that of the forgetful and the shortcut listeners.")
+    ] = False,
     out: Annotated[
         Path | None, typer.Option(help="Folder for a file of each table; prints without it.")
     ] = None,
@@ -116,7 +119,7 @@ def tables(
     from roboirg.analysis.tables.rendering import get_format
 
     output = get_format(format)
-    found = _tables(which, _cells(runs or []), published=published, chance=chance)
+    found = _tables(which, _cells(runs or []), published=published, chance=chance, floors=floors)
     if out is not None:
         _write(found, out, output.suffix, format)
     elif format == "terminal":
@@ -150,7 +153,9 @@ def compare(
         console.print(Text(sentence), highlight=False)
 
 
-def _tables(which: str, cells: Cells, *, published: bool, chance: bool) -> list[Table]:
+def _tables(
+    which: str, cells: Cells, *, published: bool, chance: bool, floors: bool
+) -> list[Table]:
     from roboirg.analysis.published import RATE_TABLES
     from roboirg.analysis.tables.paper_tables import WHICH, is_informative, make_table
 
@@ -166,7 +171,9 @@ def _tables(which: str, cells: Cells, *, published: bool, chance: bool) -> list[
         raise InvalidValueError(
             f"The table {which!r} needs a run; give its folder, or --published."
         )
-    found = [make_table(one, cells, published=published, chance=chance) for one in wanted]
+    found = [
+        make_table(one, cells, published=published, chance=chance, floors=floors) for one in wanted
+    ]
     if which not in (_ALL, "coverage") and not found[0].rows:
         raise InvalidValueError(
             f"The runs have no results for the table {which!r}; --which all shows what they have."

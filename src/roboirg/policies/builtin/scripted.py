@@ -38,8 +38,8 @@ class ScriptedPolicy(ABC):
         self._chunks: Iterator[NDArray[np.float64]] = iter(())
 
     @abstractmethod
-    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
-        """Return the goal to execute."""
+    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
+        """Return the goal to execute, one of the scene's; None to hold still."""
 
     def attach(self, env: RoboIRGEnv) -> None:
         """Receive the environment in which the expert acts."""
@@ -49,6 +49,9 @@ class ScriptedPolicy(ABC):
         """Decide on a goal and plan its stages."""
         env = self._attached()
         goal = self.decide(env, instruction)
+        if goal is None:
+            self._chunks = iter(())
+            return
         stages = get_task(env.episode.task).stages(env.episode.scene, goal)
         self._chunks = _execute(env, stages)
 
