@@ -178,7 +178,8 @@ def card(
 
 @language_app.command("shortcuts")
 def score_shortcuts(
-    split: AnySplit = "test",
+    split: Annotated[str, typer.Option(help="train, val, test, all or none.")] = "test",
+    seeds: Annotated[int, typer.Option(help="Random scenes for each task, beyond the split.")] = 0,
     tasks: Tasks = "all",
     settings: Settings = "all",
     form: Annotated[str, typer.Option(help="implicit or resolved.")] = "implicit",
@@ -207,7 +208,8 @@ def score_shortcuts(
     )
     from roboirg.language.wordings.wording_store import open_wordings
 
-    splits, grouping = parse_splits(split), None if by is None else _known("row", by, GROUPINGS)
+    splits = () if split.strip().lower() == "none" else parse_splits(split)
+    grouping = None if by is None else _known("row", by, GROUPINGS)
     if learned:
         check_learning_support()
         if TRAINING_SPLIT in splits:
@@ -225,10 +227,13 @@ def score_shortcuts(
         wordings=identity,
     )
     names, chosen = _tasks(tasks, identity), _settings(settings)
-    rows = shortcut_rows(names, splits, chosen, options, by=grouping, learned=learned)
+    rows = shortcut_rows(names, splits, chosen, options, seeds=seeds, by=grouping, learned=learned)
     if not rows:
-        raise InvalidValueError(f"None of these tasks has the setting {', '.join(chosen)}.")
-    title = f"Shortcuts, {options.form} form, {' and '.join(splits)}"
+        raise InvalidValueError(
+            f"There is nothing to score: no episode of {', '.join(names)} in {', '.join(chosen)}."
+        )
+    source = [*splits, *([f"{seeds:,} random scenes per task"] if seeds else [])]
+    title = f"Shortcuts, {options.form} form, {' and '.join(source)}"
     _console().print(shortcut_table(rows, title, grouping))
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import itertools
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from rich.table import Table
 
-from roboirg.core.episode import Split
+from roboirg.core.episode import Episode, Split
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.episodes.splits import split_episodes
+from roboirg.episodes.splits import get_episode, split_episodes
 from roboirg.language.settings import EXPLICIT
 from roboirg.language.shortcuts.learned_floor import LearnedFloor
 from roboirg.language.shortcuts.shortcut_scores import (
@@ -52,23 +54,30 @@ def shortcut_rows(
     settings: Sequence[str],
     options: InstructionOptions,
     *,
+    seeds: int = 0,
     by: Grouping | None = None,
     learned: bool = False,
 ) -> list[ShortcutRow]:
-    """Score all shortcuts on the instructions of some splits.
+    """Score all shortcuts on the instructions of some splits, and of random scenes.
 
     Args:
         tasks: names.
         splits: names.
         settings: names.
         options: all others, and the form.
+        seeds: number of random scenes for each task, beyond the splits.
         by: what to break each setting down by.
         learned: whether to train the learned floors, on the train split with the same options.
 
     Raises:
+        InvalidValueError: the number of random scenes is negative.
         MissingDependencyError: floors are to be learned, and scikit-learn is not installed.
     """
-    told = list(_told(tasks, splits, settings, options))
+    if seeds < 0:
+        raise InvalidValueError(f"The number of random seeds is {seeds}; it must be at least 0.")
+    random = (get_episode(task, "random", index) for task in tasks for index in range(seeds))
+    episodes = itertools.chain(split_episodes(tasks, splits), random)
+    told = list(_told(episodes, settings, options))
     scores = {
         name: {_key(one): score(one) for one in told} for name, score in rule_scorers().items()
     }
@@ -88,13 +97,11 @@ def shortcut_rows(
 
 
 def _told(
-    tasks: Sequence[str],
-    splits: Sequence[Split],
-    settings: Sequence[str],
-    options: InstructionOptions,
+    episodes: Iterable[Episode], settings: Sequence[str], options: InstructionOptions
 ) -> Iterator[Told]:
+    """Yield the instructions, setting by setting."""
     yield from sorted(
-        instructions(split_episodes(tasks, splits), settings, (options.form,), options),
+        instructions(episodes, settings, (options.form,), options),
         key=lambda one: settings.index(one[1].setting),
     )
 
@@ -116,13 +123,14 @@ def _learned_scores(
         LEARNED_SETTING: {},
     }
     for task in tasks:
+        seen = list(split_episodes((task,), (TRAINING_SPLIT,)))
         plain = options._replace(form="implicit")
-        explicit = LearnedFloor(list(_told((task,), (TRAINING_SPLIT,), (EXPLICIT,), plain)))
+        explicit = LearnedFloor(list(_told(seen, (EXPLICIT,), plain)))
         for setting in settings:
             tested = [one for one in told if (one[0].task, one[1].setting) == (task, setting)]
             if not tested:
                 continue
-            own = LearnedFloor(list(_told((task,), (TRAINING_SPLIT,), (setting,), options)))
+            own = LearnedFloor(list(_told(seen, (setting,), options)))
             for name, floor in ((LEARNED_EXPLICIT, explicit), (LEARNED_SETTING, own)):
                 found = floor.scores(tested)
                 scores[name] |= {_key(one): score for one, score in zip(tested, found, strict=True)}
