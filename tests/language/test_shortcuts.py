@@ -4,6 +4,7 @@ import inspect
 import sys
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,7 +33,7 @@ from roboirg.language.shortcuts.shortcut_scores import (
 )
 from roboirg.language.shortcuts.shortcut_tables import LEARNED_SETTING, shortcut_rows
 from roboirg.language.variants import expressible_options, instructions
-from roboirg.tasks import get_task
+from roboirg.tasks import all_tasks, get_task
 
 COLORS = ("blue", "green", "red")
 EXCLUDED = "My kitchen is painted red and blue. Take the cube of a color other than that pair"
@@ -260,6 +261,22 @@ def test_the_table_of_the_documentation():
         assert rows["spatial",][rule].goals < rows["spatial",][CHANCE].goals
 
 
+def test_the_documentation_says_what_is_measured():
+    """The rows of chance and of the rules, over the whole test split."""
+    page = (Path(__file__).parents[2] / "docs" / "language.md").read_text(encoding="utf-8")
+    table = page.split("| | direct | contextual | contextual, competing |")[1].split("\n\n")[0]
+    competing = InstructionOptions(distractor="competing")
+    tasks, columns = tuple(all_tasks()), ("direct", "contextual", "reasoning", "spatial")
+    direct, contextual, reasoning, spatial = (
+        row.shares for row in shortcut_rows(tasks, ("test",), columns, InstructionOptions())
+    )
+    (rivals,) = (row.shares for row in shortcut_rows(tasks, ("test",), ("contextual",), competing))
+    for name in rule_scorers():
+        cells = [shares[name] for shares in (direct, contextual, rivals, reasoning, spatial)]
+        numbers = " | ".join(f"{100 * one.slots:.0f} / {100 * one.goals:.0f}" for one in cells)
+        assert f"| {numbers} |" in table.split(f"{name}`" if name in SURFACE_RULES else name)[1]
+
+
 def test_rows_by_pattern_have_all_instructions():
     told = list(instructions(first_episodes("BinFill", "test", 20), ["reasoning"], ["implicit"]))
     groups = group_told(told, "pattern")
@@ -284,6 +301,8 @@ def test_the_learned_floor_is_deterministic_and_learns():
     assert mean_shares(first.scores(tested)).goals > 0.9
     assert mean_shares(learned("VideoRepick", "explicit").scores(tested)).goals < 1
     assert first.scores([]) == []
+    with pytest.raises(InvalidValueError, match="no instruction to learn from"):
+        LearnedFloor([])
 
 
 def test_the_learned_floor_predicts_from_the_text_alone():

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
-from roboirg.core.errors import MissingDependencyError
+from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.language.shortcuts.goal_vocabulary import (
     Value,
     goal_vocabulary,
@@ -46,14 +46,17 @@ class LearnedFloor:
     The same instructions in the same order give the same classifiers.
 
     Args:
-        told: instructions of the task to learn from, with their episodes; one or more.
+        told: instructions of the task to learn from, with their episodes.
 
     Raises:
+        InvalidValueError: there are none.
         MissingDependencyError: scikit-learn is not installed.
     """
 
     def __init__(self, told: Sequence[Told]) -> None:
         check_learning_support()
+        if not told:
+            raise InvalidValueError("The learned floor has no instruction to learn from.")
         from sklearn.feature_extraction.text import CountVectorizer
 
         self._task = told[0][0].task
