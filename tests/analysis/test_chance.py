@@ -1,7 +1,8 @@
-"""The chance level against the forgetful listener itself, and by hand."""
+"""The expected success of the listeners against the listeners themselves, and by hand."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from types import SimpleNamespace
@@ -9,11 +10,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from roboirg.analysis.stats.chance import chance_level
+from roboirg.analysis.stats.chance import FLOORS, chance_level, floor_level
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.plan import instruct_job
 from roboirg.language.settings import settings_of
+from roboirg.language.shortcuts import SURFACE_RULES
 from roboirg.language.variants import all_variants
+from roboirg.policies import make_policy
 from roboirg.policies.builtin.listeners import ForgetfulPolicy
 from roboirg.records.record import Job
 from roboirg.tasks import all_tasks, get_task
@@ -80,6 +83,36 @@ def test_it_is_what_the_forgetful_listener_comes_to(task: str, setting: str) -> 
     ]
     level = float(chance_level([played]))
     assert np.mean(right) == pytest.approx(level, abs=0.01 + 3 * np.sqrt(level * (1 - level) / 400))
+
+
+@pytest.mark.parametrize("task", ["PickXtimes", "VideoUnmask", "StopCube"])
+@pytest.mark.parametrize("setting", ["direct", "reasoning"])
+@pytest.mark.parametrize("rule", SURFACE_RULES)
+def test_floors_are_what_the_shortcut_listeners_come_to(rule: str, task: str, setting: str) -> None:
+    """Their own decisions, with 300 seeds; a goal that the scene lacks is none."""
+    played = job(task, setting, episode=3)
+    episode, instruction = get_episode(task, "test", 3), instruct_job(played)
+    env = SimpleNamespace(episode=episode, instruction=instruction)
+    goals = [make_policy(rule, seed).decide(env, instruction.text) for seed in range(300)]
+    level = float(floor_level(rule, [played]))
+    assert np.mean([goal == episode.goal for goal in goals]) == pytest.approx(
+        level, abs=3 * np.sqrt(level * (1 - level) / 300) + 1e-9
+    )
+    elsewhere = SimpleNamespace(
+        episode=replace(episode, goal=get_task(task).goals(episode.scene)[-1]),
+        instruction=instruction,
+    )
+    again = [make_policy(rule, seed).decide(elsewhere, instruction.text) for seed in range(300)]
+    assert again == goals, "the goal made a difference"
+
+
+@pytest.mark.parametrize("variant", all_variants(), ids="-".join)
+def test_floors_are_shares(variant) -> None:
+    jobs = [job(*variant, episode) for episode in range(6)]
+    levels = {floor: floor_level(floor, jobs) for floor in FLOORS}
+    assert all(0 <= level <= 1 for level in levels.values())
+    if variant[1] in ("direct", "contextual"):
+        assert levels["first-mention"] == levels["surface"] == 1
 
 
 def test_who_plays_and_how_often_makes_no_difference() -> None:

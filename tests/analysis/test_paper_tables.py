@@ -190,6 +190,20 @@ def test_the_chance_level_stands_below(result) -> None:
     assert direct["StopCube"].change is None
 
 
+def test_the_floors_stand_below_the_chance_level(result) -> None:
+    cells = gather([("run", whole(result))])
+    table = make_table("main", cells, floors=True)
+    below = [(row.group, row.name) for row in table.rows if row.source == "chance"]
+    names = ["chance", "first-mention", "last-mention", "elimination", "surface"]
+    assert below == [(setting, name) for setting in ("explicit", "direct") for name in names]
+    by_name = {(row.group, row.name): row.entries[-1].text for row in table.rows}
+    assert by_name["direct", "first-mention"] == "100.00"
+    assert by_name["direct", "elimination"] == "0.00"
+    assert [row for row in table.rows if row.source != "chance"] == list(
+        make_table("main", cells).rows
+    )
+
+
 @pytest.mark.parametrize(("width", "parts"), [(400, 1), (120, 3), (72, 6), (45, 15)])
 def test_a_wide_table_is_drawn_in_parts(result, width: int, parts: int) -> None:
     """And every rate is there, whatever the width."""

@@ -176,6 +176,67 @@ def card(
         write_atomically(out, language_card())
 
 
+@language_app.command("shortcuts")
+def score_shortcuts(
+    split: Annotated[str, typer.Option(help="train, val, test, all or none.")] = "test",
+    seeds: Annotated[int, typer.Option(help="Random scenes for each task, beyond the split.")] = 0,
+    tasks: Tasks = "all",
+    settings: Settings = "all",
+    form: Annotated[str, typer.Option(help="implicit or resolved.")] = "implicit",
+    stages: Stages = "1-5",
+    distractor: Distractor = "neutral",
+    distractors: Annotated[int, typer.Option(help="Number of distractors.")] = 1,
+    frame: Frame = "robot",
+    wordings: Wordings = None,
+    by: Annotated[
+        str | None, typer.Option(help="A row for each pattern or task of a setting.")
+    ] = None,
+    learned: Annotated[
+        bool, typer.Option(help="Add floors learned from the words of the train split (a minute).")
+    ] = False,
+) -> None:
+    """Score rules that see the words only, beside chance: how much needs no understanding."""
+    from roboirg.core.instruction_options import InstructionOptions
+    from roboirg.evaluation.plan_parsing import parse_splits, parse_stages
+    from roboirg.language import FORMS
+    from roboirg.language.shortcuts.learned_floor import check_learning_support
+    from roboirg.language.shortcuts.shortcut_scores import GROUPINGS
+    from roboirg.language.shortcuts.shortcut_tables import (
+        TRAINING_SPLIT,
+        shortcut_rows,
+        shortcut_table,
+    )
+    from roboirg.language.wordings.wording_store import open_wordings
+
+    splits = () if split.strip().lower() == "none" else parse_splits(split)
+    grouping = None if by is None else _known("row", by, GROUPINGS)
+    if learned:
+        check_learning_support()
+        if TRAINING_SPLIT in splits:
+            raise InvalidValueError(
+                f"--learned learns from the split {TRAINING_SPLIT}, so --split {split} would test "
+                "it on what it has seen; ask for val or test."
+            )
+    identity = open_wordings(wordings)
+    options = InstructionOptions(
+        form=_known("form", form, FORMS),
+        stages=parse_stages(stages),
+        distractor=distractor,
+        distractors=distractors,
+        frame=frame,
+        wordings=identity,
+    )
+    names, chosen = _tasks(tasks, identity), _settings(settings)
+    rows = shortcut_rows(names, splits, chosen, options, seeds=seeds, by=grouping, learned=learned)
+    if not rows:
+        raise InvalidValueError(
+            f"There is nothing to score: no episode of {', '.join(names)} in {', '.join(chosen)}."
+        )
+    source = [*splits, *([f"{seeds:,} random scenes per task"] if seeds else [])]
+    title = f"Shortcuts, {options.form} form, {' and '.join(source)}"
+    _console().print(shortcut_table(rows, title, grouping))
+
+
 def _with_progress(
     found: Iterable[tuple[Batch, ValidationResults]], work: Sequence[Batch]
 ) -> Iterable[ValidationResults]:

@@ -118,6 +118,9 @@ def tables(
     chance: Annotated[
         bool, typer.Option(help="Add the expected success of the forgetful listener.")
     ] = False,
+    floors: Annotated[
+        bool, typer.Option(help="Add that of the forgetful and the shortcut listeners.")
+    ] = False,
     by: By = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder for a file of each table; prints without it.")
@@ -128,10 +131,11 @@ def tables(
 
     output = get_format(format)
     if by is None:
-        found = _tables(which, _cells(runs or []), published=published, chance=chance)
-    elif published or chance or which != _ALL:
+        cells = _cells(runs or [])
+        found = _tables(which, cells, published=published, chance=chance, floors=floors)
+    elif published or chance or floors or which != _ALL:
         raise InvalidValueError(
-            "--by has tables of its own, without --which, --published, --chance."
+            "--by has tables of its own, without --which, --published, --chance, --floors."
         )
     else:
         found = _breakdown_tables(runs or [], by)
@@ -172,7 +176,9 @@ def compare(
         console.print(Text(sentence), highlight=False)
 
 
-def _tables(which: str, cells: Cells, *, published: bool, chance: bool) -> list[Table]:
+def _tables(
+    which: str, cells: Cells, *, published: bool, chance: bool, floors: bool
+) -> list[Table]:
     from roboirg.analysis.published import RATE_TABLES
     from roboirg.analysis.tables.paper_tables import WHICH, is_informative, make_table
 
@@ -188,7 +194,9 @@ def _tables(which: str, cells: Cells, *, published: bool, chance: bool) -> list[
         raise InvalidValueError(
             f"The table {which!r} needs a run; give its folder, or --published."
         )
-    found = [make_table(one, cells, published=published, chance=chance) for one in wanted]
+    found = [
+        make_table(one, cells, published=published, chance=chance, floors=floors) for one in wanted
+    ]
     if which not in (_ALL, "coverage") and not found[0].rows:
         raise InvalidValueError(
             f"The runs have no results for the table {which!r}; --which all shows what they have."

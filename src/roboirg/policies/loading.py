@@ -35,7 +35,7 @@ def make_policy(spec: str, seed: int) -> Policy:
     """Make a policy from its spec.
 
     Args:
-        spec: ``oracle``, ``listener``, ``forgetful``, ``random``; ``package.module:Class``,
+        spec: a name in `policy_classes.BUILTIN`, such as ``oracle``; ``package.module:Class``,
             called with ``seed=`` if it takes it, else without arguments; or a URL.
         seed: of the policy's own random choices.
 

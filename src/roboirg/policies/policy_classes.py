@@ -19,6 +19,10 @@ BUILTIN: Mapping[str, str] = {
     "oracle": "roboirg.policies.builtin.oracle_policy:OraclePolicy",
     "listener": "roboirg.policies.builtin.listeners:ListenerPolicy",
     "forgetful": "roboirg.policies.builtin.listeners:ForgetfulPolicy",
+    "first-mention": "roboirg.policies.builtin.shortcut_listeners:FirstMentionPolicy",
+    "last-mention": "roboirg.policies.builtin.shortcut_listeners:LastMentionPolicy",
+    "elimination": "roboirg.policies.builtin.shortcut_listeners:EliminationPolicy",
+    "surface": "roboirg.policies.builtin.shortcut_listeners:SurfacePolicy",
     "random": "roboirg.policies.builtin.random_policy:RandomPolicy",
 }
 

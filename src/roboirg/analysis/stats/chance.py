@@ -1,8 +1,10 @@
-"""The chance level: the expected success of a policy that hears only the final command.
+"""Expected success of the policies that do not understand: the chance level, and shortcuts.
 
-The forgetful listener chooses uniformly among the goals that fit the command, or among all goals if
-none fits. Its expected success follows without playing, assuming flawless execution: the share of
-these goals that have the stages of the right one. Nothing is estimated.
+The forgetful listener hears only the final command and chooses uniformly among the goals that fit
+it, or among all goals if none fits. Its expected success is the chance level. It follows without
+playing, assuming flawless execution: the share of these goals that have the stages of the right
+one. A shortcut listener draws its goal by a surface rule; its expected success is the probability
+that this goal is right. Nothing is estimated.
 """
 
 from __future__ import annotations
@@ -14,9 +16,13 @@ from fractions import Fraction
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.plan import instruct_job
-from roboirg.language import interpret
+from roboirg.language.command_chance import fitting_goals, right_share
+from roboirg.language.shortcuts import SURFACE_RULES, goal_share, guess_goal
 from roboirg.records.record import Job
-from roboirg.tasks import get_task
+
+CHANCE = "chance"
+FLOORS = (CHANCE, *SURFACE_RULES)
+"""The policies: the forgetful listener, and the shortcut listeners by the names of their rules."""
 
 
 def chance_level(jobs: Iterable[Job]) -> Fraction | None:
@@ -28,19 +34,25 @@ def chance_level(jobs: Iterable[Job]) -> Fraction | None:
         UnknownNameError: a task does not exist.
         InvalidValueError: an episode does not exist, or has no such instruction.
     """
+    return floor_level(CHANCE, jobs)
+
+
+def floor_level(floor: str, jobs: Iterable[Job]) -> Fraction | None:
+    """Return the same as `chance_level` for any of `FLOORS`.
+
+    Raises:
+        UnknownNameError: a task or the floor does not exist.
+        InvalidValueError: an episode does not exist, or has no such instruction.
+    """
     instructions = dict.fromkeys((job.task, job.split, job.episode, job.options) for job in jobs)
-    chances = [_chance(*each) for each in instructions]
-    return sum(chances, Fraction(0)) / len(chances) if chances else None
+    levels = [_level(floor, *each) for each in instructions]
+    return sum(levels, Fraction(0)) / len(levels) if levels else None
 
 
-@functools.lru_cache(maxsize=16_384)
-def _chance(task_name: str, split: str, number: int, options: InstructionOptions) -> Fraction:
-    job = Job(policy="", task=task_name, split=split, episode=number, **options._asdict())
-    episode, task = get_episode(task_name, split, number), get_task(task_name)
-    scene = episode.scene
-    fitting = interpret(instruct_job(job).command, scene, task_name).goals
-    choices = fitting or task.goals(scene)
-    # Goals with the same stages are the same to the judge.
-    wanted = task.stages(scene, episode.goal)
-    right = sum(task.stages(scene, goal) == wanted for goal in choices)
-    return Fraction(right, len(choices))
+@functools.lru_cache(maxsize=65_536)
+def _level(floor: str, task: str, split: str, number: int, options: InstructionOptions) -> Fraction:
+    job = Job(policy="", task=task, split=split, episode=number, **options._asdict())
+    episode, instruction = get_episode(task, split, number), instruct_job(job)
+    if floor == CHANCE:
+        return right_share(fitting_goals(instruction.command, episode), episode)
+    return goal_share(guess_goal(floor, instruction.text, task), episode)

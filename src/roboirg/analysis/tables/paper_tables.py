@@ -25,7 +25,7 @@ from roboirg.analysis.stats.cells import (
     cell_interval,
     labels,
 )
-from roboirg.analysis.stats.chance import chance_level
+from roboirg.analysis.stats.chance import CHANCE, FLOORS, floor_level
 from roboirg.analysis.stats.intervals import SEED
 from roboirg.analysis.stats.option_labels import setting_sort_key, staged_options
 from roboirg.analysis.stats.rates import percent
@@ -53,7 +53,6 @@ WHICH: tuple[Which, ...] = get_args(Which)
 
 OVERALL = AVERAGE
 OWN_NAME = "RoboIRGBench"
-CHANCE = "chance"
 
 TITLES: Mapping[Which, str] = {
     "main": "Success by task and setting",
@@ -73,7 +72,14 @@ class Position(NamedTuple):
     options: InstructionOptions
 
 
-def make_table(which: str, cells: Cells, *, published: bool = False, chance: bool = False) -> Table:
+def make_table(
+    which: str,
+    cells: Cells,
+    *,
+    published: bool = False,
+    chance: bool = False,
+    floors: bool = False,
+) -> Table:
     """Make one of the paper's tables.
 
     Args:
@@ -81,6 +87,7 @@ def make_table(which: str, cells: Cells, *, published: bool = False, chance: boo
         cells: as `gather` makes them; may be empty if published rows are shown.
         published: whether to add the paper's rows, and to say which rates can be compared.
         chance: whether to add the chance level below the policies.
+        floors: whether to add the chance level, and the expected success of the shortcut listeners.
 
     Raises:
         UnknownNameError: the table does not exist.
@@ -89,7 +96,8 @@ def make_table(which: str, cells: Cells, *, published: bool = False, chance: boo
         if which == known:
             if known == "coverage":
                 return _coverage()
-            return _rate_table(known, cells, published=published, chance=chance)
+            added = FLOORS if floors else (CHANCE,) if chance else ()
+            return _rate_table(known, cells, published=published, floors=added)
     raise UnknownNameError("table", which, WHICH)
 
 
@@ -105,7 +113,7 @@ def is_informative(which: Which, cells: Cells) -> bool:
     return bool(rows)
 
 
-def _rate_table(which: RateTable, cells: Cells, *, published: bool, chance: bool) -> Table:
+def _rate_table(which: RateTable, cells: Cells, *, published: bool, floors: Sequence[str]) -> Table:
     tasks = _tasks(which, cells)
     columns = _columns(which, tasks)
     rng = np.random.default_rng(SEED)
@@ -118,8 +126,8 @@ def _rate_table(which: RateTable, cells: Cells, *, published: bool, chance: bool
         keys = [CellKey(policy_run, task, position.options) for task in tasks]
         entries = {key.task: _entry(key, cells, differences, rng) for key in keys}
         rows.append(Row(position.group, position.name, "ours", with_averages(columns, entries)))
-    if chance:
-        rows += _chance_rows(which, columns, cells)
+    for floor in floors:
+        rows += _floor_rows(floor, which, columns, cells)
     if shows_published:
         rows += [_published_row(which, columns, row) for row in published_rows(which)]
     rows = with_best(with_changes(columns, _grouped(which, rows), _reference_finder(which, rows)))
@@ -219,36 +227,39 @@ def _applies(task: str, options: InstructionOptions) -> bool:
     return known is None or not is_known or options.setting in settings_of(known)
 
 
-def _chance_rows(which: RateTable, columns: Sequence[Column], cells: Cells) -> list[Row]:
-    """Return the chance level of each setting on the episodes that any policy played in it."""
+def _floor_rows(floor: str, which: RateTable, columns: Sequence[Column], cells: Cells) -> list[Row]:
+    """Return a floor of each setting on the episodes that any policy played in it."""
     rows: list[Row] = []
     if which == "context":
         return rows
     for options in dict.fromkeys(position.options for _, position in _positions(which, cells)):
         entries = {}
         for task in _tasks(which, cells):
-            level = _chance(task, options, cells)
+            level = _floor(floor, task, options, cells)
             entries[task] = Entry(
                 None if level is None else percent(level), applies=_applies(task, options)
             )
-        rows.append(Row(options.setting, CHANCE, "chance", with_averages(columns, entries)))
+        rows.append(Row(options.setting, floor, "chance", with_averages(columns, entries)))
     return rows
 
 
-def _chance(task: str, options: InstructionOptions, cells: Cells) -> Fraction | None:
+def _floor(floor: str, task: str, options: InstructionOptions, cells: Cells) -> Fraction | None:
     if task not in every_task() or options.setting not in all_settings():
         return None
-    return chance_level(
-        Job(
-            policy="",
-            task=task,
-            split=key.policy_run.conditions.split,
-            episode=trial.episode,
-            **options._asdict(),
-        )
-        for key, cell in cells.items()
-        if (key.task, key.options) == (task, options)
-        for trial in cell.verdicts
+    return floor_level(
+        floor,
+        (
+            Job(
+                policy="",
+                task=task,
+                split=key.policy_run.conditions.split,
+                episode=trial.episode,
+                **options._asdict(),
+            )
+            for key, cell in cells.items()
+            if (key.task, key.options) == (task, options)
+            for trial in cell.verdicts
+        ),
     )
 
 

@@ -7,13 +7,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from roboirg.core.episode import Goal
-from roboirg.language import interpret
+from roboirg.core.episode import Episode, Goal
+from roboirg.language.command_chance import fitting_goals
 from roboirg.policies.builtin.scripted import ScriptedPolicy
-from roboirg.tasks import get_task
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
+
+
+def choice_generator(seed: int, episode: Episode, instruction: str) -> np.random.Generator:
+    """Return the generator of a listener's random choices in an episode.
+
+    Seeded by instruction and episode, so that a choice does not depend on what this process played
+    before.
+    """
+    return np.random.default_rng([seed, episode.seed, zlib.crc32(instruction.encode())])
 
 
 class ListenerPolicy(ScriptedPolicy):
@@ -27,11 +35,8 @@ class ListenerPolicy(ScriptedPolicy):
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
         """Return a goal that fits the instruction."""
         episode = env.episode
-        goals = interpret(instruction, episode.scene, episode.task).goals
-        choices = goals or get_task(episode.task).goals(episode.scene)
-        # Seeded by instruction and episode, so that the choice does not depend on what this
-        # process played before.
-        rng = np.random.default_rng([self.seed, episode.seed, zlib.crc32(instruction.encode())])
+        choices = fitting_goals(instruction, episode)
+        rng = choice_generator(self.seed, episode, instruction)
         return choices[int(rng.integers(len(choices)))]
 
 

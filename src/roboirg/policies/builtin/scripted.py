@@ -48,8 +48,8 @@ class ScriptedPolicy(ABC):
         self._heard: list[str] = []
 
     @abstractmethod
-    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
-        """Return the goal to execute."""
+    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
+        """Return the goal to execute, one of the scene's; None to hold still."""
 
     def attach(self, env: RoboIRGEnv) -> None:
         """Receive the environment in which the expert acts."""
@@ -74,6 +74,9 @@ class ScriptedPolicy(ABC):
     def begin(self, env: RoboIRGEnv) -> None:
         """Decide on a goal and plan its stages; everything has been heard."""
         goal = self.decide(env, " ".join(self._heard))
+        if goal is None:
+            self._chunks = iter(())
+            return
         stages = get_task(env.episode.task).stages(env.episode.scene, goal)
         self._chunks = _execute(env, stages)
 

@@ -1,0 +1,148 @@
+"""Find the words of a text that name a value of a slot. No grammar, and nothing of the scene."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from roboirg.language.interpreter.tokens import (
+    Sentence,
+    color_of,
+    number_of,
+    ordinal_of,
+    split_sentences,
+    word_set,
+)
+from roboirg.language.request import SLOT_TYPE_NAMES
+from roboirg.language.shortcuts.goal_vocabulary import GoalVocabulary, SlotVocabulary, Value
+
+ADVERBS = {"once": 1, "twice": 2, "thrice": 3}
+ORDINAL_TYPES = ("visit", "placement")
+"""Slot types whose values are said as ordinals too."""
+
+POINTING = word_set("the that this those these which other each every any no")
+"""Before a cardinal they make it a pronoun: *the one there*, *those two*."""
+PRONOUNS = word_set("them these those")
+COMPARISONS = word_set("fewer less more earlier later")
+"""One or two words after a number they make it a difference: *one time fewer*."""
+STEPS = word_set("before after")
+"""The same for ordinals: *two visits before that*."""
+EXCLUSIONS = word_set("other different not neither except unlike neighbor")
+"""Before a word they say that its value is not the one meant."""
+REFERENCES = word_set("than as half twice double before after neighbor following preceding")
+"""Before a number they say that the one meant is another, which follows from it."""
+
+_REACH = 5
+"""Words before a value that may exclude it: *not the one right before*."""
+_NUMBER_REACH = 3
+
+
+class NamedValue(NamedTuple):
+    """A value that a text names.
+
+    Attributes:
+        value: the value; a number need not be in the slot's vocabulary.
+        stated: whether the last sentence states it plainly, so that nothing is left to a rule.
+    """
+
+    value: Value
+    stated: bool
+
+
+def named_values(text: str, slot: str, vocabulary: SlotVocabulary) -> tuple[NamedValue, ...]:
+    """Return every mention of a slot's values in a text, in order.
+
+    Args:
+        text: an instruction; its last sentence is taken for the command.
+        slot: name of the slot.
+        vocabulary: of that slot.
+    """
+    sentences = _sentences(text)
+    return tuple(
+        NamedValue(value, number == len(sentences) and _is_plain(words, place, value))
+        for number, words in enumerate(sentences, start=1)
+        for place, value in _values(words, slot, vocabulary)
+    )
+
+
+# Cached: every slot and every rule reads the same text.
+@functools.lru_cache(maxsize=1024)
+def _sentences(text: str) -> tuple[Sentence, ...]:
+    return split_sentences(text)
+
+
+def command_words(text: str) -> Sentence:
+    """Return the words of the last sentence."""
+    sentences = _sentences(text)
+    return sentences[-1] if sentences else ()
+
+
+def part_count(text: str, thing: str, vocabulary: GoalVocabulary) -> int:
+    """Return how many things a command seems to ask for, by its ranks, values and nouns.
+
+    Args:
+        text: an instruction.
+        thing: the noun for what the task handles.
+        vocabulary: of the task.
+    """
+    words = command_words(text)
+    stated = [
+        sum(one.stated for one in named_values(text, slot, one_slot))
+        for slot, one_slot in vocabulary.items()
+        if one_slot.several
+    ]
+    longest = max((one.longest for one in vocabulary.values()), default=1)
+    nouns = sum(word in (thing, f"{thing}s", f"{thing}es") for word in words)
+    return max(1, min(longest, max((*stated, *_ranks(words), nouns))))
+
+
+def _ranks(words: Sentence) -> Iterator[int]:
+    """Yield the ranks of introduced things: *the former*, *the third*."""
+    for before, word, after in zip(("", *words), words, (*words[1:], ""), strict=False):
+        if word in ("former", "latter"):
+            yield 2
+        rank = ordinal_of(word)
+        if rank is not None and before == "the" and after not in ("from", "closest", "farthest"):
+            yield rank
+
+
+def _values(words: Sentence, slot: str, vocabulary: SlotVocabulary) -> Iterator[tuple[int, Value]]:
+    """Yield position and value of every word that names one."""
+    if not all(isinstance(value, int) for value in vocabulary.values):
+        for place, word in enumerate(words):
+            value = color_of(word) or word
+            if value in vocabulary.values:
+                yield place, value
+        return
+    ordinals = SLOT_TYPE_NAMES.get(slot) in ORDINAL_TYPES
+    for place, word in enumerate(words):
+        number = _number(words, place, ordinals=ordinals)
+        if number is not None:
+            yield place, number
+        elif ordinals and ordinal_of(word) is not None:
+            yield place, int(ordinal_of(word) or 0)
+
+
+def _number(words: Sentence, place: int, *, ordinals: bool) -> int | None:
+    """Return the number that a cardinal or adverb names, if it counts things."""
+    word, following = words[place], words[place + 1 : place + 3]
+    if word in ADVERBS:
+        multiplies = following[:1] and (
+            following[0] in ("as", "that", "the") or number_of(following[0]) is not None
+        )
+        return None if multiplies else ADVERBS[word]
+    differences = COMPARISONS | STEPS if ordinals else COMPARISONS
+    is_pronoun = (place and words[place - 1] in POINTING) or (
+        following[:1] == ("of",) and not PRONOUNS.isdisjoint(following)
+    )
+    if is_pronoun or not differences.isdisjoint(following):
+        return None
+    return number_of(word)
+
+
+def _is_plain(words: Sequence[str], place: int, value: Value) -> bool:
+    """Return whether a command says a value without excluding it or counting from it."""
+    if isinstance(value, str):
+        return EXCLUSIONS.isdisjoint(words[max(0, place - _REACH) : place])
+    return REFERENCES.isdisjoint(words[max(0, place - _NUMBER_REACH) : place])

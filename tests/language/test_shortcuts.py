@@ -1,0 +1,376 @@
+"""Shortcuts: rules and learned floors that see the words only."""
+
+import inspect
+import sys
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from language_variants import PAIRS, TASKS, first_episodes
+from typer.testing import CliRunner
+
+from roboirg.cli.app import app
+from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.episodes.splits import get_episode
+from roboirg.language import instruct
+from roboirg.language.settings import all_settings, get_setting
+from roboirg.language.shortcuts import SURFACE_RULES, draw_goal, goal_share, guess_goal
+from roboirg.language.shortcuts.goal_vocabulary import goal_vocabulary, values_in
+from roboirg.language.shortcuts.learned_floor import LearnedFloor
+from roboirg.language.shortcuts.shortcut_scores import (
+    CHANCE,
+    group_told,
+    hidden_slots,
+    mean_shares,
+    rule_scorers,
+    score_chance,
+    score_rule,
+)
+from roboirg.language.shortcuts.shortcut_tables import LEARNED_SETTING, shortcut_rows
+from roboirg.language.variants import expressible_options, instructions
+from roboirg.tasks import all_tasks, get_task
+
+COLORS = ("blue", "green", "red")
+EXCLUDED = "My kitchen is painted red and blue. Take the cube of a color other than that pair"
+CHOSEN = "Of the two, I would choose blue."
+PICKS = (
+    "Lift the container that hides the cube whose color is different from that pair, then lift "
+    "the container with the color of that pair that I did not choose."
+)
+
+
+def places(rule, text, task, slot):
+    return guess_goal(rule, text, task)[slot]
+
+
+@pytest.mark.parametrize(
+    ("rule", "text", "colors"),
+    [
+        ("first-mention", "I like the red cube. My door is green. Take it once.", ("red",)),
+        ("last-mention", "I like the red cube. My door is green. Take it once.", ("green",)),
+        ("elimination", "I like the red cube. My door is green. Take it once.", ("blue",)),
+        ("elimination", "I like the red cube. Take it once.", ("blue", "green")),
+        ("elimination", "Red, green and blue are nice. Take it once.", COLORS),
+        ("surface", "I like the red cube. My door is green. Take it once.", ("red",)),
+        ("surface", f"{EXCLUDED} once.", ("green",)),
+        ("first-mention", f"{EXCLUDED} once.", ("red",)),
+        ("last-mention", f"{EXCLUDED} once.", ("blue",)),
+        ("first-mention", "Have a look at the cube at the far left. Take it once.", COLORS),
+        ("last-mention", "A green door. Take the red cube once.", ("red",)),
+        ("elimination", "A green door. Take the red cube once.", ("red",)),
+        ("surface", "Take the cube whose color is different from RED and blue once.", ("green",)),
+    ],
+)
+def test_colors_by_hand(rule, text, colors):
+    assert places(rule, text, "PickXtimes", "color") == (colors,)
+
+
+@pytest.mark.parametrize(
+    ("rule", "text", "repeats"),
+    [
+        ("first-mention", "My number is four. The bus is two minutes late. Do it.", (4,)),
+        ("last-mention", "My number is four. The bus is two minutes late. Do it.", (2,)),
+        ("elimination", "My number is four. The bus is two minutes late. Do it.", (1, 3, 5)),
+        ("surface", "My number is four. Take the red cube one time fewer than that.", (3,)),
+        ("surface", "My number is two. Take the red cube two more times than that.", (4,)),
+        ("surface", "My number is two. Take the red cube twice as many times as that.", (4,)),
+        ("surface", "My number is six. Take it half as many times as that.", (3,)),
+        ("surface", "Take the red cube half as many times as six.", (3,)),
+        ("first-mention", "My number is four. Take the red cube one time fewer than that.", (4,)),
+        ("first-mention", f"{EXCLUDED} three times.", (3,)),
+        ("first-mention", "I like those two. Take the one there twice.", (2,)),
+        ("first-mention", "Take one of them as before.", (1, 2, 3, 4, 5)),
+        ("last-mention", "My number is 4. Take it that many times.", (4,)),
+    ],
+)
+def test_numbers_by_hand(rule, text, repeats):
+    assert places(rule, text, "PickXtimes", "repeats") == (repeats,)
+
+
+@pytest.mark.parametrize(
+    ("rule", "text", "visit"),
+    [
+        ("first-mention", "I wait for the third visit. Press during that visit.", (3,)),
+        ("surface", "I wait for the third visit. Press during the visit right before that.", (2,)),
+        ("surface", "I wait for the third visit. Press two visits after that.", (5,)),
+        ("surface", "I say four. Press on the visit whose number is one less than that.", (3,)),
+        ("first-mention", "Press during its fifth visit.", (5,)),
+        ("elimination", "Press during its fifth visit.", (5,)),
+        ("elimination", "I wait for the third visit. Press during that visit.", (2, 4, 5)),
+    ],
+)
+def test_ordinals_by_hand(rule, text, visit):
+    assert places(rule, text, "StopCube", "visit") == (visit,)
+
+
+def test_several_values_by_hand():
+    two = "I like the red cube and the blue cube. Lift the container over the former, then the "
+    two += "container over the latter."
+    assert places("first-mention", two, "VideoUnmask", "colors") == (("red",), ("blue",))
+    assert places("elimination", two, "VideoUnmask", "colors") == (("green",), COLORS)
+    pair = f"My kitchen is painted red and blue. {CHOSEN} {PICKS}"
+    assert places("surface", pair, "VideoUnmask", "colors") == (("green",), ("red",))
+    assert places("last-mention", pair, "VideoUnmask", "colors") == (("blue",), ("blue",))
+    amounts = "She asked for two red cubes and one blue cube. Put exactly those into the bin, the "
+    amounts += "former and the latter."
+    assert guess_goal("first-mention", amounts, "BinFill") == {
+        "colors": (("red",), ("blue",)),
+        "counts": ((2,), (1,)),
+    }
+    places_ = "Look left and right. Lift the container at the former place, then at the latter."
+    assert places("surface", places_, "VideoUnmask", "colors") == (COLORS, COLORS)
+
+
+def test_two_moments_by_hand():
+    both = "Of the two moments right before and right after the press, he prefers the one right "
+    rest = "it. Take the red cube and put it at the other of the two moments, not that one."
+    for named, other in (("before", "after"), ("after", "before")):
+        text = both + f"{named} {rest}"
+        assert places("surface", text, "VideoPlaceButton", "relation") == ((other,),)
+        assert places("last-mention", text, "VideoPlaceButton", "relation") == ((named,),)
+        assert places("first-mention", text, "VideoPlaceButton", "relation") == (("before",),)
+
+
+def test_amounts_in_another_order_are_the_same_goal():
+    episode = get_episode("BinFill", "test", 3)  # three red cubes and one green cube
+    text = "She wants one green cube and three red cubes. Put the former and the latter into it."
+    guess = guess_goal("first-mention", text, "BinFill")
+    assert goal_share(guess, episode) == 1
+    assert draw_goal(guess, episode, np.random.default_rng(0)) == episode.goal
+
+
+WORDS = (
+    "red green blue one two three first second once twice other different not before after half "
+    "fewer more the of that those cube container neighbor place take and I like 2 seven"
+)
+TEXTS = st.lists(
+    st.lists(st.sampled_from(WORDS.split()), max_size=9).map(" ".join), max_size=4
+).map(". ".join)
+
+
+@given(text=TEXTS, rule=st.sampled_from(sorted(SURFACE_RULES)), task=st.sampled_from(TASKS))
+def test_any_text_gives_a_guess_of_the_right_shape(text, rule, task):
+    guess = guess_goal(rule, text, task)
+    vocabulary = goal_vocabulary(task)
+    assert list(guess) == list(vocabulary)
+    for slot, found in guess.items():
+        assert all(found)
+        assert 1 <= len(found) <= vocabulary[slot].longest
+    episode = get_episode(task, "test", 0)
+    assert 0 <= goal_share(guess, episode) <= 1
+    drawn = draw_goal(guess, episode, np.random.default_rng(1))
+    assert drawn is None or drawn in get_task(task).goals(episode.scene)
+    assert guess_goal(rule, text.upper().replace(" ", "  "), task) == guess
+
+
+@given(named=st.lists(st.sampled_from(COLORS), min_size=1, max_size=6))
+def test_first_last_and_unnamed(named):
+    text = " ".join(f"I like {color}." for color in named) + " Take it."
+    assert places("first-mention", text, "PickXtimes", "color") == ((named[0],),)
+    assert places("last-mention", text, "PickXtimes", "color") == ((named[-1],),)
+    rest = tuple(color for color in COLORS if color not in named)
+    assert places("elimination", text, "PickXtimes", "color") == (rest or COLORS,)
+
+
+def test_a_rule_has_to_exist():
+    with pytest.raises(UnknownNameError, match="first-mention"):
+        guess_goal("first-mentoin", "Take it.", "PickXtimes")
+
+
+def test_vocabularies_hold_every_goal_of_the_test_split():
+    for task in TASKS:
+        vocabulary = goal_vocabulary(task)
+        for episode in first_episodes(task, "test", 50):
+            for slot, content in episode.goal.slots:
+                assert set(values_in(content)) <= set(vocabulary[slot].values)
+                assert len(values_in(content)) <= vocabulary[slot].longest
+
+
+@pytest.mark.parametrize(("task", "setting"), PAIRS)
+def test_shares_of_every_setting(task, setting):
+    for episode in first_episodes(task, "test", 8):
+        for options in expressible_options(episode):
+            if options.setting != setting:
+                continue
+            told = episode, instruct(episode, **options._asdict())
+            for score in (one(told) for one in rule_scorers().values()):
+                assert len(score.slots) == len(hidden_slots(told))
+                assert all(0 <= share <= 1 for share in (*score.slots, score.goal))
+            if not get_setting(setting, get_task(task)).implicit:
+                assert all(score_rule(rule, told).goal == 1 for rule in SURFACE_RULES)
+            elif setting in ("direct", "contextual"):
+                assert score_rule("first-mention", told).goal == 1
+                assert score_rule("surface", told).goal == 1
+                if options.form == "resolved":
+                    assert score_rule("elimination", told).goal == 1
+
+
+def test_a_rule_sees_no_goal_and_no_scene():
+    """It has no way to: it gets a text and the name of the task."""
+    assert list(inspect.signature(guess_goal).parameters) == ["rule", "text", "task"]
+    episode = get_episode("PickXtimes", "test", 0)
+    instruction = instruct(episode, "direct")
+    others = [goal for goal in get_task("PickXtimes").goals(episode.scene) if goal != episode.goal]
+    for rule in SURFACE_RULES:
+        blank = replace(instruction, mentions=(), metadata={})
+        assert (
+            score_rule(rule, (episode, blank)).goal == score_rule(rule, (episode, instruction)).goal
+        )
+    assert all(
+        score_rule("first-mention", (replace(episode, goal=goal, stages=()), instruction)).goal == 0
+        for goal in others
+    )
+
+
+def test_shares_by_hand():
+    episode = get_episode("VideoPlaceButton", "test", 3)
+    told = episode, instruct(episode, "direct")
+    assert hidden_slots(told) == ("color", "relation")
+    assert score_rule("first-mention", told).slots == (1, 1)
+    assert score_rule("elimination", told).slots == (0, 0)
+    assert score_chance(told).slots[1] == Fraction(1, 2)
+    told = episode, instruct(episode, "reasoning")
+    assert hidden_slots(told) == ("relation",)
+    shares = mean_shares([score_rule("surface", told), score_rule("first-mention", told)])
+    assert (shares.slots, shares.goals) == (0.5, 0.5)
+    explicit = episode, instruct(episode)
+    assert mean_shares([score_chance(explicit)]) == (None, 1.0)
+
+
+def test_the_table_of_the_documentation():
+    """The rules solve direct and contextual, and one of them reasoning; none solves spatial."""
+    rows = {row.group: row.shares for row in shortcut_rows(
+        ("PickXtimes", "VideoUnmask"), ("test",), ("direct", "reasoning", "contextual", "spatial"),
+        InstructionOptions(distractor="competing"),
+    )}  # fmt: skip
+    assert list(rows) == [("direct",), ("reasoning",), ("contextual",), ("spatial",)]
+    for setting in ("direct", "contextual"):
+        assert rows[setting,]["first-mention"] == rows[setting,]["surface"] == (1, 1)
+    assert rows["direct",]["last-mention"] == (1, 1)
+    assert rows["contextual",]["last-mention"].goals == 0
+    assert rows["reasoning",]["surface"] == (1, 1)
+    assert rows["reasoning",]["first-mention"].goals == 0
+    assert rows["reasoning",]["elimination"].slots > 0.7
+    for rule in SURFACE_RULES:
+        assert rows["spatial",][rule].slots == pytest.approx(1 / 3)
+        assert rows["spatial",][rule].goals < rows["spatial",][CHANCE].goals
+
+
+def test_the_documentation_says_what_is_measured():
+    """The rows of chance and of the rules, over the whole test split."""
+    page = (Path(__file__).parents[2] / "docs" / "language.md").read_text(encoding="utf-8")
+    table = page.split("| | direct | contextual | contextual, competing |")[1].split("\n\n")[0]
+    competing = InstructionOptions(distractor="competing")
+    tasks, columns = tuple(all_tasks()), ("direct", "contextual", "reasoning", "spatial")
+    direct, contextual, reasoning, spatial = (
+        row.shares for row in shortcut_rows(tasks, ("test",), columns, InstructionOptions())
+    )
+    (rivals,) = (row.shares for row in shortcut_rows(tasks, ("test",), ("contextual",), competing))
+    for name in rule_scorers():
+        cells = [shares[name] for shares in (direct, contextual, rivals, reasoning, spatial)]
+        numbers = " | ".join(f"{100 * one.slots:.0f} / {100 * one.goals:.0f}" for one in cells)
+        assert f"| {numbers} |" in table.split(f"{name}`" if name in SURFACE_RULES else name)[1]
+
+
+def test_rows_by_pattern_have_all_instructions():
+    told = list(instructions(first_episodes("BinFill", "test", 20), ["reasoning"], ["implicit"]))
+    groups = group_told(told, "pattern")
+    assert set(groups) == {
+        ("reasoning", pattern) for pattern in get_task("BinFill").commands.patterns
+    }
+    assert sum(map(len, groups.values())) == len(told) == 20
+    assert set(group_told(told, "task")) == {("reasoning", "BinFill")}
+
+
+def learned(task, setting, count=100):
+    said = instructions(first_episodes(task, "train", count), [setting], ["implicit"])
+    return LearnedFloor(list(said))
+
+
+def test_the_learned_floor_is_deterministic_and_learns():
+    pytest.importorskip("sklearn")
+    tested = list(instructions(first_episodes("VideoRepick", "test", 50), ["direct"], ["implicit"]))
+    texts = [instruction.text for _, instruction in tested]
+    first, second = learned("VideoRepick", "direct"), learned("VideoRepick", "direct")
+    assert first.predict(texts) == second.predict(texts)
+    assert mean_shares(first.scores(tested)).goals > 0.9
+    assert mean_shares(learned("VideoRepick", "explicit").scores(tested)).goals < 1
+    assert first.scores([]) == []
+    with pytest.raises(InvalidValueError, match="no instruction to learn from"):
+        LearnedFloor([])
+
+
+def test_the_learned_floor_predicts_from_the_text_alone():
+    pytest.importorskip("sklearn")
+    floor = learned("VideoUnmask", "direct", 40)
+    ((episode, instruction),) = instructions(
+        [get_episode("VideoUnmask", "test", 1)], ["direct"], ["implicit"]
+    )
+    (score,) = floor.scores([(episode, instruction)])
+    others = [goal for goal in get_task("VideoUnmask").goals(episode.scene) if goal != episode.goal]
+    wrong = floor.scores([(replace(episode, goal=goal), instruction) for goal in others])
+    # One prediction, so it is right for one goal at most.
+    assert score.goal + sum(one.goal for one in wrong) <= 1
+
+
+def call(*words):
+    return CliRunner().invoke(app, ["language", "shortcuts", *words])
+
+
+def test_the_command_prints_a_row_for_each_setting_or_pattern():
+    output = call("--tasks", "StopCube", "--settings", "direct,reasoning").output
+    assert "Shortcuts, implicit form, test" in output
+    (direct,) = [line for line in output.splitlines() if "direct" in line]
+    assert "25 / 25" in direct
+    assert "100 / 100" in direct
+    output = call("--tasks", "StopCube", "--settings", "reasoning", "--by", "pattern").output
+    assert all(name in output for name in ("number deduction", "sequential relation"))
+    output = call(
+        "--tasks", "StopCube", "--settings", "direct", "--split", "none", "--seeds", "3"
+    ).output
+    assert "3 random scenes per task" in output
+    assert "│     3 │" in output
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--by", "colour"), "colour"),
+        (("--form", "implied"), "implied"),
+        (("--split", "tset"), "tset"),
+        (("--tasks", "StopCube", "--settings", "spatial"), "nothing to score"),
+        (("--split", "none"), "nothing to score"),
+        (("--seeds", "-1"), "number of random seeds is -1"),
+        (("--learned", "--split", "all"), "ask for val or test"),
+        (("--distractors", "0"), "distractors"),
+    ],
+)
+def test_bad_input_is_one_sentence(words, sentence):
+    outcome = call("--tasks", "StopCube", *words)
+    assert outcome.exit_code
+    assert isinstance(outcome.exception, (InvalidValueError, UnknownNameError))
+    assert sentence in str(outcome.exception)
+
+
+def test_without_scikit_learn_one_sentence_says_so(monkeypatch):
+    monkeypatch.setitem(sys.modules, "sklearn.linear_model", None)
+    outcome = call("--tasks", "StopCube", "--learned")
+    assert isinstance(outcome.exception, MissingDependencyError)
+    assert "pip install 'roboirgbench[report]'" in str(outcome.exception)
+
+
+def test_the_learned_floors_are_columns():
+    pytest.importorskip("sklearn")
+    (row,) = shortcut_rows(("StopCube",), ("val",), ("direct",), InstructionOptions(), learned=True)
+    assert list(row.shares) == [*rule_scorers(), "learned from explicit", LEARNED_SETTING]
+    assert row.shares[LEARNED_SETTING].goals > 0.9
+
+
+def test_every_setting_has_a_row():
+    rows = shortcut_rows(("PickXtimes",), ("test",), tuple(all_settings()), InstructionOptions())
+    assert [row.group[0] for row in rows] == list(all_settings())

@@ -1,0 +1,65 @@
+"""The shortcut listeners as policies."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import roboirg
+from roboirg.episodes.splits import get_episode
+from roboirg.language.shortcuts import SURFACE_RULES
+from roboirg.policies import make_policy, play
+from roboirg.policies.builtin import shortcut_listeners
+from roboirg.policies.loading import is_privileged, policy_version
+from roboirg.policies.policy_classes import BUILTIN
+
+SPATIAL = "Have a look at the cube at the far left. Take it and place it on the target once."
+
+
+def test_every_rule_is_a_policy_of_its_name():
+    assert set(SURFACE_RULES) <= set(BUILTIN)
+    for rule in SURFACE_RULES:
+        policy = make_policy(rule, 3)
+        assert isinstance(policy, shortcut_listeners.ShortcutPolicy)
+        assert (policy.rule, policy.seed, policy.cameras) == (rule, 3, ())
+        assert is_privileged(rule)
+        assert policy_version(rule) == "built-in"
+
+
+def test_what_the_words_leave_open_is_drawn_by_seed():
+    # A scene with all three colors.
+    episode = next(
+        one
+        for one in (get_episode("PickXtimes", "test", index) for index in range(50))
+        if len(one.scene.of_kind("cube")) == 3
+    )
+    env = SimpleNamespace(episode=episode)
+    goals = [make_policy("surface", seed).decide(env, SPATIAL) for seed in range(60)]
+    assert {goal["color"] for goal in goals} == {"red", "green", "blue"}
+    assert {goal["repeats"] for goal in goals} == {1}
+    assert goals == [make_policy("surface", seed).decide(env, SPATIAL) for seed in range(60)]
+
+
+def status(rule, setting):
+    env = roboirg.make("PickXtimes", setting=setting, episode=2, cameras=(), max_steps=600)
+    return play(env, make_policy(rule, 0))["status"]
+
+
+@pytest.mark.sim
+def test_first_mention_solves_direct_and_fails_in_reasoning():
+    """The blue cube, once: in reasoning the words name red and green."""
+    assert status("first-mention", "direct") == "success"
+    assert status("first-mention", "reasoning") == "failure"
+
+
+@pytest.mark.sim
+def test_without_a_goal_the_arm_holds_still():
+    env = roboirg.make("PickXtimes", episode=4, cameras=(), max_steps=60)
+    policy = make_policy("first-mention", 0)
+    observation, info = env.reset()
+    policy.attach(env)
+    policy.reset("Take the cube eight times.", info["demonstration"])
+    before = observation["joint_positions"]
+    for _ in range(2):
+        observation, *_ = env.step_chunk(policy.act(observation))
+    assert np.abs(observation["joint_positions"] - before).max() < 0.01
