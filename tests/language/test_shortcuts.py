@@ -17,7 +17,7 @@ from roboirg.cli.app import app
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.episodes.splits import get_episode
-from roboirg.language import instruct
+from roboirg.language import instruct, instruct_with
 from roboirg.language.settings import all_settings, get_setting
 from roboirg.language.shortcuts import SURFACE_RULES, draw_goal, goal_share, guess_goal
 from roboirg.language.shortcuts.goal_vocabulary import goal_vocabulary, values_in
@@ -197,7 +197,7 @@ def test_shares_of_every_setting(task, setting):
         for options in expressible_options(episode):
             if options.setting != setting:
                 continue
-            told = episode, instruct(episode, **options._asdict())
+            told = episode, instruct_with(episode, options)
             for score in (one(told) for one in rule_scorers().values()):
                 assert len(score.slots) == len(hidden_slots(told))
                 assert all(0 <= share <= 1 for share in (*score.slots, score.goal))
