@@ -28,6 +28,7 @@ from planning_fakes import (
 )
 
 import roboirg
+from roboirg.core.episode import SPLITS
 from roboirg.core.errors import (
     MissingDependencyError,
     PolicyConnectionError,
@@ -44,7 +45,6 @@ from roboirg.policies.planning.vlm_listener import NotUnderstoodError
 from roboirg.policies.planning.vlm_query import UnparsableReplyError
 from roboirg.tasks import every_task
 
-SPLITS = tuple(SIZES)
 EPISODES = 3
 
 
