@@ -13,6 +13,7 @@ from roboirg.analysis.stats.cells import CellKey, CellResults, PolicyRun
 from roboirg.analysis.stats.option_labels import words_label
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.language.settings import EXPLICIT
+from roboirg.language.wordings.worded_command import ROBOMME_NAME
 from roboirg.records.record import DEFAULT_MESHES
 from roboirg.util.plurals import counted
 
@@ -27,8 +28,6 @@ REAL: Differences = ("the paper's own robot",)
 COMPARABLE_SIGN = "="
 DIFFERENT_SIGN = "≠"
 
-_ROBOMME = "robomme"
-"""Name of the wording file with RoboMME's words, before the @ of its identity."""
 _SPLIT = "test"
 
 
@@ -108,7 +107,7 @@ def _text(tasks: Mapping[str, Differences]) -> str:
 
 def _explicit_differences(policy_run: PolicyRun, cell: CellResults) -> Iterator[str]:
     conditions, versions = policy_run.conditions, policy_run.versions
-    if conditions.wordings is None or conditions.wordings.partition("@")[0] != _ROBOMME:
+    if conditions.wordings is None or conditions.wordings.partition("@")[0] != ROBOMME_NAME:
         yield words_label(conditions.wordings)
     episodes = range(TRIALS["main"][0])
     played = len(cell.by_episode().keys() & set(episodes))

@@ -7,7 +7,12 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from roboirg.language.interpreter.descriptions import Description, describe
-from roboirg.language.interpreter.quantities import CountExpression, Quantity, quantities
+from roboirg.language.interpreter.quantities import (
+    ADVERBS,
+    CountExpression,
+    Quantity,
+    quantities,
+)
 from roboirg.language.interpreter.tokens import Sentence, colors_in, word_set
 from roboirg.language.interpreter.vocabulary import PUTTING, TAKING, VERBS
 
@@ -26,7 +31,6 @@ _PARTICLES = word_set("up down back")
 _SINGULAR = word_set("it cube one")
 _JOINTS = word_set(", ; and then finally afterwards next")
 _JOINED = word_set("container box one")
-_ADVERBS = word_set("once twice thrice")
 
 
 class Item(NamedTuple):
@@ -168,4 +172,4 @@ def _items(words: Sentence) -> tuple[Item, ...]:
 
 
 def _counts_things(quantity: Quantity, text: str) -> bool:
-    return not quantity.plain or text[quantity.start : quantity.end] not in _ADVERBS
+    return not quantity.plain or text[quantity.start : quantity.end] not in ADVERBS

@@ -75,7 +75,8 @@ _SINGLE = re.compile(
     rf"\b(?:an?|the)(?: single)? (?={COLOR} (?:{THING}|one)\b)"
 )
 _FACTORS = {"twice": 2.0, "double": 2.0, "thrice": 3.0, "triple": 3.0, "half": 0.5}
-_ADVERBS = {"once": 1, "twice": 2, "thrice": 3}
+ADVERBS = {"once": 1, "twice": 2, "thrice": 3}
+"""Numbers of repetitions in one word."""
 _TIMES = re.compile(r" (?:times?|rounds?|turns?|occasions?|cycles?)\b")
 
 Reading = tuple[re.Pattern[str], Callable[[re.Match[str]], CountExpression], bool]
@@ -101,7 +102,7 @@ _READINGS: tuple[Reading, ...] = (
     *_DERIVED,
     (_SAME, lambda _found: CountExpression(), False),
     (_SOME, lambda _found: CountExpression(quantity=2), True),
-    (_ADVERB, lambda found: CountExpression(quantity=_ADVERBS[found[0]]), True),
+    (_ADVERB, lambda found: CountExpression(quantity=ADVERBS[found[0]]), True),
     (
         _PLAIN,
         lambda found: CountExpression(quantity=number_of(found["number"] or found["times"])),
@@ -141,6 +142,6 @@ def read_times(text: str) -> CountExpression | None:
     plain = [one for one in found if one.plain]
     times = [one for one in found if not one.plain]
     times += [
-        one for one in plain if text[one.start : one.end] in _ADVERBS or _TIMES.match(text, one.end)
+        one for one in plain if text[one.start : one.end] in ADVERBS or _TIMES.match(text, one.end)
     ]
     return times[0].expression if times else None

@@ -6,6 +6,7 @@ import functools
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from roboirg.language.interpreter.quantities import ADVERBS
 from roboirg.language.interpreter.tokens import (
     Sentence,
     color_of,
@@ -17,7 +18,6 @@ from roboirg.language.interpreter.tokens import (
 from roboirg.language.request import SLOT_TYPE_NAMES
 from roboirg.language.shortcuts.goal_vocabulary import GoalVocabulary, SlotVocabulary, Value
 
-ADVERBS = {"once": 1, "twice": 2, "thrice": 3}
 ORDINAL_TYPES = ("visit", "placement")
 """Slot types whose values are said as ordinals too."""
 

@@ -29,6 +29,7 @@ from roboirg.language.wordings.goal_sentences import (
 from roboirg.language.wordings.phrase_widening import widen
 from roboirg.language.wordings.template_search import find_templates
 from roboirg.language.wordings.worded_command import (
+    ROBOMME_NAME,
     TaskWordings,
     WordedCommand,
     Wordings,
@@ -41,7 +42,6 @@ from roboirg.language.wordings.wording_writer import wording_text
 from roboirg.tasks import Task, all_tasks
 from roboirg.util.plurals import counted
 
-NAME = "robomme"
 SPLIT: Split = "train"
 READ_SCENES = 8
 """Scenes in which all goals are read back; of the others, the goals that these lack."""
@@ -77,7 +77,7 @@ class ImportedWordings(NamedTuple):
     refused: tuple[Refused, ...]
 
 
-def import_robomme(root: Path, name: str = NAME) -> ImportedWordings:
+def import_robomme(root: Path, name: str = ROBOMME_NAME) -> ImportedWordings:
     """Make wordings from a clone of RoboMME's repository.
 
     Args:

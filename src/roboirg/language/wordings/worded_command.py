@@ -9,6 +9,8 @@ from typing import NamedTuple
 
 from roboirg.core.episode import Goal, SlotValue
 
+ROBOMME_NAME = "robomme"
+"""Name of the wordings with RoboMME's sentences, before the @ of their identity."""
 FIELD = re.compile(r"\{([a-z]+(?:\.[0-9])?)\}")
 """A field of a template, such as ``{color}`` or ``{colors.1}``."""
 
