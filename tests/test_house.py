@@ -39,7 +39,7 @@ FORBIDDEN_IDENTIFIERS = {
 """A leading underscore makes no difference."""
 
 SPOKEN = (
-    "src/roboirg/language/templates.py",
+    "src/roboirg/language/templates/",
     "src/roboirg/policies/planning/prompts/listener.toml",
 )
 """Words that are said to robots and models are data: changing them would change results."""
@@ -203,7 +203,7 @@ def test_no_prose_has_a_forbidden_phrase(phrase):
     found = [
         f"{path.relative_to(ROOT)}:{text.count(chr(10), 0, match.start()) + 1}"
         for path, text in texts()
-        if str(path.relative_to(ROOT)) not in SPOKEN
+        if not str(path.relative_to(ROOT)).startswith(SPOKEN)
         for match in pattern.finditer(text)
     ]
     check_empty(found)

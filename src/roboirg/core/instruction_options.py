@@ -25,8 +25,10 @@ class InstructionOptions(NamedTuple):
         distractor: of the contextual setting: ``neutral`` or ``competing``.
         distractors: of the contextual setting: their number.
         frame: of the spatial setting: the frame of left and right, ``robot`` or ``camera``.
-        wordings: identity of the wording file whose commands are used, such as
-            ``robomme@1a2b3c4d``; None for our own. The process must have opened that file.
+        wordings: ``train`` or ``test`` for the words of that pool (`roboirg.core.word_pools`); or
+            the identity of the wording file whose commands are used, such as
+            ``robomme@1a2b3c4d``, which the process must have opened. None for our words of the
+            episode's split.
         delivery: ``prompt``, all utterances at once, or ``turns``, one after another
             (`roboirg.core.delivery`).
     """

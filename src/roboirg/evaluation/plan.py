@@ -25,6 +25,7 @@ from roboirg.core.observations import (
     check_demonstration_frames,
     check_observe_every,
 )
+from roboirg.core.word_pools import POOLS
 from roboirg.episodes import splits
 from roboirg.evaluation.plan_parsing import (
     ALL,
@@ -123,6 +124,8 @@ class Plan(BaseModel):
             return fields
         if fields.get("wordings_identity") is not None:
             return fields
+        if fields["wordings"] in POOLS:
+            return {**fields, "wordings_identity": fields["wordings"]}
         path = Path(str(fields["wordings"])).resolve()
         return {**fields, "wordings": str(path), "wordings_identity": open_wordings(path)}
 

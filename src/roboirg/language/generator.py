@@ -16,6 +16,7 @@ from roboirg.core.instruction_options import (
     DEFAULT_FRAME,
     InstructionOptions,
 )
+from roboirg.core.word_pools import POOLS
 from roboirg.language.instruction import FORMS, Instruction, Mention, Utterance
 from roboirg.language.landmarks import FRAMES
 from roboirg.language.phrases import speak
@@ -75,7 +76,8 @@ def instruct(
         distractor: ``neutral`` remarks, or ``competing`` ones that name other values.
         distractors: number of remarks.
         frame: of left and right, ``robot`` or ``camera``.
-        wordings: identity of an open wording file, whose commands are used; None for our own.
+        wordings: ``train`` or ``test`` for the words of that pool; or the identity of an open
+            wording file, whose commands are used. None for our words of the episode's split.
 
     Raises:
         UnknownNameError: a name does not exist.
@@ -168,7 +170,7 @@ def _request(episode: Episode, options: InstructionOptions) -> InstructionReques
     _check_options(options)
     task = get_task(episode.task)
     wordings = None
-    if options.wordings is not None:
+    if options.wordings is not None and options.wordings not in POOLS:
         wordings = find_wordings(options.wordings).tasks.get(task.name, TaskWordings(()))
     return InstructionRequest(episode, task, options, _sampler(episode), wordings)
 
@@ -209,7 +211,7 @@ def _check_options(options: InstructionOptions) -> None:
 
 def _instruction(request: InstructionRequest, spec: InstructionSpec) -> Instruction:
     utterances, mentions = _spoken(spec, as_written=bool(request.filled))
-    notes: dict[str, object] = {"wordings": request.options.wordings}
+    notes: dict[str, object] = {"wordings": request.options.wordings, "pool": request.pool}
     if request.filled:
         notes["command"] = request.filled[-1].text
     found = Instruction(

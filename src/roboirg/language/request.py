@@ -5,11 +5,12 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple, cast
+from typing import Literal, NamedTuple, TypeVar, cast
 
 from roboirg.core.episode import Color, Episode, Goal, Scene, SceneObject
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.word_pools import PoolName, Pools, pool_of
 from roboirg.language.instruction import UtteranceStage
 from roboirg.language.landmarks import Frame
 from roboirg.language.phrases import Phrase, antecedent, fill, plain, swap_particles
@@ -23,6 +24,7 @@ from roboirg.language.wordings.worded_command import (
 from roboirg.tasks import Task, get_task
 
 Distractor = Literal["neutral", "competing"]
+Option = TypeVar("Option")
 DISTRACTORS: tuple[Distractor, ...] = ("neutral", "competing")
 STAGE_SETS: tuple[tuple[int, ...], ...] = ((1, 5), (1, 2, 5), (1, 2, 3, 5), (1, 2, 3, 4, 5))
 
@@ -102,6 +104,15 @@ class InstructionRequest:
     def resolved(self) -> bool:
         """Whether the command names the referents of its referring expressions."""
         return self.options.form == "resolved"
+
+    @property
+    def pool(self) -> PoolName:
+        """The pool from which the words are taken."""
+        return pool_of(self.episode.split, self.options.wordings)
+
+    def pick(self, purpose: str, pools: Pools[Option]) -> Option:
+        """Pick a wording from the pool of the request, all equally likely."""
+        return self.sampler.pick(purpose, pools.of(self.pool))
 
     @property
     def frame(self) -> Frame:

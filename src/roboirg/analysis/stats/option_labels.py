@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.word_pools import POOLS
 from roboirg.language import STAGE_SETS
 from roboirg.language.settings import EXPLICIT, all_settings, setting_names
 from roboirg.util.plurals import counted
@@ -34,7 +35,9 @@ def options_label(options: InstructionOptions) -> str:
 
 
 def words_label(wordings: str | None) -> str:
-    """Return whose words the instructions have, from the identity of the wording file."""
+    """Return whose words the instructions have, from the pool or the wording file."""
+    if wordings in POOLS:
+        return f"our own words for {wordings}"
     return "our own words" if wordings is None else f"the words of {wordings}"
 
 

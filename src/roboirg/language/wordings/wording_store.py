@@ -9,6 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.word_pools import POOLS
 from roboirg.language.wordings.worded_command import Wordings
 from roboirg.language.wordings.wording_file import read_wordings
 
@@ -20,7 +21,8 @@ def open_wordings(path: str | Path | None, identity: str | None = None) -> str |
     """Open a wording file for this process, and return its identity; None for no file.
 
     Args:
-        path: the file, or the identity of wordings that are open; None for our own words.
+        path: the file, or the identity of wordings that are open; ``train`` or ``test`` for the
+            words of that pool; None for our own words.
         identity: the wordings that are wanted; None for those of the file.
 
     Raises:
@@ -28,6 +30,8 @@ def open_wordings(path: str | Path | None, identity: str | None = None) -> str |
     """
     if identity in _OPEN:
         return identity
+    if path in POOLS or identity in POOLS:
+        return str(identity or path)
     if path is None:
         if identity is not None:
             raise InvalidValueError(f"The wordings {identity} need their file; none was given.")

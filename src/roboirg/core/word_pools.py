@@ -1,0 +1,57 @@
+"""Pools of wordings: the words of training and validation, and those held out for tests.
+
+A policy that was trained on our words should not be tested in the very same sentences. Training
+and validation episodes speak from one pool, all others from the other; no wording is in both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Generic, Literal, NamedTuple, TypeVar, get_args
+
+PoolName = Literal["train", "test"]
+POOLS: tuple[PoolName, ...] = get_args(PoolName)
+TRAINING_SPLITS = ("train", "val")
+"""The splits whose words a policy may have been trained on."""
+
+Option = TypeVar("Option")
+
+
+class Pools(NamedTuple, Generic[Option]):
+    """The wordings of one kind, by pool; iterate over `everything` for all of them.
+
+    Attributes:
+        train: those of training and validation.
+        test: those held out from both.
+    """
+
+    train: tuple[Option, ...]
+    test: tuple[Option, ...]
+
+    @classmethod
+    def shared(cls, *options: Option) -> Pools[Option]:
+        """Return pools that both hold the same wordings."""
+        return cls(options, options)
+
+    @property
+    def everything(self) -> Iterator[Option]:
+        """Every wording once, those of training first."""
+        return iter(dict.fromkeys((*self.train, *self.test)))
+
+    def of(self, pool: PoolName) -> tuple[Option, ...]:
+        """Return the wordings of one pool."""
+        return self.train if pool == "train" else self.test
+
+
+def pool_of(split: str, wordings: str | None = None) -> PoolName:
+    """Return the pool from which the words for an episode are taken.
+
+    Args:
+        split: split of the episode.
+        wordings: a pool that was chosen; the identity of a wording file, or None, leaves it to
+            the split.
+    """
+    for pool in POOLS:
+        if wordings == pool:
+            return pool
+    return "train" if split in TRAINING_SPLITS else "test"
