@@ -11,7 +11,7 @@ UtteranceStage = Literal["introduction", "reinforcement", "distractor", "cue", "
 Role = Literal["antecedent", "anaphor"]
 Expression = Literal[
     "it", "them", "one", "former", "latter", "first", "second", "third",
-    "that", "then", "there", "pair", "other", "before", "after",
+    "that", "then", "there", "pair", "each", "other", "before", "after",
 ]  # fmt: skip
 
 FORMS: tuple[Form, ...] = get_args(Form)

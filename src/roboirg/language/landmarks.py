@@ -25,6 +25,9 @@ WORK_AREA = {"near": -0.3, "far": 0.2, "left": 0.25, "right": -0.25}
 TABLE = {"near": -0.7402, "far": 0.4689, "left": 1.2030, "right": -1.2149}
 """The same for the table top."""
 
+SIMPLE = 5
+"""The last class of simple landmarks, of which any may be said; others only if there is none."""
+
 Frame = Literal["robot", "camera"]
 FRAMES: tuple[Frame, ...] = ("robot", "camera")
 
@@ -46,7 +49,7 @@ class Landmark(NamedTuple):
             7 nearest to one of class 3, 8 second nearest to one of class 1 or 2, 9 third nearest
             to one of class 1 or 2, 10 fourth in a row, 11 the extreme of a few that are extreme in
             the other direction, 12 that of a few near or far from a fixture, 13 second or third of
-            a few.
+            a few, 14 second or third from a fixture.
         sided: whether the words name left or right, so that the frame matters.
     """
 
@@ -104,7 +107,7 @@ class Selector(NamedTuple):
 def landmarks(
     scene: Scene, thing: ObjectKind, target: SceneObject, frame: Frame = "robot"
 ) -> tuple[Landmark, ...]:
-    """Return the landmarks of the best available class that single out the target; maybe none.
+    """Return the landmarks that single out the target: the simple ones, or else all others.
 
     Args:
         scene: the scene.
@@ -114,7 +117,7 @@ def landmarks(
     """
     found: list[Landmark] = []
     for selector in selectors(scene, thing, frame):
-        if found and selector.landmark.level > found[0].level:
+        if selector.landmark.level > SIMPLE and found and found[0].level <= SIMPLE:
             break
         if selector.select() is target:
             found.append(selector.landmark)
@@ -133,7 +136,8 @@ def selectors(scene: Scene, thing: ObjectKind, frame: Frame) -> Iterator[Selecto
     named = (*_extremes(candidates, frame), *_corners(candidates, frame))
     ranked = tuple(_ranks(candidates, frame))
     yield from (*named, *ranked)
-    yield from _fixtures(scene, candidates)
+    fixtures = tuple(_fixtures(scene, candidates))
+    yield from fixtures
     yield from _other_colors(candidates)
     yield from _chains(thing, candidates, named, level=6)
     yield from _chains(thing, candidates, ranked, level=7)
@@ -142,8 +146,9 @@ def selectors(scene: Scene, thing: ObjectKind, frame: Frame) -> Iterator[Selecto
     yield from _ranks(candidates, frame, FOURTH, level=10)
     extremes, ranks = partial(_extremes, frame=frame), partial(_ranks, frame=frame)
     yield from _members(candidates, extremes(candidates), extremes, level=11)
-    yield from _members(candidates, _fixtures(scene, candidates), extremes, level=12)
+    yield from _members(candidates, fixtures, extremes, level=12)
     yield from _members(candidates, extremes(candidates), ranks, level=13)
+    yield from _fixture_ranks(candidates, fixtures)
 
 
 def candidates_in(scene: Scene, thing: ObjectKind) -> tuple[SceneObject, ...]:
@@ -165,16 +170,16 @@ class _Direction(NamedTuple):
 
 def _directions(frame: Frame) -> tuple[_Direction, ...]:
     if frame == "robot":
-        robot = "you"
+        robot, owner = "you", "your"
         left = Ranking(lambda item: item.position.y)
     else:
-        robot = "the robot"
+        robot, owner = "the robot", "the camera's"
         left = Ranking(lambda item: -_column(item), COLUMN_MARGIN)
     right = Ranking(_negated(left.quantity), left.margin)
     near, far = f"closest to {robot}", f"farthest from {robot}"
     return (
-        _Direction("at the far left", "from the left", left, sided=True),
-        _Direction("at the far right", "from the right", right, sided=True),
+        _Direction(f"farthest to {owner} left", f"from {owner} left", left, sided=True),
+        _Direction(f"farthest to {owner} right", f"from {owner} right", right, sided=True),
         _Direction(near, near, Ranking(lambda item: -item.position.x)),
         _Direction(far, far, Ranking(lambda item: item.position.x)),
     )
@@ -199,8 +204,9 @@ def _extremes(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Sel
 
 def _sides(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
     left, right = (direction.ranking for direction in _directions(frame) if direction.sided)
+    owner = "your" if frame == "robot" else "the camera's"
     for side, ranking in (("left", left), ("right", right)):
-        yield Selector(Landmark(f"on the {side}", 1, sided=True), (ranking,), candidates)
+        yield Selector(Landmark(f"on {owner} {side}", 1, sided=True), (ranking,), candidates)
 
 
 def _corners(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
@@ -208,9 +214,9 @@ def _corners(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Sele
     for side, mirrored in (("left", "right"), ("right", "left")):
         for depth, reach in (("near", "near"), ("far", "far from")):
             if frame == "robot":
-                phrase, y = f"closest to the {depth} {side} corner of the table", side
+                phrase, y = f"closest to your {depth} {side} corner", side
             else:
-                phrase = f"closest to the {side} corner of the table that is {reach} the robot"
+                phrase = f"closest to the camera's {side} corner {reach} the robot"
                 y = mirrored
             corners = [(area[depth], area[y]) for area in (WORK_AREA, TABLE)]
             rankings = tuple(_nearness(corner) for corner in corners)
@@ -243,6 +249,18 @@ def _fixtures(scene: Scene, candidates: tuple[SceneObject, ...]) -> Iterator[Sel
         yield Selector(Landmark(f"farthest from the {kind}", 4), (Ranking(away),), candidates)
 
 
+def _fixture_ranks(
+    candidates: tuple[SceneObject, ...], fixtures: Sequence[Selector]
+) -> Iterator[Selector]:
+    for rank, ordinal in ORDINALS.items():
+        # The last one in a row is the first from the other end.
+        if rank > len(candidates) - 2:
+            continue
+        for selector in fixtures:
+            landmark = Landmark(f"{ordinal} {selector.landmark.phrase}", 14)
+            yield selector._replace(landmark=landmark, rank=rank)
+
+
 def _other_colors(candidates: Sequence[SceneObject]) -> Iterator[Selector]:
     for anchor in candidates:
         like = [item for item in candidates if item.color == anchor.color]
@@ -268,7 +286,8 @@ def _chains(
         if rank and rank >= len(others) - 1:
             continue
         nearest = f"{ORDINALS[rank]} nearest" if rank else "nearest"
-        phrase = f"{nearest} to the {thing} {selector.landmark.phrase}"
+        noun = "cube" if thing == "hidden_cube" else thing
+        phrase = f"{nearest} to the {noun} {selector.landmark.phrase}"
         landmark = Landmark(phrase, level, selector.landmark.sided)
         yield Selector(landmark, (_nearness(anchor.position),), others, rank)
 

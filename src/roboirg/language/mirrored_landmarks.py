@@ -40,7 +40,7 @@ def mirrored_objects(episode: Episode, instruction: Instruction) -> Mapping[str,
     if frame not in FRAMES or not any(map(_SIDE.search, places)):
         return {}
     objects: dict[str, SceneObject | None] = {}
-    for selector in selectors(episode.scene, get_task(episode.task).commands.thing, frame):
+    for selector in selectors(episode.scene, get_task(episode.task).commands.pointed, frame):
         phrase = selector.landmark.phrase
         if phrase in places or exchange_sides(phrase) in places:
             objects.setdefault(phrase, selector.select())
@@ -59,7 +59,7 @@ def mirrored_objects(episode: Episode, instruction: Instruction) -> Mapping[str,
 
 
 def _alone(_scene: Scene, item: SceneObject) -> frozenset[str]:
-    return frozenset((item.name,))
+    return frozenset((item.inside or item.name,))
 
 
 def _of_same_color(scene: Scene, item: SceneObject) -> frozenset[str]:

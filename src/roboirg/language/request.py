@@ -179,8 +179,16 @@ class InstructionRequest:
             cube = fill(self.task.commands.by_color, {"cube": cube})
         return self.around(color.field, cube)
 
-    def by_place(self, color: GoalValue, place: Phrase, *, plural: bool = False) -> Phrase:
+    def by_place(
+        self, color: GoalValue, place: Phrase, *, plural: bool = False, ranked: bool = False
+    ) -> Phrase:
         """Return words for the object to handle, given words for its place.
+
+        Args:
+            color: the color that the words stand for.
+            place: words for the place.
+            plural: whether there are several objects.
+            ranked: whether the words are *the former* or *the first* of several places.
 
         Raises:
             NoCommandError: the words from outside have no phrase for the object, only for its cube.
@@ -189,16 +197,24 @@ class InstructionRequest:
         covered = commands.thing != commands.colored
         if covered and outside is not None and commands.thing not in outside.text:
             raise NoCommandError
-        words = fill(commands.by_place, {"place": place}, plural=plural)
+        template = (ranked and commands.by_rank) or commands.by_place
+        if color != self.color_values[0] or len(self.color_values) > 2:  # noqa: PLR2004
+            # "Two cubes like the one here and one like the one there"; of three, none says cube.
+            template = template.removeprefix(f"{commands.thing}[|s] ")
+        words = fill(template, {"place": place}, plural=plural)
         if covered and not self._names_thing(outside):
             return words
         return self.around(color.field, words)
 
-    def targets(self, color: GoalValue) -> tuple[SceneObject, ...]:
-        """Return the objects to handle for a color: the cubes, or the containers over them."""
+    def pointed(self, color: GoalValue) -> tuple[SceneObject, ...]:
+        """Return the objects to point at for a color: the cubes, or the containers over them."""
         scene = self.episode.scene
         cubes = [item for item in scene.objects if item.color == color.value]
-        return tuple(cube if cube.inside is None else scene[cube.inside] for cube in cubes)
+        kind = self.task.commands.pointed
+        return tuple(
+            cube if cube.inside is None or cube.kind == kind else scene[cube.inside]
+            for cube in cubes
+        )
 
     def command(self, fields: Mapping[str, Phrase]) -> Phrase:
         """Fill the task's command, which has the same wording in all settings.
@@ -209,8 +225,9 @@ class InstructionRequest:
         if self.wordings is not None:
             return self._outside_command(self.wordings, fields)
         handled = max(1, len(self.values_of("color")))
-        wordings = [one for one in self.task.commands.wordings if one.parts == handled]
-        return fill(self.sampler.pick(f"command-{handled}", wordings).text, fields)
+        wordings = self.task.commands.wordings.of(self.pool)
+        possible = [one for one in wordings if one.parts == handled]
+        return fill(self.sampler.pick(f"command-{handled}", possible).text, fields)
 
     def _outside_command(self, wordings: TaskWordings, fields: Mapping[str, Phrase]) -> Phrase:
         goal = self.episode.goal

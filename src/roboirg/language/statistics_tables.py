@@ -10,7 +10,7 @@ from roboirg.language import corpus_statistics
 from roboirg.language.corpus_statistics import ClassCounts
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import setting_names
-from roboirg.language.templates import RELATIONS, STEPS
+from roboirg.language.templates.derivations import COUNTED_STEPS, RELATIONS, STEPS
 from roboirg.tasks import every_task
 
 
@@ -28,7 +28,7 @@ def overview_tables(instructions: Sequence[Instruction]) -> Iterator[Table]:
             yield _count_table(title, "task", counts, [*every_task()], order or _found(counts))
 
 
-_RELATIONS = [*(one.name for one in (*RELATIONS, *STEPS)), "neighbor"]
+_RELATIONS = [*(one.name for one in (*RELATIONS, *COUNTED_STEPS, *STEPS)), "neighbor"]
 
 
 def expression_table(counts: ClassCounts) -> Table:

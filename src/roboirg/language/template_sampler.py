@@ -46,9 +46,7 @@ class TemplateSampler:
 
 def _generator(key: str, purpose: str) -> np.random.Generator:
     """Return the random stream of a purpose, from its start."""
-    # Language 1.1 hashed the British spelling; a change would draw other words.
-    spelled = purpose.replace("color", "colour")
-    digest = hashlib.sha256(f"{key}|{spelled}".encode()).digest()
+    digest = hashlib.sha256(f"{key}|{purpose}".encode()).digest()
     return np.random.default_rng(int.from_bytes(digest[:8], "little"))
 
 

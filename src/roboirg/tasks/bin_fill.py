@@ -24,6 +24,7 @@ from roboirg.core.episode import (
     Stage,
 )
 from roboirg.core.motions import Away, Motion, Vanish
+from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     bin_keep_out,
@@ -222,12 +223,20 @@ def _binned(cubes: Iterable[str]) -> tuple[Fact, ...]:
 
 
 COMMANDS = Commands(
-    by_place="cube[|s] of the same color as the one {place}",
+    by_place="cube[|s] like the one {place}",
+    by_rank="cube[|s] like {place}",
     patterns=("color exclusion", "number deduction", "contextual logic"),
-    wordings=(
-        Wording("Put {cubes} into the bin, then press the button to stop."),
-        Wording("Drop {cubes} into the bin, and press the button when you are done."),
-        Wording("I want you to place {cubes} into the bin, and to press the button at the end."),
+    wordings=Pools(
+        train=(
+            Wording("Put {cubes} into the bin and press the button."),
+            Wording("Drop {cubes} into the bin and press the button."),
+            Wording("Place {cubes} in the bin and press the button."),
+        ),
+        test=(
+            Wording("Move {cubes} into the bin and push the button."),
+            Wording("Toss {cubes} into the bin and push the button."),
+            Wording("Throw {cubes} in the bin and press the button."),
+        ),
     ),
 )
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
+from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import unmask
 from roboirg.tasks.shared.fixtures import button_keep_out, draw_button
 from roboirg.tasks.shared.placement import Region
@@ -37,24 +38,25 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     return (press, *unmask.pick_stages(scene, goal))
 
 
-COMMANDS = unmask.commands(
-    Wording("Lift {colors.0}, but press the button first."),
-    Wording("Pick up {colors.0}, but make sure to press the button first."),
-    Wording("I want you to lift {colors.0}, but to press the button first."),
-    Wording(
-        "Press the button first, then lift {colors.0}, put it back down, and then lift {colors.1}.",
-        parts=2,
-    ),
-    Wording(
-        "First press the button, then pick up {colors.0}, set it down again, "
-        "and after that pick up {colors.1}.",
-        parts=2,
-    ),
-    Wording(
-        "I want you to press the button first, then to lift {colors.0}, "
-        "to put it down, and finally to lift {colors.1}.",
-        parts=2,
-    ),
+COMMANDS = unmask.seen_commands(
+    Pools(
+        train=(
+            Wording("Press the button, then lift {colors.0}."),
+            Wording("Press the button and lift {colors.0}."),
+            Wording("First press the button, then lift {colors.0}."),
+            Wording("Press the button, lift {colors.0}, put it down, then lift {colors.1}.", 2),
+            Wording("Press the button, lift {colors.0}, set it down, and lift {colors.1}.", 2),
+            Wording("Press the button, lift {colors.0}, lower it, then lift {colors.1}.", 2),
+        ),
+        test=(
+            Wording("Push the button, then raise {colors.0}."),
+            Wording("Push the button and pick up {colors.0}."),
+            Wording("Start with a push of the button, then raise {colors.0}."),
+            Wording("Push the button, raise {colors.0}, put it back, then raise {colors.1}.", 2),
+            Wording("Push the button, pick up {colors.0}, lower it, and pick up {colors.1}.", 2),
+            Wording("Push the button, raise {colors.0}, lay it down, raise {colors.1}.", 2),
+        ),
+    )
 )
 
 TASK = Task(

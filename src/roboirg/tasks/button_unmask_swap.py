@@ -12,6 +12,7 @@ import numpy as np
 
 from roboirg.core.conditions import All, Fact, FactCount, OccurrenceCount
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
+from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import unmask, unmask_swap
 from roboirg.tasks.shared.fixtures import button_keep_out, draw_button
 from roboirg.tasks.shared.layouts import PlanePoint
@@ -62,27 +63,38 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 
 COMMANDS = replace(
-    unmask.commands(
-        Wording("Lift {colors.0}, but press both buttons first."),
-        Wording("Pick up {colors.0}, but make sure to press both buttons first."),
-        Wording("I want you to lift {colors.0}, but to press both buttons first."),
-        Wording(
-            "Press both buttons first, then lift {colors.0}, put it back down, "
-            "and then lift {colors.1}.",
-            parts=2,
-        ),
-        Wording(
-            "First press both buttons, then pick up {colors.0}, set it down again, "
-            "and after that pick up {colors.1}.",
-            parts=2,
-        ),
-        Wording(
-            "I want you to press both buttons first, then to lift {colors.0}, "
-            "to put it down, and finally to lift {colors.1}.",
-            parts=2,
-        ),
+    unmask.seen_commands(
+        Pools(
+            train=(
+                Wording("Press both buttons, then lift {colors.0}."),
+                Wording("Press both buttons and lift {colors.0}."),
+                Wording("First press both buttons, then lift {colors.0}."),
+                Wording(
+                    "Press both buttons, lift {colors.0}, put it down, then lift {colors.1}.", 2
+                ),
+                Wording(
+                    "Press both buttons, lift {colors.0}, set it down, and lift {colors.1}.",
+                    2,
+                ),
+                Wording("Press both buttons, lift {colors.0}, lower it, then lift {colors.1}.", 2),
+            ),
+            test=(
+                Wording("Push both buttons, then raise {colors.0}."),
+                Wording("Push both buttons and pick up {colors.0}."),
+                Wording("Start with a push of both buttons, then raise {colors.0}."),
+                Wording(
+                    "Push both buttons, raise {colors.0}, put it back, then raise {colors.1}.", 2
+                ),
+                Wording(
+                    "Push both buttons, pick up {colors.0}, lower it, pick up {colors.1}.",
+                    2,
+                ),
+                Wording("Push both buttons, raise {colors.0}, lay it down, raise {colors.1}.", 2),
+            ),
+        )
     ),
-    by_place="the container that was {place} before anything moved",
+    by_place="the container over the cube now {place}",
+    things_at="the cube[|s] now {place}",
 )
 
 TASK = Task(

@@ -10,6 +10,7 @@ import numpy as np
 
 from roboirg.core.conditions import Elapsed, Fact, Rule
 from roboirg.core.episode import Color, Difficulty, Goal, Primitive, Scene, Stage
+from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import ORDINALS, draw_number, draw_target
 from roboirg.tasks.shared.placement import Circle, Footprint, Region
 from roboirg.tasks.shared.real_table import Side, draw_sides, draw_tape, on_side
@@ -101,11 +102,20 @@ COMMANDS = Commands(
     colored="tape",
     colors=TAPES,
     by_place="the tape {place}",
+    pointed="tape",
+    things_at="the tape {place}",
     patterns=("number deduction",),
-    wordings=(
-        Wording("Take {color} and place it on the target {repeats}."),
-        Wording("Grab {color} and set it on the target {repeats}."),
-        Wording("I want you to take {color} and put it down on the target {repeats}."),
+    wordings=Pools(
+        train=(
+            Wording("Take {color} and place it on the target {repeats}."),
+            Wording("Put {color} on the target {repeats}."),
+            Wording("Please place {color} on the target {repeats}."),
+        ),
+        test=(
+            Wording("Grab {color} and set it on the target {repeats}."),
+            Wording("Lay {color} on the target {repeats}."),
+            Wording("Please set {color} on the target {repeats}."),
+        ),
     ),
 )
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, Stage
+from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     button_keep_out,
@@ -90,21 +91,17 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 
 COMMANDS = Commands(
-    thing="cube",
-    by_color="{cube}",
-    by_place="the cube {place}",
     patterns=("color exclusion", "number deduction"),
-    wordings=(
-        Wording(
-            "Take {color} and place it on the target {repeats}, then press the button to stop."
+    wordings=Pools(
+        train=(
+            Wording("Put {color} on the target {repeats}, then press the button."),
+            Wording("Take {color} and place it on the target {repeats}, then press the button."),
+            Wording("Place {color} on the target {repeats}, and press the button."),
         ),
-        Wording(
-            "Grab {color} and set it on the target {repeats}, "
-            "and press the button when you are done."
-        ),
-        Wording(
-            "I want you to take {color} and put it down on the target {repeats}, "
-            "and to press the button at the end."
+        test=(
+            Wording("Set {color} on the target {repeats}, then push the button."),
+            Wording("Grab {color}, set it down on the target {repeats}, then press the button."),
+            Wording("Lay {color} on the target {repeats}, and push the button."),
         ),
     ),
 )

@@ -11,6 +11,7 @@ import numpy as np
 
 from roboirg.core.conditions import Fact, Rule
 from roboirg.core.episode import Color, Difficulty, Goal, Primitive, Scene, Stage
+from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.placement import Footprint, Region
 from roboirg.tasks.shared.real_table import (
     Side,
@@ -85,11 +86,20 @@ COMMANDS = Commands(
     # Excluding the colors of the tape and one box leaves the other box.
     colors=(*BOXES, TAPE),
     by_place="the box {place}",
+    pointed="box",
+    things_at="the box {place}",
     patterns=("color exclusion",),
-    wordings=(
-        Wording("Put the tape into {color}."),
-        Wording("Please place the tape into {color}."),
-        Wording("I want you to put the tape into {color}."),
+    wordings=Pools(
+        train=(
+            Wording("Put the tape into {color}."),
+            Wording("Please place the tape into {color}."),
+            Wording("Drop the tape into {color}."),
+        ),
+        test=(
+            Wording("Lay the tape into {color}."),
+            Wording("Move the tape into {color}."),
+            Wording("Please set the tape into {color}."),
+        ),
     ),
 )
 

@@ -15,6 +15,7 @@ import numpy as np
 from roboirg.core.conditions import All, Elapsed, Fact, OccurrenceCount, Rule, absent
 from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, SceneObject, Stage
 from roboirg.core.motions import Point, Shuttle
+from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import ORDINALS, draw_button
 from roboirg.tasks.shared.placement import Region
 from roboirg.tasks.task import Commands, Task, Wording
@@ -133,11 +134,16 @@ def _wrong(
 
 COMMANDS = Commands(
     patterns=("number deduction", "sequential relation"),
-    wordings=(
-        Wording("Press the button so that the cube stops on the target during {visit}."),
-        Wording("Use the button to stop the cube on the target during {visit}."),
-        Wording(
-            "I want you to stop the cube on the target with a press of the button during {visit}."
+    wordings=Pools(
+        train=(
+            Wording("Press the button to stop the cube on the target {visit}."),
+            Wording("Use the button to stop the cube on the target {visit}."),
+            Wording("Stop the cube with the button, on the target, {visit}."),
+        ),
+        test=(
+            Wording("Push the button so that the cube stops on the target {visit}."),
+            Wording("With the button, halt the cube on the target {visit}."),
+            Wording("Make the cube stop on the target {visit} with the button."),
         ),
     ),
 )

@@ -13,6 +13,7 @@ import numpy as np
 from roboirg.core.conditions import Fact, OccurrenceCount, Rule
 from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, SceneObject, Stage
 from roboirg.core.motions import Glow
+from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     button_keep_out,
@@ -144,19 +145,34 @@ def _swing(cube: str, side: str, ordinal: str, wrong: tuple[Fact | Rule, ...]) -
 
 COMMANDS = Commands(
     patterns=("color exclusion", "number deduction"),
-    wordings=(
-        Wording(
-            "Take {color}, carry it from above the target on your right to above the target on "
-            "your left {repeats}, put it down, and press the button to stop."
+    wordings=Pools(
+        train=(
+            Wording(
+                "Swing {color} from your right to your left target {repeats}, then put it "
+                "down and press the button."
+            ),
+            Wording(
+                "Take {color}, swing it from your right to your left target {repeats}, put "
+                "it down and press the button."
+            ),
+            Wording(
+                "Carry {color} over from your right to your left target {repeats}, "
+                "set it down and press the button."
+            ),
         ),
-        Wording(
-            "Grab {color} and swing it from above the target on your right to above the target "
-            "on your left {repeats}, then put it down and press the button at the end."
-        ),
-        Wording(
-            "I want you to take {color}, to move it from over the target on your right to over "
-            "the target on your left {repeats}, and to put it down and press the button when you "
-            "are done."
+        test=(
+            Wording(
+                "Swing {color} over from your right to your left target "
+                "{repeats}, lay it down and push the button."
+            ),
+            Wording(
+                "Grab {color}, swing it from your right to your left target {repeats}, "
+                "then lower it and push the button."
+            ),
+            Wording(
+                "Swing {color} from your right to your left target {repeats}, "
+                "put it down and push the button."
+            ),
         ),
     ),
 )

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from roboirg.core.episode import COLORS, Color, Difficulty, Goal, ObjectKind, Scene, Stage, Suite
+from roboirg.core.word_pools import Pools
 
 
 def _no_stages(_scene: Scene) -> tuple[Stage, ...]:
@@ -35,23 +36,30 @@ class Commands:
 
     Attributes:
         patterns: reasoning patterns, in the order in which the episodes cycle through them.
-        wordings: at least two for each number of parts.
-        thing: kind of object that the goal selects, and its name in words; a place distinguishes
-            one among all objects of that kind.
+        wordings: at least two for each number of parts, in each pool.
+        thing: kind of object that the goal selects, and its name in words.
         colored: kind of object that has the goal's color: the same, or the cube in a container.
         colors: those that commands mention; color exclusion takes exactly three.
         by_color: how to refer to the object by a color; ``{cube}`` is the colored object.
         by_place: how to refer to the object by a place, after its count if it has one:
             ``cube[|s] ...``.
+        by_rank: the same by ``the former`` or ``the first`` of several places; none if it is the
+            same with *at the former place*.
+        pointed: kind of object that a place distinguishes among all objects of that kind: the
+            colored one if the things to handle are not there yet.
+        things_at: how to introduce one or more of them by their places.
     """
 
     patterns: tuple[str, ...]
-    wordings: tuple[Wording, ...]
+    wordings: Pools[Wording]
     thing: ObjectKind = "cube"
     colored: ObjectKind = "cube"
     colors: tuple[Color, ...] = COLORS
     by_color: str = "{cube}"
     by_place: str = "the cube {place}"
+    by_rank: str | None = None
+    pointed: ObjectKind = "cube"
+    things_at: str = "the cube[|s] {place}"
 
 
 @dataclass(frozen=True, slots=True)

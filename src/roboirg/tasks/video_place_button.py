@@ -10,6 +10,7 @@ import numpy as np
 
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
+from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import video_place
 from roboirg.tasks.task import Commands, Task, Wording
 
@@ -52,10 +53,17 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 COMMANDS = Commands(
     patterns=("contextual logic", "sequential relation"),
-    wordings=(
-        Wording("Going by the video, take {color} and put it on {relation}."),
-        Wording("Think back to the video, take {color} and place it on {relation}."),
-        Wording("Remember what you saw in the video, take {color} and set it down on {relation}."),
+    wordings=Pools(
+        train=(
+            Wording("Put {color} on {relation} in the video."),
+            Wording("Take {color} and put it on {relation} in the video."),
+            Wording("Going by the video, place {color} on {relation}."),
+        ),
+        test=(
+            Wording("Set {color} on {relation} in the video."),
+            Wording("Grab {color} and place it on {relation} in the video."),
+            Wording("Remember the video, and put {color} on {relation}."),
+        ),
     ),
 )
 

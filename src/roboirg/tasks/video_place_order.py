@@ -11,6 +11,7 @@ import numpy as np
 
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
+from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import video_place
 from roboirg.tasks.shared.fixtures import draw_number
 from roboirg.tasks.task import Commands, Task, Wording
@@ -55,10 +56,17 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 COMMANDS = Commands(
     patterns=("sequential relation",),
-    wordings=(
-        Wording("Going by the video, take {color} and put it on {placement}."),
-        Wording("Think back to the video, take {color} and place it on {placement}."),
-        Wording("Remember what you saw in the video, take {color} and set it down on {placement}."),
+    wordings=Pools(
+        train=(
+            Wording("Put {color} on {placement} in the video."),
+            Wording("Take {color} and put it on {placement} in the video."),
+            Wording("Going by the video, place {color} on {placement}."),
+        ),
+        test=(
+            Wording("Set {color} on {placement} in the video."),
+            Wording("Grab {color} and place it on {placement} in the video."),
+            Wording("Remember the video, and put {color} on {placement}."),
+        ),
     ),
 )
 

@@ -14,6 +14,7 @@ import numpy as np
 from roboirg.core.conditions import All, Elapsed, Fact, Rule
 from roboirg.core.episode import COLORS, Difficulty, Goal, Primitive, Scene, SceneObject, Stage
 from roboirg.core.motions import Swap
+from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import video_stages
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
@@ -180,18 +181,34 @@ def _early_press(timer: str) -> Rule:
 
 COMMANDS = Commands(
     patterns=("number deduction",),
-    wordings=(
-        Wording(
-            "Take the cube that was picked up in the video, lift it and put it down {repeats}, "
-            "then press the button to stop."
+    wordings=Pools(
+        train=(
+            Wording(
+                "Take the cube picked up in the video, lift it and put it down {repeats}, then "
+                "press the button."
+            ),
+            Wording(
+                "Find the cube lifted in the video, raise it and set it down {repeats}, then press "
+                "the button."
+            ),
+            Wording(
+                "As in the video, lift the same cube and put it down {repeats}, then press the "
+                "button."
+            ),
         ),
-        Wording(
-            "Find the cube that was picked up in the video, raise it and set it back down "
-            "{repeats}, and press the button when you are done."
-        ),
-        Wording(
-            "I want you to raise the cube that was lifted in the video and to lower it back to "
-            "the table {repeats}, and to press the button at the end."
+        test=(
+            Wording(
+                "Grab the cube raised in the video, lift it and lay it down {repeats}, then push "
+                "the button."
+            ),
+            Wording(
+                "Take the cube that the robot held in the video, raise it and put it back "
+                "{repeats}, then push the button."
+            ),
+            Wording(
+                "The video showed a cube being lifted: raise it and lower it {repeats}, then push "
+                "the button."
+            ),
         ),
     ),
 )

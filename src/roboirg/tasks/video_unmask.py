@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
+from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import unmask, video_stages
 from roboirg.tasks.shared.placement import Region
 from roboirg.tasks.task import Task, Wording
@@ -37,24 +38,25 @@ def demonstration(_scene: Scene) -> tuple[Stage, ...]:
     return (video_stages.hold_still(HOLD_STEPS),)
 
 
-COMMANDS = unmask.commands(
-    Wording("Think back to the video and lift {colors.0}."),
-    Wording("Going by what the video showed, pick up {colors.0}."),
-    Wording("Remember what you saw in the video, then lift {colors.0}."),
-    Wording(
-        "Think back to the video and lift {colors.0}, put it back down, and then lift {colors.1}.",
-        parts=2,
-    ),
-    Wording(
-        "Going by what the video showed, pick up {colors.0}, set it down again, "
-        "and after that pick up {colors.1}.",
-        parts=2,
-    ),
-    Wording(
-        "Remember what you saw in the video, then lift {colors.0}, put it down, "
-        "and finally lift {colors.1}.",
-        parts=2,
-    ),
+COMMANDS = unmask.hidden_commands(
+    Pools(
+        train=(
+            Wording("Think back to the video and lift {colors.0}."),
+            Wording("Going by the video, lift {colors.0}."),
+            Wording("Remember the video, then lift {colors.0}."),
+            Wording("First lift {colors.0}, put it down, then lift {colors.1}.", 2),
+            Wording("Lift {colors.0}, put it down, then lift {colors.1}.", 2),
+            Wording("Lift {colors.0}, set it down, and lift {colors.1}.", 2),
+        ),
+        test=(
+            Wording("Keep the video in mind and raise {colors.0}."),
+            Wording("Going by what you saw, raise {colors.0}."),
+            Wording("Pick up {colors.0}."),
+            Wording("First raise {colors.0}, put it back, then raise {colors.1}.", 2),
+            Wording("Pick up {colors.0}, lay it down, and pick up {colors.1}.", 2),
+            Wording("Raise {colors.0}, lower it, and raise {colors.1}.", 2),
+        ),
+    )
 )
 
 TASK = Task(

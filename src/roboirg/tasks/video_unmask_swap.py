@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
+from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import unmask, unmask_swap, video_stages
 from roboirg.tasks.shared.layouts import layout_points
 from roboirg.tasks.shared.swapping import last_step
@@ -29,29 +30,28 @@ def demonstration(scene: Scene) -> tuple[Stage, ...]:
 
 
 COMMANDS = replace(
-    unmask.commands(
-        Wording("Going by everything that happened in the video, lift {colors.0}."),
-        Wording(
-            "Keep in mind what the video showed from beginning to end, and pick up {colors.0}."
-        ),
-        Wording("Remember all that you saw in the video, then lift {colors.0}."),
-        Wording(
-            "Going by everything that happened in the video, lift {colors.0}, put it back down, "
-            "and then lift {colors.1}.",
-            parts=2,
-        ),
-        Wording(
-            "Keep in mind what the video showed from beginning to end, and pick up {colors.0}, "
-            "set it down again, and after that pick up {colors.1}.",
-            parts=2,
-        ),
-        Wording(
-            "Remember all that you saw in the video, then lift {colors.0}, put it down, "
-            "and finally lift {colors.1}.",
-            parts=2,
-        ),
+    unmask.hidden_commands(
+        Pools(
+            train=(
+                Wording("Think of all that moved in the video and lift {colors.0}."),
+                Wording("Going by the whole video, lift {colors.0}."),
+                Wording("Remember all that the video showed, then lift {colors.0}."),
+                Wording("Lift {colors.0}, set it down, then lift {colors.1}.", 2),
+                Wording("Lift {colors.0}, put it down, and then lift {colors.1}.", 2),
+                Wording("First lift {colors.0}, put it down, then lift {colors.1}.", 2),
+            ),
+            test=(
+                Wording("Keep the whole video in mind and raise {colors.0}."),
+                Wording("Recalling the whole video, raise {colors.0}."),
+                Wording("Going by all you saw, pick up {colors.0}."),
+                Wording("Raise {colors.0}, put it back, then raise {colors.1}.", 2),
+                Wording("Pick up {colors.0}, lay it down, then pick up {colors.1}.", 2),
+                Wording("First raise {colors.0}, lower it, then raise {colors.1}.", 2),
+            ),
+        )
     ),
-    by_place="the container that was {place} before anything moved",
+    by_place="the container that was {place} at first",
+    things_at="the container[|s] that [was|were] {place} at first",
 )
 
 TASK = Task(

@@ -19,7 +19,7 @@ from roboirg.language.interpreter.comprehension import (
     is_unknown_command,
 )
 from roboirg.language.interpreter.constraints import goal_constraints
-from roboirg.language.interpreter.discourse_context import read_discourse, read_remark
+from roboirg.language.interpreter.discourse_context import names_camera, read_discourse, read_remark
 from roboirg.language.interpreter.negations import is_negated_command, unread_negations
 from roboirg.language.interpreter.reference_resolution import ReferenceResolver
 from roboirg.language.interpreter.temporal_relations import mentioned_times
@@ -70,9 +70,10 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
             _distinct(word for gap in gaps for word in gap.words),
         )
     context = read_discourse(sentences[:first])
-    command = read_command(_joined(sentences[first:last]))
+    words = _joined(sentences[first:last])
+    command = read_command(words)
     times = context.times | mentioned_times(command.text)
-    resolver = ReferenceResolver(scene, context, times)
+    resolver = ReferenceResolver(scene, context, times, mirrored=names_camera(words))
     constraints = goal_constraints(candidates, command, resolver)
     goals = tuple(goal for goal in candidates if all(limit.fits(goal) for limit in constraints))
     complaints = list(resolver.complaints)

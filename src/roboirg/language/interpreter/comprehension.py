@@ -14,7 +14,8 @@ from roboirg.language.interpreter.command import BEFORE_VERB
 from roboirg.language.interpreter.negations import OBJECT, VERB, unread_negations
 from roboirg.language.interpreter.places import place_mentions
 from roboirg.language.interpreter.quantities import quantities
-from roboirg.language.interpreter.tokens import Sentence, color_of, number_of, word_set
+from roboirg.language.interpreter.several_amounts import several_amounts
+from roboirg.language.interpreter.tokens import COLOR, Sentence, color_of, number_of, word_set
 from roboirg.language.interpreter.vocabulary import (
     DETERMINERS,
     PLACE_WORDS,
@@ -46,6 +47,7 @@ _BOTH_TARGETS = re.compile(
     r"|(?:target|disc) .{,20}? and the .{,20}?(?:target|disc)\b)"
 )
 _HIDDEN = re.compile(r"(?:^| )(?!(?:that|which) )\w+ (?:is|was|are|were)(?: hidden)?$")
+_COLORS_WITHOUT_ONE = re.compile(rf"{COLOR} , not {COLOR}\b")
 _BELOW = word_set("under below beneath underneath")
 _AFTER_BELOW = ((), (",",), (";",), ("and",), ("then",))
 _LOCATING = PREPOSITIONS | PLACE_WORDS
@@ -86,8 +88,17 @@ def find_gaps(words: Sentence) -> tuple[ComprehensionGap, ...]:
 
 def _unknown_words(words: Sentence) -> Iterator[ComprehensionGap]:
     for at, word in enumerate(words):
-        if not is_known(word):
+        if not is_known(word) and not _is_read_alternative(words, at):
             yield ComprehensionGap(f"does not know the {_with_role(words, at)}", (word,))
+
+
+def _is_read_alternative(words: Sentence, at: int) -> bool:
+    """Return whether a word is the *or* of *before or after* or of two colors without one."""
+    return words[at] in ("or", "nor") and (
+        words[at - 1 : at + 2 : 2] == ("before", "after")
+        or _COLORS_WITHOUT_ONE.match(" ".join(words[at + 1 : at + 5])) is not None
+        or "neither" in words[max(0, at - 2) : at]
+    )
 
 
 def _with_role(words: Sentence, at: int) -> str:
@@ -151,6 +162,7 @@ def _unread_comparisons(words: Sentence) -> Iterator[ComprehensionGap]:
     """Yield the comparisons that are no part of a number, such as *fewer than three*."""
     text = " ".join(words)
     spans = [(quantity.start, quantity.end) for quantity in quantities(text)]
+    spans += [found.span() for found in several_amounts(text)]
     for found in _COMPARISON.finditer(text):
         if not any(start <= found.start() < end for start, end in spans):
             yield ComprehensionGap(

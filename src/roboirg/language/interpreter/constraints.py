@@ -15,6 +15,7 @@ from roboirg.language.interpreter.reference_resolution import (
     ReferenceResolver,
     common_options,
 )
+from roboirg.language.interpreter.several_amounts import read_several_amounts
 from roboirg.language.interpreter.temporal_relations import read_temporal_relation
 
 GoalTest = Callable[[Goal], bool]
@@ -100,7 +101,11 @@ def _things_in_order(command: Command, resolver: ReferenceResolver) -> GoalTest:
 
 def _amounts(command: Command, resolver: ReferenceResolver) -> GoalTest:
     """Return a test for colors with numbers that match the items one to one, in any order."""
-    items = [resolver.amounts(item) for item in command.items]
+    several = read_several_amounts(command.text)
+    if several is None:
+        items = [resolver.amounts(item) for item in command.items]
+    else:
+        items = resolver.several_amounts(several)
 
     def fits(goal: Goal) -> bool:
         amounts = list(zip(goal.texts("colors"), goal.numbers("counts"), strict=True))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Literal, NamedTuple
 
-from roboirg.language.interpreter.places import Place, read_places
+from roboirg.language.interpreter.places import NamedPlace, read_places
 from roboirg.language.interpreter.temporal_relations import Time, mentioned_times
 from roboirg.language.interpreter.tokens import (
     COLOR,
@@ -42,7 +42,7 @@ class Description(NamedTuple):
     kind: DescriptionKind
     colors: tuple[str, ...] = ()
     excluded: str | None = None
-    place: Place | None = None
+    place: NamedPlace | None = None
     times: frozenset[Time] = frozenset()
     position: int | None = None
 
@@ -55,6 +55,7 @@ _OTHER_OF = re.compile(
     r"\bthe other (?:one |color )?(?:of|in|from)\b(?! (?:the |those |these )?(?:two )?moments)"
 )
 _ONE_NOT = re.compile(r"\bthe (?:one|color) (?:of|in|from)\b.*\b(?:not|other than|except)\b")
+_EITHER_NOT = re.compile(rf"\b{COLOR} or {COLOR} , not {COLOR}\b")
 _NOT = re.compile(rf"\b(?:not|other than|except) (?:in |for |the )?({COLOR})\b")
 
 
@@ -65,7 +66,7 @@ def describe(words: Sentence) -> Description:
     places = read_places(words)
     if places:
         return Description("place", place=places[0], times=mentioned_times(text))
-    if _OTHER_OF.search(text) or _ONE_NOT.search(text):
+    if _OTHER_OF.search(text) or _ONE_NOT.search(text) or _EITHER_NOT.search(text):
         return _complement(text, colors)
     if _THAN.search(text):
         return Description("not", colors)

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from roboirg.language.interpreter.ordinals import named_positions
-from roboirg.language.interpreter.places import Place, read_places
+from roboirg.language.interpreter.places import NamedPlace, read_places
 from roboirg.language.interpreter.quantities import plain_numbers, quantities
 from roboirg.language.interpreter.temporal_relations import (
     PressRelation,
@@ -19,8 +19,8 @@ from roboirg.language.interpreter.temporal_relations import (
 from roboirg.language.interpreter.tokens import COLOR, Sentence, colors_in
 
 _DISMISSAL = re.compile(
-    r"\b(never mind|nothing to do with|not matter|no matter|ignore|forget (about )?"
-    r"(it|that|this|them)|irrelevant|not important|unimportant|regardless|not for you)\b"
+    r"\b(never mind|nothing to do with|not matter|not that it matters|no matter|ignore"
+    r"|forget (about )?(it|that|this|them)|irrelevant|not important|unimportant|regardless|not for you)\b"
 )
 
 
@@ -32,7 +32,7 @@ class Remark(NamedTuple):
     amounts: tuple[tuple[str, int], ...]
     positions: tuple[int, ...]
     moments: tuple[PressRelation, ...]
-    places: tuple[Place, ...]
+    places: tuple[NamedPlace, ...]
     times: frozenset[Time]
     camera: bool
     dismissed: bool
@@ -61,9 +61,14 @@ class DiscourseContext(NamedTuple):
     positions: tuple[int, ...] = ()
     moments: tuple[PressRelation, ...] = ()
     preferred_moment: PressRelation | None = None
-    places: tuple[Place, ...] = ()
+    places: tuple[NamedPlace, ...] = ()
     times: frozenset[Time] = frozenset()
     mirrored: bool = False
+
+
+def names_camera(words: Sentence) -> bool:
+    """Return whether left and right may be those of the front camera's picture."""
+    return "camera" in words or "camera's" in words
 
 
 @functools.lru_cache(maxsize=8192)
@@ -80,7 +85,7 @@ def read_remark(words: Sentence) -> Remark:
         moments=named_moments(text),
         places=places,
         times=mentioned_times(text),
-        camera="camera" in words,
+        camera=names_camera(words),
         dismissed=_DISMISSAL.search(text) is not None,
     )
 

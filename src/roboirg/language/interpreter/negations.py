@@ -50,6 +50,9 @@ _READ_ELSEWHERE = tuple(
         r"\bwhichever\b.*?\bnot\b",
         rf"\bnot {_REMARK}",
         rf"\bno {NUMBER}\b",
+        rf"\b(?:painted|colored|with|in|is|are) neither {COLOR} n?or {COLOR}\b",
+        r"\b(?:painted|colored|with|in|is|are) neither of (?:those|these|them)\b",
+        rf"\b{COLOR} or {COLOR} , not {COLOR}\b",
         rf"\b(?:that|it|this|{NUMBER}) minus\b",
     )
 )

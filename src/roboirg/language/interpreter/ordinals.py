@@ -30,7 +30,9 @@ _STEP = re.compile(
     r"(?! (?:the )?(?:button|press|pressing|placing|taking))"
 )
 _NEXT = re.compile(rf"\bthe (?:very )?(?P<way>next|following|previous|preceding) (?:one|{_NOUN})\b")
-_NEIGHBOR = re.compile(r"\b(?:neighbor\w* (?:of|to)|adjacent to|next to)\b")
+_NEIGHBOR = re.compile(
+    r"\b(?:neighbor\w* (?:of|to)|adjacent to|next to|(?:just |right )?before or after)\b"
+)
 _PENULTIMATE = re.compile(
     rf"\b(?P<rank>{ORDINAL}|next) (?:to|from) (?:the )?last\b|\bpenultimate\b"
 )
@@ -104,15 +106,15 @@ def _read_relative(text: str) -> OrdinalExpression | None:
     following = _NEXT.search(text)
     if following:
         return OrdinalExpression("that", (1 if following["way"] in _LATER else -1,))
+    for found in _NEIGHBOR.finditer(text):
+        base = _base(text, found.end())
+        if base is not None:
+            return OrdinalExpression(base, (-1, 1))
     for found in _STEP.finditer(text):
         base = _base(text, found.end())
         if base is not None:
             step = number_of(found["step"] or "") or 1
             return OrdinalExpression(base, (step if found["way"] in _LATER else -step,))
-    for found in _NEIGHBOR.finditer(text):
-        base = _base(text, found.end())
-        if base is not None:
-            return OrdinalExpression(base, (-1, 1))
     return None
 
 

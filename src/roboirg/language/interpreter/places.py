@@ -25,13 +25,14 @@ _NEAREST = frozenset({"closest", "nearest"})
 _FARTHEST = frozenset({"farthest", "furthest"})
 _ROBOT = frozenset({"you", "robot", "yourself"})
 _FIXTURES = frozenset({"button", "target", "bin"})
-_FILLERS = frozenset({"the", "to", "from", "a", "on", "at"})
+_OWNERS = frozenset({"your", "camera's"})
+_FILLERS = frozenset({"the", "to", "from", "a", "on", "at"}) | _OWNERS
 _CORNER_FILLERS = frozenset({"of", "the", "table", "that", "is"})
 _THINGS = frozenset({"cube", "container", "box", "tape"})
 _COLORED = _THINGS - {"container"}
 _PAIRED = _COLORED - {"cube"}
 _TO_A_SIDE = frozenset({"on", "to", "at"})
-_SIDE_FILLERS = frozenset({"the", "your", "far"})
+_SIDE_FILLERS = frozenset({"the", "far"}) | _OWNERS
 
 _MAX_DEPTH = 4
 """Levels of places that other places describe; deeper ones are not read."""
@@ -103,6 +104,13 @@ Measure = Callable[[SceneObject], float]
 """The order of things, small values first."""
 
 
+class NamedPlace(NamedTuple):
+    """A place, and whether the words before it say that a cube is there, not a container."""
+
+    place: Place
+    of_cube: bool = False
+
+
 class PlaceMention(NamedTuple):
     """A place, and from which word to which it goes."""
 
@@ -123,9 +131,17 @@ def place_mentions(words: Sentence) -> Iterator[PlaceMention]:
             at = read[1]
 
 
-def read_places(words: Sentence) -> tuple[Place, ...]:
+def read_places(words: Sentence) -> tuple[NamedPlace, ...]:
     """Return every place that a sentence names, in order."""
-    return tuple(mention.place for mention in place_mentions(words))
+    return tuple(
+        NamedPlace(mention.place, _is_of_cube(words[: mention.start]))
+        for mention in place_mentions(words)
+    )
+
+
+def _is_of_cube(before: Sentence) -> bool:
+    nouns = (word.removesuffix("s") for word in reversed(before))
+    return next((noun for noun in nouns if noun in _THINGS), None) == "cube"
 
 
 def _read(words: Sentence, at: int, depth: int = 0) -> tuple[Place, int] | None:
@@ -332,7 +348,8 @@ def _present(scene: Scene, kind: str) -> list[SceneObject]:
     if kind == "cube":
         motions = [motion for motion in scene.motions if isinstance(motion, Away)]
         late = {motion.subject for motion in motions if motion.start == 0}
-    return [item for item in scene.objects if item.kind == kind and item.name not in late]
+    kinds = ("cube", "hidden_cube") if kind == "cube" else (kind,)
+    return [item for item in scene.objects if item.kind in kinds and item.name not in late]
 
 
 def _ranked(

@@ -55,7 +55,8 @@ _SCALED = re.compile(
     rf"(?: as (?:many|often|much){_NOUNS}{{0,5}} as| of| the| as)? {_TO}"
 )
 _SAME = re.compile(
-    r"\b(?:that|as|this|so) (?:many|often)\b|\b(?:that|this|the same) (?:number|amount) of\b"
+    r"\b(?:that|as|this|so|equally) (?:many|often)\b"
+    r"|\b(?:that|this|the same) (?:number|amount) of\b"
 )
 _SOME = re.compile(r"\ba (?:couple|pair) of\b")
 _ADVERB = re.compile(r"\b(?:once(?! (?:you|it|that|the|all|this))|twice|thrice)\b")
@@ -125,10 +126,14 @@ def quantities(text: str) -> tuple[Quantity, ...]:
 
 
 def plain_numbers(words: Sentence) -> tuple[int, ...]:
-    """Return the plain numbers of a sentence."""
-    found = _PLAIN.finditer(" ".join(words))
-    numbers = (number_of(match["number"] or match["times"]) for match in found)
-    return tuple(number for number in numbers if number is not None)
+    """Return the plain numbers of a sentence: *three times*, *twice*."""
+    text = " ".join(words)
+    found = [
+        (match.start(), number_of(match["number"] or match["times"]))
+        for match in _PLAIN.finditer(text)
+    ]
+    found += [(match.start(), ADVERBS[match[0]]) for match in _ADVERB.finditer(text)]
+    return tuple(number for _, number in sorted(found) if number is not None)
 
 
 def read_value(text: str) -> CountExpression | None:

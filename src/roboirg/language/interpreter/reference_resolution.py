@@ -12,8 +12,9 @@ from roboirg.language.interpreter.descriptions import Description
 from roboirg.language.interpreter.discourse_context import DiscourseContext
 from roboirg.language.interpreter.object_positions import objects_at
 from roboirg.language.interpreter.ordinals import OrdinalExpression
-from roboirg.language.interpreter.places import Place
+from roboirg.language.interpreter.places import NamedPlace
 from roboirg.language.interpreter.quantities import CountExpression
+from roboirg.language.interpreter.several_amounts import SeveralAmounts
 from roboirg.language.interpreter.temporal_relations import (
     MOMENTS,
     PressRelation,
@@ -37,8 +38,16 @@ class ReferenceResolver:
         complaints: what the descriptions point at in vain, in plain sentences.
     """
 
-    def __init__(self, scene: Scene, context: DiscourseContext, times: frozenset[Time]) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        context: DiscourseContext,
+        times: frozenset[Time],
+        *,
+        mirrored: bool = False,
+    ) -> None:
         self.complaints: list[str] = []
+        self._mirrored = mirrored
         self._scene = scene
         self._context = context
         self._times = times
@@ -75,6 +84,12 @@ class ReferenceResolver:
         return {
             color: count.results(self._introduced_numbers(count, color)) for color in sorted(colors)
         }
+
+    def several_amounts(self, words: SeveralAmounts) -> list[Amounts]:
+        """Return the amount of each color that words for all of them mean."""
+        if not (words.amounts or self._context.amounts):
+            self._complain("amounts")
+        return [{color: numbers} for color, numbers in words.results(self._context.amounts)]
 
     def times(self, count: CountExpression | None) -> set[int] | None:
         """Return the numbers of repetitions that fit an expression; once, without any number."""
@@ -156,13 +171,13 @@ class ReferenceResolver:
             return None
         return set().union(*(self._at(place, thing.times) for place in chosen))
 
-    def _at(self, place: Place, times: frozenset[Time]) -> set[str]:
+    def _at(self, named: NamedPlace, times: frozenset[Time]) -> set[str]:
         found = objects_at(
-            place,
+            named.place,
             self._scene,
-            self._kind,
+            "cube" if named.of_cube else self._kind,
             times | self._times,
-            mirrored=self._context.mirrored,
+            mirrored=self._context.mirrored or self._mirrored,
         )
         cubes = [item if item.color else self._scene.hidden_in(item.name) for item in found]
         if None in cubes or not cubes:

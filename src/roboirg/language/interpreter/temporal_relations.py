@@ -21,7 +21,10 @@ _NAMED = re.compile(
     r"\b(before|prior to|preceding|preceded|after|following|followed)\b"
     r"(?! (?:that|this|which|watching|seeing|(?:the|this) (?:video|demonstration))\b)"
 )
-_NEIGHBOR = re.compile(r"\b(?:neighbor\w*|neighboring|adjacent|next to|beside)\b")
+_EITHER = re.compile(r"\b(?:just |right )?before or after\b")
+_NEIGHBOR = re.compile(
+    rf"\b(?:neighbor\w*|neighboring|adjacent|next to|beside)\b|{_EITHER.pattern}"
+)
 _OTHER = re.compile(
     r"\bother (?:one |moment )?(?:of|moment|time|point|than)\b|\bthe other one\b"
     r"|\bnot (?:at |in )?(?:that|this|it|the one|the moment|when)\b|\bwhichever\b.*\bnot\b"
@@ -62,6 +65,7 @@ def named_moments(text: str) -> tuple[PressRelation, ...]:
     """Return the moments about the button press that a sentence names, in order."""
     if not _PRESS.search(text):
         return ()
+    text = _EITHER.sub("", text)
     return tuple(_WORD[found[1]] for found in _NAMED.finditer(text))
 
 

@@ -51,7 +51,7 @@ _NOUNS = word_set(
     "table robot video camera picture beginning start outset end pair couple color colors amount "
     "place places spot position location press presses swaps swap order way hand mind "
     "neighbor neighbors action actions motion motions movement task process steps sequence "
-    "demonstration side total object objects cycle cycles"
+    "demonstration side total whole object objects cycle cycles"
 )
 _PRONOUNS = word_set(
     "it them they you yourself i me us we what when where which who whichever there here then "
@@ -63,7 +63,8 @@ _VERB_FORMS = word_set(
     "exchanged shuffled started began stands stood happened showed shown saw seen went goes go "
     "going think thinks remember find choose chose chosen prefer preferred like liked want need "
     "sure use used keep kept see look differs took given say said meant mean forget worry hesitate "
-    "work preceded followed ready colored watch watched repeated reaches reach reached arrives "
+    "painted being held work preceded followed ready colored watch watched repeated reaches "
+    "reach reached arrives "
     "arrived passed shown demonstrated contains contained visited finished finish done completed "
     "complete remembering recalling returns returned according based initial original correct"
 )
@@ -77,7 +78,7 @@ _CONNECTIVES = word_set(
     "and but so then now finally afterwards again also too with for before after during until up "
     "down back just only not no never together respectively "
     "initially originally begin long while exactly precisely repeatedly forth altogether "
-    "previously already each"
+    "previously already each equally"
 )
 _MODALS = word_set("can could will would must should may")
 _NEGATIONS = word_set("avoid refrain nothing none nor without instead rather dont")

@@ -12,7 +12,7 @@ __all__ = ["PATTERNS", "REFERENCE", "Derived", "Pattern", "find_pattern"]
 
 PATTERNS: Mapping[str, tuple[Pattern, ...]] = {
     "color exclusion": (exclusion.ONE_COLOR,),
-    "number deduction": (deduction.TIMES, deduction.AMOUNTS, deduction.VISIT),
+    "number deduction": (deduction.TIMES, deduction.AMOUNTS, sequence.COUNTED_VISIT),
     "sequential relation": (sequence.ORDINAL, before_after.NEIGHBOR),
     "contextual logic": (exclusion.TWO_AMOUNTS, before_after.OTHER),
 }

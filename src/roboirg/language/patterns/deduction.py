@@ -5,21 +5,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from roboirg.language import templates
 from roboirg.language.number_words import cardinal
 from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill
-from roboirg.language.request import GoalValue, InstructionRequest, SlotTypeName
-from roboirg.language.slot_types import amount, ordinal
+from roboirg.language.request import (
+    AMOUNT_FIELD,
+    GoalValue,
+    InstructionRequest,
+    SlotTypeName,
+)
+from roboirg.language.slot_types import amount
 from roboirg.language.slot_types.number import introduce_quantity
-
-NUMBER_SLOTS = ("repeats", "visit", "counts")
+from roboirg.language.templates import derivations
 
 
 class Deduction(NamedTuple):
     """A relation, and the quantity from which it gives each result."""
 
-    relation: templates.Relation
+    relation: derivations.Relation
     references: tuple[int, ...]
 
 
@@ -32,7 +35,7 @@ def deductions(results: Sequence[int], choices: Sequence[Sequence[int]]) -> list
             of them would give the result away.
     """
     found: list[Deduction] = []
-    for relation in templates.RELATIONS:
+    for relation in derivations.RELATIONS:
         references = tuple(_reference(relation, result) for result in results)
         if any(reference is None for reference in references):
             continue
@@ -42,14 +45,14 @@ def deductions(results: Sequence[int], choices: Sequence[Sequence[int]]) -> list
     return found
 
 
-def _reference(relation: templates.Relation, result: int) -> int | None:
+def _reference(relation: derivations.Relation, result: int) -> int | None:
     reference = relation.reference(result)
-    if reference is None or not 1 <= reference <= templates.MAX_REFERENCE:
+    if reference is None or not 1 <= reference <= derivations.MAX_REFERENCE:
         return None
     return None if result == reference else reference
 
 
-def _open(relation: templates.Relation, choices: Sequence[Sequence[int]]) -> bool:
+def _open(relation: derivations.Relation, choices: Sequence[Sequence[int]]) -> bool:
     reachable = [
         choice
         for choice in choices
@@ -59,9 +62,7 @@ def _open(relation: templates.Relation, choices: Sequence[Sequence[int]]) -> boo
 
 
 def _deductions(request: InstructionRequest) -> list[Deduction]:
-    (slot,) = {
-        goal_value.slot for goal_value in request.goal_values if goal_value.slot in NUMBER_SLOTS
-    }
+    slot = "counts" if request.values_of("amount") else "repeats"
     results = [goal_value.number for goal_value in request.goal_values if goal_value.slot == slot]
     return deductions(results, request.alternative_numbers(slot))
 
@@ -98,28 +99,36 @@ def _times(request: InstructionRequest) -> Derived:
     return Derived(context, {goal_value.field: words}, _notes(deduction))
 
 
-def _visit(request: InstructionRequest) -> Derived:
-    (goal_value,) = request.values_of("visit")
-    deduction = _chosen(request)
-    (number,) = deduction.references
-    value = fill(deduction.relation.value, {"number": _pointer(request, number)})
-    context = introduce_quantity(request, REFERENCE, number)
-    return Derived(context, ordinal.by_number(request, goal_value, value), _notes(deduction))
-
-
 def _amounts(request: InstructionRequest) -> Derived:
     """Derive all counts by one relation, each from its own quantity."""
     goal_values = request.values_of("amount")
     deduction = _chosen(request)
+    context = amount.introduce_references(request, goal_values, REFERENCE, deduction.references)
+    matched = amount.pairs(goal_values)
     items = [
         fill(
             deduction.relation.cubes,
             {"color": _shade(shade), "number": _pointer(request, number)},
         )
-        for (shade, _), number in zip(amount.pairs(goal_values), deduction.references, strict=True)
+        for (shade, _), number in zip(matched, deduction.references, strict=True)
     ]
-    context = amount.introduce_references(request, goal_values, REFERENCE, deduction.references)
-    return Derived(context, amount.amounts(items), _notes(deduction))
+    fields = amount.amounts(items)
+    if len(matched) > 1:
+        fields[AMOUNT_FIELD] = _of_each(request, goal_values, deduction)
+    return Derived(context, fields, _notes(deduction))
+
+
+def _of_each(
+    request: InstructionRequest, goal_values: tuple[GoalValue, ...], deduction: Deduction
+) -> Phrase:
+    """Return ``half as many of each``; resolved, ``of each as six red and four blue cubes``."""
+    relation, colors = deduction.relation, amount.all_colors(goal_values)
+    if not request.resolved:
+        return fill(relation.each, {"number": anaphor("of each", "each", "colors", colors)})
+    quantities = amount.references(goal_values, REFERENCE, deduction.references)
+    named = "".join(piece.text for piece in quantities)
+    words = f"of each {relation.than} {named}"
+    return fill(relation.each, {"number": antecedent(words, "colors", colors)})
 
 
 def _shade(goal_value: GoalValue) -> Phrase:
@@ -128,4 +137,3 @@ def _shade(goal_value: GoalValue) -> Phrase:
 
 TIMES = Pattern(lambda request: _possible(request, "number"), _times)
 AMOUNTS = Pattern(lambda request: _possible(request, "amount"), _amounts)
-VISIT = Pattern(lambda request: _possible(request, "visit"), _visit)

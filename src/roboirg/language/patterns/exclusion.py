@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import itertools
 
-from roboirg.language import templates
 from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, sentences
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.slot_types import described
+from roboirg.language.templates import derivations
 
 
 def _exclude(request: InstructionRequest) -> Derived:
@@ -17,22 +17,23 @@ def _exclude(request: InstructionRequest) -> Derived:
     others = request.other_colors(target.color)
     pair = request.sampler.pick("pair", list(itertools.permutations(others)))
     both = " and ".join(pair)
-    named = antecedent(both, REFERENCE, both)
-    template = request.sampler.pick("pair introduction", templates.PAIR_INTRODUCTIONS)
-    context = [fill(template, {"pair": named})]
+    template = request.pick("pair introduction", derivations.PAIR_INTRODUCTIONS)
+    context = [fill(template, {"pair": antecedent(both, REFERENCE, both)})]
     counted = bool(request.values_of("amount"))
-    anaphors = templates.AMOUNT_PAIR_ANAPHORS if counted else templates.PAIR_ANAPHORS
-    word = request.sampler.pick("pair anaphor", anaphors)
-    reference = named if request.resolved else anaphor(word, "pair", REFERENCE, both)
-    options = templates.AMOUNT_EXCLUSIONS if counted else templates.EXCLUSIONS
-    exclusion = request.sampler.pick("exclusion", options)
+    word = request.sampler.pick("pair anaphor", derivations.PAIR_ANAPHORS)
+    reference = (
+        antecedent(" nor ".join(pair), REFERENCE, both)
+        if request.resolved
+        else anaphor(word, "pair", REFERENCE, both)
+    )
+    exclusions = derivations.AMOUNT_EXCLUSIONS if counted else derivations.EXCLUSIONS
+    exclusion = request.pick("exclusion", exclusions)
     things = [_thing(request, target, exclusion, {"pair": reference})]
     patterns = ["color exclusion"]
     for goal_value in rest:
         context.append(_singled(request, goal_value, pair))
-        options = templates.AMOUNT_COMPLEMENTS if counted else templates.COMPLEMENTS
-        complement = request.sampler.pick("complement", options)
-        other = _other(request, goal_value, pair, word)
+        complement = derivations.AMOUNT_COMPLEMENT if counted else derivations.COMPLEMENT
+        other = _other(request, goal_value, pair)
         things.append(_thing(request, goal_value, complement, {"other": other}))
         patterns.append("contextual logic")
     return Derived(sentences(context), described(request, things), {"patterns": patterns})
@@ -49,19 +50,16 @@ def _thing(
 def _singled(request: InstructionRequest, goal_value: GoalValue, pair: tuple[str, ...]) -> Phrase:
     """Return a remark that chooses the color of the pair that is not meant."""
     chosen = _rejected(goal_value, pair)
-    remark = request.sampler.pick("singled introduction", templates.SINGLED_INTRODUCTIONS)
+    remark = request.pick("singled introduction", derivations.SINGLED_INTRODUCTIONS)
     return fill(remark, {"single": antecedent(chosen, REFERENCE, chosen)})
 
 
-def _other(
-    request: InstructionRequest, goal_value: GoalValue, pair: tuple[str, ...], word: str
-) -> Phrase:
+def _other(request: InstructionRequest, goal_value: GoalValue, pair: tuple[str, ...]) -> Phrase:
     """Return the command's words for the other color of the pair."""
     if request.resolved:
-        words = f"the color of {' and '.join(pair)} that is not {_rejected(goal_value, pair)}"
+        words = f"{' or '.join(pair)}, not {_rejected(goal_value, pair)}"
         return antecedent(words, goal_value.slot, goal_value.value)
-    words = f"the color of {word} that I did not choose"
-    return anaphor(words, "other", goal_value.slot, goal_value.value)
+    return anaphor("the other of those colors", "other", goal_value.slot, goal_value.value)
 
 
 def _rejected(goal_value: GoalValue, pair: tuple[str, ...]) -> str:

@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.language import templates
-from roboirg.language.phrases import Phrase, fill, plain, sentences
+from roboirg.language.phrases import Phrase, fill, plain
 from roboirg.language.request import (
     DISTRACTORS,
     STAGE_SETS,
@@ -19,6 +18,7 @@ from roboirg.language.request import (
 from roboirg.language.setting import Instruct, Setting
 from roboirg.language.settings import direct
 from roboirg.language.slot_types import slot_types_in
+from roboirg.language.templates import remarks
 
 REINFORCEMENT, DISTRACTOR, CUE = 2, 3, 4
 """Numbers of the stages between introduction and command."""
@@ -33,28 +33,27 @@ def say(request: InstructionRequest) -> InstructionSpec:
     utterances = [direct.introduction(request)]
     if REINFORCEMENT in options.stages:
         utterances.append(reinforcement(request))
-    remarks = distractors(request) if DISTRACTOR in options.stages else ()
-    utterances += [UtteranceSpec("distractor", phrase) for phrase, _ in remarks]
+    distracting = distractors(request) if DISTRACTOR in options.stages else ()
+    utterances += [UtteranceSpec("distractor", phrase) for phrase, _ in distracting]
     if CUE in options.stages:
-        cue = request.sampler.pick("cue", templates.CUES)
+        cue = request.pick("cue", remarks.CUES)
         utterances.append(UtteranceSpec("cue", plain(cue)))
     command = direct.command(request)
     utterances.append(command)
     notes: dict[str, object] = {"stages": list(options.stages)}
-    if remarks:
+    if distracting:
         notes |= {"distractor": options.distractor, "distractors": options.distractors}
-        notes["recency_rival"] = remarks[-1].thing if _says_it(command) else None
+        notes["recency_rival"] = distracting[-1].thing if _says_it(command) else None
     return InstructionSpec(tuple(utterances), notes)
 
 
 def reinforcement(request: InstructionRequest) -> UtteranceSpec:
-    """Return one more remark on each referent, in the order of the introduction."""
-    remarks: list[Phrase] = []
-    for slot_type, goal_values in slot_types_in(request):
-        template = request.sampler.pick(f"{slot_type.name} reinforcement", slot_type.reinforcements)
-        pointing = slot_type.pointing(request, goal_values)
-        remarks.append(fill(template, {"ref": pointing}, plural=slot_type.plural(goal_values)))
-    return UtteranceSpec("reinforcement", sentences(remarks))
+    """Return one more remark on one of the referents."""
+    slot_type, goal_values = request.sampler.pick("reinforced", [*slot_types_in(request)])
+    template = request.pick(f"{slot_type.name} reinforcement", slot_type.reinforcements)
+    pointing = slot_type.pointing(request, goal_values)
+    remark = fill(template, {"ref": pointing}, plural=slot_type.plural(goal_values))
+    return UtteranceSpec("reinforcement", remark)
 
 
 class _Distractor(NamedTuple):
@@ -76,17 +75,17 @@ def _says_it(command: UtteranceSpec) -> bool:
 
 def _neutral(request: InstructionRequest) -> Iterator[_Distractor]:
     # The order stays the same in each cycle, so that repetitions are as far apart as possible.
-    for remark in request.sampler.cycle("distractor", templates.NEUTRAL_DISTRACTORS):
+    for remark in request.sampler.cycle("distractor", remarks.NEUTRAL_DISTRACTORS.of(request.pool)):
         yield _Distractor(plain(remark.text), remark.thing)
 
 
 def _competing(request: InstructionRequest) -> Iterator[_Distractor]:
-    remarks = [
+    competing = [
         _Distractor(remark, None)
         for slot_type, goal_values in slot_types_in(request)
         for remark in slot_type.competing(request, goal_values)
     ]
-    return request.sampler.cycle("competing distractor", remarks)
+    return request.sampler.cycle("competing distractor", competing)
 
 
 def _pairing_rules(instruct: Instruct) -> Iterator[str]:

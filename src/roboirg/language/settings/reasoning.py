@@ -53,8 +53,15 @@ def say(request: InstructionRequest) -> InstructionSpec:
 
 
 def _hidden_slots(instruction: Instruction, goal: Goal) -> frozenset[str]:
-    """Return the slots of the goal that the episode's pattern derives."""
-    return frozenset(goal.as_mapping()) & _DERIVED[str(instruction.metadata["pattern"])]
+    """Return the slots of the goal that the episode's pattern derives, or its words point at."""
+    last = len(instruction.utterances) - 1
+    pointed = {
+        mention.slot
+        for mention in instruction.mentions
+        if mention.utterance == last and mention.role == "anaphor"
+    }
+    derived = _DERIVED[str(instruction.metadata["pattern"])]
+    return frozenset(goal.as_mapping()) & (derived | pointed)
 
 
 SETTING = Setting(

@@ -7,11 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from roboirg.core.motions import Swap
-from roboirg.language import templates
 from roboirg.language.instruction import Expression
-from roboirg.language.landmarks import FRAMES, Landmark, landmarks
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain, sentences
+from roboirg.language.landmarks import FRAMES, SIMPLE, Landmark, landmarks
+from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed
 from roboirg.language.request import (
     COLOR_SLOTS,
     GoalValue,
@@ -22,29 +20,43 @@ from roboirg.language.request import (
 from roboirg.language.setting import Setting
 from roboirg.language.settings.explicit import stated
 from roboirg.language.slot_types import described
+from roboirg.language.templates import introductions
 
-POINTING: Mapping[int, tuple[tuple[str, Expression], ...]] = {
+Pointer = tuple[str, Expression]
+POINTING: Mapping[int, tuple[Pointer, ...]] = {
     1: (("there", "there"),),
-    2: (("at the former place", "former"), ("at the latter place", "latter")),
-    3: (
-        ("at the first place", "first"),
-        ("at the second place", "second"),
-        ("at the third place", "third"),
-    ),
+    2: (("the former", "former"), ("the latter", "latter")),
+    3: (("the first", "first"), ("the second", "second"), ("the third", "third")),
 }
+LONGEST = {1: 12, 2: 6, 3: 5}
+"""The length that a landmark should have beside others, in `_length`; see `templates`."""
 
 
-def usable(request: InstructionRequest, goal_value: GoalValue) -> tuple[Landmark, ...]:
-    """Return the landmarks of the best class that locate a thing of this color."""
-    thing = request.task.commands.thing
-    scene = request.episode.scene
+def usable(request: InstructionRequest, goal_value: GoalValue) -> Mapping[int, list[Landmark]]:
+    """Return the landmarks that may locate a thing of this color, by class.
+
+    These are the short ones of simple classes; or if there are none, the shortest one of a simple
+    class, or of any other class.
+    """
     found = [
         landmark
-        for target in request.targets(goal_value)
-        for landmark in landmarks(scene, thing, target, request.frame)
+        for target in request.pointed(goal_value)
+        for landmark in landmarks(
+            request.episode.scene, request.task.commands.pointed, target, request.frame
+        )
     ]
-    best = min((landmark.level for landmark in found), default=0)
-    return tuple(landmark for landmark in found if landmark.level == best)
+    simple = [one for one in found if one.level <= SIMPLE]
+    limit = LONGEST[len(request.color_values)]
+    short = [one for one in simple if _length(one) <= limit]
+    possible = short or sorted(simple or found, key=_length)[:1]
+    levels = sorted({one.level for one in possible})
+    return {level: [one for one in possible if one.level == level] for level in levels}
+
+
+def _length(landmark: Landmark) -> int:
+    """Return the number of words, and of those that most tokenizers split once more."""
+    words = landmark.phrase.split()
+    return len(words) + 2 * words.count("farthest") + words.count("cube")
 
 
 def refusal(request: InstructionRequest) -> str | None:
@@ -57,18 +69,11 @@ def refusal(request: InstructionRequest) -> str | None:
 def say(request: InstructionRequest) -> InstructionSpec:
     """Return an introduction with a landmark for each color, and a command that points there."""
     colors = request.color_values
-    chosen = [
-        request.sampler.pick(f"landmark-{color.field}", usable(request, color)) for color in colors
+    chosen = [_drawn(request, color) for color in colors]
+    things = [
+        _pointed(request, color, landmark, pointer)
+        for color, landmark, pointer in zip(colors, chosen, POINTING[len(colors)], strict=True)
     ]
-    things: list[Phrase] = []
-    pointing = POINTING[len(colors)]
-    for color, landmark, (words, expression) in zip(colors, chosen, pointing, strict=True):
-        place = (
-            antecedent(landmark.phrase, color.slot, color.value)
-            if request.resolved
-            else anaphor(words, expression, color.slot, color.value)
-        )
-        things.append(request.by_place(color, place, plural=request.count_of(color) > 1))
     fields = stated(request) | described(request, things)
     utterances = (
         introduction(request, colors, chosen),
@@ -82,26 +87,43 @@ def say(request: InstructionRequest) -> InstructionSpec:
     return InstructionSpec(utterances, notes)
 
 
+def _drawn(request: InstructionRequest, color: GoalValue) -> Landmark:
+    """Draw the class first, or most landmarks would be extremes."""
+    classes = usable(request, color)
+    level = request.sampler.pick(f"landmark class-{color.field}", list(classes))
+    return request.sampler.pick(f"landmark-{color.field}", classes[level])
+
+
+def _pointed(
+    request: InstructionRequest, color: GoalValue, landmark: Landmark, pointer: Pointer
+) -> Phrase:
+    """Return the command's words for a thing, which name its place or point at it."""
+    words, expression = pointer
+    several = expression != "there"
+    ranked = several and request.task.commands.by_rank is not None
+    if request.resolved:
+        named = f"the one {landmark.phrase}" if ranked else landmark.phrase
+        place = antecedent(named, color.slot, color.value)
+    else:
+        words = f"at {words} place" if several and not ranked else words
+        place = anaphor(words, expression, color.slot, color.value)
+    return request.by_place(color, place, plural=request.count_of(color) > 1, ranked=ranked)
+
+
 def introduction(
     request: InstructionRequest, colors: Sequence[GoalValue], chosen: Sequence[Landmark]
 ) -> UtteranceSpec:
-    """Name the places; say where needed whose left and right is meant, and at what time."""
-    noun = plain(f"the {request.task.commands.thing} ")
-    things: list[Phrase] = [
-        (*noun, *antecedent(landmark.phrase, color.slot, color.value))
-        for color, landmark in zip(colors, chosen, strict=True)
-    ]
-    if not any(landmark.sided for landmark in chosen):
-        purpose, options = "place introduction", templates.PLACE_INTRODUCTIONS
-    elif request.frame == "robot":
-        purpose, options = "sided place introduction", templates.SIDED_PLACE_INTRODUCTIONS
-    else:
-        purpose, options = "camera place introduction", templates.CAMERA_PLACE_INTRODUCTIONS
-    template = request.sampler.pick(purpose, options)
-    remarks = [fill(template, {"things": listed(things)}, plural=len(things) > 1)]
-    if any(isinstance(motion, Swap) for motion in request.episode.scene.motions):
-        remarks.append(plain(request.sampler.pick("moved", templates.MOVED_INTRODUCTIONS)))
-    return UtteranceSpec("introduction", sentences(remarks))
+    """Name the places."""
+    several = len(chosen) > 1
+    places = listed(
+        [
+            antecedent(landmark.phrase, color.slot, color.value)
+            for color, landmark in zip(colors, chosen, strict=True)
+        ]
+    )
+    things = fill(request.task.commands.things_at, {"place": places}, plural=several)
+    template = request.pick("place introduction", introductions.PLACE_INTRODUCTIONS)
+    return UtteranceSpec("introduction", fill(template, {"things": things}, plural=several))
 
 
 SETTING = Setting(

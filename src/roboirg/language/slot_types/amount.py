@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from roboirg.language import templates
 from roboirg.language.instruction import Expression
 from roboirg.language.number_words import cardinal
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain
 from roboirg.language.request import AMOUNT_FIELD, GoalValue, InstructionRequest
 from roboirg.language.slot_types import color, number
 from roboirg.language.slot_types.slot_type import Fields, SlotType
+from roboirg.language.templates import introductions, remarks
 
 
 def pairs(goal_values: tuple[GoalValue, ...]) -> tuple[tuple[GoalValue, GoalValue], ...]:
@@ -46,13 +46,19 @@ def _count(goal_value: GoalValue) -> Phrase:
 
 
 def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
-    """Return ``two red cubes and one blue cube``."""
-    things = [cubes(shade, count.number) for shade, count in pairs(goal_values)]
+    """Return ``two red cubes and one blue cube``, ``two red, one blue and one green cube``."""
+    matched = pairs(goal_values)
+    things = [cubes(shade, count.number) for shade, count in matched]
+    if len(matched) > 2:  # noqa: PLR2004 - the noun of many stands at the end
+        things[:-1] = [_color(shade) for shade, _ in matched[:-1]]
     return _described(request, goal_values, things)
 
 
 def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
-    """Return ``that many of them``, or ``that many of the former and that many of the latter``."""
+    """Return ``that many of them``, or ``exactly those`` for several colors.
+
+    The parts of a command from outside are ``that many of the former`` and so on.
+    """
     matched = pairs(goal_values)
     them: tuple[tuple[str, Expression], ...] = (("them", "them"),)
     pointers = them if len(matched) == 1 else color.REDUCED[len(matched)]
@@ -63,7 +69,15 @@ def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) ->
         )
         for (shade, count), (words, expression) in zip(matched, pointers, strict=True)
     ]
-    return amounts([(*item, *_after(request, at)) for at, item in enumerate(items)])
+    fields = amounts([(*item, *_after(request, at)) for at, item in enumerate(items)])
+    if len(matched) > 1:
+        fields[AMOUNT_FIELD] = anaphor("exactly those", "them", "colors", all_colors(goal_values))
+    return fields
+
+
+def all_colors(goal_values: Sequence[GoalValue]) -> str:
+    """Return ``red and green``, the value of a mention of several colors."""
+    return " and ".join(one.color for one in goal_values if one.slot == "colors")
 
 
 def _after(request: InstructionRequest, index: int) -> Phrase:
@@ -73,13 +87,16 @@ def _after(request: InstructionRequest, index: int) -> Phrase:
 
 
 def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
-    template = request.sampler.pick("amount introduction", templates.AMOUNT_INTRODUCTIONS)
+    template = request.pick("amount introduction", introductions.AMOUNT_INTRODUCTIONS)
     # "One of the red cubes": "them" then also fits a count of one.
-    things = [
-        (*_count(count), *plain(" of the "), *cubes(shade, 2))
-        for shade, count in pairs(goal_values)
-    ]
+    *others, last = pairs(goal_values)
+    things = [(*_count(count), *plain(" of the "), *_color(shade)) for shade, count in others]
+    things.append((*_count(last[1]), *plain(" of the "), *cubes(last[0], 2)))
     return fill(template, {"things": listed(things)})
+
+
+def _color(shade: GoalValue) -> Phrase:
+    return antecedent(shade.color, shade.slot, shade.value)
 
 
 def introduce_references(
@@ -89,12 +106,20 @@ def introduce_references(
     quantities: Sequence[int],
 ) -> Phrase:
     """Return a sentence that names a reference quantity for each color."""
-    purpose, options = "reference amounts", templates.REFERENCE_AMOUNT_INTRODUCTIONS
-    things = [
-        amount(antecedent(cardinal(quantity), slot, quantity), cubes(shade, quantity))
-        for (shade, _), quantity in zip(pairs(goal_values), quantities, strict=True)
-    ]
-    return fill(request.sampler.pick(purpose, options), {"things": listed(things)})
+    template = request.pick("reference amounts", introductions.REFERENCE_AMOUNT_INTRODUCTIONS)
+    return fill(template, {"things": references(goal_values, slot, quantities)})
+
+
+def references(goal_values: tuple[GoalValue, ...], slot: str, quantities: Sequence[int]) -> Phrase:
+    """Return ``six red and four blue cubes``, whose numbers only lead to the goal."""
+    shades = [shade for shade, _ in pairs(goal_values)]
+    nouns = [*map(_color, shades[:-1]), cubes(shades[-1], quantities[-1])]
+    return listed(
+        [
+            amount(antecedent(cardinal(quantity), slot, quantity), noun)
+            for quantity, noun in zip(quantities, nouns, strict=True)
+        ]
+    )
 
 
 def _pointing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
@@ -126,7 +151,7 @@ AMOUNT = SlotType(
     introduce=_introduce,
     pointing=_pointing,
     plural=lambda _parts: True,
-    reinforcements=templates.COLOR_REINFORCEMENTS,
+    reinforcements=remarks.COLOR_REINFORCEMENTS,
     competing=_competing,
     described=_described,
 )

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from roboirg.language import templates
 from roboirg.language.instruction import Expression
 from roboirg.language.number_words import plural
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_remarks
+from roboirg.language.templates import introductions, remarks
 
 REDUCED: Mapping[int, tuple[tuple[str, Expression], ...]] = {
     1: (("it", "it"),),
@@ -46,8 +46,10 @@ def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) ->
 
 
 def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
-    template = request.sampler.pick("color introduction", templates.COLOR_INTRODUCTIONS)
-    things = listed([named(request, goal_value) for goal_value in goal_values])
+    template = request.pick("color introduction", introductions.COLOR_INTRODUCTIONS)
+    *others, last = goal_values
+    shades = [antecedent(f"the {one.color}", one.slot, one.value) for one in others]
+    things = listed([*shades, named(request, last)])
     return fill(template, {"things": things}, plural=len(goal_values) > 1)
 
 
@@ -68,7 +70,8 @@ def those(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Ph
 def competing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> list[Phrase]:
     """Return remarks that name other colors."""
     colors = request.task.commands.colors
-    return competing_remarks(templates.COMPETING_COLOR_DISTRACTORS, colors, str, goal_values)
+    sentences = remarks.COMPETING_COLOR_DISTRACTORS.of(request.pool)
+    return competing_remarks(sentences, colors, str, goal_values)
 
 
 def _described(
@@ -83,7 +86,7 @@ COLOR = SlotType(
     reduced=_reduced,
     introduce=_introduce,
     pointing=_pointing,
-    reinforcements=templates.COLOR_REINFORCEMENTS,
+    reinforcements=remarks.COLOR_REINFORCEMENTS,
     competing=competing,
     described=_described,
 )

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from roboirg.language import templates
+from roboirg.core.word_pools import Pools
 from roboirg.language.number_words import cardinal, times
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_remarks
+from roboirg.language.templates import introductions, remarks
 
 COMPETING_NUMBERS = tuple(range(1, 11))
 """The numbers that a competing remark may name."""
+SAME_NUMBER = Pools(
+    train=("just as often", "exactly as often"), test=("equally often", "just that often")
+)
+"""Words that fit once, too."""
 
 
 def _stated(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
@@ -20,10 +25,11 @@ def _stated(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) ->
     }
 
 
-def _reduced(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
-    """Return ``that many times``."""
+def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+    """Return ``just as often``."""
+    words = request.pick("same number", SAME_NUMBER)
     return {
-        goal_value.field: anaphor("that many times", "that", goal_value.slot, goal_value.value)
+        goal_value.field: anaphor(words, "that", goal_value.slot, goal_value.value)
         for goal_value in goal_values
     }
 
@@ -34,17 +40,17 @@ def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) 
 
 def introduce_quantity(request: InstructionRequest, slot: str, quantity: int) -> Phrase:
     """Return a sentence that names a quantity."""
-    template = request.sampler.pick("number introduction", templates.NUMBER_INTRODUCTIONS)
-    return fill(template, {"number": antecedent(cardinal(quantity), slot, quantity)})
+    template = request.pick("number introduction", introductions.NUMBER_INTRODUCTIONS)
+    return fill(template, {"times": antecedent(times(quantity), slot, quantity)})
 
 
 def _pointing(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
     return anaphor("that number", "that", goal_values[0].slot, goal_values[0].value)
 
 
-def competing(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> list[Phrase]:
+def competing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> list[Phrase]:
     """Return remarks that name other numbers."""
-    sentences = templates.COMPETING_NUMBER_DISTRACTORS
+    sentences = remarks.COMPETING_NUMBER_DISTRACTORS.of(request.pool)
     return competing_remarks(
         sentences, COMPETING_NUMBERS, lambda value: cardinal(int(value)), goal_values
     )
@@ -56,6 +62,6 @@ NUMBER = SlotType(
     reduced=_reduced,
     introduce=_introduce,
     pointing=_pointing,
-    reinforcements=templates.NUMBER_REINFORCEMENTS,
+    reinforcements=remarks.NUMBER_REINFORCEMENTS,
     competing=competing,
 )

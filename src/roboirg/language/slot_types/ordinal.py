@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import re
+
 from roboirg.core.motions import Shuttle
-from roboirg.language import templates
 from roboirg.language.number_words import ordinal
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain
+from roboirg.language.phrases import Phrase, anaphor, antecedent, fill
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_remarks
+from roboirg.language.templates import introductions, remarks
 
 INTRODUCTIONS = {
-    "visit": templates.VISIT_INTRODUCTIONS,
-    "placement": templates.PLACEMENT_INTRODUCTIONS,
+    "visit": introductions.VISIT_INTRODUCTIONS,
+    "placement": introductions.PLACEMENT_INTRODUCTIONS,
 }
-WRAPPED = {"visit": "{which}", "placement": "the target of {which}"}
+WRAPPED = {"visit": "during {which}", "placement": "the target of {which}"}
 """The command's field around the words for the element of the series."""
 OUTSIDE_NOUNS = ("visit", "placement", "time", "pass", "occasion")
 """Nouns for an element in the words of others that may follow *that*."""
 OWNERS = {"visit": "its", "placement": "the"}
 """The determiner; *its placement* would give the cube away, as only one was placed."""
+INTRODUCED_OWNERS = {"visit": "the cube's", "placement": "the"}
+"""The same before anything is named."""
 VISITS = (1, 2, 3, 4, 5)
 PLACEMENTS = (1, 2, 3, 4)
 """The positions that a competing remark may name."""
@@ -49,13 +53,14 @@ def wrapped(request: InstructionRequest, goal_value: GoalValue, which: Phrase) -
 def _wrapping(request: InstructionRequest, goal_value: GoalValue) -> str:
     """Return the words around an element; none if words from outside name just the element."""
     outside = request.outside_phrase(goal_value.field)
-    if outside is not None and outside.core.split()[-1] in OUTSIDE_NOUNS:
+    stays = goal_value.slot_type == "visit"  # so does its preposition
+    if outside is not None and (stays or outside.core.split()[-1] in OUTSIDE_NOUNS):
         return "{which}"
     return WRAPPED[goal_value.slot_type]
 
 
 def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
-    """Return ``its third visit``, ``the second placement``."""
+    """Return ``during its third visit``, ``the target of the second placement``."""
     (goal_value,) = goal_values
     words = f"{OWNERS[goal_value.slot_type]} {ordinal(goal_value.number)} {goal_value.slot_type}"
     return wrapped(request, goal_value, antecedent(words, goal_value.slot, goal_value.value))
@@ -83,17 +88,24 @@ def introduce_position(
     request: InstructionRequest, goal_value: GoalValue, slot: str, position: int
 ) -> Phrase:
     """Return a sentence that names an element of the series."""
-    template = request.sampler.pick(
+    template = request.pick(
         f"{goal_value.slot_type} introduction", INTRODUCTIONS[goal_value.slot_type]
     )
-    which = antecedent(f"the {ordinal(position)} {goal_value.slot_type}", slot, position)
+    words = f"{INTRODUCED_OWNERS[goal_value.slot_type]} {ordinal(position)} {goal_value.slot_type}"
+    which = antecedent(words, slot, position)
     return fill(template, {"which": which})
 
 
-def by_number(request: InstructionRequest, goal_value: GoalValue, value: Phrase) -> Fields:
-    """Return ``the visit whose number is ...``."""
-    words = plain(f"the {series_noun(request, goal_value)} whose number is ")
-    return wrapped(request, goal_value, (*words, *value))
+def counted(request: InstructionRequest, goal_value: GoalValue, template: str) -> str:
+    """Return ``one visit earlier than {reference}``, which takes the place of ``during ...``.
+
+    Words from outside keep their preposition: ``the time one earlier than {reference}``.
+    """
+    if request.outside_phrase(goal_value.field) is None:
+        noun = goal_value.slot_type
+        nouns = {"{noun}": f"{noun} ", "{nouns}": f"{noun}s "}
+        return re.sub(r"{nouns?}", lambda field: nouns[field[0]], template)
+    return f"the {series_noun(request, goal_value)} {re.sub(r'{nouns?}', '', template)}"
 
 
 def _pointing(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
@@ -102,17 +114,17 @@ def _pointing(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) 
 
 
 def _visit_competing(
-    _request: InstructionRequest, goal_values: tuple[GoalValue, ...]
+    request: InstructionRequest, goal_values: tuple[GoalValue, ...]
 ) -> list[Phrase]:
-    return competing_remarks(templates.COMPETING_VISIT_DISTRACTORS, VISITS, _word, goal_values)
+    sentences = remarks.COMPETING_VISIT_DISTRACTORS.of(request.pool)
+    return competing_remarks(sentences, VISITS, _word, goal_values)
 
 
 def _placement_competing(
-    _request: InstructionRequest, goal_values: tuple[GoalValue, ...]
+    request: InstructionRequest, goal_values: tuple[GoalValue, ...]
 ) -> list[Phrase]:
-    return competing_remarks(
-        templates.COMPETING_PLACEMENT_DISTRACTORS, PLACEMENTS, _word, goal_values
-    )
+    sentences = remarks.COMPETING_PLACEMENT_DISTRACTORS.of(request.pool)
+    return competing_remarks(sentences, PLACEMENTS, _word, goal_values)
 
 
 def _word(value: str | int) -> str:
@@ -125,7 +137,7 @@ VISIT = SlotType(
     reduced=_reduced,
     introduce=_introduce,
     pointing=_pointing,
-    reinforcements=templates.VISIT_REINFORCEMENTS,
+    reinforcements=remarks.VISIT_REINFORCEMENTS,
     competing=_visit_competing,
 )
 PLACEMENT = SlotType(
@@ -134,6 +146,6 @@ PLACEMENT = SlotType(
     reduced=_reduced,
     introduce=_introduce,
     pointing=_pointing,
-    reinforcements=templates.VIDEO_REINFORCEMENTS,
+    reinforcements=remarks.VIDEO_REINFORCEMENTS,
     competing=_placement_competing,
 )

@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from roboirg.language import templates
 from roboirg.language.instruction import Expression
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_remarks
+from roboirg.language.templates import derivations, introductions, remarks
 
 EXPRESSIONS: dict[str, Expression] = {"at that moment": "that", "then": "then"}
 
 
 def placed(request: InstructionRequest, goal_value: GoalValue, moment: Phrase) -> Fields:
-    """Return ``the target where a cube was placed ...``.
+    """Return ``the target used ...``.
 
     Not *it*: only one cube is placed in the video, so *it* would give the cube away.
     """
     if request.outside_phrase(goal_value.field) is None:
-        moment = (*plain("the target where a cube was placed "), *moment)
+        moment = (*plain("the target used "), *moment)
     return {goal_value.field: request.around(goal_value.field, moment)}
 
 
 def named(goal_value: GoalValue) -> Phrase:
     """Return ``right before the button press``."""
-    return antecedent(templates.MOMENTS[str(goal_value.value)], goal_value.slot, goal_value.value)
+    return antecedent(derivations.MOMENTS[str(goal_value.value)], goal_value.slot, goal_value.value)
 
 
 def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
@@ -33,13 +33,13 @@ def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> 
 def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
     """Return ``at that moment``, or ``then``."""
     (goal_value,) = goal_values
-    words = request.sampler.pick("moment anaphor", templates.MOMENT_ANAPHORS)
+    words = request.sampler.pick("moment anaphor", derivations.MOMENT_ANAPHORS)
     moment = anaphor(words, EXPRESSIONS[words], goal_value.slot, goal_value.value)
     return placed(request, goal_value, moment)
 
 
 def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
-    template = request.sampler.pick("moment introduction", templates.MOMENT_INTRODUCTIONS)
+    template = request.pick("moment introduction", introductions.MOMENT_INTRODUCTIONS)
     return fill(template, {"moment": named(goal_values[0])})
 
 
@@ -47,11 +47,11 @@ def _pointing(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) 
     return anaphor("that moment", "that", goal_values[0].slot, goal_values[0].value)
 
 
-def _competing(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> list[Phrase]:
-    values = tuple(templates.MOMENTS)
-    sentences = templates.COMPETING_MOMENT_DISTRACTORS
+def _competing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> list[Phrase]:
+    values = tuple(derivations.MOMENTS)
+    sentences = remarks.COMPETING_MOMENT_DISTRACTORS.of(request.pool)
     return competing_remarks(
-        sentences, values, lambda value: templates.MOMENTS[str(value)], goal_values
+        sentences, values, lambda value: derivations.MOMENTS[str(value)], goal_values
     )
 
 
@@ -61,6 +61,6 @@ RELATION = SlotType(
     reduced=_reduced,
     introduce=_introduce,
     pointing=_pointing,
-    reinforcements=templates.VIDEO_REINFORCEMENTS,
+    reinforcements=remarks.VIDEO_REINFORCEMENTS,
     competing=_competing,
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from roboirg.core.word_pools import Pools
 from roboirg.language.phrases import Phrase, fill, plain
 from roboirg.language.request import GoalValue, InstructionRequest, SlotTypeName
 
@@ -34,7 +35,7 @@ class SlotType:
     reduced: Callable[[InstructionRequest, tuple[GoalValue, ...]], Fields]
     introduce: Callable[[InstructionRequest, tuple[GoalValue, ...]], Phrase]
     pointing: Callable[[InstructionRequest, tuple[GoalValue, ...]], Phrase]
-    reinforcements: tuple[str, ...]
+    reinforcements: Pools[str]
     competing: Callable[[InstructionRequest, tuple[GoalValue, ...]], list[Phrase]]
     plural: Callable[[tuple[GoalValue, ...]], bool] = lambda goal_values: len(goal_values) > 1
     described: (

@@ -30,7 +30,8 @@ _RANKS = ("first", "second", "third")
 
 def find_leaks(instruction: Instruction, goal: Goal) -> frozenset[str]:
     """Return the words and landmarks of an implicit command that give a hidden value away."""
-    words = frozenset(re.findall(r"[a-z0-9]+", _without_ranks(instruction).lower()))
+    text = _without_ranks(instruction).lower().replace("before or after", "")
+    words = frozenset(re.findall(r"[a-z0-9]+", text))
     hidden = all_settings()[instruction.setting].hidden_slots(instruction, goal)
     words -= _template_words(instruction, hidden)
     found = [words & _spellings(goal[slot]) for slot in hidden]

@@ -52,7 +52,8 @@ def without_references(instruction: Instruction) -> str:
     text = instruction.command
     for mention in reversed(_command_mentions(instruction)):
         text = f"{text[: mention.start]}@{text[mention.end :]}"
-    return re.sub(r"@ (up|down)\b", r"\1 @", text)  # "pick it up", "pick up the red cube"
+    text = re.sub(r"@ (up|down)\b", r"\1 @", text)  # "pick it up", "pick up the red cube"
+    return re.sub(r"@(?:(?:,| and|) @)+", "@", text)  # "exactly those", "two red cubes and one ..."
 
 
 def _command_mentions(instruction: Instruction) -> list[Mention]:

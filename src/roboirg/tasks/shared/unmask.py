@@ -22,6 +22,7 @@ from roboirg.core.episode import (
 )
 from roboirg.core.errors import SceneRejectedError
 from roboirg.core.motions import Away, Point
+from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.placement import Circle, Footprint, Rectangle, Region, place
 from roboirg.tasks.task import Commands, Wording
 
@@ -160,12 +161,26 @@ def press_stage(expects: Condition, button: str, which: str = "button") -> Stage
     )
 
 
-def commands(*wordings: Wording) -> Commands:
-    """Return the commands of an Unmask task, which refer to the container over a cube."""
+def hidden_commands(wordings: Pools[Wording]) -> Commands:
+    """Return the commands of a task in which the containers stand when the words are said."""
     return Commands(
         thing="container",
-        by_color="the container that hides {cube}",
+        by_color="the container over {cube}",
         by_place="the container {place}",
+        pointed="container",
+        things_at="the container[|s] {place}",
+        patterns=("color exclusion",),
+        wordings=wordings,
+    )
+
+
+def seen_commands(wordings: Pools[Wording]) -> Commands:
+    """Return the commands of a task in which only the cubes are there when the words are said."""
+    return Commands(
+        thing="container",
+        by_color="the container over {cube}",
+        by_place="the container over the cube {place}",
+        pointed="hidden_cube",
         patterns=("color exclusion",),
         wordings=wordings,
     )

@@ -1,0 +1,204 @@
+"""Words of the reasoning setting: what the context names, and how the goal follows from it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from roboirg.core.word_pools import Pools
+
+PAIR_INTRODUCTIONS = Pools(
+    train=(
+        "I like {pair}.",
+        "My room is {pair}.",
+        "{pair} look good.",
+        "I use {pair}.",
+    ),
+    test=(
+        "{pair} suit me.",
+        "My hat is {pair}.",
+        "The flag is {pair}.",
+        "I wear {pair}.",
+    ),
+)
+SINGLED_INTRODUCTIONS = Pools(
+    train=("I prefer {single}.", "{single} is better.", "I want {single}."),
+    test=("I choose {single}.", "{single} looks better.", "{single} is best."),
+)
+EXCLUSIONS = Pools(
+    train=(
+        "the {thing} that is neither {pair}",
+        "the {thing} with neither {pair}",
+    ),
+    test=(
+        "the {thing} colored neither {pair}",
+        "the {thing} painted neither {pair}",
+    ),
+)
+AMOUNT_EXCLUSIONS = Pools(
+    train=(
+        "{thing}[|s] that [is|are] neither {pair}",
+        "{thing}[|s] with neither {pair}",
+    ),
+    test=(
+        "{thing}[|s] colored neither {pair}",
+        "{thing}[|s] painted neither {pair}",
+    ),
+)
+PAIR_ANAPHORS = ("of those", "of them")
+COMPLEMENT = "the {thing} in {other}"
+"""For the second pick: of the two excluded colors, the one that was not chosen."""
+AMOUNT_COMPLEMENT = "{thing}[|s] in {other}"
+
+MOMENTS = {"before": "right before the button press", "after": "right after the button press"}
+MOMENT_ANAPHORS = ("at that moment", "then")
+BOTH_MOMENTS = "right before and right after the button press"
+TWO_MOMENTS_INTRODUCTIONS = Pools(
+    train=(
+        "Of the moments {pair}, I prefer {single}.",
+        "Among the moments {pair}, {single} was nicer.",
+        "Of what happened {pair}, my brother liked {single}.",
+    ),
+    test=(
+        "Of the parts {pair}, I would choose {single}.",
+        "Between the parts {pair}, my sister chose {single}.",
+        "Comparing the moments {pair}, my choice is {single}.",
+    ),
+)
+NEIGHBOR_INTRODUCTIONS = Pools(
+    train=(
+        "I liked the placement {moment}.",
+        "The placement {moment} was neat.",
+        "I remember the placement {moment}.",
+    ),
+    test=(
+        "I enjoyed the placement {moment}.",
+        "The placement {moment} impressed me.",
+        "I keep thinking of the placement {moment}.",
+    ),
+)
+MOMENT_COMPLEMENT = "at the other moment"
+RESOLVED_MOMENT_COMPLEMENT = "at the other moment, not {single}"
+NEIGHBOR = "the placement just before or after {single}"
+"""Of two placements, each is the other's neighbor; *earlier* would give it away."""
+
+
+class Relation(NamedTuple):
+    """The relation of a number to a reference quantity.
+
+    Attributes:
+        name: for records.
+        times: words for a number of repetitions.
+        cubes: words for a number of cubes of a color.
+        each: words for numbers of cubes of several colors, with ``{number}`` for *each*.
+        offset: the result is ``factor * reference + offset``.
+        factor: see `offset`.
+        spells: the number that the words contain; they would give away a result of this value.
+    """
+
+    name: str
+    times: str
+    cubes: str
+    each: str
+    offset: int = 0
+    factor: float = 1.0
+    spells: int | None = None
+
+    @property
+    def than(self) -> str:
+        """The word before what a number is compared with."""
+        return "as" if self.offset == 0 else "than"
+
+    def reference(self, result: int) -> int | None:
+        """Return the quantity to introduce; None if it is no whole number."""
+        reference = (result - self.offset) / self.factor
+        return int(reference) if reference.is_integer() else None
+
+
+MAX_REFERENCE = 10
+"""The largest quantity to introduce."""
+
+RELATIONS = (
+    Relation(
+        "one fewer",
+        "one time fewer than {number}",
+        "one fewer {color} cube than {number}",
+        "one fewer {number}",
+        offset=-1,
+        spells=1,
+    ),
+    Relation(
+        "one more",
+        "one more time than {number}",
+        "one more {color} cube than {number}",
+        "one more {number}",
+        offset=1,
+        spells=1,
+    ),
+    Relation(
+        "two fewer",
+        "two fewer times than {number}",
+        "two fewer {color} cubes than {number}",
+        "two fewer {number}",
+        offset=-2,
+        spells=2,
+    ),
+    Relation(
+        "two more",
+        "two more times than {number}",
+        "two more {color} cubes than {number}",
+        "two more {number}",
+        offset=2,
+        spells=2,
+    ),
+    Relation(
+        "twice",
+        "twice as often as {number}",
+        "twice as many {color} cubes as {number}",
+        "twice as many {number}",
+        factor=2.0,
+        spells=2,
+    ),
+    Relation(
+        "half",
+        "half as often as {number}",
+        "half as many {color} cubes as {number}",
+        "half as many {number}",
+        factor=0.5,
+    ),
+)
+
+
+class Step(NamedTuple):
+    """The relation of an element of a series to a reference element.
+
+    Attributes:
+        name: for records.
+        words: words after the noun.
+        offset: from the reference to the result.
+        spells: as in `Relation`.
+    """
+
+    name: str
+    words: str
+    offset: int
+    spells: int | None = None
+
+
+STEPS = (
+    Step("right after", "right after {reference}", 1),
+    Step("right before", "right before {reference}", -1),
+    Step("two after", "two after {reference}", 2, spells=2),
+    Step("two before", "two before {reference}", -2, spells=2),
+)
+NEIGHBORS = {
+    1: Step("neighbor", "just before or after {reference}", -1),
+    2: Step("neighbor", "just before or after {reference}", 1),
+}
+"""The steps in a series of two elements, by position."""
+COUNTED_STEPS = (
+    Step("one earlier", "one {noun}earlier than {reference}", -1, spells=1),
+    Step("one later", "one {noun}later than {reference}", 1, spells=1),
+    Step("two earlier", "two {nouns}earlier than {reference}", -2, spells=2),
+    Step("two later", "two {nouns}later than {reference}", 2, spells=2),
+)
+"""The same as numbers: *one visit earlier than that*."""

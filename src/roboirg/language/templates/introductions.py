@@ -1,0 +1,131 @@
+"""Introductions: sentences that name the values of a goal, by type of slot."""
+
+from __future__ import annotations
+
+from roboirg.core.word_pools import Pools
+
+COLOR_INTRODUCTIONS = Pools(
+    train=(
+        "I like {things}.",
+        "{things} [is|are] my favorite[|s].",
+        "My daughter loves {things}.",
+        "I love {things}.",
+        "I often use {things}.",
+        "{things} [looks|look] nice.",
+    ),
+    test=(
+        "My favorite[|s] [is|are] {things}.",
+        "I am fond of {things}.",
+        "{things} caught my eye.",
+        "My son adores {things}.",
+        "I cherish {things}.",
+        "{things} [makes|make] me happy.",
+    ),
+)
+NUMBER_INTRODUCTIONS = Pools(
+    train=(
+        "The bell rang {times}.",
+        "I always knock {times}.",
+        "My phone rang {times}.",
+        "The clock struck {times}.",
+        "My dog barked {times}.",
+    ),
+    test=(
+        "The owl hooted {times}.",
+        "My alarm beeped {times}.",
+        "The train whistled {times}.",
+        "I clapped {times}.",
+        "The floor creaked {times}.",
+    ),
+)
+AMOUNT_INTRODUCTIONS = Pools(
+    train=(
+        "My daughter wants {things}.",
+        "I am thinking of {things}.",
+        "My friend needs {things}.",
+        "I promised him {things}.",
+        "Dad wants {things}.",
+    ),
+    test=(
+        "My son asked for {things}.",
+        "I have plans for {things}.",
+        "We could use {things}.",
+        "She wants {things}.",
+        "I need {things}.",
+    ),
+)
+REFERENCE_AMOUNT_INTRODUCTIONS = Pools(
+    train=(
+        "Yesterday I saw {things}.",
+        "My nephew owns {things}.",
+        "Grandpa made {things}.",
+        "I gave away {things}.",
+    ),
+    test=(
+        "My niece has {things}.",
+        "I recently bought {things}.",
+        "The picture shows {things}.",
+        "At home I have {things}.",
+    ),
+)
+"""Amounts that only lead to the goal; they may exceed the cubes on the table."""
+VISIT_INTRODUCTIONS = Pools(
+    train=(
+        "I am waiting for {which}.",
+        "My money is on {which}.",
+        "{which} matters to me.",
+        "I have my eye on {which}.",
+    ),
+    test=(
+        "I look forward to {which}.",
+        "We all await {which}.",
+        "{which} is my favorite.",
+        "I care about {which}.",
+    ),
+)
+PLACEMENT_INTRODUCTIONS = Pools(
+    train=(
+        "I liked {which} in the video.",
+        "{which} in the video was neat.",
+        "I keep thinking about {which}.",
+        "In the video I admired {which}.",
+    ),
+    test=(
+        "{which} in the video impressed me.",
+        "I enjoyed {which} most.",
+        "My favorite was {which}.",
+        "I well remember {which}.",
+    ),
+)
+MOMENT_INTRODUCTIONS = Pools(
+    train=(
+        "I liked the part {moment}.",
+        "The part {moment} was fun.",
+        "I remember the part {moment}.",
+        "What happened {moment} was neat.",
+    ),
+    test=(
+        "I enjoyed the moment {moment}.",
+        "The moment {moment} was great.",
+        "I keep thinking of the moment {moment}.",
+        "What I saw {moment} impressed me.",
+    ),
+)
+PLACE_INTRODUCTIONS = Pools(
+    train=(
+        "I like {things}.",
+        "I watch {things}.",
+        "{things} caught my eye.",
+        "I love {things}.",
+        "I see {things}.",
+        "You can see {things}.",
+    ),
+    test=(
+        "{things} stand[s|] out.",
+        "I spotted {things}.",
+        "I noticed {things}.",
+        "I point at {things}.",
+        "I mean {things}.",
+        "{things} look[s|] nice.",
+    ),
+)
