@@ -138,12 +138,12 @@ COMMANDS = Commands(
         train=(
             Wording("Press the button to stop the cube on the target {visit}."),
             Wording("Use the button to stop the cube on the target {visit}."),
-            Wording("Stop the cube with the button, on the target, {visit}."),
+            Wording("Stop the cube on the target {visit} by pressing the button."),
         ),
         test=(
             Wording("Push the button so that the cube stops on the target {visit}."),
-            Wording("With the button, halt the cube on the target {visit}."),
-            Wording("Make the cube stop on the target {visit} with the button."),
+            Wording("Halt the cube on the target {visit} with the button."),
+            Wording("With the button, make the cube stop on the target {visit}."),
         ),
     ),
 )

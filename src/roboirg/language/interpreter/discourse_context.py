@@ -20,7 +20,8 @@ from roboirg.language.interpreter.tokens import COLOR, Sentence, colors_in
 
 _DISMISSAL = re.compile(
     r"\b(never mind|nothing to do with|not matter|not that it matters|no matter|ignore"
-    r"|forget (about )?(it|that|this|them)|irrelevant|not important|unimportant|regardless|not for you)\b"
+    r"|forget (about )?(it|that|this|them)|irrelevant|not important|unimportant|regardless"
+    r"|not for you)\b"
 )
 
 

@@ -51,7 +51,7 @@ _READ_ELSEWHERE = tuple(
         rf"\bnot {_REMARK}",
         rf"\bno {NUMBER}\b",
         rf"\b(?:painted|colored|with|in|is|are) neither {COLOR} n?or {COLOR}\b",
-        r"\b(?:painted|colored|with|in|is|are) neither of (?:those|these|them)\b",
+        r"\b(?:painted|colored|with|in|is|are) neither of (?:those|these|them|the two)\b",
         rf"\b{COLOR} or {COLOR} , not {COLOR}\b",
         rf"\b(?:that|it|this|{NUMBER}) minus\b",
     )

@@ -20,7 +20,7 @@ def _exclude(request: InstructionRequest) -> Derived:
     template = request.pick("pair introduction", derivations.PAIR_INTRODUCTIONS)
     context = [fill(template, {"pair": antecedent(both, REFERENCE, both)})]
     counted = bool(request.values_of("amount"))
-    word = request.sampler.pick("pair anaphor", derivations.PAIR_ANAPHORS)
+    word = request.pick("pair anaphor", derivations.PAIR_ANAPHORS)
     reference = (
         antecedent(" nor ".join(pair), REFERENCE, both)
         if request.resolved

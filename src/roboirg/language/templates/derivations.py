@@ -25,26 +25,14 @@ SINGLED_INTRODUCTIONS = Pools(
     test=("I choose {single}.", "{single} looks better.", "{single} is best."),
 )
 EXCLUSIONS = Pools(
-    train=(
-        "the {thing} that is neither {pair}",
-        "the {thing} with neither {pair}",
-    ),
-    test=(
-        "the {thing} colored neither {pair}",
-        "the {thing} painted neither {pair}",
-    ),
+    train=("the {thing} that is neither {pair}", "the {thing} which is neither {pair}"),
+    test=("the {thing} whose color is neither {pair}",),
 )
 AMOUNT_EXCLUSIONS = Pools(
-    train=(
-        "{thing}[|s] that [is|are] neither {pair}",
-        "{thing}[|s] with neither {pair}",
-    ),
-    test=(
-        "{thing}[|s] colored neither {pair}",
-        "{thing}[|s] painted neither {pair}",
-    ),
+    train=("{thing}[|s] that [is|are] neither {pair}", "{thing}[|s] which [is|are] neither {pair}"),
+    test=("{thing}[|s] whose color is neither {pair}",),
 )
-PAIR_ANAPHORS = ("of those", "of them")
+PAIR_ANAPHORS = Pools(train=("of those", "of them"), test=("of these", "of the two"))
 COMPLEMENT = "the {thing} in {other}"
 """For the second pick: of the two excluded colors, the one that was not chosen."""
 AMOUNT_COMPLEMENT = "{thing}[|s] in {other}"
@@ -136,7 +124,7 @@ RELATIONS = (
     ),
     Relation(
         "two fewer",
-        "two fewer times than {number}",
+        "two times fewer than {number}",
         "two fewer {color} cubes than {number}",
         "two fewer {number}",
         offset=-2,
