@@ -207,14 +207,16 @@ def instruct(
     split: Split = "test",
     stages: Stages = "1-5",
     distractor: Distractor = "neutral",
+    distractors: Annotated[int, typer.Option(help="Number of distractors.")] = 1,
     frame: Frame = "robot",
     wordings: Wordings = None,
 ) -> None:
-    """Print the instructions of an episode."""
+    """Print the instructions of an episode, and how many tokens they need."""
     from roboirg.episodes.splits import get_episode
     from roboirg.evaluation.plan_parsing import means_all, parse_stages
     from roboirg.language import instruct as make_instruction
     from roboirg.language import settings_of
+    from roboirg.language.token_counts import count_tokens
     from roboirg.language.wordings.wording_store import open_wordings
     from roboirg.tasks import get_task
 
@@ -227,10 +229,12 @@ def instruct(
             form,
             stages=spoken,
             distractor=distractor,
+            distractors=distractors,
             frame=frame,
             wordings=identity,
         )
-        typer.echo(typer.style(f"{name}:", bold=True))
+        length = counted(count_tokens(instruction.text), "token")
+        typer.echo(f"{typer.style(name, bold=True)} ({length}):")
         for utterance in instruction.utterances:
             typer.echo(f"  {utterance.stage:<13} {utterance.text}")
 

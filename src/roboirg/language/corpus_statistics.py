@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple, cast, get_args
 
 from roboirg.language.instruction import Expression, Instruction
+from roboirg.language.token_counts import SHORT_LIMIT, USUAL_LIMIT, count_tokens
 
 
 class Lengths(NamedTuple):
@@ -65,6 +66,38 @@ def word_counts(instructions: Iterable[Instruction]) -> Mapping[str, Lengths]:
     return {
         setting: Lengths(statistics.fmean(words), min(words), max(words))
         for setting, words in found.items()
+    }
+
+
+class TokenCounts(NamedTuple):
+    """Tokens per instruction (`roboirg.language.token_counts`).
+
+    Attributes:
+        median: half of the instructions need at most so many.
+        longest: the most.
+        over_short: share over the shortest limit of the field, 0 to 1.
+        over_usual: share over the usual limit.
+    """
+
+    median: float
+    longest: int
+    over_short: float
+    over_usual: float
+
+
+def token_counts(instructions: Iterable[Instruction]) -> Mapping[str, TokenCounts]:
+    """Return how many tokens the prompts need, by setting."""
+    found: dict[str, list[int]] = {}
+    for instruction in instructions:
+        found.setdefault(instruction.setting, []).append(count_tokens(instruction.text))
+    return {
+        setting: TokenCounts(
+            statistics.median(counts),
+            max(counts),
+            statistics.fmean(count > SHORT_LIMIT for count in counts),
+            statistics.fmean(count > USUAL_LIMIT for count in counts),
+        )
+        for setting, counts in found.items()
     }
 
 

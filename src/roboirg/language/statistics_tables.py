@@ -11,12 +11,14 @@ from roboirg.language.corpus_statistics import ClassCounts
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import setting_names
 from roboirg.language.templates.derivations import COUNTED_STEPS, RELATIONS, STEPS
+from roboirg.language.token_counts import SHORT_LIMIT, USUAL_LIMIT
 from roboirg.tasks import every_task
 
 
 def overview_tables(instructions: Sequence[Instruction]) -> Iterator[Table]:
     """Yield tables of lengths, expressions, patterns, relations and landmark classes."""
     yield _lengths(corpus_statistics.word_counts(instructions))
+    yield _tokens(corpus_statistics.token_counts(instructions))
     yield expression_table(corpus_statistics.expression_counts(instructions))
     by_task = (
         ("Reasoning patterns (scenes)", corpus_statistics.pattern_counts(instructions), None),
@@ -44,6 +46,19 @@ def _lengths(lengths: Mapping[str, corpus_statistics.Lengths]) -> Table:
         if setting in lengths:
             one = lengths[setting]
             table.add_row(setting, f"{one.mean:.1f}", str(one.shortest), str(one.longest))
+    return table
+
+
+def _tokens(counts: Mapping[str, corpus_statistics.TokenCounts]) -> Table:
+    columns = ("median", "most", f"over {SHORT_LIMIT}", f"over {USUAL_LIMIT}")
+    table = _table(
+        "Tokens per instruction (at most, in vocabularies of 32,000)", "setting", columns
+    )
+    for setting in setting_names():
+        if setting in counts:
+            one = counts[setting]
+            shares = (f"{one.over_short:.1%}", f"{one.over_usual:.1%}")
+            table.add_row(setting, f"{one.median:.0f}", str(one.longest), *shares)
     return table
 
 

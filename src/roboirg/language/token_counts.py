@@ -1,0 +1,49 @@
+"""Count the tokens that an instruction needs, without a tokenizer.
+
+Many policies cut what they hear after a fixed number of tokens, most often 64, some 48. The count
+here is that of a SentencePiece vocabulary of 32,000 pieces, the one of the first Mistral models
+(`mistral-common` ships it), and two more: the beginning of the text and the line break that openpi
+adds. The tokenizers of the compared systems know 49,000 to 257,000 pieces and need fewer. Such a
+vocabulary never joins words, so a sentence needs as many pieces as its words and marks.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import re
+from collections.abc import Mapping
+from importlib.resources import files
+
+ADDED_TOKENS = 2
+"""The beginning of the text, and a line break after it."""
+USUAL_LIMIT = 64
+"""Tokens that the systems of the paper read; the pi0.5 baseline of MME-VLA among them."""
+SHORT_LIMIT = 48
+"""Tokens that pi0 and SmolVLA read."""
+
+_WORD = re.compile(r"[^\s.,:;?!]+|[.,:;?!]")
+
+
+def count_tokens(text: str) -> int:
+    """Return the number of tokens of a text.
+
+    A word that the language does not use counts one token for each character and one for the
+    space before it, the most that such a vocabulary can need for English.
+    """
+    pieces = _pieces()
+    words: list[str] = _WORD.findall(text)
+    return ADDED_TOKENS + sum(pieces.get(word, len(word) + 1) for word in words)
+
+
+def split_words(text: str) -> frozenset[str]:
+    """Return the words and marks of a text, as they are counted."""
+    return frozenset(_WORD.findall(text))
+
+
+@functools.cache
+def _pieces() -> Mapping[str, int]:
+    """Return the number of pieces of every word and mark of the language, in each spelling."""
+    text = files("roboirg.language").joinpath("token_pieces.json").read_text(encoding="utf-8")
+    found: dict[str, list[str]] = json.loads(text)
+    return {word: int(count) for count, words in found.items() for word in words}
