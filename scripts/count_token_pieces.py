@@ -34,7 +34,7 @@ def tokenizer() -> SentencePieceProcessor:
 
 
 def texts() -> Iterator[str]:
-    """Yield instructions of random scenes in every setting, form, pool and combination of options."""
+    """Yield instructions of random scenes in both pools, with all settings, forms and options."""
     for task in every_task():
         for index in range(EPISODES):
             episode = get_episode(task, "random", index)

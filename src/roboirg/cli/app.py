@@ -26,6 +26,7 @@ from roboirg.cli.real_commands import real_app
 from roboirg.cli.run_commands import INTERRUPTED, USAGE_ERROR, Out
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.version import __version__
+from roboirg.util.plurals import counted
 
 # Heavy modules are imported inside the commands, so that --help is fast.
 

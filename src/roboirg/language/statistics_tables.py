@@ -51,9 +51,7 @@ def _lengths(lengths: Mapping[str, corpus_statistics.Lengths]) -> Table:
 
 def _tokens(counts: Mapping[str, corpus_statistics.TokenCounts]) -> Table:
     columns = ("median", "most", f"over {SHORT_LIMIT}", f"over {USUAL_LIMIT}")
-    table = _table(
-        "Tokens per instruction (at most, in vocabularies of 32,000)", "setting", columns
-    )
+    table = _table("Tokens per instruction (vocabulary of 32,000)", "setting", columns)
     for setting in setting_names():
         if setting in counts:
             one = counts[setting]
