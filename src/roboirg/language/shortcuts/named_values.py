@@ -23,6 +23,10 @@ ORDINAL_TYPES = ("visit", "placement")
 
 POINTING = word_set("the that this those these which other each every any no")
 """Before a cardinal they make it a pronoun: *the one there*, *those two*."""
+NEIGHBOR = "neighbor"
+"""Stands for *before or after*, which names neither."""
+ALL_OF_THEM = word_set("those these each")
+"""In a command they may mean all values that were named."""
 PRONOUNS = word_set("them these those")
 COMPARISONS = word_set("fewer less more earlier later")
 """One or two words after a number they make it a difference: *one time fewer*."""
@@ -69,7 +73,7 @@ def named_values(text: str, slot: str, vocabulary: SlotVocabulary) -> tuple[Name
 # Cached: every slot and every rule reads the same text.
 @functools.lru_cache(maxsize=1024)
 def _sentences(text: str) -> tuple[Sentence, ...]:
-    return split_sentences(text)
+    return split_sentences(text.replace("before or after", NEIGHBOR))
 
 
 def command_words(text: str) -> Sentence:
@@ -93,8 +97,17 @@ def part_count(text: str, thing: str, vocabulary: GoalVocabulary) -> int:
         if one_slot.several
     ]
     longest = max((one.longest for one in vocabulary.values()), default=1)
+    if not ALL_OF_THEM.isdisjoint(words):
+        stated.append(max((_distinct(text, *item) for item in vocabulary.items()), default=1))
     nouns = sum(word in (thing, f"{thing}s", f"{thing}es") for word in words)
     return max(1, min(longest, max((*stated, *_ranks(words), nouns))))
+
+
+def _distinct(text: str, slot: str, vocabulary: SlotVocabulary) -> int:
+    """Return how many values a text names for a slot with several."""
+    return len(
+        {one.value for one in named_values(text, slot, vocabulary)} if vocabulary.several else ()
+    )
 
 
 def _ranks(words: Sentence) -> Iterator[int]:

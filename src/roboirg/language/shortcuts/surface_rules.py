@@ -12,7 +12,7 @@ from typing import NamedTuple
 from roboirg.language.interpreter.tokens import Sentence, number_of
 from roboirg.language.request import SLOT_TYPE_NAMES
 from roboirg.language.shortcuts.goal_vocabulary import SlotVocabulary, Value
-from roboirg.language.shortcuts.named_values import EXCLUSIONS, ORDINAL_TYPES
+from roboirg.language.shortcuts.named_values import EXCLUSIONS, NEIGHBOR, ORDINAL_TYPES
 
 Candidates = tuple[Value, ...]
 """Values for one place of a slot, among which a rule chooses with equal probability."""
@@ -21,7 +21,6 @@ MORE = frozenset({"more", "later", "after", "following"})
 FEWER = frozenset({"fewer", "less", "earlier", "before", "preceding"})
 ONLY_ORDINAL = frozenset({"before", "after", "following", "preceding"})
 """Next to other numbers these words are about time."""
-NEIGHBOR = "neighbor"
 _REACH = 2
 """Words between a difference and its number: *two visits before*."""
 
