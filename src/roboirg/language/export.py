@@ -16,6 +16,7 @@ from typing import Any, Literal, get_args
 from roboirg.core.episode import Episode
 from roboirg.core.errors import MissingDependencyError
 from roboirg.language.instruction import Instruction
+from roboirg.language.token_counts import count_tokens
 from roboirg.tasks import get_task
 from roboirg.util.atomic_write import write_atomically
 
@@ -44,6 +45,7 @@ def row(episode: Episode, instruction: Instruction) -> ExportRow:
         "turns": _turns(instruction),
         "mentions": _mentions(instruction),
         "words": len(instruction.text.split()),
+        "tokens": count_tokens(instruction.text),
         # As text, because each task has its own slots.
         "goal": json.dumps(episode.goal.as_mapping()),
         "pattern": metadata["pattern"],
@@ -59,6 +61,7 @@ def row(episode: Episode, instruction: Instruction) -> ExportRow:
         "templates": metadata["templates"],
         # Never null: readers infer the types of columns.
         "wordings": metadata["wordings"] or "own",
+        "pool": metadata["pool"],
         "command_template": metadata["command"],
         "language_version": metadata["language_version"],
     }
@@ -138,7 +141,7 @@ def _parquet(rows: Iterable[ExportRow]) -> bytes:
     text, number = pa.string(), pa.int64()
     texts, numbers = pa.list_(text), pa.list_(number)
     special = {
-        **dict.fromkeys(("episode", "seed", "words", "distractors"), number),
+        **dict.fromkeys(("episode", "seed", "words", "tokens", "distractors"), number),
         **dict.fromkeys(("landmark_classes", "stages"), numbers),
         **dict.fromkeys(("patterns", "references", "landmarks", "templates"), texts),
         "turns": pa.list_(_struct(("stage", text), ("start", number), ("text", text))),

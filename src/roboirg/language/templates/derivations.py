@@ -22,15 +22,15 @@ PAIR_INTRODUCTIONS = Pools(
 )
 SINGLED_INTRODUCTIONS = Pools(
     train=("I prefer {single}.", "{single} is better.", "I want {single}."),
-    test=("I choose {single}.", "{single} looks better.", "{single} is best."),
+    test=("I choose {single}.", "{single} is nice.", "{single} is best."),
 )
 EXCLUSIONS = Pools(
-    train=("the {thing} that is neither {pair}", "the {thing} which is neither {pair}"),
-    test=("the {thing} whose color is neither {pair}",),
+    train=("the {thing} that is neither {pair}", "the {thing} whose color is neither {pair}"),
+    test=("the {thing} which is neither {pair}",),
 )
 AMOUNT_EXCLUSIONS = Pools(
-    train=("{thing}[|s] that [is|are] neither {pair}", "{thing}[|s] which [is|are] neither {pair}"),
-    test=("{thing}[|s] whose color is neither {pair}",),
+    train=("{thing}[|s] that [is|are] neither {pair}", "{thing}[|s] whose color is neither {pair}"),
+    test=("{thing}[|s] which [is|are] neither {pair}",),
 )
 PAIR_ANAPHORS = Pools(train=("of those", "of them"), test=("of these", "of the two"))
 COMPLEMENT = "the {thing} in {other}"

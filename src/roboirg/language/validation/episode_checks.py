@@ -60,8 +60,7 @@ def check_episode(
                 known.add(instruction.command)
                 violations += not_needed(instruction, episode, read, exception=exception)
                 violations += leaking(instruction, episode)
-        elif instruction.metadata["frame"] != "camera":
-            # The introduction alone says that left and right are the camera's: no reference.
+        else:
             violations += not_self_contained(instruction, episode, read)
         _add_violations(results, episode, setting, violations)
     for setting, words in unpaired(episode, expressible(episode, wordings=wordings), wordings):
