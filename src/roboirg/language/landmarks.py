@@ -43,7 +43,7 @@ class Landmark(NamedTuple):
     """Words for a place that single out one object of its kind.
 
     Attributes:
-        phrase: words after the noun: "the cube *at the far left*".
+        phrase: words after the noun: "the cube *farthest to your left*".
         level: class, in the order of preference: 1 extremes and the sides of a pair, 2 corners,
             3 ranks, 4 fixtures, 5 cubes of another color, 6 nearest to an object of class 1 or 2,
             7 nearest to one of class 3, 8 second nearest to one of class 1 or 2, 9 third nearest

@@ -26,7 +26,7 @@ def named(request: InstructionRequest, goal_value: GoalValue) -> Phrase:
 
 
 def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
-    """Return ``the red cube``, or words for the container that hides it."""
+    """Return ``the red cube``, or words for the container over it."""
     return {
         goal_value.field: request.by_color(goal_value, named(request, goal_value))
         for goal_value in goal_values
