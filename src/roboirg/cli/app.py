@@ -21,7 +21,18 @@ from roboirg.cli import (
     wording_commands,
 )
 from roboirg.cli.bench_commands import bench
-from roboirg.cli.options import Distractor, Frame, Split, Stages, Tasks, Video, Wordings, Workers
+from roboirg.cli.options import (
+    Distractor,
+    Frame,
+    Reasoning,
+    Rival,
+    Split,
+    Stages,
+    Tasks,
+    Video,
+    Wordings,
+    Workers,
+)
 from roboirg.cli.real_commands import real_app
 from roboirg.cli.run_commands import INTERRUPTED, USAGE_ERROR, Out
 from roboirg.core.errors import InvalidValueError, RoboIRGError
@@ -208,6 +219,8 @@ def instruct(
     stages: Stages = "1-5",
     distractor: Distractor = "neutral",
     frame: Frame = "robot",
+    rival: Rival = "none",
+    reasoning: Reasoning = "plain",
     wordings: Wordings = None,
 ) -> None:
     """Print the instructions of an episode."""
@@ -228,6 +241,8 @@ def instruct(
             stages=spoken,
             distractor=distractor,
             frame=frame,
+            rival=rival,
+            reasoning=reasoning,
             wordings=identity,
         )
         typer.echo(typer.style(f"{name}:", bold=True))

@@ -22,6 +22,7 @@ from roboirg.language.interpreter.constraints import goal_constraints
 from roboirg.language.interpreter.discourse_context import read_discourse, read_remark
 from roboirg.language.interpreter.negations import is_negated_command, unread_negations
 from roboirg.language.interpreter.reference_resolution import ReferenceResolver
+from roboirg.language.interpreter.selections import read_selection, with_selection
 from roboirg.language.interpreter.temporal_relations import mentioned_times
 from roboirg.language.interpreter.tokens import Sentence, split_sentences
 from roboirg.language.interpreter.vocabulary import VERBS
@@ -69,7 +70,7 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
             _distinct(gap.complaint for gap in gaps),
             _distinct(word for gap in gaps for word in gap.words),
         )
-    context = read_discourse(sentences[:first])
+    context = with_selection(read_discourse(sentences[:first]), sentences[:first])
     command = read_command(_joined(sentences[first:last]))
     times = context.times | mentioned_times(command.text)
     resolver = ReferenceResolver(scene, context, times)
@@ -91,7 +92,10 @@ def _possible_goals(scene: Scene, task: str) -> tuple[Goal, ...]:
 
 def _commands(words: Sentence) -> bool:
     """Return whether a sentence gives a command, understood or not."""
-    return is_command(words) or is_negated_command(words) or is_unknown_command(words)
+    if is_command(words) or is_negated_command(words):
+        return True
+    # "Leave out the former" chooses; it is no command with an unknown verb.
+    return is_unknown_command(words) and read_selection(words) is None
 
 
 def _command_span(sentences: tuple[Sentence, ...]) -> tuple[int, int]:

@@ -21,6 +21,14 @@ _POINTED = word_set("cube box tape one color")
 _PLACE_NOUNS = word_set("place spot position location")
 _SERIES_NOUNS = word_set("visit placement time pass placing stay occasion")
 _FORMER = {"former": 0, "latter": -1}
+_CHOSEN = re.compile(
+    r"\b(?:the|my) (?P<noun>cubes?|box|tapes?|ones?|color|place|spot) i "
+    r"(?:mean|meant|want|wanted|asked for|favor|chose|choose|prefer|preferred|decided on"
+    r"|settled on|picked)\b"
+)
+_OTHERS = re.compile(
+    r"\bthe (?:other (?P<noun>cubes?|ones?|box|tape|place|spot)|others)\b(?! (?:of|in|from|than)\b)"
+)
 
 DescriptionKind = Literal["any", "color", "not", "other", "place", "introduced", "introduced place"]
 
@@ -71,7 +79,7 @@ def describe(words: Sentence) -> Description:
         return Description("not", colors)
     if colors:
         return Description("color", colors[:1])
-    return _pointer(words) or Description("any")
+    return _choice(text) or _pointer(words) or Description("any")
 
 
 def _complement(text: str, colors: tuple[str, ...]) -> Description:
@@ -79,6 +87,17 @@ def _complement(text: str, colors: tuple[str, ...]) -> Description:
     excluded = color_of(found[1]) if found else None
     among = tuple(dict.fromkeys(colors))
     return Description("other", () if among == (excluded,) else among, excluded)
+
+
+def _choice(text: str) -> Description | None:
+    """Read ``the cube I want`` and ``the other one``: the chosen value comes first."""
+    for pattern, position in ((_CHOSEN, 0), (_OTHERS, 1)):
+        found = pattern.search(text)
+        if found:
+            placed = found["noun"] in _PLACE_NOUNS
+            kind: DescriptionKind = "introduced place" if placed else "introduced"
+            return Description(kind, times=mentioned_times(text), position=position)
+    return None
 
 
 def _pointer(words: Sentence) -> Description | None:

@@ -56,6 +56,7 @@ _SCALED = re.compile(
 )
 _SAME = re.compile(
     r"\b(?:that|as|this|so) (?:many|often)\b|\b(?:that|this|the same) (?:number|amount) of\b"
+    r"|\bmy (?:\w+ )?number of\b|\bthe number of times(?= i\b)"
 )
 _SOME = re.compile(r"\ba (?:couple|pair) of\b")
 _ADVERB = re.compile(r"\b(?:once(?! (?:you|it|that|the|all|this))|twice|thrice)\b")

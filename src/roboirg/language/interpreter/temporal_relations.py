@@ -29,7 +29,7 @@ _OTHER = re.compile(
 _NOT = re.compile(r"\bnot (?:the |one |right |just |moment |at |directly )*(before|after)\b")
 _POINTER = re.compile(
     r"\b(?:that|this|the same) (?:very )?(?:moment|time|point|instant|part|placement|one)\b"
-    r"|\bthen\b(?! (?:press|take|put|place|set|to|go|pick|lift|push)\b)"
+    r"|\bthe moment i\b|\bthen\b(?! (?:press|take|put|place|set|to|go|pick|lift|push)\b)"
 )
 
 _MOVED = r"(?:moved?|moves|moving|swapped|changed|exchanged|shuffled|started|began)"

@@ -65,7 +65,7 @@ _VERB_FORMS = word_set(
     "sure use used keep kept see look differs took given say said meant mean forget worry hesitate "
     "work preceded followed ready colored watch watched repeated reaches reach reached arrives "
     "arrived passed shown demonstrated contains contained visited finished finish done completed "
-    "complete remembering recalling returns returned according based initial original correct"
+    "asked decided settled favor favorite own special complete remembering recalling returns returned according based initial original correct"
 )
 _COMPARISONS = word_set(
     "many often much more less fewer larger greater higher bigger smaller lower than as half "

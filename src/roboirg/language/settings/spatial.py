@@ -5,12 +5,17 @@ Counts stay explicit.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 
+from roboirg.core.episode import Goal
+from roboirg.core.instruction_options import RIVALS
 from roboirg.core.motions import Swap
 from roboirg.language import templates
-from roboirg.language.instruction import Expression
+from roboirg.language.instruction import Expression, Instruction
 from roboirg.language.landmarks import FRAMES, Landmark, landmarks
+from roboirg.language.pairs import draw_pair, hidden_by_pair, pair_notes, pair_refusal, wants_pair
+from roboirg.language.pairs.pair_words import choosing_remark, chosen, the_other
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain, sentences
 from roboirg.language.request import (
     COLOR_SLOTS,
@@ -50,19 +55,21 @@ def usable(request: InstructionRequest, goal_value: GoalValue) -> tuple[Landmark
 def refusal(request: InstructionRequest) -> str | None:
     """Return a reason if some color of the goal has no thing with a landmark."""
     if all(usable(request, goal_value) for goal_value in request.color_values):
-        return None
+        return pair_refusal(request, usable)
     return "no landmark singles out a target"
 
 
 def say(request: InstructionRequest) -> InstructionSpec:
     """Return an introduction with a landmark for each color, and a command that points there."""
+    if wants_pair(request):
+        return _say_with_rival(request)
     colors = request.color_values
-    chosen = [
+    marks = [
         request.sampler.pick(f"landmark-{color.field}", usable(request, color)) for color in colors
     ]
     things: list[Phrase] = []
     pointing = POINTING[len(colors)]
-    for color, landmark, (words, expression) in zip(colors, chosen, pointing, strict=True):
+    for color, landmark, (words, expression) in zip(colors, marks, pointing, strict=True):
         place = (
             antecedent(landmark.phrase, color.slot, color.value)
             if request.resolved
@@ -71,27 +78,59 @@ def say(request: InstructionRequest) -> InstructionSpec:
         things.append(request.by_place(color, place, plural=request.count_of(color) > 1))
     fields = stated(request) | described(request, things)
     utterances = (
-        introduction(request, colors, chosen),
+        introduction(request, colors, marks),
         UtteranceSpec("command", request.command(fields)),
     )
-    notes = {
-        "landmarks": [landmark.phrase for landmark in chosen],
-        "landmark_classes": [landmark.level for landmark in chosen],
+    return InstructionSpec(utterances, _notes(request, marks))
+
+
+def _say_with_rival(request: InstructionRequest) -> InstructionSpec:
+    """Return an introduction with two places, the remark that chooses one, and the command."""
+    draw = draw_pair(request, usable)
+    meant, rival = draw.pair
+    places = {
+        value.field: request.sampler.pick(f"landmark-{value.field}", usable(request, value))
+        for value in draw.pair
+    }
+    thing = request.task.commands.thing
+    remark = choosing_remark(
+        request, draw, lambda value: f"the {thing} {places[value.field].phrase}", thing
+    )
+    pointing = [(meant, chosen(request, draw, "at the place"))]
+    if draw.pair.ordered:
+        pointing.append((rival, the_other(rival, "at the other place")))
+    things: list[Phrase] = []
+    for value, words in pointing:
+        name = antecedent(places[value.field].phrase, value.slot, value.value)
+        place = name if request.resolved else words
+        things.append(request.by_place(value, place, plural=request.count_of(value) > 1))
+    command = request.command(stated(request) | described(request, things))
+    shown = [places[value.field] for value in draw.introduced]
+    utterances = (
+        introduction(request, draw.introduced, shown),
+        UtteranceSpec("command", sentences([remark, command])),
+    )
+    return InstructionSpec(utterances, {**_notes(request, shown), **pair_notes(draw)})
+
+
+def _notes(request: InstructionRequest, landmarks: Sequence[Landmark]) -> dict[str, object]:
+    return {
+        "landmarks": [landmark.phrase for landmark in landmarks],
+        "landmark_classes": [landmark.level for landmark in landmarks],
         "frame": request.frame,
     }
-    return InstructionSpec(utterances, notes)
 
 
 def introduction(
-    request: InstructionRequest, colors: Sequence[GoalValue], chosen: Sequence[Landmark]
+    request: InstructionRequest, colors: Sequence[GoalValue], marks: Sequence[Landmark]
 ) -> UtteranceSpec:
     """Name the places; say where needed whose left and right is meant, and at what time."""
     noun = plain(f"the {request.task.commands.thing} ")
     things: list[Phrase] = [
         (*noun, *antecedent(landmark.phrase, color.slot, color.value))
-        for color, landmark in zip(colors, chosen, strict=True)
+        for color, landmark in zip(colors, marks, strict=True)
     ]
-    if not any(landmark.sided for landmark in chosen):
+    if not any(landmark.sided for landmark in marks):
         purpose, options = "place introduction", templates.PLACE_INTRODUCTIONS
     elif request.frame == "robot":
         purpose, options = "sided place introduction", templates.SIDED_PLACE_INTRODUCTIONS
@@ -104,6 +143,11 @@ def introduction(
     return UtteranceSpec("introduction", sentences(remarks))
 
 
+def _hidden_slots(instruction: Instruction, goal: Goal) -> frozenset[str]:
+    colors = frozenset(goal.as_mapping()) & frozenset(COLOR_SLOTS)
+    return hidden_by_pair(instruction) or colors
+
+
 SETTING = Setting(
     name="spatial",
     order=4,
@@ -112,9 +156,11 @@ SETTING = Setting(
     say=say,
     applies_to=lambda task: task.spatial,
     refusal=refusal,
-    hidden_slots=lambda _instruction, goal: frozenset(goal.as_mapping()) & frozenset(COLOR_SLOTS),
-    reads=frozenset({"frame", "delivery"}),
-    variants=tuple({"frame": frame} for frame in FRAMES),
+    hidden_slots=_hidden_slots,
+    reads=frozenset({"frame", "delivery", "rival"}),
+    variants=tuple(
+        {"frame": frame, "rival": rival} for rival, frame in itertools.product(RIVALS, FRAMES)
+    ),
     hides_only_color=lambda _instruction: True,
     example=6,
 )
