@@ -58,6 +58,7 @@ _PRONOUNS = word_set(
     "everything anything something"
 )
 _VERB_FORMS = word_set(
+    "asked decided settled favor favorite own special "
     "is are was were be been am do does did done has had have stops stopped hides hid hidden "
     "covers covered picked lifted raised placed moved moves pressed presses swapped changed "
     "exchanged shuffled started began stands stood happened showed shown saw seen went goes go "
@@ -65,7 +66,7 @@ _VERB_FORMS = word_set(
     "sure use used keep kept see look differs took given say said meant mean forget worry hesitate "
     "work preceded followed ready colored watch watched repeated reaches reach reached arrives "
     "arrived passed shown demonstrated contains contained visited finished finish done completed "
-    "asked decided settled favor favorite own special complete remembering recalling returns returned according based initial original correct"
+    "complete remembering recalling returns returned according based initial original correct"
 )
 _COMPARISONS = word_set(
     "many often much more less fewer larger greater higher bigger smaller lower than as half "

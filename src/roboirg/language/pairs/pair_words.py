@@ -58,7 +58,9 @@ def pair_command(request: InstructionRequest, draw: PairDraw) -> UtteranceSpec:
     """Return the remark that chooses, and a command that states the other slots."""
     remark = choosing_remark(request, draw, lambda value: _full_name(request, draw, value))
     fields = stated(request)
-    if not request.resolved:
+    if draw.pair.slot == "counts":
+        fields |= _counted(request, draw)
+    elif not request.resolved:
         fields |= _chosen_fields(request, draw)
     return UtteranceSpec("command", sentences([remark, request.command(fields)]))
 
@@ -174,12 +176,6 @@ def _chosen_fields(request: InstructionRequest, draw: PairDraw) -> Fields:
     if kind == "amount":
         words = chosen(request, draw, f"of the {noun(request, draw)}")
         return described(request, [words])
-    if meant.slot == "counts":
-        words = anaphor(
-            request.pick("rival number", templates.NUMBERS_OF), "choice", meant.slot, meant.value
-        )
-        (color,) = request.color_values
-        return amount.amounts([amount.amount(words, _of_those(color))])
     if kind == "number":
         return {meant.field: chosen(request, draw, "the number of times")}
     if kind == "relation":
@@ -187,6 +183,14 @@ def _chosen_fields(request: InstructionRequest, draw: PairDraw) -> Fields:
     return wrapped(request, meant, chosen(request, draw, f"the {series_noun(request, meant)}"))
 
 
-def _of_those(color: GoalValue) -> Phrase:
-    """Return ``of the red cubes``, which fits any number."""
-    return (*plain("of the "), *amount.cubes(color, 2))
+def _counted(request: InstructionRequest, draw: PairDraw) -> Fields:
+    """Return ``my number of the red cubes``; resolved, ``two of the red cubes``."""
+    meant, (color,) = draw.pair.meant, request.color_values
+    words = request.pick("rival number", templates.NUMBERS_OF)
+    number = (
+        antecedent(cardinal(meant.number), meant.slot, meant.value)
+        if request.resolved
+        else anaphor(words, "choice", meant.slot, meant.value)
+    )
+    # The plural fits any number.
+    return amount.amounts([(*number, *plain(" of the "), *amount.cubes(color, 2))])
