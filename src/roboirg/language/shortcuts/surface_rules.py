@@ -22,6 +22,7 @@ FEWER = frozenset({"fewer", "less", "earlier", "before", "preceding"})
 ONLY_ORDINAL = frozenset({"before", "after", "following", "preceding"})
 """Next to other numbers these words are about time."""
 NEIGHBOR = "neighbor"
+PAIR = 2
 _REACH = 2
 """Words between a difference and its number: *two visits before*."""
 
@@ -35,6 +36,7 @@ class SlotWords(NamedTuple):
         named: the values that the text names, in order.
         command: the words of the last sentence.
         parts: the number of values to find.
+        pointed: which of two named values the words before the command point at.
     """
 
     slot: str
@@ -42,6 +44,7 @@ class SlotWords(NamedTuple):
     named: tuple[Value, ...]
     command: Sentence
     parts: int
+    pointed: int | None = None
 
     @property
     def is_number(self) -> bool:
@@ -78,12 +81,16 @@ def take_unnamed(words: SlotWords) -> list[Candidates]:
 
 
 def take_by_cues(words: SlotWords) -> list[Candidates]:
-    """Choose among four rules by key words of the command.
+    """Choose among four rules by key words of the command and of what points at one of two values.
 
+    After a pointer, such as *former* or *latter*, the value at its place, and then the other one.
     *Other*, *different*, *not* or *neighbor*: the value that is not named, then the one that is
     named but not last. *One fewer*, *twice*, *right after* and the like: the number that is named
     first, changed by the difference. Otherwise the first value.
     """
+    pair = tuple(dict.fromkeys(words.named))
+    if words.pointed is not None and len(pair) == PAIR:
+        return [(pair[words.pointed],), (pair[1 - words.pointed],)][: words.parts]
     if words.is_number:
         change = _change(words)
         first = [one for (one,) in take_first(words)]
