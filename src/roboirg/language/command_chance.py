@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from fractions import Fraction
 from typing import cast
 
@@ -24,14 +24,24 @@ def blind_goals(instruction: Instruction, episode: Episode) -> tuple[Goal, ...]:
     Where the context names the candidates, as with a rival, it is a guess among them: to pick one
     of two takes no understanding of which one is meant.
     """
-    goals = fitting_goals(instruction.command, episode)
+    fitting = fitting_goals(instruction.command, episode)
     candidates = cast("Mapping[str, list[str | int]]", instruction.metadata["candidates"])
-    left = tuple(
+    if not candidates:
+        return fitting
+    shapes = [_shape(goal, candidates) for goal in fitting]
+    return tuple(
         goal
-        for goal in goals
-        if all(_values(goal[slot]) <= set(values) for slot, values in candidates.items())
+        for goal in get_task(episode.task).goals(episode.scene)
+        if _shape(goal, candidates) in shapes
+        and all(_values(goal[slot]) <= set(values) for slot, values in candidates.items())
     )
-    return left or goals
+
+
+def _shape(goal: Goal, candidates: Collection[str]) -> list[tuple[str, SlotValue]]:
+    """Return a goal with the number of values in place of those of the candidates."""
+    return [
+        (slot, len(_values(value)) if slot in candidates else value) for slot, value in goal.slots
+    ]
 
 
 def _values(content: SlotValue) -> set[str | int]:

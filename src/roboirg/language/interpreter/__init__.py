@@ -21,6 +21,7 @@ from roboirg.language.interpreter.comprehension import (
 from roboirg.language.interpreter.constraints import goal_constraints
 from roboirg.language.interpreter.discourse_context import read_discourse, read_remark
 from roboirg.language.interpreter.negations import is_negated_command, unread_negations
+from roboirg.language.interpreter.preferences import with_preference
 from roboirg.language.interpreter.reference_resolution import ReferenceResolver
 from roboirg.language.interpreter.selections import read_selection, with_selection
 from roboirg.language.interpreter.temporal_relations import mentioned_times
@@ -70,7 +71,8 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
             _distinct(gap.complaint for gap in gaps),
             _distinct(word for gap in gaps for word in gap.words),
         )
-    context = with_selection(read_discourse(sentences[:first]), sentences[:first])
+    before = sentences[:first]
+    context = with_selection(with_preference(read_discourse(before), before), before)
     command = read_command(_joined(sentences[first:last]))
     times = context.times | mentioned_times(command.text)
     resolver = ReferenceResolver(scene, context, times)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import Literal, NamedTuple
 
+from roboirg.language.interpreter.comparisons import Comparison, read_comparison
 from roboirg.language.interpreter.places import Place, read_places
 from roboirg.language.interpreter.temporal_relations import Time, mentioned_times
 from roboirg.language.interpreter.tokens import (
@@ -30,7 +31,9 @@ _OTHERS = re.compile(
     r"\bthe (?:other (?P<noun>cubes?|ones?|box|tape|place|spot)|others)\b(?! (?:of|in|from|than)\b)"
 )
 
-DescriptionKind = Literal["any", "color", "not", "other", "place", "introduced", "introduced place"]
+DescriptionKind = Literal[
+    "any", "color", "not", "other", "place", "introduced", "introduced place", "compared"
+]
 
 
 class Description(NamedTuple):
@@ -39,12 +42,14 @@ class Description(NamedTuple):
     Attributes:
         kind: ``any`` describes nothing; ``color`` names a color; ``not`` excludes colors; ``other``
             is the remaining one of some colors; ``place`` names a place; ``introduced`` and
-            ``introduced place`` point at an earlier color or place.
+            ``introduced place`` point at an earlier color or place; ``compared`` is the foremost
+            one of those that ``not`` leaves.
         colors: named colors; empty if the words point at those of the context.
         excluded: for ``other``, the excluded color; None if the words only point at it.
         place: the named place.
         times: whether the place is the one before or after things move.
         position: index of the introduced value; None for any of them.
+        comparison: for ``compared``, the order.
     """
 
     kind: DescriptionKind
@@ -53,11 +58,13 @@ class Description(NamedTuple):
     place: Place | None = None
     times: frozenset[Time] = frozenset()
     position: int | None = None
+    comparison: Comparison | None = None
 
 
 _THAN = re.compile(
     r"\b(other than|different from|different to|differs from|unlike|"
-    r"not (in|of|among|one of|part of)|neither|except|apart from|outside)\b"
+    r"not (in|of|among|one of|part of)|neither|except|apart from|outside|"
+    r"(another|a different|some other|any other) color)\b"
 )
 _OTHER_OF = re.compile(
     r"\bthe other (?:one |color )?(?:of|in|from)\b(?! (?:the |those |these )?(?:two )?moments)"
@@ -70,6 +77,9 @@ def describe(words: Sentence) -> Description:
     """Return the description that the words for one thing give."""
     text = " ".join(words)
     colors = colors_in(words)
+    comparison = read_comparison(text)
+    if comparison is not None and _THAN.search(text):
+        return Description("compared", colors, comparison=comparison)
     places = read_places(words)
     if places:
         return Description("place", place=places[0], times=mentioned_times(text))

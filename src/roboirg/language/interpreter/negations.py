@@ -49,6 +49,7 @@ _READ_ELSEWHERE = tuple(
         r"\bnot (?:at |in )?(?:that|this|it|the one|the moment|when)\b",
         r"\bwhichever\b.*?\bnot\b",
         rf"\bnot {_REMARK}",
+        r"\b(?:she|he) (?:would|did|does) not\b",
         rf"\bno {NUMBER}\b",
         rf"\b(?:that|it|this|{NUMBER}) minus\b",
     )

@@ -6,7 +6,7 @@ import functools
 from collections.abc import Callable, Iterator
 from typing import Literal, NamedTuple
 
-from roboirg.core.episode import Difficulty, Goal, Split
+from roboirg.core.episode import Difficulty, Goal, SlotValue, Split
 from roboirg.core.instruction_options import DEFAULT_DISTRACTOR, DEFAULT_RIVAL
 from roboirg.episodes.splits import split_episodes
 from roboirg.language.instruction import Instruction
@@ -116,7 +116,7 @@ def draw_pair(request: InstructionRequest, locate: Locate | None = None) -> Pair
     pair = request.sampler.pick("rival", [one for one in pairs if one.slot == slot])
     bits = draw_balanced(request, "rival order")
     kind, text, fill = _remark(request, points_at_meant=bits.second)
-    pointers = (templates.RANKS,)
+    pointers: tuple[templates.Pointers, ...] = (templates.RANKS,)
     if slot in COLOR_SLOTS:
         pointers = (templates.RANKS, templates.RANKS, *templates.MENTIONED.of(request.pool))
     return PairDraw(
@@ -180,13 +180,17 @@ def _possible(request: InstructionRequest) -> Iterator[ValuePair]:
 def _alternatives(request: InstructionRequest, slot: str) -> list[tuple[str | int, ...]]:
     """Return the other contents of a slot in goals of the scene that agree in all other slots."""
     goal = request.episode.goal
-    own, same = _contents(goal, slot), goal.as_mapping() | {slot: ()}
+    own = _contents(goal, slot)
     found = [
         _contents(one, slot)
         for one in request.task.goals(request.episode.scene)
-        if one.as_mapping() | {slot: ()} == same
+        if _without(one, slot) == _without(goal, slot)
     ]
     return [one for one in found if one != own and len(one) == len(own)]
+
+
+def _without(goal: Goal, slot: str) -> dict[str, SlotValue]:
+    return {name: value for name, value in goal.slots if name != slot}
 
 
 def _contents(goal: Goal, slot: str) -> tuple[str | int, ...]:

@@ -22,6 +22,9 @@ FEWER = frozenset({"fewer", "less", "earlier", "before", "preceding"})
 ONLY_ORDINAL = frozenset({"before", "after", "following", "preceding"})
 """Next to other numbers these words are about time."""
 NEIGHBOR = "neighbor"
+TOTALS = frozenset({"total", "sum", "together"})
+DIFFERENCES = frozenset({"difference", "gap"})
+"""Made of two named numbers. A rule takes one step: it does not go on to *one fewer than that*."""
 PAIR = 2
 _REACH = 2
 """Words between a difference and its number: *two visits before*."""
@@ -90,7 +93,11 @@ def take_by_cues(words: SlotWords) -> list[Candidates]:
     """
     pair = tuple(dict.fromkeys(words.named))
     if words.pointed is not None and len(pair) == PAIR:
-        return [(pair[words.pointed],), (pair[1 - words.pointed],)][: words.parts]
+        places: list[Candidates] = [(pair[words.pointed],), (pair[1 - words.pointed],)]
+        return places[: words.parts]
+    if words.is_number and not (TOTALS | DIFFERENCES).isdisjoint(words.command):
+        first, second = (int(one) for one in (*words.named, 0, 0)[:PAIR])
+        return [(abs(first - second if TOTALS.isdisjoint(words.command) else first + second),)]
     if words.is_number:
         change = _change(words)
         first = [one for (one,) in take_first(words)]
