@@ -96,8 +96,8 @@ def take_by_cues(words: SlotWords) -> list[Candidates]:
         places: list[Candidates] = [(pair[words.pointed],), (pair[1 - words.pointed],)]
         return places[: words.parts]
     if words.is_number and not (TOTALS | DIFFERENCES).isdisjoint(words.command):
-        first, second = (int(one) for one in (*words.named, 0, 0)[:PAIR])
-        return [(abs(first - second if TOTALS.isdisjoint(words.command) else first + second),)]
+        left, right = (int(one) for one in (*words.named, 0, 0)[:PAIR])
+        return [(abs(left - right if TOTALS.isdisjoint(words.command) else left + right),)]
     if words.is_number:
         change = _change(words)
         first = [one for (one,) in take_first(words)]
