@@ -8,6 +8,7 @@ from roboirg.core.word_pools import Pools
 from roboirg.language.instruction import Expression
 from roboirg.language.number_words import cardinal, ordinal, plural
 from roboirg.language.pairs.value_pair import PairDraw
+from roboirg.language.patterns import REFERENCE
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, sentences
 from roboirg.language.request import GoalValue, InstructionRequest, UtteranceSpec
 from roboirg.language.settings.explicit import stated
@@ -49,7 +50,7 @@ def pair_reinforcement(request: InstructionRequest, draw: PairDraw) -> Utterance
     """Return one more remark on both values."""
     values = " and ".join(str(value.value) for value in draw.introduced)
     nouns = noun(request, draw) if _many(draw) else plural(noun(request, draw))
-    ref = anaphor(f"those {nouns}", "them", draw.pair.slot, values)
+    ref = anaphor(f"those {nouns}", "them", REFERENCE, values)
     template = request.pick("pair reinforcement", templates.PAIR_REINFORCEMENTS)
     return UtteranceSpec("reinforcement", fill(template, {"ref": ref}))
 

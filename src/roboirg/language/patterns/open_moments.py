@@ -21,18 +21,14 @@ def _derive(request: InstructionRequest) -> Derived:
     first, last = (favorite, least) if favorite_first else (least, favorite)
     words = {first: MOMENTS[first], last: f"right {last} it"}
     template = request.pick("preference", templates.PREFERENCES[0 if favorite_first else 1])
-    context = fill(
-        template,
-        {
-            "yes": antecedent(words[favorite], REFERENCE, favorite),
-            "no": antecedent(words[least], REFERENCE, least),
-        },
-    )
+    slots = {str(goal_value.value): goal_value.slot, other: REFERENCE}
+    named = {one: antecedent(words[one], slots[one], one) for one in (favorite, least)}
+    context = fill(template, {"yes": named[favorite], "no": named[least]})
     pools = templates.FAVORITES if goal_is_favorite else templates.NOT_FAVORITES
     pointer = request.pick("favorite", pools)
-    named = MOMENTS[favorite] if goal_is_favorite else f"that is not {MOMENTS[favorite]}"
+    resolved = MOMENTS[favorite] if goal_is_favorite else f"that is not {MOMENTS[favorite]}"
     moment = (
-        antecedent(f"at the moment {named}", goal_value.slot, goal_value.value)
+        antecedent(f"at the moment {resolved}", goal_value.slot, goal_value.value)
         if request.resolved
         else anaphor(
             pointer, "choice" if goal_is_favorite else "other", goal_value.slot, goal_value.value
