@@ -6,6 +6,7 @@ import hashlib
 import pytest
 from language_variants import PAIRS, first_episodes
 
+from roboirg.core.instruction_options import DEFAULT_REASONING, DEFAULT_RIVAL
 from roboirg.language import LANGUAGE_VERSION, instruct_with
 from roboirg.language.variants import expressible_options
 
@@ -80,7 +81,8 @@ def digest(task, setting):
     sha = hashlib.sha256()
     for episode in first_episodes(task, "train", 24):
         for options in expressible_options(episode):
-            if options.setting == setting:
+            usual = (options.rival, options.reasoning) == (DEFAULT_RIVAL, DEFAULT_REASONING)
+            if options.setting == setting and usual:
                 instruction = instruct_with(episode, options)
                 sha.update("\n".join((episode.key, options.form, *instruction.turns)).encode())
                 sha.update(

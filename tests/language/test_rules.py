@@ -21,6 +21,12 @@ from roboirg.tasks import every_task, get_task
 COLOR_NAMES = frozenset(ALL_COLORS)
 
 
+UNNAMED = ("pair", "other", "choice", "total", "difference")
+"""Expression classes whose name need not be in the words."""
+DERIVED = ("other", "total", "difference")
+"""Classes whose value need not be introduced: it follows from others."""
+
+
 def words_of(text):
     return re.findall(r"[a-z0-9]+", text.lower())
 
@@ -48,7 +54,7 @@ def check_spans(instruction):
         assert (mention.expression is None) == (mention.role == "antecedent")
         if mention.role == "anaphor":
             assert COLOR_NAMES.isdisjoint(words)
-        if mention.expression not in (None, "pair", "other") and "those" not in words:
+        if mention.expression not in (None, *UNNAMED) and "those" not in words:
             assert mention.expression in words
 
 
@@ -58,9 +64,12 @@ def check_values(instruction, goal):
         assert mention.slot == "reference" or mention.value in values_of(goal, mention), mention
         if mention.role == "antecedent":
             introduced.add((mention.slot, mention.value))
+        elif instruction.metadata["rival_slot"] and mention.expression == "them":
+            # The value that is meant, and its rival.
+            assert set(mention.value.split(" and ")) == {str(value) for _, value in introduced}
         else:
             assert referents(mention) <= introduced, (instruction.text, mention)
-        if mention.expression == "other":
+        if mention.expression == "other" and not instruction.metadata["rival_slot"]:
             check_other(instruction, mention)
 
 
@@ -72,13 +81,18 @@ def values_of(goal, mention):
 
 def referents(mention):
     """The values that must be introduced before an anaphor."""
-    if mention.expression == "other":
+    if mention.expression in DERIVED:
         return set()  # derived: the goal's value itself never was
     values = mention.value.split(" and ") if mention.expression == "them" else [mention.value]
     return {(mention.slot, value) for value in values}
 
 
 def check_other(instruction, mention):
+    if instruction.metadata["reasoning"] == "open":
+        assert (mention.slot, mention.value) in {
+            (one.slot, one.value) for one in instruction.mentions if one.role == "antecedent"
+        } or mention.slot == "relation"
+        return
     pair, chosen = (one.value for one in instruction.mentions[:2])
     assert {chosen, mention.value} == set(pair.split(" and "))
     assert {one.slot for one in instruction.mentions[:2]} == {"reference"}
@@ -137,7 +151,7 @@ def check_numbers(lower):
     assert not re.search(rf"\b({MANY}) {things}\b", lower), lower
     assert not re.search(rf"\bone (more |fewer )?{color} (cubes|boxes|tapes)\b", lower), lower
     assert not re.search(rf"\b({MANY}|many) {color} (cube|box|tape)\b", lower), lower
-    assert not re.search(rf"\bof the {color} (cube|box|tape)\b", lower), lower
+    assert not re.search(rf"(?<!instead )\bof the {color} (cube|box|tape)\b", lower), lower
 
 
 MANY = "|".join(CARDINALS[2:])
@@ -156,7 +170,8 @@ def check_agreement(lower):
         if re.search(r"\b(i|you|we|they|those)( would| still| should really)? $", subject):
             continue
         if found and re.search(rf"\b({THING}|number|visit|placement)\b", subject):
-            several = re.search(rf"\b({THING})\b.* and the (\w+ )?({THING})", subject)
+            things = rf"({THING}|visit|placement)"
+            several = re.search(rf"\b{things}\b.* and the (\w+ )?{things}", subject)
             assert (found[1] in ("are", "were", "have")) == bool(several), sentence
 
 

@@ -21,7 +21,18 @@ from roboirg.cli import (
     wording_commands,
 )
 from roboirg.cli.bench_commands import bench
-from roboirg.cli.options import Distractor, Frame, Split, Stages, Tasks, Video, Wordings, Workers
+from roboirg.cli.options import (
+    Distractor,
+    Frame,
+    Reasoning,
+    Rival,
+    Split,
+    Stages,
+    Tasks,
+    Video,
+    Wordings,
+    Workers,
+)
 from roboirg.cli.real_commands import real_app
 from roboirg.cli.run_commands import INTERRUPTED, USAGE_ERROR, Out
 from roboirg.core.errors import InvalidValueError, RoboIRGError
@@ -210,6 +221,8 @@ def instruct(
     distractor: Distractor = "neutral",
     distractors: Annotated[int, typer.Option(help="Number of distractors.")] = 1,
     frame: Frame = "robot",
+    rival: Rival = "none",
+    reasoning: Reasoning = "plain",
     wordings: Wordings = None,
 ) -> None:
     """Print the instructions of an episode, and how many tokens they need."""
@@ -232,6 +245,8 @@ def instruct(
             distractor=distractor,
             distractors=distractors,
             frame=frame,
+            rival=rival,
+            reasoning=reasoning,
             wordings=identity,
         )
         length = counted(count_tokens(instruction.text), "token")

@@ -13,6 +13,8 @@ from roboirg.cli.options import (
     Distractor,
     Forms,
     Frame,
+    Reasoning,
+    Rival,
     Settings,
     Stages,
     Tasks,
@@ -59,6 +61,8 @@ def export_instructions(
     stages: Stages = "1-5",
     distractor: Distractor = "neutral",
     frame: Frame = "robot",
+    rival: Rival = "none",
+    reasoning: Reasoning = "plain",
     wordings: Wordings = None,
 ) -> None:
     """Export a row per episode, setting and form (columns: see docs/language.md)."""
@@ -83,7 +87,12 @@ def export_instructions(
         chosen,
         spoken,
         InstructionOptions(
-            stages=parse_stages(stages), distractor=distractor, frame=frame, wordings=identity
+            stages=parse_stages(stages),
+            distractor=distractor,
+            frame=frame,
+            wordings=identity,
+            rival=rival,
+            reasoning=reasoning,
         ),
     )
     rows = [row(episode, instruction) for episode, instruction in said]
@@ -187,6 +196,8 @@ def score_shortcuts(
     distractor: Distractor = "neutral",
     distractors: Annotated[int, typer.Option(help="Number of distractors.")] = 1,
     frame: Frame = "robot",
+    rival: Rival = "none",
+    reasoning: Reasoning = "plain",
     wordings: Wordings = None,
     by: Annotated[
         str | None, typer.Option(help="A row for each pattern or task of a setting.")
@@ -225,6 +236,8 @@ def score_shortcuts(
         distractors=distractors,
         frame=frame,
         wordings=identity,
+        rival=rival,
+        reasoning=reasoning,
     )
     names, chosen = _tasks(tasks, identity), _settings(settings)
     rows = shortcut_rows(names, splits, chosen, options, seeds=seeds, by=grouping, learned=learned)

@@ -18,6 +18,10 @@ AnySplit = Annotated[str, typer.Option(help="train, val, test or all.")]
 Stages = Annotated[str, typer.Option(help="Stages of the contextual setting, such as 1,5.")]
 Distractor = Annotated[str, typer.Option(help="Kind of distractor in the contextual setting.")]
 Frame = Annotated[str, typer.Option(help="Frame of reference in the spatial setting.")]
+Rival = Annotated[
+    str, typer.Option(help="A second value in direct, contextual, spatial: none or drawn.")
+]
+Reasoning = Annotated[str, typer.Option(help="Patterns of the reasoning setting: plain or open.")]
 Wordings = Annotated[
     str | None, typer.Option(help="Wording file whose commands are used instead of our own.")
 ]

@@ -51,6 +51,13 @@ Delivery = Annotated[
         help="prompt: the whole instruction at once; turns: one utterance after another.  (prompt)"
     ),
 ]
+Rival = Annotated[
+    str | None,
+    typer.Option(help="A second value in direct, contextual, spatial: none or drawn.  (none)"),
+]
+Reasoning = Annotated[
+    str | None, typer.Option(help="Patterns of the reasoning setting: plain or open.  (plain)")
+]
 Wordings = Annotated[
     str | None,
     typer.Option(help="Wording file: use its commands (docs/language.md).  (our own words)"),

@@ -18,6 +18,8 @@ from roboirg.core.errors import InvalidValueError, MotionPlanningError, UnknownN
 from roboirg.core.instruction_options import (
     ALL_STAGES,
     DEFAULT_DELIVERY,
+    DEFAULT_REASONING,
+    DEFAULT_RIVAL,
     InstructionOptions,
 )
 from roboirg.core.observations import CAMERAS, DemonstrationFrames
@@ -109,6 +111,8 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         frame: str = "robot",
         wordings: str | Path | None = None,
         delivery: str = DEFAULT_DELIVERY,
+        rival: str = DEFAULT_RIVAL,
+        reasoning: str = DEFAULT_REASONING,
         actions: str = JOINT_ANGLE.name,
         cameras: Sequence[str] = CAMERAS,
         depth: bool = False,
@@ -131,6 +135,8 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
             frame,
             open_wordings(wordings),
             delivery,
+            rival,
+            reasoning,
         )
         self.instruction, self.delivery = instruct_with(self.episode, options), delivery
         self._space = find_action_space(actions)

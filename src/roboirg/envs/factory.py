@@ -28,6 +28,8 @@ class EnvOptions(TypedDict, total=False):
     frame: str
     wordings: str | Path | None
     delivery: str
+    rival: str
+    reasoning: str
     actions: str
     cameras: Sequence[str]
     depth: bool
@@ -60,6 +62,9 @@ def make(task: str | Episode, **options: Unpack[EnvOptions]) -> RoboIRGEnv:
         frame: whose left and right a spatial instruction uses: robot or camera.
         wordings: wording file whose commands are used, or its identity; None for our own words.
         delivery: prompt, all utterances at once, or turns: one after another while it acts.
+        rival: drawn adds a second value of the same kind to direct, contextual and spatial
+            instructions; none adds nothing.
+        reasoning: plain, or open for reasoning instructions whose goal follows from no single word.
         actions: joint_angle, ee_pose or waypoint.
         cameras: cameras whose pictures observations hold; () renders nothing.
         depth: add depth for the same cameras.

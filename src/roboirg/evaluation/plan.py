@@ -18,6 +18,10 @@ from roboirg.core.instruction_options import (
     DEFAULT_DISTRACTOR,
     DEFAULT_DISTRACTORS,
     DEFAULT_FRAME,
+    DEFAULT_REASONING,
+    DEFAULT_RIVAL,
+    REASONINGS,
+    RIVALS,
     InstructionOptions,
 )
 from roboirg.core.observations import (
@@ -75,6 +79,8 @@ class Plan(BaseModel):
         distractors: number of distractors, for settings that read it.
         frame: frame of reference, for settings that read it.
         delivery: prompt or turns, for settings with several utterances.
+        rival: none or drawn, for settings that read it.
+        reasoning: plain or open, for settings that read it.
         wordings: path of the wording file whose commands are used; None for our own.
         wordings_identity: name and fingerprint of that file; read from it if it is not given.
         max_steps: the policy's limit, control steps.
@@ -104,6 +110,8 @@ class Plan(BaseModel):
     distractors: int = DEFAULT_DISTRACTORS
     frame: str = DEFAULT_FRAME
     delivery: str = DEFAULT_DELIVERY
+    rival: str = DEFAULT_RIVAL
+    reasoning: str = DEFAULT_REASONING
     wordings: str | None = None
     wordings_identity: str | None = None
     max_steps: int = DEFAULT_MAX_STEPS
@@ -232,6 +240,8 @@ class Plan(BaseModel):
     def _check_options(self) -> None:
         _check_names("form", self.forms, FORMS)
         _check_names("delivery", (self.delivery,), DELIVERIES)
+        _check_names("rival", (self.rival,), RIVALS)
+        _check_names("reasoning", (self.reasoning,), REASONINGS)
         _check_names("kind of meshes", (self.meshes,), MESHES)
         for name, least in (("max_steps", 1), ("tries", 1)):
             if getattr(self, name) < least:

@@ -58,6 +58,11 @@ def row(episode: Episode, instruction: Instruction) -> ExportRow:
         "stages": metadata["stages"],
         "distractor": metadata["distractor"],
         "distractors": metadata["distractors"],
+        "rival": None if metadata["rival"] is None else str(metadata["rival"]),
+        "rival_slot": metadata["rival_slot"],
+        "rival_position": metadata["rival_position"],
+        "rival_reference": metadata["rival_reference"],
+        "reasoning": metadata["reasoning"],
         "templates": metadata["templates"],
         # Never null: readers infer the types of columns.
         "wordings": metadata["wordings"] or "own",

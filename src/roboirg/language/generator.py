@@ -14,6 +14,10 @@ from roboirg.core.instruction_options import (
     DEFAULT_DISTRACTOR,
     DEFAULT_DISTRACTORS,
     DEFAULT_FRAME,
+    DEFAULT_REASONING,
+    DEFAULT_RIVAL,
+    REASONINGS,
+    RIVALS,
     InstructionOptions,
 )
 from roboirg.core.word_pools import POOLS
@@ -47,6 +51,12 @@ _DEFAULT_METADATA: dict[str, object] = {
     "landmarks": [],
     "landmark_classes": [],
     "frame": None,
+    "rival": None,
+    "rival_slot": None,
+    "rival_position": None,
+    "rival_reference": None,
+    "reasoning": None,
+    "candidates": {},
     "wordings": None,
     "command": "own",
 }
@@ -63,6 +73,8 @@ def instruct(
     distractors: int = DEFAULT_DISTRACTORS,
     frame: str = DEFAULT_FRAME,
     wordings: str | None = None,
+    rival: str = DEFAULT_RIVAL,
+    reasoning: str = DEFAULT_REASONING,
 ) -> Instruction:
     """Return the instruction of an episode; the same arguments always give the same bytes.
 
@@ -78,6 +90,8 @@ def instruct(
         frame: of left and right, ``robot`` or ``camera``.
         wordings: ``train`` or ``test`` for the words of that pool; or the identity of an open
             wording file, whose commands are used. None for our words of the episode's split.
+        rival: ``none``, or ``drawn`` for a second value of the same kind.
+        reasoning: ``plain``, or ``open`` for patterns that no single word gives away.
 
     Raises:
         UnknownNameError: a name does not exist.
@@ -87,7 +101,17 @@ def instruct(
     """
     return instruct_with(
         episode,
-        InstructionOptions(setting, form, tuple(stages), distractor, distractors, frame, wordings),
+        InstructionOptions(
+            setting,
+            form,
+            tuple(stages),
+            distractor,
+            distractors,
+            frame,
+            wordings,
+            rival=rival,
+            reasoning=reasoning,
+        ),
     )
 
 
@@ -204,6 +228,8 @@ def _check_options(options: InstructionOptions) -> None:
         ("distractor", options.distractor, DISTRACTORS),
         ("frame", options.frame, FRAMES),
         ("delivery", options.delivery, DELIVERIES),
+        ("rival", options.rival, RIVALS),
+        ("reasoning", options.reasoning, REASONINGS),
     ):
         if name not in known:
             raise UnknownNameError(kind, name, known)

@@ -12,6 +12,7 @@ Role = Literal["antecedent", "anaphor"]
 Expression = Literal[
     "it", "them", "one", "former", "latter", "first", "second", "third",
     "that", "then", "there", "pair", "each", "other", "before", "after",
+    "last", "earlier", "later", "choice", "total", "difference",
 ]  # fmt: skip
 
 FORMS: tuple[Form, ...] = get_args(Form)

@@ -12,7 +12,9 @@ from roboirg.language.instruction import Instruction
 from roboirg.language.request import InstructionRequest, InstructionSpec
 from roboirg.tasks import Task
 
-OptionName = Literal["stages", "distractor", "distractors", "frame", "delivery"]
+OptionName = Literal[
+    "stages", "distractor", "distractors", "frame", "delivery", "rival", "reasoning"
+]
 """An option of an instruction that a setting may read."""
 
 Instruct = Callable[[InstructionOptions], Instruction]

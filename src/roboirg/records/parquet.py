@@ -24,6 +24,8 @@ _TEXT_COLUMNS = [
     "distractor",
     "frame",
     "delivery",
+    "rival",
+    "reasoning",
     "actions",
     "demonstration_frames",
     "meshes",

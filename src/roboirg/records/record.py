@@ -19,6 +19,8 @@ from roboirg.core.instruction_options import (
     DEFAULT_DISTRACTOR,
     DEFAULT_DISTRACTORS,
     DEFAULT_FRAME,
+    DEFAULT_REASONING,
+    DEFAULT_RIVAL,
     InstructionOptions,
 )
 from roboirg.core.observations import DemonstrationFrames, DemonstrationSource
@@ -79,6 +81,8 @@ class Job(_RecordModel):
         distractors: number of distractors; the default if the setting does not read it.
         frame: frame of reference; the default if the setting does not read it.
         delivery: ``prompt`` or ``turns``; the default if the setting does not read it.
+        rival: ``none`` or ``drawn``; the default if the setting does not read it.
+        reasoning: ``plain`` or ``open``; the default if the setting does not read it.
         policy_seed: seed chosen for the run; the policy's seed is derived from it and the episode.
         max_steps: the policy's limit, control steps.
         actions: required action space; None for the policy's own.
@@ -103,6 +107,8 @@ class Job(_RecordModel):
     distractors: int = DEFAULT_DISTRACTORS
     frame: str = DEFAULT_FRAME
     delivery: str = DEFAULT_DELIVERY
+    rival: str = DEFAULT_RIVAL
+    reasoning: str = DEFAULT_REASONING
     policy_seed: int = 0
     max_steps: int = DEFAULT_MAX_STEPS
     actions: str | None = None
@@ -127,6 +133,8 @@ class Job(_RecordModel):
             self.distractors,
             self.frame,
             delivery=self.delivery,
+            rival=self.rival,
+            reasoning=self.reasoning,
         )
 
     @property

@@ -16,6 +16,8 @@ from roboirg.core.instruction_options import (
     DEFAULT_DISTRACTOR,
     DEFAULT_DISTRACTORS,
     DEFAULT_FRAME,
+    DEFAULT_REASONING,
+    DEFAULT_RIVAL,
     InstructionOptions,
 )
 from roboirg.records.record import (
@@ -61,6 +63,8 @@ class RecordIndexEntry(msgspec.Struct, frozen=True, gc=False):
     distractors: int = DEFAULT_DISTRACTORS
     frame: str = DEFAULT_FRAME
     delivery: str = DEFAULT_DELIVERY
+    rival: str = DEFAULT_RIVAL
+    reasoning: str = DEFAULT_REASONING
     policy_seed: int = 0
     max_steps: int = DEFAULT_MAX_STEPS
     actions: str | None = None
@@ -95,7 +99,15 @@ class StoredInstruction(RecordIndexEntry, frozen=True):
     def options(self) -> InstructionOptions:
         """The instruction options, as of its `Job`."""
         return InstructionOptions(
-            self.setting, self.form, self.stages, self.distractor, self.distractors, self.frame
+            self.setting,
+            self.form,
+            self.stages,
+            self.distractor,
+            self.distractors,
+            self.frame,
+            delivery=self.delivery,
+            rival=self.rival,
+            reasoning=self.reasoning,
         )
 
 

@@ -82,9 +82,7 @@ COMMANDS = replace(
                 Wording("Push both buttons, then raise {colors.0}."),
                 Wording("Push both buttons and pick up {colors.0}."),
                 Wording("Start with a push of both buttons, then raise {colors.0}."),
-                Wording(
-                    "Push both buttons, raise {colors.0}, put it back, raise {colors.1}.", 2
-                ),
+                Wording("Push both buttons, raise {colors.0}, put it back, raise {colors.1}.", 2),
                 Wording(
                     "Push both buttons, pick up {colors.0}, lower it, pick up {colors.1}.",
                     2,

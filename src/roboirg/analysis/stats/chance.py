@@ -16,7 +16,7 @@ from fractions import Fraction
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.plan import instruct_job
-from roboirg.language.command_chance import fitting_goals, right_share
+from roboirg.language.command_chance import blind_goals, right_share
 from roboirg.language.shortcuts import SURFACE_RULES, goal_share, guess_goal
 from roboirg.records.record import Job
 
@@ -54,5 +54,5 @@ def _level(floor: str, task: str, split: str, number: int, options: InstructionO
     job = Job(policy="", task=task, split=split, episode=number, **options._asdict())
     episode, instruction = get_episode(task, split, number), instruct_job(job)
     if floor == CHANCE:
-        return right_share(fitting_goals(instruction.command, episode), episode)
+        return right_share(blind_goals(instruction, episode), episode)
     return goal_share(guess_goal(floor, instruction.text, task), episode)

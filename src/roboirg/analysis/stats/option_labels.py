@@ -31,6 +31,10 @@ def options_label(options: InstructionOptions) -> str:
         changed.append(f"{options.frame} frame")
     if options.delivery != _DEFAULTS.delivery:
         changed.append(f"in {options.delivery}")
+    if options.rival != _DEFAULTS.rival:
+        changed.append("with a rival")
+    if options.reasoning != _DEFAULTS.reasoning:
+        changed.append(options.reasoning)
     return f"{options.setting} ({', '.join(changed)})" if changed else options.setting
 
 

@@ -21,7 +21,9 @@ from roboirg.language.interpreter.comprehension import (
 from roboirg.language.interpreter.constraints import goal_constraints
 from roboirg.language.interpreter.discourse_context import names_camera, read_discourse, read_remark
 from roboirg.language.interpreter.negations import is_negated_command, unread_negations
+from roboirg.language.interpreter.preferences import with_preference
 from roboirg.language.interpreter.reference_resolution import ReferenceResolver
+from roboirg.language.interpreter.selections import read_selection, with_selection
 from roboirg.language.interpreter.temporal_relations import mentioned_times
 from roboirg.language.interpreter.tokens import Sentence, split_sentences
 from roboirg.language.interpreter.vocabulary import VERBS
@@ -69,7 +71,8 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
             _distinct(gap.complaint for gap in gaps),
             _distinct(word for gap in gaps for word in gap.words),
         )
-    context = read_discourse(sentences[:first])
+    before = sentences[:first]
+    context = with_selection(with_preference(read_discourse(before), before), before)
     words = _joined(sentences[first:last])
     command = read_command(words)
     times = context.times | mentioned_times(command.text)
@@ -92,7 +95,10 @@ def _possible_goals(scene: Scene, task: str) -> tuple[Goal, ...]:
 
 def _commands(words: Sentence) -> bool:
     """Return whether a sentence gives a command, understood or not."""
-    return is_command(words) or is_negated_command(words) or is_unknown_command(words)
+    if is_command(words) or is_negated_command(words):
+        return True
+    # "Leave out the former" chooses; it is no command with an unknown verb.
+    return is_unknown_command(words) and read_selection(words) is None
 
 
 def _command_span(sentences: tuple[Sentence, ...]) -> tuple[int, int]:

@@ -41,6 +41,7 @@ _AFTER_VERB = re.compile(rf"{OBJECT}|[,;:]|up\b|down\b|$")
 _BEFORE_UNKNOWN_VERB = BEFORE_VERB | {"you"}
 _COMPARISON = re.compile(r"\b(?P<word>more|fewer|less)\b(?: than \w+)?")
 _SWINGING = word_set("swing swinging forth")
+_DIFFERENCES = word_set("difference gap")
 _BOTH_TARGETS = re.compile(
     r"(?:(?:the|both|two|these|those) )*"
     r"(?:(?:target|disc)s\b|(?:left|right)\b.{,20}? and (?:the )?(?:left|right)\b"
@@ -174,8 +175,10 @@ def _locates(words: Sentence, at: int) -> bool:
     following = words[at + 1 : at + 2]
     if words[at] in ("left", "right"):
         return following == ("of",)
-    if words[at] == "between" and not _SWINGING.isdisjoint(words):
-        return _BOTH_TARGETS.match(" ".join(words[at + 1 :])) is None  # the way of a cube
+    if words[at] == "between" and not (_SWINGING | _DIFFERENCES).isdisjoint(words):
+        # The way of a cube, or the difference between two numbers.
+        after = " ".join(words[at + 1 :])
+        return _BOTH_TARGETS.match(after) is None and words[at - 1] not in _DIFFERENCES
     if words[at] in _BELOW and following == ("which",):
         return False  # the container under which the red cube is
     if words[at] in _BELOW and following in _AFTER_BELOW:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import Literal, NamedTuple
 
+from roboirg.language.interpreter.comparisons import Comparison, read_comparison
 from roboirg.language.interpreter.places import NamedPlace, read_places
 from roboirg.language.interpreter.temporal_relations import Time, mentioned_times
 from roboirg.language.interpreter.tokens import (
@@ -21,8 +22,18 @@ _POINTED = word_set("cube box tape one color")
 _PLACE_NOUNS = word_set("place spot position location")
 _SERIES_NOUNS = word_set("visit placement time pass placing stay occasion")
 _FORMER = {"former": 0, "latter": -1}
+_CHOSEN = re.compile(
+    r"\b(?:the|my) (?P<noun>cubes?|box|tapes?|ones?|color|place|spot) i "
+    r"(?:mean|meant|want|wanted|asked for|favor|chose|choose|prefer|preferred|decided on"
+    r"|settled on|picked)\b"
+)
+_OTHERS = re.compile(
+    r"\bthe (?:other (?P<noun>cubes?|ones?|box|tape|place|spot)|others)\b(?! (?:of|in|from|than)\b)"
+)
 
-DescriptionKind = Literal["any", "color", "not", "other", "place", "introduced", "introduced place"]
+DescriptionKind = Literal[
+    "any", "color", "not", "other", "place", "introduced", "introduced place", "compared"
+]
 
 
 class Description(NamedTuple):
@@ -31,12 +42,14 @@ class Description(NamedTuple):
     Attributes:
         kind: ``any`` describes nothing; ``color`` names a color; ``not`` excludes colors; ``other``
             is the remaining one of some colors; ``place`` names a place; ``introduced`` and
-            ``introduced place`` point at an earlier color or place.
+            ``introduced place`` point at an earlier color or place; ``compared`` is the foremost
+            one of those that ``not`` leaves.
         colors: named colors; empty if the words point at those of the context.
         excluded: for ``other``, the excluded color; None if the words only point at it.
         place: the named place.
         times: whether the place is the one before or after things move.
         position: index of the introduced value; None for any of them.
+        comparison: for ``compared``, the order.
     """
 
     kind: DescriptionKind
@@ -45,11 +58,13 @@ class Description(NamedTuple):
     place: NamedPlace | None = None
     times: frozenset[Time] = frozenset()
     position: int | None = None
+    comparison: Comparison | None = None
 
 
 _THAN = re.compile(
     r"\b(other than|different from|different to|differs from|unlike|"
-    r"not (in|of|among|one of|part of)|neither|except|apart from|outside)\b"
+    r"not (in|of|among|one of|part of)|neither|except|apart from|outside|"
+    r"(another|a different|some other|any other) color)\b"
 )
 _OTHER_OF = re.compile(
     r"\bthe other (?:one |color )?(?:of|in|from)\b(?! (?:the |those |these )?(?:two )?moments)"
@@ -63,6 +78,9 @@ def describe(words: Sentence) -> Description:
     """Return the description that the words for one thing give."""
     text = " ".join(words)
     colors = colors_in(words)
+    comparison = read_comparison(text)
+    if comparison is not None and _THAN.search(text):
+        return Description("compared", colors, comparison=comparison)
     places = read_places(words)
     if places:
         return Description("place", place=places[0], times=mentioned_times(text))
@@ -72,7 +90,7 @@ def describe(words: Sentence) -> Description:
         return Description("not", colors)
     if colors:
         return Description("color", colors[:1])
-    return _pointer(words) or Description("any")
+    return _choice(text) or _pointer(words) or Description("any")
 
 
 def _complement(text: str, colors: tuple[str, ...]) -> Description:
@@ -80,6 +98,17 @@ def _complement(text: str, colors: tuple[str, ...]) -> Description:
     excluded = color_of(found[1]) if found else None
     among = tuple(dict.fromkeys(colors))
     return Description("other", () if among == (excluded,) else among, excluded)
+
+
+def _choice(text: str) -> Description | None:
+    """Read ``the cube I want`` and ``the other one``: the chosen value comes first."""
+    for pattern, position in ((_CHOSEN, 0), (_OTHERS, 1)):
+        found = pattern.search(text)
+        if found:
+            placed = found["noun"] in _PLACE_NOUNS
+            kind: DescriptionKind = "introduced place" if placed else "introduced"
+            return Description(kind, times=mentioned_times(text), position=position)
+    return None
 
 
 def _pointer(words: Sentence) -> Description | None:

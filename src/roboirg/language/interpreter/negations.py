@@ -49,6 +49,7 @@ _READ_ELSEWHERE = tuple(
         r"\bnot (?:at |in )?(?:that|this|it|the one|the moment|when)\b",
         r"\bwhichever\b.*?\bnot\b",
         rf"\bnot {_REMARK}",
+        r"\b(?:she|he) (?:would|did|does) not\b",
         rf"\bno {NUMBER}\b",
         rf"\b(?:painted|colored|with|in|is|are) neither {COLOR} n?or {COLOR}\b",
         r"\b(?:painted|colored|with|in|is|are) neither of (?:those|these|them|the two)\b",

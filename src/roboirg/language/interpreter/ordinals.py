@@ -37,7 +37,9 @@ _PENULTIMATE = re.compile(
     rf"\b(?P<rank>{ORDINAL}|next) (?:to|from) (?:the )?last\b|\bpenultimate\b"
 )
 _BARE = re.compile(rf"\b(?:its|the|placed) (?P<ordinal>{ORDINAL}|last)\b")
-_POINTER = re.compile(rf"\b(?:that|this|the same) (?:very )?(?:one|number|{_NOUN})\b")
+_POINTER = re.compile(
+    rf"\b(?:that|this|the same) (?:very )?(?:one|number|{_NOUN})\b|\bthe {_NOUN} i\b"
+)
 _LATER = ("after", "following", "later than", "behind", "next")
 
 

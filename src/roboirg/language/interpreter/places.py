@@ -31,6 +31,7 @@ _CORNER_FILLERS = frozenset({"of", "the", "table", "that", "is"})
 _THINGS = frozenset({"cube", "container", "box", "tape"})
 _COLORED = _THINGS - {"container"}
 _PAIRED = _COLORED - {"cube"}
+_BOTH = frozenset({"boxes", "tapes"})
 _TO_A_SIDE = frozenset({"on", "to", "at"})
 _SIDE_FILLERS = frozenset({"the", "far"}) | _OWNERS
 
@@ -180,11 +181,12 @@ def _read_one(words: Sentence, at: int, depth: int) -> tuple[Place, int] | None:
 
 
 def _read_side(words: Sentence, at: int) -> tuple[Place, int] | None:
-    """Read ``left box``, ``tape on your right``: the place of one of two things."""
+    """Read ``left box``, ``tape on your right``, ``boxes on the left and on the right``."""
     word, following = _word(words, at), _word(words, at + 1)
     if word in _SIDES and following in _PAIRED:
         return DirectionalPlace(_SIDES[word], 0), at + 2
-    if word not in _PAIRED or following not in _TO_A_SIDE:
+    second = word == "and" and not _BOTH.isdisjoint(words[:at])
+    if not (word in _PAIRED | _BOTH or second) or following not in _TO_A_SIDE:
         return None
     after = at + 2
     while _word(words, after) in _SIDE_FILLERS:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from roboirg.language.interpreter.tokens import COLOR, NUMBER, THING, THINGS, Sentence, number_of
 
@@ -12,12 +12,19 @@ _CONCEIVABLE = range(1, 11)
 """The values that a quantity may have if no text introduces it."""
 
 
+Combination = Literal["total", "difference"]
+
+
 class CountExpression(NamedTuple):
-    """The number ``factor * quantity + offset``; the context gives a missing quantity."""
+    """The number ``factor * quantity + offset``; the context gives a missing quantity.
+
+    With a combination, the missing quantity is the total or difference of two introduced numbers.
+    """
 
     factor: float = 1.0
     offset: int = 0
     quantity: int | None = None
+    combination: Combination | None = None
 
     @property
     def derived(self) -> bool:
@@ -29,6 +36,10 @@ class CountExpression(NamedTuple):
         quantities = [self.quantity] if self.quantity is not None else list(introduced)
         if not quantities and not self.derived:
             return None
+        if self.combination is not None and quantities:
+            first, *others = quantities
+            total, difference = sum(quantities), abs(first - sum(others))
+            quantities = [total if self.combination == "total" else difference]
         results = [self.factor * one + self.offset for one in quantities or _CONCEIVABLE]
         return {int(result) for result in results if result.is_integer()}
 
@@ -43,7 +54,11 @@ class Quantity(NamedTuple):
 
 
 _NOUNS = rf"(?: (?:times?|{THING}|{THINGS}|ones?|visits?|{COLOR}|such|of|the|them))"
-_TO = rf"(?P<quantity>that|it|this|the|{NUMBER})\b"
+_TO = (
+    r"(?:(?:the|their|that|this) (?:combined )?(?P<combined>total|sum|difference|gap)\b"
+    rf"(?: between them| (?:of|between) (?P<left>{NUMBER}) and (?P<right>{NUMBER}))?"
+    rf"|(?P<quantity>that|it|this|the|{NUMBER})\b)"
+)
 _MORE = "more|larger|greater|higher|bigger|above|over"
 _LESS = "fewer|less|smaller|lower|below|under"
 _STEP = re.compile(
@@ -57,6 +72,7 @@ _SCALED = re.compile(
 _SAME = re.compile(
     r"\b(?:that|as|this|so|equally) (?:many|often)\b"
     r"|\b(?:that|this|the same) (?:number|amount) of\b"
+    r"|\bmy (?:\w+ )?number of\b|\bthe number of times(?= i\b)"
 )
 _SOME = re.compile(r"\ba (?:couple|pair) of\b")
 _ADVERB = re.compile(r"\b(?:once(?! (?:you|it|that|the|all|this))|twice|thrice)\b")
@@ -75,6 +91,7 @@ _SINGLE = re.compile(
     r"(?<!\bas )(?<!\bthan )(?<!\bto )(?<!\bfrom )(?<!\bof )(?<!\bhides )(?<!\bover )"
     rf"\b(?:an?|the)(?: single)? (?={COLOR} (?:{THING}|one)\b)"
 )
+_TOTALS = ("total", "sum")
 _FACTORS = {"twice": 2.0, "double": 2.0, "thrice": 3.0, "triple": 3.0, "half": 0.5}
 ADVERBS = {"once": 1, "twice": 2, "thrice": 3}
 """Numbers of repetitions in one word."""
@@ -85,16 +102,25 @@ Reading = tuple[re.Pattern[str], Callable[[re.Match[str]], CountExpression], boo
 
 def _stepped(found: re.Match[str]) -> CountExpression:
     sign = 1 if re.fullmatch(f"{_MORE}|plus", found["way"]) else -1
-    return CountExpression(offset=sign * (number_of(found["step"]) or 0), quantity=_quantity(found))
+    return _expression(found, offset=sign * (number_of(found["step"]) or 0))
 
 
 def _scaled(found: re.Match[str]) -> CountExpression:
     factor = _FACTORS.get(found["factor"]) or float(number_of(found["factor"].split()[0]) or 1)
-    return CountExpression(factor=factor, quantity=_quantity(found))
+    return _expression(found, factor=factor)
 
 
-def _quantity(found: re.Match[str]) -> int | None:
-    return number_of(found["quantity"])
+def _expression(found: re.Match[str], *, factor: float = 1.0, offset: int = 0) -> CountExpression:
+    """Return the expression for a quantity that a text names, points at, or combines."""
+    words = found.groupdict()
+    combined = words.get("combined")
+    if combined is None:
+        return CountExpression(factor, offset, number_of(words["quantity"]))
+    way: Combination = "total" if combined in _TOTALS else "difference"
+    left, right = number_of(words["left"] or ""), number_of(words["right"] or "")
+    if left is None or right is None:
+        return CountExpression(factor, offset, combination=way)
+    return CountExpression(factor, offset, left + right if way == "total" else abs(left - right))
 
 
 _DERIVED: tuple[Reading, ...] = ((_STEP, _stepped, False), (_PLUS, _stepped, False),

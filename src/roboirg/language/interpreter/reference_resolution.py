@@ -8,6 +8,7 @@ from typing import TypeVar
 from roboirg.core.episode import ObjectKind, Scene, SceneObject
 from roboirg.core.motions import Shuttle
 from roboirg.language.interpreter.command import Item
+from roboirg.language.interpreter.comparisons import compared_colors
 from roboirg.language.interpreter.descriptions import Description
 from roboirg.language.interpreter.discourse_context import DiscourseContext
 from roboirg.language.interpreter.object_positions import objects_at
@@ -145,6 +146,10 @@ class ReferenceResolver:
 
     def _derived(self, thing: Description) -> set[str] | None:
         named = set(thing.colors or self._context.colors)
+        if thing.comparison is not None:
+            if not named:
+                self._complain("the excluded color")
+            return compared_colors(thing.comparison, self._scene, named)
         if thing.kind == "not":
             if not named:
                 self._complain("the excluded colors")

@@ -26,12 +26,15 @@ _NEIGHBOR = re.compile(
     rf"\b(?:neighbor\w*|neighboring|adjacent|next to|beside)\b|{_EITHER.pattern}"
 )
 _OTHER = re.compile(
-    r"\bother (?:one |moment )?(?:of|moment|time|point|than)\b|\bthe other one\b"
+    r"(?<!\bcolor )\bother (?:one |moment )?(?:of|moment|time|point|than)\b|\bthe other one\b"
     r"|\bnot (?:at |in )?(?:that|this|it|the one|the moment|when)\b|\bwhichever\b.*\bnot\b"
+    r"|\bthe moment s?he (?:(?:would|did|does) not|(?:would )?(?:skip|give up|gave up|left out))\b"
 )
 _NOT = re.compile(r"\bnot (?:the |one |right |just |moment |at |directly )*(before|after)\b")
 _POINTER = re.compile(
     r"\b(?:that|this|the same) (?:very )?(?:moment|time|point|instant|part|placement|one)\b"
+    r"|\bthe moment (?:i|s?he|of (?:her|his) choice)\b"
+    r"|\b(?:her|his) (?:favorite|preferred) moment\b"
     r"|\bthen\b(?! (?:press|take|put|place|set|to|go|pick|lift|push)\b)"
 )
 

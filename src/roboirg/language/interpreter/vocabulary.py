@@ -51,13 +51,15 @@ _NOUNS = word_set(
     "table robot video camera picture beginning start outset end pair couple color colors amount "
     "place places spot position location press presses swaps swap order way hand mind "
     "neighbor neighbors action actions motion motions movement task process steps sequence "
-    "demonstration side total whole object objects cycle cycles"
+    "demonstration side total whole object objects cycle cycles sum difference gap"
 )
 _PRONOUNS = word_set(
-    "it them they you yourself i me us we what when where which who whichever there here then "
-    "everything anything something"
+    "he she it them they you yourself i me us we what when where which who whichever there here "
+    "then everything anything something"
 )
 _VERB_FORMS = word_set(
+    "asked decided settled favor favorite own special prefers skip give gave choice left pick "
+    "combined named "
     "is are was were be been am do does did done has had have stops stopped hides hid hidden "
     "covers covered picked lifted raised placed moved moves pressed presses swapped changed "
     "exchanged shuffled started began stands stood happened showed shown saw seen went goes go "
@@ -69,6 +71,7 @@ _VERB_FORMS = word_set(
     "complete remembering recalling returns returned according based initial original correct"
 )
 _COMPARISONS = word_set(
+    "nearer closer farther further away "
     "many often much more less fewer larger greater higher bigger smaller lower than as half "
     "double triple thrice twice once plus minus different unlike differs other except apart "
     "outside neither either former latter last final next very previous following preceding "

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from roboirg.language.patterns import before_after, deduction, exclusion, sequence
+from roboirg.language.patterns import (
+    before_after,
+    deduction,
+    exclusion,
+    open_colors,
+    open_moments,
+    open_numbers,
+    sequence,
+)
 from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
 from roboirg.language.request import InstructionRequest
 
-__all__ = ["PATTERNS", "REFERENCE", "Derived", "Pattern", "find_pattern"]
+__all__ = ["OPEN_PATTERNS", "PATTERNS", "REFERENCE", "Derived", "Pattern", "find_pattern"]
 
 PATTERNS: Mapping[str, tuple[Pattern, ...]] = {
     "color exclusion": (exclusion.ONE_COLOR,),
@@ -18,6 +26,18 @@ PATTERNS: Mapping[str, tuple[Pattern, ...]] = {
 }
 
 
-def find_pattern(name: str, request: InstructionRequest) -> Pattern | None:
+OPEN_PATTERNS: Mapping[str, tuple[Pattern, ...]] = {
+    "color exclusion": (open_colors.ONE_OF_TWO, open_colors.ONE_OF_THREE),
+    "number deduction": (open_numbers.TWO_STEPS,),
+    "contextual logic": (open_moments.FAVORITE,),
+}
+"""Rules whose words alone, or any single one of them, do not give the goal away."""
+
+
+def find_pattern(
+    name: str,
+    request: InstructionRequest,
+    patterns: Mapping[str, tuple[Pattern, ...]] = PATTERNS,
+) -> Pattern | None:
     """Return the rule by which a pattern derives the episode's goal; None if it cannot."""
-    return next((one for one in PATTERNS[name] if one.allows(request)), None)
+    return next((one for one in patterns[name] if one.allows(request)), None)

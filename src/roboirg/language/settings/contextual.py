@@ -6,7 +6,16 @@ import itertools
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.instruction_options import RIVALS, InstructionOptions
+from roboirg.language.pairs import (
+    draw_pair,
+    pair_command,
+    pair_introduction,
+    pair_notes,
+    pair_refusal,
+    pair_reinforcement,
+    wants_pair,
+)
 from roboirg.language.phrases import Phrase, fill, plain
 from roboirg.language.request import (
     DISTRACTORS,
@@ -30,17 +39,23 @@ MANY_DISTRACTORS = 4
 def say(request: InstructionRequest) -> InstructionSpec:
     """Return the requested stages; 1 and 5 alone are the direct instruction."""
     options = request.options
-    utterances = [direct.introduction(request)]
+    pair = draw_pair(request) if wants_pair(request) else None
+    utterances = [
+        pair_introduction(request, pair) if pair is not None else direct.introduction(request)
+    ]
     if REINFORCEMENT in options.stages:
-        utterances.append(reinforcement(request))
+        utterances.append(
+            pair_reinforcement(request, pair) if pair is not None else reinforcement(request)
+        )
     distracting = distractors(request) if DISTRACTOR in options.stages else ()
     utterances += [UtteranceSpec("distractor", phrase) for phrase, _ in distracting]
     if CUE in options.stages:
         cue = request.pick("cue", remarks.CUES)
         utterances.append(UtteranceSpec("cue", plain(cue)))
-    command = direct.command(request)
+    command = pair_command(request, pair) if pair is not None else direct.command(request)
     utterances.append(command)
     notes: dict[str, object] = {"stages": list(options.stages)}
+    notes |= pair_notes(pair) if pair is not None else {}
     if distracting:
         notes |= {"distractor": options.distractor, "distractors": options.distractors}
         notes["recency_rival"] = distracting[-1].thing if _says_it(command) else None
@@ -106,10 +121,15 @@ SETTING = Setting(
     summary="direct, with reinforcement, a distractor and a cue before the command",
     color="#009E73",
     say=say,
-    reads=frozenset({"stages", "distractor", "distractors", "delivery"}),
-    variants=tuple(
-        {"stages": stages, "distractor": distractor}
-        for stages, distractor in itertools.product(STAGE_SETS, DISTRACTORS)
+    refusal=pair_refusal,
+    hidden_slots=direct.hidden_slots,
+    reads=frozenset({"stages", "distractor", "distractors", "delivery", "rival"}),
+    variants=(
+        *(
+            {"stages": stages, "distractor": distractor}
+            for stages, distractor in itertools.product(STAGE_SETS, DISTRACTORS)
+        ),
+        *({"stages": stages, "rival": RIVALS[-1]} for stages in STAGE_SETS),
     ),
     pairing_rules=_pairing_rules,
     example=1,

@@ -7,8 +7,9 @@ that the pattern does not cover.
 from __future__ import annotations
 
 from roboirg.core.episode import Goal
+from roboirg.core.instruction_options import DEFAULT_REASONING, REASONINGS
 from roboirg.language.instruction import Instruction
-from roboirg.language.patterns import Pattern, find_pattern
+from roboirg.language.patterns import OPEN_PATTERNS, Pattern, find_pattern
 from roboirg.language.request import COLOR_SLOTS, InstructionRequest, InstructionSpec, UtteranceSpec
 from roboirg.language.setting import Setting
 from roboirg.language.settings.explicit import stated
@@ -16,7 +17,7 @@ from roboirg.language.settings.explicit import stated
 _COLOR_SLOTS = frozenset(COLOR_SLOTS)
 _DERIVED = {
     "color exclusion": _COLOR_SLOTS,
-    "number deduction": frozenset(("repeats", "counts", "visit")),
+    "number deduction": frozenset(("repeats", "counts", "visit", "placement")),
     "sequential relation": frozenset(("visit", "placement", "relation")),
     "contextual logic": frozenset(("colors", "relation")),
 }
@@ -34,10 +35,32 @@ def pattern_of(request: InstructionRequest) -> tuple[str, Pattern]:
     Move on by one more after each block of four episodes: otherwise a task with two patterns
     would use only one of them in its hard episodes.
     """
-    found = [(name, find_pattern(name, request)) for name in request.task.commands.patterns]
-    possible = [(name, pattern) for name, pattern in found if pattern is not None]
+    possible = possible_patterns(request)
     index = request.episode.index
     return possible[(index + index // BLOCK) % len(possible)]
+
+
+def possible_patterns(request: InstructionRequest) -> list[tuple[str, Pattern]]:
+    """Return the patterns that the episode allows: of the task's own ones, or of the open ones."""
+    if is_open(request):
+        found = [(name, find_pattern(name, request, OPEN_PATTERNS)) for name in OPEN_PATTERNS]
+    else:
+        found = [(name, find_pattern(name, request)) for name in request.task.commands.patterns]
+    return [(name, pattern) for name, pattern in found if pattern is not None]
+
+
+def is_open(request: InstructionRequest) -> bool:
+    """Return whether the options ask for open reasoning."""
+    return request.options.reasoning != DEFAULT_REASONING
+
+
+def refusal(request: InstructionRequest) -> str | None:
+    """Return why an episode allows no open pattern; every episode allows a plain one."""
+    if not is_open(request) or possible_patterns(request):
+        return None
+    if len(request.values_of("amount")) > 2:  # noqa: PLR2004 - a color and its count
+        return "open reasoning derives one number of cubes or one color, and the goal has several"
+    return "no open pattern singles out the goal in this scene"
 
 
 def say(request: InstructionRequest) -> InstructionSpec:
@@ -49,7 +72,8 @@ def say(request: InstructionRequest) -> InstructionSpec:
         UtteranceSpec("introduction", derived.context),
         UtteranceSpec("command", command),
     )
-    return InstructionSpec(utterances, {"pattern": name, **derived.notes})
+    notes = {"pattern": name, "reasoning": request.options.reasoning, **derived.notes}
+    return InstructionSpec(utterances, notes)
 
 
 def _hidden_slots(instruction: Instruction, goal: Goal) -> frozenset[str]:
@@ -70,7 +94,9 @@ SETTING = Setting(
     summary="the context gives an intermediate reference, from which the goal is derived",
     color="#D55E00",
     say=say,
-    reads=frozenset({"delivery"}),
+    refusal=refusal,
+    reads=frozenset({"delivery", "reasoning"}),
+    variants=tuple({"reasoning": reasoning} for reasoning in REASONINGS),
     hidden_slots=_hidden_slots,
     hides_only_color=lambda instruction: instruction.metadata["pattern"] in _HIDE_ONLY_COLOR,
     example=3,

@@ -5,11 +5,16 @@ Counts stay explicit.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 
-from roboirg.language.instruction import Expression
+from roboirg.core.episode import Goal
+from roboirg.core.instruction_options import RIVALS
+from roboirg.language.instruction import Expression, Instruction
 from roboirg.language.landmarks import FRAMES, SIMPLE, Landmark, landmarks
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed
+from roboirg.language.pairs import draw_pair, hidden_by_pair, pair_notes, pair_refusal, wants_pair
+from roboirg.language.pairs.pair_words import choosing_remark, chosen, the_other
+from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, sentences
 from roboirg.language.request import (
     COLOR_SLOTS,
     GoalValue,
@@ -46,7 +51,7 @@ def usable(request: InstructionRequest, goal_value: GoalValue) -> Mapping[int, l
         )
     ]
     simple = [one for one in found if one.level <= SIMPLE]
-    limit = LONGEST[len(request.color_values)]
+    limit = LONGEST[max(len(request.color_values), 1 + wants_pair(request))]
     short = [one for one in simple if _length(one) <= limit]
     possible = short or sorted(simple or found, key=_length)[:1]
     levels = sorted({one.level for one in possible})
@@ -62,29 +67,60 @@ def _length(landmark: Landmark) -> int:
 def refusal(request: InstructionRequest) -> str | None:
     """Return a reason if some color of the goal has no thing with a landmark."""
     if all(usable(request, goal_value) for goal_value in request.color_values):
-        return None
+        return pair_refusal(request, usable)
     return "no landmark singles out a target"
 
 
 def say(request: InstructionRequest) -> InstructionSpec:
     """Return an introduction with a landmark for each color, and a command that points there."""
+    if wants_pair(request):
+        return _say_with_rival(request)
     colors = request.color_values
-    chosen = [_drawn(request, color) for color in colors]
+    marks = [_drawn(request, color) for color in colors]
     things = [
         _pointed(request, color, landmark, pointer)
-        for color, landmark, pointer in zip(colors, chosen, POINTING[len(colors)], strict=True)
+        for color, landmark, pointer in zip(colors, marks, POINTING[len(colors)], strict=True)
     ]
     fields = stated(request) | described(request, things)
     utterances = (
-        introduction(request, colors, chosen),
+        introduction(request, colors, marks),
         UtteranceSpec("command", request.command(fields)),
     )
-    notes = {
-        "landmarks": [landmark.phrase for landmark in chosen],
-        "landmark_classes": [landmark.level for landmark in chosen],
+    return InstructionSpec(utterances, _notes(request, marks))
+
+
+def _say_with_rival(request: InstructionRequest) -> InstructionSpec:
+    """Return an introduction with two places, the remark that chooses one, and the command."""
+    draw = draw_pair(request, usable)
+    meant, rival = draw.pair
+    places = {value.field: _drawn(request, value) for value in draw.pair}
+    thing = request.task.commands.pointed.removeprefix("hidden_")
+    remark = choosing_remark(
+        request, draw, lambda value: f"the {thing} {places[value.field].phrase}", thing
+    )
+    pointing = [(meant, chosen(request, draw, "at the place"))]
+    if draw.pair.ordered:
+        pointing.append((rival, the_other(rival, "at the other place")))
+    things: list[Phrase] = []
+    for value, words in pointing:
+        name = antecedent(places[value.field].phrase, value.slot, value.value)
+        place = name if request.resolved else words
+        things.append(request.by_place(value, place, plural=request.count_of(value) > 1))
+    command = request.command(stated(request) | described(request, things))
+    shown = [places[value.field] for value in draw.introduced]
+    utterances = (
+        introduction(request, draw.introduced, shown),
+        UtteranceSpec("command", sentences([remark, command])),
+    )
+    return InstructionSpec(utterances, {**_notes(request, shown), **pair_notes(draw)})
+
+
+def _notes(request: InstructionRequest, landmarks: Sequence[Landmark]) -> dict[str, object]:
+    return {
+        "landmarks": [landmark.phrase for landmark in landmarks],
+        "landmark_classes": [landmark.level for landmark in landmarks],
         "frame": request.frame,
     }
-    return InstructionSpec(utterances, notes)
 
 
 def _drawn(request: InstructionRequest, color: GoalValue) -> Landmark:
@@ -111,19 +147,24 @@ def _pointed(
 
 
 def introduction(
-    request: InstructionRequest, colors: Sequence[GoalValue], chosen: Sequence[Landmark]
+    request: InstructionRequest, colors: Sequence[GoalValue], marks: Sequence[Landmark]
 ) -> UtteranceSpec:
     """Name the places."""
-    several = len(chosen) > 1
+    several = len(marks) > 1
     places = listed(
         [
             antecedent(landmark.phrase, color.slot, color.value)
-            for color, landmark in zip(colors, chosen, strict=True)
+            for color, landmark in zip(colors, marks, strict=True)
         ]
     )
     things = fill(request.task.commands.things_at, {"place": places}, plural=several)
     template = request.pick("place introduction", introductions.PLACE_INTRODUCTIONS)
     return UtteranceSpec("introduction", fill(template, {"things": things}, plural=several))
+
+
+def _hidden_slots(instruction: Instruction, goal: Goal) -> frozenset[str]:
+    colors = frozenset(goal.as_mapping()) & frozenset(COLOR_SLOTS)
+    return hidden_by_pair(instruction) or colors
 
 
 SETTING = Setting(
@@ -134,9 +175,11 @@ SETTING = Setting(
     say=say,
     applies_to=lambda task: task.spatial,
     refusal=refusal,
-    hidden_slots=lambda _instruction, goal: frozenset(goal.as_mapping()) & frozenset(COLOR_SLOTS),
-    reads=frozenset({"frame", "delivery"}),
-    variants=tuple({"frame": frame} for frame in FRAMES),
+    hidden_slots=_hidden_slots,
+    reads=frozenset({"frame", "delivery", "rival"}),
+    variants=tuple(
+        {"frame": frame, "rival": rival} for rival, frame in itertools.product(RIVALS, FRAMES)
+    ),
     hides_only_color=lambda _instruction: True,
     example=6,
 )

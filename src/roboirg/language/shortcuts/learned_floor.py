@@ -19,7 +19,7 @@ NGRAMS = (1, 3)
 SEED = 0
 MAX_ITERATIONS = 1000
 INVERSE_REGULARIZATION = 10.0
-"""Of 1, 10 and 100, the one that predicts direct and reasoning best."""
+"""Of 1, 10 and 100, the one that predicts direct and reasoning of the val split best."""
 
 Place = tuple[str, int]
 """A slot, and the position of a value in it."""

@@ -32,10 +32,16 @@ COMPARISONS = word_set("fewer less more earlier later")
 """One or two words after a number they make it a difference: *one time fewer*."""
 STEPS = word_set("before after")
 """The same for ordinals: *two visits before that*."""
-EXCLUSIONS = word_set("other different not neither except unlike neighbor")
+EXCLUSIONS = word_set("other another different differs not neither except unlike neighbor")
 """Before a word they say that its value is not the one meant."""
 REFERENCES = word_set("than as half twice double before after neighbor following preceding")
 """Before a number they say that the one meant is another, which follows from it."""
+POINTERS = {"former": 0, "first": 0, "earlier": 0, "latter": 1, "last": 1, "later": 1}
+"""Words that point at the first or the second of two values."""
+OPPOSITES = word_set("other not no")
+"""In the sentence of a pointer they say that it is about the value that is not meant."""
+SAYING = word_set("mentioned named")
+"""Next to *first*, *last*, *earlier* and *later* they say that these are no ordinals or places."""
 
 _REACH = 5
 """Words before a value that may exclude it: *not the one right before*."""
@@ -80,6 +86,20 @@ def command_words(text: str) -> Sentence:
     """Return the words of the last sentence."""
     sentences = _sentences(text)
     return sentences[-1] if sentences else ()
+
+
+def pointed_value(text: str) -> int | None:
+    """Return which of two values the words before the command point at, 0 or 1; None if neither.
+
+    The last pointer decides; under *other*, *not* or *no* it is the opposite. That is no grammar:
+    *not the former but the latter* has a *not*, too.
+    """
+    for words in reversed(_sentences(text)[:-1]):
+        pointers = [word for word in words if word in POINTERS]
+        ranks = not {"former", "latter"}.isdisjoint(pointers)
+        if pointers and (ranks or not SAYING.isdisjoint(words)):
+            return abs(POINTERS[pointers[-1]] - (not OPPOSITES.isdisjoint(words)))
+    return None
 
 
 def part_count(text: str, thing: str, vocabulary: GoalVocabulary) -> int:

@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Literal, NamedTuple, get_args
 
 from roboirg.core.episode import Episode, Goal
-from roboirg.language.command_chance import fitting_goals, right_share
+from roboirg.language.command_chance import blind_goals, right_share
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import all_settings
 from roboirg.language.shortcuts.goal_vocabulary import values_in
@@ -58,9 +58,9 @@ def hidden_slots(told: Told) -> tuple[str, ...]:
 
 
 def score_chance(told: Told) -> ShortcutScore:
-    """Score a guess among the goals that fit the command alone; it knows the scene."""
+    """Score a blind guess among the goals that command and scene leave; see `blind_goals`."""
     episode, instruction = told
-    goals = fitting_goals(instruction.command, episode)
+    goals = blind_goals(instruction, episode)
     slots = tuple(
         sum((_overlap(goal, episode.goal, slot) for goal in goals), Fraction(0)) / len(goals)
         for slot in hidden_slots(told)

@@ -21,6 +21,10 @@ MORE = frozenset({"more", "later", "after", "following"})
 FEWER = frozenset({"fewer", "less", "earlier", "before", "preceding"})
 ONLY_ORDINAL = frozenset({"before", "after", "following", "preceding"})
 """Next to other numbers these words are about time."""
+TOTALS = frozenset({"total", "sum", "together"})
+DIFFERENCES = frozenset({"difference", "gap"})
+"""Made of two named numbers. A rule takes one step: it does not go on to *one fewer than that*."""
+PAIR = 2
 _REACH = 2
 """Words between a difference and its number: *two visits before*."""
 
@@ -34,6 +38,7 @@ class SlotWords(NamedTuple):
         named: the values that the text names, in order.
         command: the words of the last sentence.
         parts: the number of values to find.
+        pointed: which of two named values the words before the command point at.
     """
 
     slot: str
@@ -41,6 +46,7 @@ class SlotWords(NamedTuple):
     named: tuple[Value, ...]
     command: Sentence
     parts: int
+    pointed: int | None = None
 
     @property
     def is_number(self) -> bool:
@@ -77,12 +83,20 @@ def take_unnamed(words: SlotWords) -> list[Candidates]:
 
 
 def take_by_cues(words: SlotWords) -> list[Candidates]:
-    """Choose among four rules by key words of the command.
+    """Choose among four rules by key words of the command and of what points at one of two values.
 
+    After a pointer, such as *former* or *latter*, the value at its place, and then the other one.
     *Other*, *different*, *not* or *neighbor*: the value that is not named, then the one that is
     named but not last. *One fewer*, *twice*, *right after* and the like: the number that is named
     first, changed by the difference. Otherwise the first value.
     """
+    pair = tuple(dict.fromkeys(words.named))
+    if words.pointed is not None and len(pair) == PAIR:
+        places: list[Candidates] = [(pair[words.pointed],), (pair[1 - words.pointed],)]
+        return places[: words.parts]
+    if words.is_number and not (TOTALS | DIFFERENCES).isdisjoint(words.command):
+        left, right = (int(one) for one in (*words.named, 0, 0)[:PAIR])
+        return [(abs(left - right if TOTALS.isdisjoint(words.command) else left + right),)]
     if words.is_number:
         change = _change(words)
         first = [one for (one,) in take_first(words)]

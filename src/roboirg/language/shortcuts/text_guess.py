@@ -20,7 +20,12 @@ from roboirg.language.shortcuts.goal_vocabulary import (
     orders,
     values_in,
 )
-from roboirg.language.shortcuts.named_values import command_words, named_values, part_count
+from roboirg.language.shortcuts.named_values import (
+    command_words,
+    named_values,
+    part_count,
+    pointed_value,
+)
 from roboirg.language.shortcuts.surface_rules import SURFACE_RULES, Candidates, SlotWords
 from roboirg.tasks import get_task
 
@@ -57,7 +62,7 @@ def _candidates(
     found: list[Candidates] = [(one.value,) for one in named if one.stated]
     if not found:
         values = tuple(one.value for one in named)
-        words = SlotWords(slot, vocabulary, values, command_words(text), parts)
+        words = SlotWords(slot, vocabulary, values, command_words(text), parts, pointed_value(text))
         found = SURFACE_RULES[rule](words)
     # Where a rule has nothing to go by, every value is as likely.
     padded = itertools.chain(found, itertools.repeat(()))

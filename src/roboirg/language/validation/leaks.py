@@ -7,6 +7,7 @@ from collections.abc import Collection
 from typing import cast
 
 from roboirg.core.episode import ALL_COLORS, Goal, SlotValue
+from roboirg.core.instruction_options import REASONINGS
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import all_settings
 from roboirg.language.wordings.worded_command import FIELD
@@ -33,11 +34,18 @@ def find_leaks(instruction: Instruction, goal: Goal) -> frozenset[str]:
     text = _without_ranks(instruction).lower().replace("before or after", "")
     words = frozenset(re.findall(r"[a-z0-9]+", text))
     hidden = all_settings()[instruction.setting].hidden_slots(instruction, goal)
-    words -= _template_words(instruction, hidden)
+    words -= _template_words(instruction, hidden) | _relation_words(instruction)
     found = [words & _spellings(goal[slot]) for slot in hidden]
     places = cast("list[str]", instruction.metadata["landmarks"])
     named = [place for place in places if place in instruction.command]
     return frozenset(named).union(*found)
+
+
+def _relation_words(instruction: Instruction) -> frozenset[str]:
+    """Return the words of an open relation, which go with every result: *two fewer*, *twice*."""
+    if instruction.metadata["reasoning"] != REASONINGS[-1]:
+        return frozenset()
+    return frozenset(re.findall(r"[a-z]+", str(instruction.metadata["relation"])))
 
 
 def _template_words(instruction: Instruction, hidden: Collection[str]) -> frozenset[str]:

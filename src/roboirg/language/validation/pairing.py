@@ -6,9 +6,10 @@ import re
 from collections.abc import Iterator, Sequence
 
 from roboirg.core.episode import Episode
-from roboirg.core.instruction_options import InstructionOptions
-from roboirg.language.generator import instruct_with
+from roboirg.core.instruction_options import REASONINGS, RIVALS, InstructionOptions
+from roboirg.language.generator import find_refusal, instruct_with
 from roboirg.language.instruction import Instruction, Mention
+from roboirg.language.setting import Instruct
 from roboirg.language.settings import all_settings
 
 
@@ -27,24 +28,37 @@ def unpaired(
         return instruct_with(episode, options._replace(wordings=wordings))
 
     for name in settings:
-        setting = all_settings()[name]
-        for complaint in setting.pairing_rules(say):
+        for complaint in all_settings()[name].pairing_rules(say):
             yield name, complaint
-        implicit, resolved = (
-            say(InstructionOptions(name, form)) for form in ("implicit", "resolved")
-        )
-        if implicit.turns[:-1] != resolved.turns[:-1]:
-            yield name, "resolved, its context differs"
-        # In words from outside, one time may have a sentence of its own, without a number; but
-        # both forms have our own command, or none of them.
-        templates = {str(one.metadata["command"]) for one in (implicit, resolved)}
-        same = len(templates) == 1 or "own" in templates
-        if same and without_references(implicit) != without_references(resolved):
-            yield name, "resolved, more than its references differ"
-        if setting.implicit and implicit.command == resolved.command:
-            yield name, "resolved, its command is still the implicit one"
-        if any(mention.role == "anaphor" for mention in _command_mentions(resolved)):
-            yield name, "resolved, its command still points back"
+        for options in _kinds(name):
+            if find_refusal(episode, options._replace(wordings=wordings)) is None:
+                yield from ((name, complaint) for complaint in _differences(options, say))
+
+
+def _kinds(setting: str) -> Iterator[InstructionOptions]:
+    """Yield the options under which a setting says the same in another way of its own."""
+    yield InstructionOptions(setting)
+    if "rival" in all_settings()[setting].reads:
+        yield InstructionOptions(setting, rival=RIVALS[-1])
+    if "reasoning" in all_settings()[setting].reads:
+        yield InstructionOptions(setting, reasoning=REASONINGS[-1])
+
+
+def _differences(options: InstructionOptions, say: Instruct) -> Iterator[str]:
+    """Yield how the forms of an instruction differ, beside their references."""
+    implicit, resolved = say(options), say(options._replace(form="resolved"))
+    if implicit.turns[:-1] != resolved.turns[:-1]:
+        yield "resolved, its context differs"
+    # In words from outside, one time may have a sentence of its own, without a number; but both
+    # forms have our own command, or none of them.
+    templates = {str(one.metadata["command"]) for one in (implicit, resolved)}
+    same = len(templates) == 1 or "own" in templates
+    if same and without_references(implicit) != without_references(resolved):
+        yield "resolved, more than its references differ"
+    if all_settings()[options.setting].implicit and implicit.command == resolved.command:
+        yield "resolved, its command is still the implicit one"
+    if any(mention.role == "anaphor" for mention in _command_mentions(resolved)):
+        yield "resolved, its command still points back"
 
 
 def without_references(instruction: Instruction) -> str:

@@ -1,0 +1,72 @@
+"""Comparisons: the one of two things that stands nearer, farther away, or farther to one side."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Collection, Iterator
+from typing import NamedTuple
+
+from roboirg.core.episode import Scene, SceneObject
+
+_COMPARATIVE = re.compile(
+    r"\b(?P<near>nearer|closer)(?: to you)?\b"
+    r"|\b(?:farther|further) (?:over )?(?:to|on) (?:the|your) (?P<side>left|right)\b"
+    r"|\b(?P<far>farther|further)(?: away)?(?: from you)?\b"
+)
+_TIE = 0.01
+"""Meters; the same words may mean things that differ by less."""
+
+
+class Comparison(NamedTuple):
+    """An order of two things.
+
+    Attributes:
+        axis: 0 to compare how far they are from the robot, 1 to compare how far on its left.
+        sign: +1 if the larger coordinate is meant, -1 for the smaller.
+    """
+
+    axis: int
+    sign: int
+
+
+def read_comparison(text: str) -> Comparison | None:
+    """Return the comparison in the words for one thing; None if there is none."""
+    found = _COMPARATIVE.search(text)
+    if found is None:
+        return None
+    if found["side"]:
+        return Comparison(1, 1 if found["side"] == "left" else -1)
+    return Comparison(0, -1 if found["near"] else 1)
+
+
+def compared_colors(comparison: Comparison, scene: Scene, excluded: Collection[str]) -> set[str]:
+    """Return the colors that a comparison of the two things of other colors can mean.
+
+    Args:
+        comparison: the order.
+        scene: where things stand at first.
+        excluded: colors that are not meant; if there are none, any one may be.
+    """
+    colored = [item for item in scene.objects if item.color is not None]
+    colors = sorted({str(item.color) for item in colored})
+    found: set[str] = set()
+    for left in _remaining(colors, excluded):
+        pair = [item for item in colored if item.color in left]
+        found |= {str(item.color) for item in _foremost(comparison, pair)}
+    return found
+
+
+def _remaining(colors: list[str], excluded: Collection[str]) -> Iterator[set[str]]:
+    """Yield the colors that are left; for every choice of one excluded color if none is known."""
+    if excluded:
+        yield set(colors) - set(excluded)
+        return
+    yield from map(set, itertools.combinations(colors, len(colors) - 1))
+
+
+def _foremost(comparison: Comparison, items: list[SceneObject]) -> list[SceneObject]:
+    if not items:
+        return []
+    places = [comparison.sign * item.position[comparison.axis] for item in items]
+    return [item for item, place in zip(items, places, strict=True) if max(places) - place <= _TIE]

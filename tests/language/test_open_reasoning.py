@@ -1,0 +1,196 @@
+"""Open reasoning: goals that follow from the words and the scene, and from no single word."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from language_variants import TASKS, first_episodes
+from test_rivals import pools
+
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.word_pools import POOLS
+from roboirg.episodes.splits import get_episode
+from roboirg.language import instruct, instruct_with, interpret
+from roboirg.language.command_chance import blind_goals, right_share
+from roboirg.language.generator import find_refusal
+from roboirg.language.interpreter.comparisons import Comparison, compared_colors, read_comparison
+from roboirg.language.patterns.open_numbers import quantities, relations
+from roboirg.language.shortcuts import SURFACE_RULES, goal_share, guess_goal
+from roboirg.language.templates import open_reasoning
+from roboirg.tasks import all_tasks
+
+OPEN = InstructionOptions("reasoning", reasoning="open")
+
+
+def told(task, split="test", count=40):
+    for episode in first_episodes(task, split, count):
+        if find_refusal(episode, OPEN) is None:
+            yield episode, instruct_with(episode, OPEN)
+
+
+@given(st.sampled_from(TASKS), st.integers(0, 10_000), st.sampled_from(POOLS))
+@settings(max_examples=150, deadline=None)
+def test_random_episodes_are_read_back(task, index, pool):
+    episode = get_episode(task, "random", index)
+    options = OPEN._replace(wordings=pool)
+    if find_refusal(episode, options) is not None:
+        return
+    said = instruct_with(episode, options)
+    found = interpret(said.text, episode.scene, task)
+    assert (found.goals, found.not_understood) == ((episode.goal,), ()), said.text
+    alone = interpret(said.command, episode.scene, task).goals
+    assert episode.goal in alone
+    assert len(alone) > 1, said.command
+    resolved = instruct_with(episode, options._replace(form="resolved"))
+    assert interpret(resolved.command, episode.scene, task).goals == (episode.goal,)
+
+
+def test_plain_is_the_default():
+    for task in TASKS:
+        episode = get_episode(task, "test", 1)
+        assert instruct(episode, "reasoning", reasoning="plain") == instruct(episode, "reasoning")
+        assert (
+            instruct(episode, "direct", reasoning="open").turns == instruct(episode, "direct").turns
+        )
+
+
+@pytest.mark.parametrize(
+    ("task", "index", "reason"),
+    [
+        ("PutInBox", 0, "no open pattern singles out the goal"),
+        ("BinFill", 3, "one number of cubes or one color, and the goal has several"),
+    ],
+)
+def test_what_no_open_pattern_derives_is_refused_by_name(task, index, reason):
+    with pytest.raises(InvalidValueError, match=f"The reasoning setting cannot express .*{reason}"):
+        instruct(get_episode(task, "test", index), "reasoning", reasoning="open")
+
+
+def test_an_unknown_kind_is_refused():
+    with pytest.raises(UnknownNameError, match="opne"):
+        instruct(get_episode("PickXtimes", "test", 0), "reasoning", reasoning="opne")
+
+
+def test_every_pattern_and_step_occurs():
+    patterns, notes, relations_ = set(), set(), set()
+    for task in all_tasks():
+        for _, said in told(task):
+            patterns.add(said.metadata["pattern"])
+            assert said.metadata["reasoning"] == "open"
+            if said.metadata["pattern"] == "number deduction":
+                name, step = said.metadata["relation"].split(", ")
+                notes.add(step)
+                relations_.add(name)
+    assert patterns == {"color exclusion", "number deduction", "contextual logic"}
+    assert notes == {"total", "difference"}
+    assert relations_ >= {"one fewer", "two fewer", "half", "twice"}
+
+
+def test_quantities_make_the_total_or_the_difference():
+    for reference in range(1, 11):
+        for first, second, step in quantities(reference):
+            assert first != second
+            assert reference == (first + second if step == "total" else abs(first - second))
+    assert not quantities(20)
+
+
+def test_a_relation_says_nothing_about_the_number():
+    """All but *twice* lead to every number of the scene."""
+    for choices in ({1, 2, 3}, {1, 2, 3, 4, 5}, {2, 3, 4, 5}):
+        names = {
+            result: {one.name for one in relations(result, choices)} - {"twice"}
+            for result in choices
+        }
+        assert len(set(map(frozenset, names.values()))) == 1
+        assert all(names.values())
+    assert "twice" not in {one.name for one in relations(2, {1, 2, 3})}
+
+
+def test_which_moment_is_named_last_is_drawn():
+    last = [said.mentions[1].value == episode.goal.text("relation")
+            for episode, said in told("VideoPlaceButton", "train", 100)
+            if said.metadata["pattern"] == "contextual logic"]  # fmt: skip
+    favorite = [said.metadata["relation"] for _, said in told("VideoPlaceButton", "train", 100)
+                if said.metadata["pattern"] == "contextual logic"]  # fmt: skip
+    assert 0.35 < sum(last) / len(last) < 0.65
+    assert 0.35 < favorite.count("favorite") / len(favorite) < 0.65
+
+
+def test_one_must_look_where_a_color_is_excluded():
+    """Two colors are left when the words are heard; which one is meant the scene alone tells."""
+    for task in ("PickXtimes", "VideoUnmask", "BinFill"):
+        for episode, said in told(task):
+            if said.metadata["pattern"] != "color exclusion":
+                continue
+            (excluded,) = {one.value for one in said.mentions if one.utterance == 0}
+            left = {"red", "green", "blue"} - {excluded}
+            colors = {item.color for item in episode.scene.objects if item.color is not None}
+            goal = episode.goal.as_mapping()
+            named = goal.get("colors") or (goal["color"],)
+            assert set(named) <= left
+            assert len(colors) in (2, 3)
+
+
+def test_comparisons_by_hand():
+    scene = get_episode("PickXtimes", "test", 2).scene
+    cubes = {item.color: item.position for item in scene.of_kind("cube")}
+    nearest = sorted(cubes, key=lambda color: cubes[color].x)
+    left = sorted(cubes, key=lambda color: -cubes[color].y)
+    assert read_comparison("that is nearer to you") == Comparison(0, -1)
+    assert read_comparison("further from you") == Comparison(0, 1)
+    assert read_comparison("farther to your left") == Comparison(1, 1)
+    assert read_comparison("the far left") is None
+    assert compared_colors(Comparison(0, -1), scene, {nearest[0]}) == {nearest[1]}
+    assert compared_colors(Comparison(1, 1), scene, {left[-1]}) == {left[0]}
+    assert len(compared_colors(Comparison(1, 1), scene, ())) == 2
+
+
+def test_no_rule_is_above_chance():
+    episodes = [one for task in all_tasks() for one in told(task, "train", 100)]
+    chance = sum(right_share(blind_goals(said, one), one) for one, said in episodes)
+    assert 0.3 < chance / len(episodes) < 0.5
+    for rule in SURFACE_RULES:
+        right = sum(
+            goal_share(guess_goal(rule, said.text, one.task), one) for one, said in episodes
+        )
+        assert right < chance + 0.05 * len(episodes), rule
+
+
+def test_the_pools_are_disjoint_and_have_four_each():
+    for name, pool in pools(open_reasoning):
+        assert not set(map(str, pool.train)) & set(map(str, pool.test)), name
+        assert len(pool.train) >= 4, name
+        assert len(pool.test) >= 4, name
+
+
+def test_a_total_of_introduced_numbers_is_read():
+    scene = get_episode("PickXtimes", "test", 2).scene
+    for words, repeats in (
+        ("one time fewer than the total", 4),
+        ("half as many times as their difference", None),
+        ("twice as many times as the gap between them", 2),
+        ("one more time than the difference between two and three", 2),
+    ):
+        text = f"The dice show three and two. Take the red cube and put it on the target {words}."
+        goals = interpret(text, scene, "PickXtimes").goals
+        assert [goal.number("repeats") for goal in goals] == ([repeats] if repeats else []), words
+
+
+def test_a_block_of_four_has_every_combination():
+    for task in ("StopCube", "VideoRepick"):
+        drawn = [
+            instruct(get_episode(task, "test", index), "direct", rival="drawn")
+            for index in range(8)
+        ]
+        for block in (drawn[:4], drawn[4:]):
+            noted = {
+                entry
+                for said in block
+                for entry in said.metadata["templates"]
+                if entry.startswith("rival order/")
+            }
+            assert len(noted) == len(list(itertools.product((0, 1), repeat=2)))

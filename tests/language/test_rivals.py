@@ -1,0 +1,251 @@
+"""Rivals: a second value on equal terms, and words that single one of the two out."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections import Counter
+from fractions import Fraction
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from language_variants import TASKS, first_episodes
+
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.word_pools import POOLS, Pools
+from roboirg.episodes.splits import get_episode
+from roboirg.language import instruct, instruct_with, interpret
+from roboirg.language.command_chance import blind_goals, right_share
+from roboirg.language.generator import find_refusal
+from roboirg.language.interpreter.selections import read_selection
+from roboirg.language.interpreter.tokens import split_sentences
+from roboirg.language.settings import settings_of
+from roboirg.language.shortcuts import SURFACE_RULES, goal_share, guess_goal
+from roboirg.language.templates import rivals
+from roboirg.tasks import all_tasks, get_task
+
+SETTINGS = ("direct", "contextual", "spatial")
+CELLS = [
+    (name, setting)
+    for name in TASKS
+    for setting in SETTINGS
+    if setting in settings_of(get_task(name))
+]
+POINTERS = {"former": 0, "first": 0, "earlier": 0, "latter": 1, "last": 1, "later": 1}
+
+
+def told(task, setting, split="test", count=40, **options):
+    """Episodes with a rival, each with its instruction."""
+    wanted = InstructionOptions(setting, rival="drawn")._replace(**options)
+    for episode in first_episodes(task, split, count):
+        if find_refusal(episode, wanted) is None:
+            yield episode, instruct_with(episode, wanted)
+
+
+def remark(instruction):
+    """The sentence that singles one value out."""
+    return re.split(r"(?<=[.?]) ", instruction.command)[0]
+
+
+@given(st.sampled_from(CELLS), st.integers(0, 10_000), st.sampled_from(POOLS))
+@settings(max_examples=150, deadline=None)
+def test_random_episodes_are_read_back(cell, index, pool):
+    """Exactly one goal with the context, two or more without; resolved, the command alone."""
+    task, setting = cell
+    episode = get_episode(task, "random", index)
+    options = InstructionOptions(setting, rival="drawn", wordings=pool)
+    if find_refusal(episode, options) is not None:
+        return
+    said = instruct_with(episode, options)
+    found = interpret(said.text, episode.scene, task)
+    assert (found.goals, found.not_understood) == ((episode.goal,), ()), said.text
+    alone = interpret(said.command, episode.scene, task).goals
+    assert episode.goal in alone
+    assert len(alone) > 1
+    resolved = instruct_with(episode, options._replace(form="resolved"))
+    assert interpret(resolved.command, episode.scene, task).goals == (episode.goal,)
+    assert resolved.turns[:-1] == said.turns[:-1]
+
+
+@pytest.mark.parametrize(("task", "setting"), CELLS)
+def test_the_notes_are_those_of_the_words(task, setting):
+    for episode, said in told(task, setting):
+        notes = said.metadata
+        slot = notes["rival_slot"]
+        meant = episode.goal[slot]
+        meant = meant[0] if isinstance(meant, tuple) else meant
+        introduced = [one for one in said.mentions if one.utterance == 0]
+        assert [one.role for one in introduced] == ["antecedent"] * 2
+        values = [one.value for one in introduced]
+        assert notes["candidates"] == {slot: values}
+        assert sorted(map(str, values)) == sorted((str(meant), str(notes["rival"])))
+        at = ("first", "second").index(notes["rival_position"])
+        assert values[at] == notes["rival"]
+        goals = get_task(task).goals(episode.scene)
+        assert any(
+            goal != episode.goal and notes["rival"] in contents(goal, slot) for goal in goals
+        )
+        choice = read_selection(split_sentences(said.command)[0])
+        assert choice == 1 - at, said.text
+
+
+def contents(goal, slot):
+    value = goal[slot]
+    return value if isinstance(value, tuple) else (value,)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_direct_and_contextual_share_introduction_and_command(task):
+    for episode, direct in told(task, "direct", count=12):
+        contextual = instruct(episode, "contextual", rival="drawn")
+        assert (contextual.turns[0], contextual.turns[-1]) == (direct.turns[0], direct.turns[-1])
+        short = instruct(episode, "contextual", rival="drawn", stages=(1, 5))
+        assert short.turns == direct.turns
+
+
+def test_without_a_rival_nothing_changes():
+    for task in TASKS:
+        episode = get_episode(task, "test", 3)
+        for setting in settings_of(get_task(task)):
+            assert instruct(episode, setting, rival="none") == instruct(episode, setting)
+            assert instruct(episode, setting).metadata["rival"] is None
+
+
+def test_other_settings_do_not_read_it():
+    episode = get_episode("PickXtimes", "test", 2)
+    for setting in ("explicit", "reasoning"):
+        assert instruct(episode, setting, rival="drawn").turns == instruct(episode, setting).turns
+
+
+@pytest.mark.parametrize(
+    ("task", "difficulty", "setting", "options", "reason"),
+    [
+        ("PickXtimes", "easy", "spatial", {}, "no second value that the goal could ask for"),
+        ("BinFill", "hard", "direct", {}, "counts cubes of several colors leaves no rival"),
+        ("StopCube", "easy", "contextual", {"distractor": "competing"}, "one value too many"),
+    ],
+)
+def test_what_cannot_have_a_rival_is_refused_by_name(task, difficulty, setting, options, reason):
+    episodes = (get_episode(task, "test", index) for index in itertools.count())
+    episode = next(one for one in episodes if one.difficulty == difficulty)
+    with pytest.raises(InvalidValueError, match=f"The {setting} setting cannot express .*{reason}"):
+        instruct(episode, setting, rival="drawn", **options)
+
+
+def test_an_unknown_rival_is_refused():
+    with pytest.raises(UnknownNameError, match="drwan"):
+        instruct(get_episode("PickXtimes", "test", 0), "direct", rival="drwan")
+
+
+def all_told(setting, split="train", count=100):
+    tasks = [task for task in all_tasks() if (task, setting) in CELLS]
+    return [one for task in tasks for one in told(task, setting, split, count)]
+
+
+def test_each_value_is_meant_equally_often():
+    """Whatever the episode: in blocks of four, each order comes with each kind of pointer once."""
+    found = Counter(said.metadata["rival_position"] for _, said in all_told("direct"))
+    assert abs(found["first"] / found.total() - 0.5) < 0.01
+    kinds = Counter(said.metadata["rival_reference"] for _, said in all_told("direct"))
+    assert set(kinds) == {"alone", "set aside", *rivals.CHOICES}
+    assert min(kinds.values()) > 0.08 * kinds.total()
+
+
+def test_no_pointer_with_any_key_words_tells_the_value():
+    """The first or last pointer, turned over by any of *other*, *not* and *no*: at chance."""
+    remarks = [
+        (re.findall("[a-z]+", remark(said).lower()), said.metadata["rival_position"] == "first")
+        for _, said in all_told("direct")
+    ]
+    for place, count in itertools.product((0, -1), range(4)):
+        for words in itertools.combinations(("other", "not", "no"), count):
+            right = 0
+            for spoken, second in remarks:
+                pointers = [POINTERS[word] for word in spoken if word in POINTERS]
+                right += (pointers[place] != any(word in spoken for word in words)) == second
+            assert abs(right / len(remarks) - 0.5) < 0.05, (place, words)
+
+
+@pytest.mark.parametrize("setting", SETTINGS)
+def test_no_rule_is_above_chance(setting):
+    episodes = all_told(setting)
+    chance = sum(right_share(blind_goals(said, one), one) for one, said in episodes)
+    assert chance == Fraction(len(episodes), 2)
+    for rule in SURFACE_RULES:
+        right = sum(
+            goal_share(guess_goal(rule, said.text, one.task), one) for one, said in episodes
+        )
+        assert right / len(episodes) < 0.55, rule
+
+
+def test_only_understanding_finds_the_value():
+    text = (
+        "I like the red cube and the blue cube. {} Take the cube I mean and put it on the target."
+    )
+    for said, color in (
+        ("I mean the former.", "red"),
+        ("Not the former.", "blue"),
+        ("I mean the former - no, the latter.", "blue"),
+        ("I mean the latter, not the other cube.", "blue"),
+        ("I mean the other cube, not the latter.", "red"),
+        ("I gave up the one I mentioned earlier for the other cube.", "blue"),
+        ("I prefer the other cube to the last one I mentioned.", "red"),
+        ("I cannot do without the latter.", "blue"),
+    ):
+        assert read_selection(split_sentences(said)[0]) == ("red", "blue").index(color), said
+        scene = get_episode("PickXtimes", "test", 2).scene
+        goals = interpret(text.format(said), scene, "PickXtimes").goals
+        assert {goal.text("color") for goal in goals} == {color}, said
+
+
+@pytest.mark.parametrize(
+    "said",
+    ["I mean the former, not the former.", "I like it.", "I see the other cube.", "The first day."],
+)
+def test_other_remarks_single_nothing_out(said):
+    assert read_selection(split_sentences(said)[0]) is None
+
+
+def pools(module):
+    """Every pool of a module, by name."""
+    for name, value in vars(module).items():
+        if isinstance(value, Pools):
+            yield name, value
+        elif name in ("CHOICES", "PREFERENCES"):
+            groups = value.values() if isinstance(value, dict) else (value,)
+            for group in groups:
+                yield (
+                    name,
+                    Pools(*(tuple(itertools.chain(*one)) for one in zip(*group, strict=True))),
+                )
+
+
+def test_the_pools_are_disjoint_and_have_four_each():
+    for name, pool in pools(rivals):
+        assert not set(pool.train) & set(pool.test), name
+        least = 2 if name == "MENTIONED" else 4
+        assert len(pool.train) >= least, name
+        assert len(pool.test) >= least, name
+
+
+def test_both_orders_have_the_same_key_words():
+    """In each kind and pool *not* and *no* are as frequent with the meant value first as last."""
+    for kind, (first, last) in rivals.CHOICES.items():
+        for pool in POOLS:
+            words = [
+                Counter(
+                    word
+                    for text in side.of(pool)
+                    for word in re.findall(r"\w+", text.lower())
+                    if word in ("not", "no", "other")
+                )
+                for side in (first, last)
+            ]
+            assert words[0] == words[1], (kind, pool)
+    for pool in POOLS:
+        meant, aside = rivals.SINGLED.of(pool), rivals.SET_ASIDE.of(pool)
+        assert sum(bool(re.search(r"\b(not|cannot)\b", one, re.I)) for one in meant) == sum(
+            bool(re.search(r"\bnot\b", one, re.I)) for one in aside
+        )
