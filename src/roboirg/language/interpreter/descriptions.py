@@ -23,12 +23,13 @@ _PLACE_NOUNS = word_set("place spot position location")
 _SERIES_NOUNS = word_set("visit placement time pass placing stay occasion")
 _FORMER = {"former": 0, "latter": -1}
 _CHOSEN = re.compile(
-    r"\b(?:the|my) (?P<noun>cubes?|box|tapes?|ones?|color|place|spot) i "
+    r"\b(?:the|my) (?P<noun>cubes?|box|container|tapes?|ones?|color|place|spot) i "
     r"(?:mean|meant|want|wanted|asked for|favor|chose|choose|prefer|preferred|decided on"
     r"|settled on|picked)\b"
 )
 _OTHERS = re.compile(
-    r"\bthe (?:other (?P<noun>cubes?|ones?|box|tape|place|spot)|others)\b(?! (?:of|in|from|than)\b)"
+    r"\bthe (?:other (?P<noun>cubes?|ones?|box|container|tape|place|spot)|others)\b"
+    r"(?! (?:of|in|from|than)\b)"
 )
 
 DescriptionKind = Literal[
@@ -64,7 +65,7 @@ class Description(NamedTuple):
 _THAN = re.compile(
     r"\b(other than|different from|different to|differs from|unlike|"
     r"not (in|of|among|one of|part of)|neither|except|apart from|outside|"
-    r"(another|a different|some other|any other) color)\b"
+    r"(another|(a|an|some|any) (different|other|new|distinct|alternative|separate)) color)\b"
 )
 _OTHER_OF = re.compile(
     r"\bthe other (?:one |color )?(?:of|in|from)\b(?! (?:the |those |these )?(?:two )?moments)"

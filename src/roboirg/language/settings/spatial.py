@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from roboirg.core.episode import Goal
 from roboirg.core.instruction_options import RIVALS
@@ -98,14 +99,19 @@ def _say_with_rival(request: InstructionRequest) -> InstructionSpec:
     remark = choosing_remark(
         request, draw, lambda value: f"the {thing} {places[value.field].phrase}", thing
     )
-    pointing = [(meant, chosen(request, draw, "at the place"))]
+    counted = bool(request.values_of("amount"))
+    noun = "one" if counted else thing
+    pointing = [(meant, chosen(request, draw, f"the {noun}"))]
     if draw.pair.ordered:
-        pointing.append((rival, the_other(rival, "at the other place")))
+        pointing.append((rival, the_other(rival, f"the other {noun}")))
     things: list[Phrase] = []
     for value, words in pointing:
-        name = antecedent(places[value.field].phrase, value.slot, value.value)
-        place = name if request.resolved else words
-        things.append(request.by_place(value, place, plural=request.count_of(value) > 1))
+        place = places[value.field].phrase
+        full = "the one {place}" if counted else request.task.commands.by_place
+        name = antecedent(full.format(place=place), value.slot, value.value)
+        thing_words = name if request.resolved else words
+        plural = request.count_of(value) > 1
+        things.append(_whole(request).by_place(value, thing_words, plural=plural))
     command = request.command(stated(request) | described(request, things))
     shown = [places[value.field] for value in draw.introduced]
     utterances = (
@@ -113,6 +119,16 @@ def _say_with_rival(request: InstructionRequest) -> InstructionSpec:
         UtteranceSpec("command", sentences([remark, command])),
     )
     return InstructionSpec(utterances, {**_notes(request, shown), **pair_notes(draw)})
+
+
+def _whole(request: InstructionRequest) -> InstructionRequest:
+    """Return a request whose words for a place are those for the whole thing there."""
+    commands = request.task.commands
+    before, one, _ = commands.by_place.partition("the one {place}")
+    by_place = f"{before}{{place}}" if one else "{place}"
+    return replace(
+        request, task=replace(request.task, commands=replace(commands, by_place=by_place))
+    )
 
 
 def _notes(request: InstructionRequest, landmarks: Sequence[Landmark]) -> dict[str, object]:

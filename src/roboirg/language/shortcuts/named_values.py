@@ -32,7 +32,9 @@ COMPARISONS = word_set("fewer less more earlier later")
 """One or two words after a number they make it a difference: *one time fewer*."""
 STEPS = word_set("before after")
 """The same for ordinals: *two visits before that*."""
-EXCLUSIONS = word_set("other another different differs not neither except unlike neighbor")
+EXCLUSIONS = word_set(
+    "other another different distinct alternative separate new not neither except unlike neighbor"
+)
 """Before a word they say that its value is not the one meant."""
 REFERENCES = word_set("than as half twice double before after neighbor following preceding")
 """Before a number they say that the one meant is another, which follows from it."""

@@ -21,18 +21,8 @@ EXCLUDED_COLORS = Pools(
     ),
 )
 ANOTHER_COLOR = Pools(
-    train=(
-        "another color",
-        "a different color",
-        "some other color",
-        "a color that differs from that one",
-    ),
-    test=(
-        "any other color",
-        "a color other than that one",
-        "a color unlike that one",
-        "a color different from that one",
-    ),
+    train=("another color", "a different color", "some other color", "a new color"),
+    test=("any other color", "a distinct color", "an alternative color", "a separate color"),
 )
 """Next to one excluded color; two of them are left."""
 

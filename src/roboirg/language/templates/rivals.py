@@ -153,7 +153,7 @@ CHOICES: dict[ReferenceKind, tuple[Pools[str], Pools[str]]] = {
             test=("It is {yes}, not {no}.", "My choice is {yes} and not {no}."),
         ),
         Pools(
-            train=("I mean not {no} but {yes}.", "I do not want {no} but {yes}."),
+            train=("I did not mean {no} but {yes}.", "I do not want {no} but {yes}."),
             test=("It is not {no} but {yes}.", "My choice is not {no} but {yes}."),
         ),
     ),
