@@ -180,7 +180,7 @@ class InstructionRequest:
         return self.around(color.field, cube)
 
     def by_place(
-        self, color: GoalValue, place: Phrase, *, plural: bool = False, ranked: bool = False
+        self, color: GoalValue, place: Phrase, *, plural: bool = False, template: str | None = None
     ) -> Phrase:
         """Return words for the object to handle, given words for its place.
 
@@ -188,7 +188,7 @@ class InstructionRequest:
             color: the color that the words stand for.
             place: words for the place.
             plural: whether there are several objects.
-            ranked: whether the words are *the former* or *the first* of several places.
+            template: ``{place}`` and the words around it; None for those of the task.
 
         Raises:
             NoCommandError: the words from outside have no phrase for the object, only for its cube.
@@ -197,7 +197,7 @@ class InstructionRequest:
         covered = commands.thing != commands.colored
         if covered and outside is not None and commands.thing not in outside.text:
             raise NoCommandError
-        template = (ranked and commands.by_rank) or commands.by_place
+        template = template or commands.by_place
         if color != self.color_values[0] or len(self.color_values) > 2:  # noqa: PLR2004
             # "Two cubes like the one here and one like the one there"; of three, none says cube.
             template = template.removeprefix(f"{commands.thing}[|s] ")

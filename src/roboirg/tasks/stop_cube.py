@@ -142,8 +142,8 @@ COMMANDS = Commands(
         ),
         test=(
             Wording("Push the button so that the cube stops on the target {visit}."),
-            Wording("Halt the cube on the target {visit} with the button."),
-            Wording("With the button, make the cube stop on the target {visit}."),
+            Wording("With the button, halt the cube on the target {visit}."),
+            Wording("Push the button to make the cube stop on the target {visit}."),
         ),
     ),
 )

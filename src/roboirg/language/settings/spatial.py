@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 from roboirg.core.episode import Goal
 from roboirg.core.instruction_options import RIVALS
@@ -15,7 +14,7 @@ from roboirg.language.instruction import Expression, Instruction
 from roboirg.language.landmarks import FRAMES, SIMPLE, Landmark, landmarks
 from roboirg.language.pairs import draw_pair, hidden_by_pair, pair_notes, pair_refusal, wants_pair
 from roboirg.language.pairs.pair_words import choosing_remark, chosen, the_other
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, sentences
+from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain, sentences
 from roboirg.language.request import (
     COLOR_SLOTS,
     GoalValue,
@@ -99,19 +98,13 @@ def _say_with_rival(request: InstructionRequest) -> InstructionSpec:
     remark = choosing_remark(
         request, draw, lambda value: f"the {thing} {places[value.field].phrase}", thing
     )
-    counted = bool(request.values_of("amount"))
-    noun = "one" if counted else thing
+    noun = "one" if request.values_of("amount") else thing
     pointing = [(meant, chosen(request, draw, f"the {noun}"))]
     if draw.pair.ordered:
         pointing.append((rival, the_other(rival, f"the other {noun}")))
-    things: list[Phrase] = []
-    for value, words in pointing:
-        place = places[value.field].phrase
-        full = "the one {place}" if counted else request.task.commands.by_place
-        name = antecedent(full.format(place=place), value.slot, value.value)
-        thing_words = name if request.resolved else words
-        plural = request.count_of(value) > 1
-        things.append(_whole(request).by_place(value, thing_words, plural=plural))
+    things = [
+        _chosen_thing(request, value, places[value.field], words) for value, words in pointing
+    ]
     command = request.command(stated(request) | described(request, things))
     shown = [places[value.field] for value in draw.introduced]
     utterances = (
@@ -121,14 +114,21 @@ def _say_with_rival(request: InstructionRequest) -> InstructionSpec:
     return InstructionSpec(utterances, {**_notes(request, shown), **pair_notes(draw)})
 
 
-def _whole(request: InstructionRequest) -> InstructionRequest:
-    """Return a request whose words for a place are those for the whole thing there."""
+def _chosen_thing(
+    request: InstructionRequest, value: GoalValue, landmark: Landmark, words: Phrase
+) -> Phrase:
+    """Return the command's words for one of two things; resolved, they name its place."""
     commands = request.task.commands
-    before, one, _ = commands.by_place.partition("the one {place}")
-    by_place = f"{before}{{place}}" if one else "{place}"
-    return replace(
-        request, task=replace(request.task, commands=replace(commands, by_place=by_place))
-    )
+    if commands.by_rank is not None:
+        named, template = f"the one {landmark.phrase}", commands.by_rank
+    else:
+        named = "".join(
+            piece.text for piece in fill(commands.things_at, {"place": plain(landmark.phrase)})
+        )
+        handled = commands.pointed == commands.thing
+        template = "{place}" if handled else commands.by_color.replace("{cube}", "{place}")
+    place = antecedent(named, value.slot, value.value) if request.resolved else words
+    return request.by_place(value, place, plural=request.count_of(value) > 1, template=template)
 
 
 def _notes(request: InstructionRequest, landmarks: Sequence[Landmark]) -> dict[str, object]:
@@ -159,7 +159,8 @@ def _pointed(
     else:
         words = f"at {words} place" if several and not ranked else words
         place = anaphor(words, expression, color.slot, color.value)
-    return request.by_place(color, place, plural=request.count_of(color) > 1, ranked=ranked)
+    template = request.task.commands.by_rank if ranked else None
+    return request.by_place(color, place, plural=request.count_of(color) > 1, template=template)
 
 
 def introduction(

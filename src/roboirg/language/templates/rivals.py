@@ -172,7 +172,7 @@ CHOICES: dict[ReferenceKind, tuple[Pools[str], Pools[str]]] = {
 
 CLAUSES = Pools(
     train=("I mean", "I want", "I asked for", "I favor"),
-    test=("I chose", "I prefer", "I decided on", "I settled on"),
+    test=("I chose", "I prefer", "I selected", "I opted for"),
 )
 """Follow the noun in the command: *the cube I mean*."""
 NUMBERS_OF = Pools(
