@@ -25,7 +25,7 @@ _FORMER = {"former": 0, "latter": -1}
 _CHOSEN = re.compile(
     r"\b(?:the|my) (?P<noun>cubes?|box|container|tapes?|ones?|color|place|spot) i "
     r"(?:mean|meant|want|wanted|asked for|favor|chose|choose|prefer|preferred|decided on"
-    r"|settled on|picked)\b"
+    r"|settled on|picked|selected|opted for)\b"
 )
 _OTHERS = re.compile(
     r"\bthe (?:other (?P<noun>cubes?|ones?|box|container|tape|place|spot)|others)\b"
