@@ -21,7 +21,8 @@ MORE = frozenset({"more", "later", "after", "following"})
 FEWER = frozenset({"fewer", "less", "earlier", "before", "preceding"})
 ONLY_ORDINAL = frozenset({"before", "after", "following", "preceding"})
 """Next to other numbers these words are about time."""
-NEIGHBOR = "neighbor"
+NEIGHBOR = frozenset({"neighbor", "or"})
+"""*Just before or after that*."""
 _REACH = 2
 """Words between a difference and its number: *two visits before*."""
 
@@ -80,8 +81,8 @@ def take_unnamed(words: SlotWords) -> list[Candidates]:
 def take_by_cues(words: SlotWords) -> list[Candidates]:
     """Choose among four rules by key words of the command.
 
-    *Other*, *different*, *not* or *neighbor*: the value that is not named, then the one that is
-    named but not last. *One fewer*, *twice*, *right after* and the like: the number that is named
+    *Other*, *neither*, *not* or *before or after*: the value that is not named, then the one that
+    is named but not last. *One fewer*, *twice*, *right after* and the like: the number that is named
     first, changed by the difference. Otherwise the first value.
     """
     if words.is_number:
@@ -102,13 +103,11 @@ def _change(words: SlotWords) -> Callable[[int], Candidates] | None:
         return lambda number: (number // 2,)
     if "twice" in command or "double" in command:
         return lambda number: (2 * number,)
-    difference = next(_differences(words), None)
-    if difference is not None:
-        return lambda number: (number + difference,)
-    if words.is_ordinal and NEIGHBOR in command:
+    if words.is_ordinal and not NEIGHBOR.isdisjoint(command):
         near = words.vocabulary.values
         return lambda number: tuple(one for one in (number - 1, number + 1) if one in near)
-    return None
+    difference = next(_differences(words), None)
+    return None if difference is None else lambda number: (number + difference,)
 
 
 def _differences(words: SlotWords) -> Iterator[int]:
