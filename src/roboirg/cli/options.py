@@ -19,7 +19,11 @@ Stages = Annotated[str, typer.Option(help="Stages of the contextual setting, suc
 Distractor = Annotated[str, typer.Option(help="Kind of distractor in the contextual setting.")]
 Frame = Annotated[str, typer.Option(help="Frame of reference in the spatial setting.")]
 Wordings = Annotated[
-    str | None, typer.Option(help="Wording file whose commands are used instead of our own.")
+    str | None,
+    typer.Option(
+        help="Wording file whose commands are used instead of our own; or train or test: our words "
+        "of that pool in every split."
+    ),
 ]
 Workers = Annotated[
     int | None,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.word_pools import POOLS
 from roboirg.language.phrases import sentences
 from roboirg.language.request import InstructionRequest, InstructionSpec, UtteranceSpec
 from roboirg.language.setting import Instruct, Setting
@@ -40,7 +41,8 @@ def _pairing_rules(instruct: Instruct) -> Iterator[str]:
     introduction = instruct(InstructionOptions("direct")).turns[0]
     explicit = instruct(InstructionOptions("explicit")).command
     resolved = instruct(InstructionOptions("direct", "resolved"))
-    paired = resolved.metadata["wordings"] is None or resolved.metadata["command"] != "own"
+    outside = resolved.metadata["wordings"] not in (None, *POOLS)
+    paired = not outside or resolved.metadata["command"] != "own"
     if paired and resolved.turns != (introduction, explicit):
         yield "resolved, its command is not the explicit one"
 

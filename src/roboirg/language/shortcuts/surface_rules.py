@@ -82,8 +82,8 @@ def take_by_cues(words: SlotWords) -> list[Candidates]:
     """Choose among four rules by key words of the command.
 
     *Other*, *neither*, *not* or *before or after*: the value that is not named, then the one that
-    is named but not last. *One fewer*, *twice*, *right after* and the like: the number that is named
-    first, changed by the difference. Otherwise the first value.
+    is named but not last. *One fewer*, *twice*, *right after* and the like: the number that is
+    named first, changed by the difference. Otherwise the first value.
     """
     if words.is_number:
         change = _change(words)
