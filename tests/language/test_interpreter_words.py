@@ -11,6 +11,7 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import COLORS, Goal, Point, Scene, SceneObject
 from roboirg.core.motions import Away, Swap
 from roboirg.language import interpret
+from roboirg.tasks import get_task
 
 
 def cube(name, x, y):
@@ -95,6 +96,96 @@ def test_amounts_in_other_words(text, counts):
         scene = Scene((*FILL.objects, cube("cube_red_5", -0.17, 0), cube("cube_green_5", 0.17, 0)),
                       FILL.motions)  # fmt: skip
     assert interpret(text, scene, "BinFill").goals == (filled(**counts),)
+
+
+@pytest.mark.parametrize(
+    ("text", "counts"),
+    [
+        ("She wants two of the red and one of the blue cubes. Put exactly those into the bin.",
+         {"red": 2, "blue": 1}),
+        ("I need one green cube and three red cubes. Throw just these into the bin.",
+         {"red": 3, "green": 1}),
+        (("Dad asked for one of the red, one of the blue and two of the green cubes. Put precisely "
+          "those into the bin."), {"red": 1, "blue": 1, "green": 2}),
+        ("I own four red and two blue cubes. Drop half as many of each into the bin.",
+         {"red": 2, "blue": 1}),
+        ("I own one red and two blue cubes. Drop two more of each into the bin.",
+         {"red": 3, "blue": 4}),
+        ("Mom has three red, two blue and three green cubes. Put one fewer of each into the bin.",
+         {"red": 2, "blue": 1, "green": 2}),
+        ("Put half as many of each as four red and six green cubes into the bin.",
+         {"red": 2, "green": 3}),
+        ("Drop 2 fewer of each than 3 red, 3 blue and 4 green cubes into the bin.",
+         {"red": 1, "blue": 1, "green": 2}),
+        ("Put twice as many of each as one red and two blue cubes into the bin.",
+         {"red": 2, "blue": 4}),
+    ],
+)  # fmt: skip
+def test_amounts_of_several_colors_at_once(text, counts):
+    expected = {filled(**counts)} if sum(counts.values()) <= 5 else set()
+    assert left_over(text) == expected
+
+
+@pytest.mark.parametrize(
+    ("words", "possible"),
+    [
+        ("exactly those", lambda counts: sum(counts) > 1),
+        ("half as many of each", lambda counts: len(counts) > 1),
+        ("twice as many of each", lambda counts: len(counts) > 1 and {*counts} <= {2, 4}),
+        ("one more of each", lambda counts: len(counts) > 1 and 1 not in counts),
+    ],
+)
+def test_amounts_of_several_colors_need_their_introduction(words, possible):
+    found = interpret(f"Put {words} into the bin.", FILL, "BinFill")
+    every = get_task("BinFill").goals(FILL)
+    assert found.goals == tuple(one for one in every if possible(one.numbers("counts")))
+    assert len(found.goals) > 1
+    assert found.not_understood == ("nothing before the command introduces amounts",)
+
+
+@pytest.mark.parametrize(
+    ("introduction", "words", "other"),
+    [
+        ("I need two of the red and one of the blue cubes.", "exactly those", "one red"),
+        ("I own four red and two blue cubes.", "half as many of each", "twice as many of each"),
+        ("I own four red and two blue cubes.", "half as many of each", "exactly those"),
+        ("I own three red and two blue cubes.", "one fewer of each", "two fewer of each"),
+    ],
+)
+def test_each_word_for_several_amounts_counts(introduction, words, other):
+    put = f"{introduction} Put {{}} into the bin."
+    (goal,) = left_over(put.format(words))
+    assert goal not in left_over(put.format(other))
+
+
+NEITHER = ("that is neither", "which is neither", "whose color is neither", "colored neither")
+
+
+@pytest.mark.parametrize("words", NEITHER)
+@pytest.mark.parametrize("pair", ["of those", "of them", "of these", "of the two"])
+def test_neither_excludes_an_introduced_pair(words, pair):
+    pick = Scene(
+        (BUTTON, *(cube(f"cube_{one}", 0, at / 9) for at, one in enumerate(COLORS)), *DISCS)
+    )
+    take = f"Take the cube {words} {pair} and place it on the target once."
+
+    def colors(text):
+        return {goal.text("color") for goal in left_over(text, pick, "PickXtimes")}
+
+    assert colors(f"My hat is red and blue. {take}") == {"green"}
+    assert colors(f"My hat is red and green. {take}") == {"blue"}
+    assert colors(take) == set(COLORS)  # the pair has to be introduced
+    counted = f"Put two cubes {words.replace('is', 'are')} {pair} into the bin."
+    assert left_over(f"My hat is red and blue. {counted}") == {filled(green=2)}
+    assert left_over(counted) == {filled(**{one: 2}) for one in COLORS}
+
+
+@pytest.mark.parametrize("words", NEITHER)
+def test_neither_excludes_a_pair_that_it_names(words):
+    for one, two in itertools.permutations(COLORS, 2):
+        (rest,) = set(COLORS) - {one, two}
+        text = f"Lift the container over the cube {words} {one} nor {two}."
+        assert left_over(text, SWAPPED, "VideoUnmaskSwap") == {Goal.of(colors=(rest,))}
 
 
 def left_over(text, scene=FILL, task="BinFill"):
@@ -326,6 +417,19 @@ def test_any_introduced_amounts_are_pointed_at(counts, words):
     text = f"I need {asked}. Drop {', '.join(items)} into the bin."
     expected = {filled(**counts)} if sum(counts.values()) <= 5 else set()
     assert left_over(text) == expected
+
+
+@given(COUNTS, st.sampled_from(["one fewer", "two more", "half as many", "twice as many"]))
+def test_any_amounts_of_each_are_computed(counts, words):
+    result = {
+        "one fewer": lambda count: count - 1, "two more": lambda count: count + 2,
+        "half as many": lambda count: count / 2, "twice as many": lambda count: count * 2,
+    }[words]  # fmt: skip
+    own = ", ".join(f"{WORDED[count]} {color}" for color, count in counts.items())
+    text = f"I own {' and '.join(own.rsplit(', ', 1))} cubes. Put {words} of each into the bin."
+    wanted = {color: result(count) for color, count in counts.items()}
+    possible = sum(wanted.values()) <= 5 and all(one in range(1, 5) for one in wanted.values())
+    assert left_over(text) == ({filled(**wanted)} if possible else set())
 
 
 @given(NUMBERS, NUMBERS, st.sampled_from(["more", "less", "fewer"]), st.booleans())

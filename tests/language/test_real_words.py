@@ -9,7 +9,7 @@ from language_variants import random_episodes
 
 from roboirg.core.episode import ALL_COLORS, Goal, Point, Scene, SceneObject
 from roboirg.language import expressible, instruct, interpret
-from roboirg.language.interpreter.places import DirectionalPlace, read_places
+from roboirg.language.interpreter.places import DirectionalPlace, NamedPlace, read_places
 from roboirg.language.interpreter.tokens import split_sentences
 from roboirg.language.landmarks import MARGIN, landmarks
 
@@ -73,7 +73,7 @@ def test_two_of_a_kind_are_told_by_their_sides_alone(left, right, near, far, kin
     for mine, other in itertools.permutations((one, two)):
         ahead = mine.position.y - other.position.y
         side = "left" if ahead > 0 else "right"
-        words = {f"on the {side}"} if abs(ahead) >= MARGIN else set()
+        words = {f"on your {side}"} if abs(ahead) >= MARGIN else set()
         assert {landmark.phrase for landmark in landmarks(scene, kind, mine)} == words
 
 
@@ -82,13 +82,13 @@ def test_for_the_camera_sides_are_mirrored(kind):
     left = SceneObject("left", kind, Point(0.0, 0.15, 0.03), color="green")
     right = SceneObject("right", kind, Point(0.0, -0.15, 0.03), color="gray")
     (landmark,) = landmarks(Scene((left, right)), kind, left, "camera")
-    assert landmark.phrase == "on the right"
+    assert landmark.phrase == "on the camera's right"
     assert landmark.sided
 
 
 def test_sides_of_other_things_are_no_places():
     (words,) = split_sentences("swing it over the target on your right and the box on your left")
-    assert read_places(words) == (DirectionalPlace("left", 0),)
+    assert read_places(words) == (NamedPlace(DirectionalPlace("left", 0)),)
 
 
 def test_the_excluded_pair_is_the_tape_s_color_and_the_other_box_s():
@@ -128,4 +128,9 @@ def test_the_camera_frame_can_be_told_too(task):
         assert "spatial" in expressible(episode, frame="camera")
         robot = instruct(episode, "spatial").metadata["landmarks"]
         camera = instruct(episode, "spatial", frame="camera").metadata["landmarks"]
-        assert {*robot, *camera} == {"on the left", "on the right"}
+        sides = {(one.split()[-1], two.split()[-1]) for one, two in zip(robot, camera, strict=True)}
+        assert sides in ({("left", "right")}, {("right", "left")})
+        assert [one.rsplit(" ", 1)[0] for one in (*robot, *camera)] == [
+            "on your",
+            "on the camera's",
+        ]

@@ -10,15 +10,26 @@ import pytest
 from language_variants import SPATIAL_TASKS, TASKS, split_episodes
 
 from roboirg.core.episode import ALL_COLORS
+from roboirg.core.word_pools import POOLS, pool_of
 from roboirg.episodes.splits import get_episode
-from roboirg.language import FORMS, STAGE_SETS, instruct, instruct_with, templates
+from roboirg.language import FORMS, LANGUAGE_VERSION, STAGE_SETS, instruct, instruct_with
 from roboirg.language.number_words import CARDINALS, ORDINALS
 from roboirg.language.patterns import deduction, sequence
 from roboirg.language.settings import settings_of
+from roboirg.language.slot_types.number import SAME_NUMBER
+from roboirg.language.templates import derivations, introductions, remarks
 from roboirg.language.variants import expressible_options
 from roboirg.tasks import every_task, get_task
 
 COLOR_NAMES = frozenset(ALL_COLORS)
+SAID_AS = {
+    "that": ("that", *SAME_NUMBER.everything),
+    "them": ("them", "those"),
+    "pair": tuple(derivations.PAIR_ANAPHORS.everything),
+}
+"""The words for a class of expressions, if they are not its name."""
+OF_SEVERAL = ("them", "each")
+"""Expressions that refer to all colors of the goal."""
 
 
 UNNAMED = ("pair", "other", "choice", "total", "difference")
@@ -55,7 +66,8 @@ def check_spans(instruction):
         if mention.role == "anaphor":
             assert COLOR_NAMES.isdisjoint(words)
         if mention.expression not in (None, *UNNAMED) and "those" not in words:
-            assert mention.expression in words
+            said = SAID_AS.get(mention.expression, (mention.expression,))
+            assert any(one in words or one == span.lower() for one in said), span
 
 
 def check_values(instruction, goal):
@@ -76,14 +88,17 @@ def check_values(instruction, goal):
 def values_of(goal, mention):
     value = goal.as_mapping().get(mention.slot)
     values = value if isinstance(value, tuple) else (value,)
-    return (" and ".join(values),) if mention.expression == "them" else values
+    # Resolved, "of each" names all colors with the numbers to count from.
+    named = mention.role == "antecedent" and mention.value == " and ".join(map(str, values))
+    return (mention.value,) if named or mention.expression in OF_SEVERAL else values
 
 
 def referents(mention):
     """The values that must be introduced before an anaphor."""
     if mention.expression in DERIVED:
         return set()  # derived: the goal's value itself never was
-    values = mention.value.split(" and ") if mention.expression == "them" else [mention.value]
+    several = mention.expression in OF_SEVERAL
+    values = mention.value.split(" and ") if several else [mention.value]
     return {(mention.slot, value) for value in values}
 
 
@@ -103,19 +118,25 @@ def test_every_choice_is_noted(task):
     for episode in itertools.islice(split_episodes(task), 24):
         said = instruct(episode, "contextual", distractors=30)
         chosen = [int(one.split("/")[1]) for one in noted(said, "distractor/")]
-        remarks = [one.text for one in said.utterances if one.stage == "distractor"]
-        assert [templates.NEUTRAL_DISTRACTORS[index].text for index in chosen] == remarks
+        said_remarks = [one.text for one in said.utterances if one.stage == "distractor"]
+        pool = pool_of(episode.split)
+        neutral = remarks.NEUTRAL_DISTRACTORS.of(pool)
+        assert [neutral[index].text for index in chosen] == said_remarks
         rivals = instruct(episode, "contextual", distractor="competing", distractors=5)
         assert len(noted(rivals, "competing distractor/")) == 5
         derived = instruct(episode, "reasoning")
         if noted(derived, "pair anaphor/"):
             (index,) = (int(one[-1]) for one in noted(derived, "pair anaphor/"))
-            assert templates.PAIR_ANAPHORS[index] in derived.command
-        elif derived.metadata["relation"] != "neighbor":
-            assert len(noted(derived, "relation/" if named(derived) else "complement/")) == 1
+            assert derivations.PAIR_ANAPHORS.of(pool)[index] in derived.command
+        else:
+            purposes = (
+                ("relation/", "neighbor introduction/") if named(derived) else ("two moments/",)
+            )
+            assert sum(len(noted(derived, one)) for one in purposes) == 1
         if "spatial" in settings_of(get_task(task)):
             placed = instruct(episode, "spatial")
-            assert len(noted(placed, "landmark-")) == len(placed.metadata["landmarks"])
+            for purpose in ("landmark class-", "landmark-"):
+                assert len(noted(placed, purpose)) == len(placed.metadata["landmarks"])
 
 
 def named(instruction):
@@ -134,8 +155,9 @@ def check_english(text):
     assert not re.search(r"[{}\[\]|]|  | [,.;]|,,|\.\.", text), text
     assert not re.search(r"[,.;](?! |$)", text), text
     assert all(sentence[0].isupper() for sentence in text.split(". ")), text
-    words = words_of(text)
-    assert not [one for one, two in itertools.pairwise(words) if one == two], text
+    for sentence in text.split(". "):
+        words = words_of(sentence)
+        assert not [one for one, two in itertools.pairwise(words) if one == two], text
     lower = text.lower()
     assert not re.search(r"\ba [aeio]", lower), text
     assert not re.search(r"\ban [^aeiou]", lower), text
@@ -145,13 +167,15 @@ def check_english(text):
 
 
 def check_numbers(lower):
-    things = "(time|cube|container|box|tape|cat|minute|meeting)"
+    things = "(time|cube|container|box|tape|visit|cat|minute|meeting|car|hour|apple)"
     color = f"({'|'.join(ALL_COLORS)})"
     assert not re.search(rf"\b(one|1) {things}e?s\b", lower), lower
     assert not re.search(rf"\b({MANY}) {things}\b", lower), lower
     assert not re.search(rf"\bone (more |fewer )?{color} (cubes|boxes|tapes)\b", lower), lower
     assert not re.search(rf"\b({MANY}|many) {color} (cube|box|tape)\b", lower), lower
-    assert not re.search(rf"(?<!instead )\bof the {color} (cube|box|tape)\b", lower), lower
+    assert not re.search(rf"(?<!instead )(?<!\bfond )\bof the {color} (cube|box|tape)\b", lower), (
+        lower
+    )
 
 
 MANY = "|".join(CARDINALS[2:])
@@ -165,14 +189,19 @@ def check_agreement(lower):
         assert not re.search(several, sentence), sentence
         # A relative clause has a verb of its own: "the corner that is near the robot".
         main = re.sub(r"\b(that|which|whose color) (is|was)\b", r"\1", sentence)
-        found = re.search(r"\b(is|are|was|were|has|have) ", main)
+        found = re.search(r"\b(is|are|was|were|has|have|looks?|makes?|stands?) ", main)
         subject = main[: found.start()] if found else ""
         if re.search(r"\b(i|you|we|they|those)( would| still| should really)? $", subject):
             continue
         if found and re.search(rf"\b({THING}|number|visit|placement)\b", subject):
             things = rf"({THING}|visit|placement)"
-            several = re.search(rf"\b{things}\b.* and the (\w+ )?{things}", subject)
-            assert (found[1] in ("are", "were", "have")) == bool(several), sentence
+            several = re.search(
+                rf"\b{things}\b.* and the (\w+ )?{things}|\bthe \w+ and the \w+ {things}\b"
+                rf"|\bthe {things}(e?s)\b",
+                subject,
+            )
+            plural = ("are", "were", "have", "look", "make", "stand")
+            assert (found[1] in plural) == bool(several), sentence
 
 
 def test_neutral_remarks_and_cues_name_nothing_that_fills_a_slot():
@@ -181,22 +210,23 @@ def test_neutral_remarks_and_cues_name_nothing_that_fills_a_slot():
     forbidden |= {"button", "target", "it", "them", "former", "latter", "half", "all"}
     forbidden |= {"after", "earlier", "then", "visit", "placement", "moment", "bin", "video"}
     forbidden |= {*CARDINALS, *ORDINALS, "once", "twice", "double", "both", "pair", "single"}
-    allowed = {"last", "it", "all"}  # "last night", "it has been raining", "all right"
-    neutral = [remark.text for remark in templates.NEUTRAL_DISTRACTORS]
-    for sentence in (*neutral, *templates.CUES):
-        words = words_of(re.sub("all right", "", sentence.lower()))
-        assert not set(words) & (forbidden - allowed), sentence
+    neutral = [remark.text for remark in remarks.NEUTRAL_DISTRACTORS.everything]
+    for sentence in (*neutral, *remarks.CUES.everything):
+        words = words_of(re.sub("^It (is|may) ", "", sentence))  # "It is raining again."
+        assert not set(words) & forbidden, sentence
 
 
-def test_there_are_enough_paraphrases():
-    assert len(templates.NEUTRAL_DISTRACTORS) >= 8
-    assert len(set(templates.NEUTRAL_DISTRACTORS)) == len(templates.NEUTRAL_DISTRACTORS)
-    assert len(templates.CUES) >= 4
-    for name, value in vars(templates).items():
-        if name.endswith(("INTRODUCTIONS", "REINFORCEMENTS")):
-            assert len(value) >= 3, name
+@pytest.mark.parametrize("pool", POOLS)
+def test_there_are_enough_paraphrases(pool):
+    neutral = remarks.NEUTRAL_DISTRACTORS.of(pool)
+    assert len({remark.text for remark in neutral}) == len(neutral) >= 8
+    assert len(remarks.CUES.of(pool)) >= 4
+    for module in (introductions, remarks, derivations):
+        for name, value in vars(module).items():
+            if name.endswith(("INTRODUCTIONS", "REINFORCEMENTS")):
+                assert len(value.of(pool)) >= 3, name
     for task in every_task().values():
-        by_parts = Counter(wording.parts for wording in task.commands.wordings)
+        by_parts = Counter(wording.parts for wording in task.commands.wordings.of(pool))
         assert min(by_parts.values()) >= 2
         assert task.commands.patterns
 
@@ -256,18 +286,33 @@ def test_amounts_keep_count_and_color_together():
         said = instruct(episode)
         values = [mention.value for mention in said.mentions]
         assert values == [value for color, count in amounts for value in (count, color)]
-        for color, count in amounts:
-            cubes = "cube" if count == 1 else "cubes"
-            assert f"{CARDINALS[count]} {color} {cubes}" in said.text
+        for index, (color, count) in enumerate(amounts):
+            # Of three colors, only the last one has the noun.
+            has_noun = len(amounts) < 3 or index == 2
+            noun = ("cube" if count == 1 else "cubes") if has_noun else ""
+            assert re.search(rf"\b{CARDINALS[count]} {color} ?{noun}\b", said.text)
 
 
-def test_where_things_move_places_are_those_before():
-    for task in SPATIAL_TASKS:
-        for form in FORMS:
-            said = instruct(get_episode(task, "test", 0), "spatial", form)
-            moving = "Swap" in task
-            assert ("before anything moved" in said.turns[0]) == moving
-            assert ("before anything moved" in said.command) == moving
+MOVING = {"VideoUnmaskSwap": "at first", "ButtonUnmaskSwap": "now"}
+"""What says that a place is that before things change places: in the video, and to come."""
+
+
+@pytest.mark.parametrize("pool", POOLS)
+def test_where_things_move_places_are_those_before(pool):
+    for task, form, index in itertools.product(SPATIAL_TASKS, FORMS, range(24)):
+        said = instruct(get_episode(task, "test", index), "spatial", form, wordings=pool)
+        for text in (said.turns[0], said.command):
+            found = {words for words in MOVING.values() if re.search(rf"\b{words}\b", text)}
+            assert found == ({MOVING[task]} if task in MOVING else set()), text
+
+
+def test_cubes_that_will_be_covered_are_pointed_at():
+    """Where the containers come after the words, the words name the cubes that are there."""
+    for task, pool in itertools.product(("ButtonUnmask", "ButtonUnmaskSwap"), POOLS):
+        for index in range(12):
+            said = instruct(get_episode(task, "test", index), "spatial", wordings=pool)
+            assert "container" not in said.turns[0].lower()
+            assert "the container over the cube" in said.command
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -279,7 +324,7 @@ def test_metadata_is_plain_and_complete(task):
             assert json.loads(json.dumps(metadata)) == dict(metadata)
             keys = keys or set(metadata)
             assert set(metadata) == keys
-            assert metadata["language_version"] == templates.LANGUAGE_VERSION
+            assert metadata["language_version"] == LANGUAGE_VERSION
             assert (metadata["frame"] is not None) == (options.setting == "spatial")
             if options.setting == "contextual":
                 assert tuple(metadata["stages"]) in STAGE_SETS

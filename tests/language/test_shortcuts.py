@@ -39,8 +39,8 @@ COLORS = ("blue", "green", "red")
 EXCLUDED = "My kitchen is painted red and blue. Take the cube of a color other than that pair"
 CHOSEN = "Of the two, I would choose blue."
 PICKS = (
-    "Lift the container that hides the cube whose color is different from that pair, then lift "
-    "the container with the color of that pair that I did not choose."
+    "Lift the container over the cube that is neither of those, then lift the container over the "
+    "cube in the other of those colors."
 )
 
 
@@ -64,6 +64,11 @@ def places(rule, text, task, slot):
         ("last-mention", "A green door. Take the red cube once.", ("red",)),
         ("elimination", "A green door. Take the red cube once.", ("red",)),
         ("surface", "Take the cube whose color is different from RED and blue once.", ("green",)),
+        (
+            "surface",
+            "I like red and blue. Take the cube that is neither of those once.",
+            ("green",),
+        ),
     ],
 )
 def test_colors_by_hand(rule, text, colors):
@@ -81,6 +86,10 @@ def test_colors_by_hand(rule, text, colors):
         ("surface", "My number is two. Take the red cube twice as many times as that.", (4,)),
         ("surface", "My number is six. Take it half as many times as that.", (3,)),
         ("surface", "Take the red cube half as many times as six.", (3,)),
+        ("surface", "The bell rang six times. Take the red cube half as often as that.", (3,)),
+        ("surface", "I knock twice. Take the red cube twice as often as that.", (4,)),
+        ("surface", "I knock twice. Take the red cube just as often.", (2,)),
+        ("surface", "I knock five times. Take the red cube two times fewer than that.", (3,)),
         ("first-mention", "My number is four. Take the red cube one time fewer than that.", (4,)),
         ("first-mention", f"{EXCLUDED} three times.", (3,)),
         ("first-mention", "I like those two. Take the one there twice.", (2,)),
@@ -98,6 +107,8 @@ def test_numbers_by_hand(rule, text, repeats):
         ("first-mention", "I wait for the third visit. Press during that visit.", (3,)),
         ("surface", "I wait for the third visit. Press during the visit right before that.", (2,)),
         ("surface", "I wait for the third visit. Press two visits after that.", (5,)),
+        ("surface", "I wait for the third visit. Press two visits earlier than that.", (1,)),
+        ("surface", "I wait for the third visit. Press just before or after that.", (2, 4)),
         ("surface", "I say four. Press on the visit whose number is one less than that.", (3,)),
         ("first-mention", "Press during its fifth visit.", (5,)),
         ("elimination", "Press during its fifth visit.", (5,)),
@@ -122,6 +133,16 @@ def test_several_values_by_hand():
         "colors": (("red",), ("blue",)),
         "counts": ((2,), (1,)),
     }
+    amounts = "She wants two of the red and one of the blue cubes. Put exactly those into the bin."
+    assert guess_goal("first-mention", amounts, "BinFill") == {
+        "colors": (("red",), ("blue",)),
+        "counts": ((2,), (1,)),
+    }
+    halves = "I own two red, six blue and four green cubes. Put half as many of each into the bin."
+    assert guess_goal("surface", halves, "BinFill") == {
+        "colors": (("red",), ("blue",), ("green",)),
+        "counts": ((1,), (3,), (2,)),
+    }
     places_ = "Look left and right. Lift the container at the former place, then at the latter."
     assert places("surface", places_, "VideoUnmask", "colors") == (COLORS, COLORS)
 
@@ -134,6 +155,16 @@ def test_two_moments_by_hand():
         assert places("surface", text, "VideoPlaceButton", "relation") == ((other,),)
         assert places("last-mention", text, "VideoPlaceButton", "relation") == ((named,),)
         assert places("first-mention", text, "VideoPlaceButton", "relation") == (("before",),)
+
+
+def test_before_or_after_names_no_moment():
+    text = "I liked the placement right {} the press. Put the red cube on the target of the "
+    text += "placement just before or after that one."
+    for named, other in (("before", "after"), ("after", "before")):
+        said = text.format(named)
+        assert places("surface", said, "VideoPlaceButton", "relation") == ((other,),)
+        assert places("elimination", said, "VideoPlaceButton", "relation") == ((other,),)
+        assert places("first-mention", said, "VideoPlaceButton", "relation") == ((named,),)
 
 
 def test_amounts_in_another_order_are_the_same_goal():
@@ -257,8 +288,20 @@ def test_the_table_of_the_documentation():
     assert rows["reasoning",]["first-mention"].goals == 0
     assert rows["reasoning",]["elimination"].slots > 0.7
     for rule in SURFACE_RULES:
-        assert rows["spatial",][rule].slots == pytest.approx(1 / 3)
+        assert rows["spatial",][rule].slots == pytest.approx(1 / 3, abs=0.011)
         assert rows["spatial",][rule].goals < rows["spatial",][CHANCE].goals
+
+
+def test_a_place_tells_no_color_but_that_of_another_cube():
+    named = 0
+    for episode in first_episodes("PickXtimes", "test", 50):
+        told = episode, instruct(episode, "spatial")
+        other = any(color in told[1].text for color in COLORS)
+        named += other
+        for rule in SURFACE_RULES:
+            share = Fraction(1, 2) if rule == "elimination" else 0
+            assert score_rule(rule, told).slots == ((share if other else Fraction(1, 3)),)
+    assert 0 < named < 25
 
 
 def test_the_documentation_says_what_is_measured():
@@ -294,12 +337,12 @@ def learned(task, setting, count=100):
 
 def test_the_learned_floor_is_deterministic_and_learns():
     pytest.importorskip("sklearn")
-    tested = list(instructions(first_episodes("VideoRepick", "test", 50), ["direct"], ["implicit"]))
+    tested = list(instructions(first_episodes("VideoUnmask", "test", 50), ["direct"], ["implicit"]))
     texts = [instruction.text for _, instruction in tested]
-    first, second = learned("VideoRepick", "direct"), learned("VideoRepick", "direct")
+    first, second = learned("VideoUnmask", "direct"), learned("VideoUnmask", "direct")
     assert first.predict(texts) == second.predict(texts)
     assert mean_shares(first.scores(tested)).goals > 0.9
-    assert mean_shares(learned("VideoRepick", "explicit").scores(tested)).goals < 1
+    assert mean_shares(learned("VideoUnmask", "explicit").scores(tested)).goals < 0.9
     assert first.scores([]) == []
     with pytest.raises(InvalidValueError, match="no instruction to learn from"):
         LearnedFloor([])

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from wording_stand_ins import train_episodes
+from wording_stand_ins import same_number, train_episodes
 
 from roboirg.core.episode import Goal
 from roboirg.core.errors import InvalidValueError
@@ -93,7 +93,9 @@ def test_a_file_by_hand(tmp_path):
         ("three times", "repeats", 3),
     ]
     direct = instruct(once, "direct", wordings=identity)
-    assert direct.command == "Could you put it on the target that many times, and press the button?"
+    assert direct.command == (
+        f"Could you put it on the target {same_number(direct)}, and press the button?"
+    )
     assert interpret(direct.text, once.scene, "PickXtimes").goals == (once.goal,)
     hidden = instruct(episode_with("VideoUnmask", colors=("red",)), "direct", wordings=identity)
     assert hidden.command == "lift the container with it"
@@ -350,16 +352,15 @@ text = "put {cubes.0} into the bin, then press the button"
 def test_words_around_brackets_stay():
     identity = opened(BRACKETS)
     red = [episode_with("PickXtimes", color="red", repeats=repeats) for repeats in (2, 3)]
-    assert [instruct(one, "direct", wordings=identity).command for one in red] == [
-        (
-            "put our friend it on the table on the target that many times please, "
-            "then press the button"
-        ),
-        (
-            "put our friend it on the table on the target exactly that many times, "
-            "then press the button"
-        ),
-    ]
+    twice, thrice = (instruct(one, "direct", wordings=identity) for one in red)
+    assert twice.command == (
+        f"put our friend it on the table on the target {same_number(twice)} please, "
+        "then press the button"
+    )
+    assert thrice.command == (
+        f"put our friend it on the table on the target exactly {same_number(thrice)}, "
+        "then press the button"
+    )
     said = instruct(red[0], "spatial", wordings=identity).command
     assert re.search(r"put our friend the cube .* on the table on the target twice please", said)
     said = next(
@@ -394,8 +395,10 @@ def test_the_phrases_of_a_command_stay_with_it():
         """
     )
     episode = episode_with("PickXtimes", color="red", repeats=1)
-    direct = instruct(episode, "direct", wordings=identity).command
-    assert direct == "take it, put it on the target that many times, then press the button"
+    direct = instruct(episode, "direct", wordings=identity)
+    assert direct.command == (
+        f"take it, put it on the target {same_number(direct)}, then press the button"
+    )
     spatial = instruct(episode, "spatial", wordings=identity).command
     assert re.fullmatch("put our the cube .* on the target, then press the button", spatial)
     wordings = find_wordings(identity).tasks["PickXtimes"]

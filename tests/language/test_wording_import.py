@@ -10,13 +10,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
-from wording_stand_ins import STYLES, TASKS, make_clone, sentence, train_episodes, train_goals
+from wording_stand_ins import (
+    STYLES,
+    TASKS,
+    make_clone,
+    same_number,
+    sentence,
+    train_episodes,
+    train_goals,
+)
 
 from roboirg.cli import app as cli
 from roboirg.core.episode import COLORS, Goal
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.language import FORMS, expressible, instruct_with, interpret
+from roboirg.language import FORMS, Instruction, expressible, instruct_with, interpret
 from roboirg.language.validation.episode_checks import check_episode
 from roboirg.language.wordings import goal_sentences, robomme_import, wording_store
 from roboirg.language.wordings.template_search import find_templates
@@ -89,16 +97,20 @@ def test_every_instruction_is_valid(style, task):
 def test_referring_expressions_take_the_place_of_the_phrases():
     identity = imported("sentences_in_words").wordings.identity
 
-    def command(task: str, setting: str, **wanted) -> str:
+    def said(task: str, setting: str, **wanted) -> Instruction:
         episode = next(
             one
             for one in train_episodes(task, 0, 100)
             if wanted.items() <= one.goal.as_mapping().items()
         )
-        return instruct_with(episode, InstructionOptions(setting, wordings=identity)).command
+        return instruct_with(episode, InstructionOptions(setting, wordings=identity))
 
-    assert command("PickXtimes", "direct", repeats=1) == (
-        "grab it and set it on the target, repeating this action that many times, "
+    def command(task: str, setting: str, **wanted) -> str:
+        return said(task, setting, **wanted).command
+
+    once = said("PickXtimes", "direct", repeats=1)
+    assert once.command == (
+        f"grab it and set it on the target, repeating this action {same_number(once)}, "
         "then press the button to stop"
     )
     assert command("PickXtimes", "spatial", repeats=3) == (
@@ -134,11 +146,11 @@ def test_a_pronoun_stands_between_verb_and_particle():
     (episode,) = train_episodes("PickXtimes", 0, 1)
     said = instruct_with(episode, InstructionOptions("direct", wordings=identity))
     assert said.command == (
-        "pick it up, place it on the target that many times, then press the button"
+        f"pick it up, place it on the target {same_number(said)}, then press the button"
     )
     assert [said.span(one) for one in said.mentions if one.utterance == 1] == [
         "it",
-        "that many times",
+        same_number(said),
     ]
 
 

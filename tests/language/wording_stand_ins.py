@@ -8,6 +8,8 @@ from pathlib import Path
 
 from roboirg.core.episode import Episode, Goal
 from roboirg.episodes.published_episodes import published_episode
+from roboirg.language.instruction import Instruction
+from roboirg.language.slot_types.number import SAME_NUMBER
 from roboirg.language.wordings import goal_sentences
 from roboirg.tasks import all_tasks, get_task
 
@@ -56,3 +58,10 @@ def train_goals(task: str) -> frozenset[Goal]:
     return frozenset(
         goal for one in train_episodes(task, 0, 100) for goal in get_task(task).goals(one.scene)
     )
+
+
+def same_number(said: Instruction) -> str:
+    """Our words for *that many times* that stand in a command from outside, as it noted them."""
+    noted = [str(one) for one in said.metadata["templates"]]  # type: ignore[attr-defined]
+    (index,) = (int(one.split("/")[1]) for one in noted if one.startswith("same number/"))
+    return SAME_NUMBER.of(said.metadata["pool"])[index]  # type: ignore[arg-type]

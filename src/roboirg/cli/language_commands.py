@@ -278,12 +278,13 @@ def _console() -> Console:
 
 def _tasks(text: str, wordings: str | None = None) -> tuple[str, ...]:
     """Return the tasks that were typed; of all, those that open wordings have commands of."""
+    from roboirg.core.word_pools import POOLS
     from roboirg.evaluation.plan_parsing import means_all, parse_names
     from roboirg.language.wordings.wording_store import find_wordings
     from roboirg.tasks import find_tasks
 
     names = find_tasks(parse_names("task", text))
-    if wordings is None or not means_all(text):
+    if wordings is None or wordings in POOLS or not means_all(text):
         return names
     return tuple(name for name in names if name in find_wordings(wordings).tasks)
 

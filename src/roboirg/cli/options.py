@@ -23,7 +23,11 @@ Rival = Annotated[
 ]
 Reasoning = Annotated[str, typer.Option(help="Patterns of the reasoning setting: plain or open.")]
 Wordings = Annotated[
-    str | None, typer.Option(help="Wording file whose commands are used instead of our own.")
+    str | None,
+    typer.Option(
+        help="Wording file whose commands are used instead of our own; or train or test: our words "
+        "of that pool in every split."
+    ),
 ]
 Workers = Annotated[
     int | None,

@@ -110,7 +110,7 @@ def _amounts(command: Command, resolver: ReferenceResolver) -> GoalTest:
     def fits(goal: Goal) -> bool:
         amounts = list(zip(goal.texts("colors"), goal.numbers("counts"), strict=True))
         if not items:
-            return True
+            return several is None or several.leaves_open([number for _, number in amounts])
         return len(items) == len(amounts) and any(
             _match(amounts, order) for order in itertools.permutations(items)
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import NamedTuple
 
 from roboirg.language.interpreter.quantities import CountExpression
@@ -35,6 +35,13 @@ class SeveralAmounts(NamedTuple):
             (color, self.expression.results([number]) or set())
             for color, number in self.amounts or introduced
         ]
+
+    def leaves_open(self, numbers: Collection[int]) -> bool:
+        """Return whether these numbers, one for each color, are possible without a context."""
+        results = self.expression.results(())
+        if results is None:
+            return sum(numbers) > 1  # "those" are several cubes
+        return len(numbers) > 1 and set(numbers) <= results
 
 
 def several_amounts(text: str) -> Iterator[re.Match[str]]:

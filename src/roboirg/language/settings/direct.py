@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from roboirg.core.episode import Goal
 from roboirg.core.instruction_options import RIVALS, InstructionOptions
+from roboirg.core.word_pools import POOLS
 from roboirg.language.instruction import Instruction
 from roboirg.language.pairs import (
     draw_pair,
@@ -60,7 +61,8 @@ def _pairing_rules(instruct: Instruct) -> Iterator[str]:
     introduction = instruct(InstructionOptions("direct")).turns[0]
     explicit = instruct(InstructionOptions("explicit")).command
     resolved = instruct(InstructionOptions("direct", "resolved"))
-    paired = resolved.metadata["wordings"] is None or resolved.metadata["command"] != "own"
+    outside = resolved.metadata["wordings"] not in (None, *POOLS)
+    paired = not outside or resolved.metadata["command"] != "own"
     if paired and resolved.turns != (introduction, explicit):
         yield "resolved, its command is not the explicit one"
 

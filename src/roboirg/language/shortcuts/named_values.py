@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -25,8 +26,6 @@ POINTING = word_set("the that this those these which other each every any no")
 """Before a cardinal they make it a pronoun: *the one there*, *those two*."""
 NEIGHBOR = "neighbor"
 """Stands for *before or after*, which names neither."""
-ALL_OF_THEM = word_set("those these each")
-"""In a command they may mean all values that were named."""
 PRONOUNS = word_set("them these those")
 COMPARISONS = word_set("fewer less more earlier later")
 """One or two words after a number they make it a difference: *one time fewer*."""
@@ -36,6 +35,8 @@ EXCLUSIONS = word_set(
     "other another different distinct alternative separate new not neither except unlike neighbor"
 )
 """Before a word they say that its value is not the one meant."""
+ALL_PARTS = (("exactly", "those"), ("of", "each"))
+"""Words of a command for all things that the context introduces."""
 REFERENCES = word_set("than as half twice double before after neighbor following preceding")
 """Before a number they say that the one meant is another, which follows from it."""
 POINTERS = {"former": 0, "first": 0, "earlier": 0, "latter": 1, "last": 1, "later": 1}
@@ -118,18 +119,21 @@ def part_count(text: str, thing: str, vocabulary: GoalVocabulary) -> int:
         for slot, one_slot in vocabulary.items()
         if one_slot.several
     ]
+    if any(pair in ALL_PARTS for pair in itertools.pairwise(words)):
+        stated.append(_introduced(text, vocabulary))
     longest = max((one.longest for one in vocabulary.values()), default=1)
-    if not ALL_OF_THEM.isdisjoint(words):
-        stated.append(max((_distinct(text, *item) for item in vocabulary.items()), default=1))
     nouns = sum(word in (thing, f"{thing}s", f"{thing}es") for word in words)
     return max(1, min(longest, max((*stated, *_ranks(words), nouns))))
 
 
-def _distinct(text: str, slot: str, vocabulary: SlotVocabulary) -> int:
-    """Return how many values a text names for a slot with several."""
-    return len(
-        {one.value for one in named_values(text, slot, vocabulary)} if vocabulary.several else ()
-    )
+def _introduced(text: str, vocabulary: GoalVocabulary) -> int:
+    """Return how many values the first sentence names that names some of a slot with several."""
+    several = {slot: one for slot, one in vocabulary.items() if one.several}
+    for words in _sentences(text):
+        found = [len(list(_values(words, slot, one))) for slot, one in several.items()]
+        if any(found):
+            return max(found)
+    return 1
 
 
 def _ranks(words: Sentence) -> Iterator[int]:
@@ -147,7 +151,8 @@ def _values(words: Sentence, slot: str, vocabulary: SlotVocabulary) -> Iterator[
     if not all(isinstance(value, int) for value in vocabulary.values):
         for place, word in enumerate(words):
             value = color_of(word) or word
-            if value in vocabulary.values:
+            # "Before or after" names neither.
+            if value in vocabulary.values and "or" not in words[max(0, place - 1) : place + 2]:
                 yield place, value
         return
     ordinals = SLOT_TYPE_NAMES.get(slot) in ORDINAL_TYPES
@@ -180,4 +185,5 @@ def _is_plain(words: Sequence[str], place: int, value: Value) -> bool:
     """Return whether a command says a value without excluding it or counting from it."""
     if isinstance(value, str):
         return EXCLUSIONS.isdisjoint(words[max(0, place - _REACH) : place])
-    return REFERENCES.isdisjoint(words[max(0, place - _NUMBER_REACH) : place])
+    counted_from = "each" in words[:place]  # "half as many of each as two red and four blue"
+    return not counted_from and REFERENCES.isdisjoint(words[max(0, place - _NUMBER_REACH) : place])

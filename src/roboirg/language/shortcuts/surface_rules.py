@@ -115,13 +115,11 @@ def _change(words: SlotWords) -> Callable[[int], Candidates] | None:
         return lambda number: (number // 2,)
     if "twice" in command or "double" in command:
         return lambda number: (2 * number,)
-    difference = next(_differences(words), None)
-    if difference is not None:
-        return lambda number: (number + difference,)
     if words.is_ordinal and NEIGHBOR in command:
         near = words.vocabulary.values
         return lambda number: tuple(one for one in (number - 1, number + 1) if one in near)
-    return None
+    difference = next(_differences(words), None)
+    return None if difference is None else lambda number: (number + difference,)
 
 
 def _differences(words: SlotWords) -> Iterator[int]:

@@ -152,7 +152,7 @@ PLACE_INTRODUCTIONS = Pools(
         "We prefer {things}.",
         "I picked {things}.",
         "You may like {things}.",
-        "I now see {things}.",
+        "I found {things}.",
         "Our guest likes {things}.",
         "I remember {things}.",
         "You might like {things}.",
