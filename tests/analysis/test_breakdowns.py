@@ -112,6 +112,7 @@ def test_labels_are_what_the_record_says(records: tuple[Record, ...]) -> None:
     assert BREAKDOWNS["slots"].labels(direct) == ("2",)
     assert BREAKDOWNS["slots"].labels(reasoning) == ("1",)
     assert BREAKDOWNS["rival"].labels(direct) == ()
+    assert labels_of("rival", direct, rival_reference="contrast") == ("one of two: contrast",)
     assert labels_of("rival", contextual, recency_rival="the printer") == (RIVAL,)
     assert labels_of("rival", contextual, recency_rival=None) == (NO_RIVAL,)
     assert labels_of("rival", contextual, distractor="competing") == (COMPETING,)

@@ -22,6 +22,8 @@ def test_labels_name_what_differs_from_the_defaults() -> None:
     )
     assert options_label(InstructionOptions("direct")) == "direct"
     assert options_label(InstructionOptions("direct", delivery="turns")) == "direct (in turns)"
+    assert options_label(InstructionOptions("direct", rival="drawn")) == "direct (with a rival)"
+    assert options_label(InstructionOptions("reasoning", reasoning="open")) == "reasoning (open)"
 
 
 def test_settings_have_the_order_of_the_language_and_unknown_ones_are_last() -> None:

@@ -102,6 +102,28 @@ def test_turns_are_other_jobs_where_there_is_more_than_one_utterance() -> None:
         assert other.options.delivery == ("prompt" if same_job else "turns")
 
 
+def test_only_settings_that_read_rivals_and_open_reasoning_have_other_jobs() -> None:
+    usual, other = (
+        make_plan(["random"], tasks="StopCube", **options).jobs()
+        for options in ({}, {"rival": "drawn", "reasoning": "open"})
+    )
+    assert len(usual) == len(other)
+    for one, changed in zip(usual, other, strict=True):
+        assert (identity_key(one) == identity_key(changed)) == (one.setting == "explicit")
+        assert (changed.options.rival == "drawn") == (one.setting in ("direct", "contextual"))
+        assert (changed.options.reasoning == "open") == (one.setting == "reasoning")
+
+
+def test_episodes_without_a_rival_are_left_out() -> None:
+    options = {"tasks": "BinFill", "settings": "explicit,direct", "episodes": "0-7"}
+    jobs = make_plan(["random"], rival="drawn", **options).checked().jobs()
+    told = [job.episode for job in jobs if job.setting == "direct"]
+    assert 0 < len(told) < 8
+    assert [job.episode for job in jobs if job.setting == "explicit"] == list(range(8))
+    with pytest.raises(InvalidValueError, match="nothing to play: with rival 'none' and reasoning"):
+        make_plan(["random"], tasks="PutInBox", settings="reasoning", reasoning="open").checked()
+
+
 def test_jobs_are_ordered_and_named_uniquely() -> None:
     plan = make_plan(["random", "oracle"], policy_seeds="0-2", forms="implicit,resolved")
     assert plan.jobs() == plan.jobs()
@@ -122,6 +144,8 @@ def test_jobs_are_ordered_and_named_uniquely() -> None:
         ({"distractor": "loud"}, r"no distractor 'loud'"),
         ({"frame": "world"}, r"no frame 'world'"),
         ({"settings": "explicit", "delivery": "turn"}, r"no delivery 'turn'.*'turns'"),
+        ({"rival": "draw"}, r"no rival 'draw'.*'drawn'"),
+        ({"reasoning": "opne"}, r"no reasoning 'opne'.*'open'"),
         ({"max_steps": 0}, r"max_steps is 0; it must be at least 1"),
         ({"max_steps": "many"}, r"max_steps is 'many'"),
     ],

@@ -17,7 +17,11 @@ def test_every_variant_has_an_example():
         assert page.count(f"### {task}, {setting}\n") == 1
         episode = card.example_episode(task, setting)
         assert f"`{episode.key}`" in page
-    assert page.count("| resolved | ") == page.count("| explicit | ") == 40
+    assert page.count("| explicit | ") == 40
+    options = page.split("## Options\n")[1]
+    assert page.count("| resolved | ") == 40 + options.count("### ")
+    assert options.count(", rival drawn\n") == 18
+    assert options.count(", reasoning open\n") == 11
 
 
 def test_marks_are_around_the_mentions():

@@ -17,7 +17,11 @@ from roboirg.episodes.splits import get_episode
 from roboirg.language import instruct, instruct_with, interpret
 from roboirg.language.command_chance import blind_goals, right_share
 from roboirg.language.generator import find_refusal
-from roboirg.language.interpreter.comparisons import Comparison, compared_colors, read_comparison
+from roboirg.language.interpreter.comparisons import (
+    PlaceComparison,
+    compared_colors,
+    read_comparison,
+)
 from roboirg.language.patterns.open_numbers import quantities, relations
 from roboirg.language.shortcuts import SURFACE_RULES, goal_share, guess_goal
 from roboirg.language.templates import open_reasoning
@@ -140,13 +144,13 @@ def test_comparisons_by_hand():
     cubes = {item.color: item.position for item in scene.of_kind("cube")}
     nearest = sorted(cubes, key=lambda color: cubes[color].x)
     left = sorted(cubes, key=lambda color: -cubes[color].y)
-    assert read_comparison("that is nearer to you") == Comparison(0, -1)
-    assert read_comparison("further from you") == Comparison(0, 1)
-    assert read_comparison("farther to your left") == Comparison(1, 1)
+    assert read_comparison("that is nearer to you") == PlaceComparison(0, -1)
+    assert read_comparison("further from you") == PlaceComparison(0, 1)
+    assert read_comparison("farther to your left") == PlaceComparison(1, 1)
     assert read_comparison("the far left") is None
-    assert compared_colors(Comparison(0, -1), scene, {nearest[0]}) == {nearest[1]}
-    assert compared_colors(Comparison(1, 1), scene, {left[-1]}) == {left[0]}
-    assert len(compared_colors(Comparison(1, 1), scene, ())) == 2
+    assert compared_colors(PlaceComparison(0, -1), scene, {nearest[0]}) == {nearest[1]}
+    assert compared_colors(PlaceComparison(1, 1), scene, {left[-1]}) == {left[0]}
+    assert len(compared_colors(PlaceComparison(1, 1), scene, ())) == 2
 
 
 def test_no_rule_is_above_chance():

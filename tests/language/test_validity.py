@@ -35,17 +35,28 @@ def test_every_instruction_is_valid(task, split):
     assert not found.failures
     episodes = amount(split)
     read = {setting: found.texts[task, setting] for setting in settings_of(get_task(task))}
-    # Two forms; four sets of stages with two kinds of distractors; two frames.
+    rivals, open_ones = told(found, task, "direct", "drawn"), told(found, task, "reasoning", "open")
+    # Two forms; four sets of stages with two kinds of distractors, or with a rival; two frames.
     spatial = read.pop("spatial", 4 * episodes)
     assert read == {
         "explicit": 2 * episodes,
-        "direct": 2 * episodes,
-        "reasoning": 2 * episodes,
-        "contextual": 16 * episodes,
+        "direct": 2 * (episodes + rivals),
+        "reasoning": 2 * (episodes + open_ones),
+        "contextual": 16 * episodes + 8 * rivals,
     }
-    assert 3.6 * episodes <= spatial <= 4 * episodes
+    assert 3.6 * episodes <= spatial <= 8 * episodes
     if split == "test":
         assert spatial >= 3.8 * episodes
+    assert rivals == episodes if task != "BinFill" else rivals > 0.6 * episodes
+    assert open_ones > 0.6 * episodes or task == "PutInBox"
+
+
+def told(found: ValidationResults, task: str, setting: str, option: str) -> int:
+    """Number of scenes that a setting tells with an option."""
+    groups = [one for one in found.scenes if one.setting == setting and option in one.variant]
+    assert groups
+    assert {one.task for one in groups} == {task}
+    return sum(found.scenes[one] - found.refused[one] for one in groups)
 
 
 @pytest.mark.parametrize("task", TASKS)

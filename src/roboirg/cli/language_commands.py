@@ -110,8 +110,11 @@ def stats(
         Path | None,
         typer.Option(help="Folder for a figure of the referring expressions, as PNG and SVG."),
     ] = None,
+    rival: Rival = "none",
+    reasoning: Reasoning = "plain",
 ) -> None:
     """Count words, referring expressions, patterns, relations and landmarks."""
+    from roboirg.core.instruction_options import InstructionOptions
     from roboirg.episodes.splits import split_episodes
     from roboirg.evaluation.plan_parsing import parse_splits
     from roboirg.language.expression_figure import write_figure
@@ -123,7 +126,8 @@ def stats(
         check_figure_support()
     names, wanted = _tasks(tasks), parse_splits(split)
     episodes = split_episodes(names, wanted)
-    said = [one for _, one in instructions(episodes, _settings("all"), ("implicit",))]
+    options = InstructionOptions(rival=rival, reasoning=reasoning)
+    said = [one for _, one in instructions(episodes, _settings("all"), ("implicit",), options)]
     console = _console()
     for table in overview_tables(said):
         console.print(table)

@@ -41,6 +41,7 @@ from roboirg.evaluation.plan_parsing import (
     parse_policies,
     parse_stage_sets,
 )
+from roboirg.language.generator import find_refusal
 from roboirg.language.instruction import FORMS, Instruction
 from roboirg.language.settings import all_settings
 from roboirg.language.wordings.wording_store import open_wordings
@@ -172,8 +173,14 @@ class Plan(BaseModel):
             for index in (min(self.episodes), max(self.episodes)):
                 splits.get_episode(task, self.split, index)
             self._check_settings(task)
-        for job in self._instruction_jobs():
+        jobs = list(self._instruction_jobs())
+        for job in jobs:
             instruct_job(job)  # raises if the options cannot express the episode
+        if not jobs:
+            raise InvalidValueError(
+                f"There is nothing to play: with rival {self.rival!r} and reasoning "
+                f"{self.reasoning!r} no setting can express any of these episodes."
+            )
         return self
 
     def jobs(self) -> tuple[Job, ...]:
@@ -198,6 +205,8 @@ class Plan(BaseModel):
         name, spec = policy
         for setting in self.settings_of(task, episode):
             for options in self._options_of(setting):
+                if self._is_left_out(task, episode, options):
+                    continue
                 job = Job(
                     policy=name,
                     task=task,
@@ -229,10 +238,27 @@ class Plan(BaseModel):
             for stages in self.stages if "stages" in rule.reads else (usual.stages,):
                 yield usual._replace(form=form, stages=stages, **chosen)
 
+    def _is_left_out(self, task: str, episode: int, options: InstructionOptions) -> bool:
+        """Return whether an episode has no rival, or no open pattern, in a setting that it has.
+
+        Some scenes have no second value; a plan over many tasks leaves them out.
+        """
+        plain = options._replace(rival=DEFAULT_RIVAL, reasoning=DEFAULT_REASONING)
+        if options == plain:
+            return False
+        found = splits.get_episode(task, self.split, episode)
+        refused = [find_refusal(found, one) is not None for one in (options, plain)]
+        return refused == [True, False]
+
     def _instruction_jobs(self) -> Iterator[Job]:
         """Yield one job for each instruction that the language may not be able to express."""
         # All settings with the default frame are only those that can express the episode.
-        usual = self.settings == "all" and self.frame == DEFAULT_FRAME and self.wordings is None
+        usual = (
+            self.settings == "all"
+            and self.frame == DEFAULT_FRAME
+            and self.wordings is None
+            and (self.rival, self.reasoning) == (DEFAULT_RIVAL, DEFAULT_REASONING)
+        )
         for task in self.tasks:
             for episode in self.episodes[:1] if usual else self.episodes:
                 yield from self._jobs_of(("", ""), task, episode, seeds=(0,))

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
+from typing import Any
 
 from roboirg.core.episode import Episode
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.instruction_options import REASONINGS, RIVALS, InstructionOptions
 from roboirg.episodes.splits import get_episode
-from roboirg.language.generator import find_refusal, instruct
+from roboirg.language.generator import find_refusal, instruct, instruct_with
 from roboirg.language.instruction import Instruction, Mention
 from roboirg.language.settings import all_settings
 from roboirg.language.templates import LANGUAGE_VERSION
-from roboirg.language.variants import all_variants
+from roboirg.language.variants import Variant, all_variants
 from roboirg.tasks import all_tasks, get_task
 
 SPLIT = "test"
@@ -35,14 +36,22 @@ def language_card() -> str:
     for task in all_tasks().values():
         parts.append(f"## {task.name}")
         parts += [_example(task.name, one.setting) for one in variants if one.task == task.name]
+    parts.append("## Options\n\nWith a rival, and with open reasoning.")
+    parts += [_option_example(one) for one in variants if _option_of(one.setting)]
     return "\n\n".join(parts) + "\n"
 
 
-def example_episode(task: str, setting: str) -> Episode:
-    """Return the setting's example, or the next episode that the setting can express."""
+def example_episode(task: str, setting: str, options: InstructionOptions | None = None) -> Episode:
+    """Return the setting's example, or the next episode that the setting can express.
+
+    Args:
+        task: name of the task.
+        setting: name of the setting.
+        options: of the setting; None for the usual ones.
+    """
     first = all_settings()[setting].example
     episodes = (get_episode(get_task(task).name, SPLIT, index) for index in itertools.count(first))
-    options = InstructionOptions(setting)
+    options = options or InstructionOptions(setting)
     return next(episode for episode in episodes if find_refusal(episode, options) is None)
 
 
@@ -63,12 +72,46 @@ def _example(task: str, setting: str) -> str:
     return "\n".join(lines)
 
 
+def _option_of(setting: str) -> dict[str, Any]:
+    """Return the option that adds other words of our own to a setting; none for contextual.
+
+    Its introduction and command are those of direct.
+    """
+    reads = all_settings()[setting].reads
+    if "stages" in reads:
+        return {}
+    if "rival" in reads:
+        return {"rival": RIVALS[-1]}
+    return {"reasoning": REASONINGS[-1]} if "reasoning" in reads else {}
+
+
+def _option_example(variant: Variant) -> str:
+    option = _option_of(variant.setting)
+    options = InstructionOptions(variant.setting)._replace(**option)
+    episode = example_episode(variant.task, variant.setting, options)
+    ((name, value),) = option.items()
+    implicit = instruct_with(episode, options)
+    lines = [
+        f"### {variant.task}, {variant.setting}, {name} {value}",
+        "",
+        f"Episode `{episode.key}`, {', '.join((episode.difficulty, *_about(implicit)))}.",
+        "",
+        "| | |",
+        "| --- | --- |",
+        f"| {variant.setting} | {marked(implicit)} |",
+        f"| resolved | {marked(instruct_with(episode, options._replace(form='resolved')))} |",
+    ]
+    return "\n".join(lines)
+
+
 def _about(instruction: Instruction) -> Iterator[str]:
     """Yield the reasoning pattern and relation, if any."""
     if instruction.metadata["pattern"] is not None:
         yield str(instruction.metadata["pattern"])
     if instruction.metadata["relation"] is not None:
         yield f"*{instruction.metadata['relation']}*"
+    if instruction.metadata["rival_reference"] is not None:
+        yield f"{instruction.metadata['rival_reference']}"
 
 
 def marked(instruction: Instruction) -> str:

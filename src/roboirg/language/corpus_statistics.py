@@ -116,6 +116,11 @@ def landmark_counts(instructions: Iterable[Instruction]) -> ClassCounts:
     return _tally(instructions, lambda one: _texts(one.metadata.get("landmark_classes")))
 
 
+def rival_counts(instructions: Iterable[Instruction]) -> ClassCounts:
+    """Count the instructions by task and the kind of words that single one of two values out."""
+    return _tally(instructions, lambda one: _texts(one.metadata.get("rival_reference")))
+
+
 def _tally(
     instructions: Iterable[Instruction], values: Callable[[Instruction], Sequence[str]]
 ) -> ClassCounts:

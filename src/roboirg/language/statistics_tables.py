@@ -10,6 +10,7 @@ from roboirg.language import corpus_statistics
 from roboirg.language.corpus_statistics import ClassCounts
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import setting_names
+from roboirg.language.templates import open_reasoning
 from roboirg.language.templates.derivations import COUNTED_STEPS, RELATIONS, STEPS
 from roboirg.language.token_counts import SHORT_LIMIT, USUAL_LIMIT
 from roboirg.tasks import every_task
@@ -24,13 +25,25 @@ def overview_tables(instructions: Sequence[Instruction]) -> Iterator[Table]:
         ("Reasoning patterns (scenes)", corpus_statistics.pattern_counts(instructions), None),
         ("Relations (scenes)", corpus_statistics.relation_counts(instructions), _RELATIONS),
         ("Landmark classes (targets)", corpus_statistics.landmark_counts(instructions), None),
+        ("Rivals (scenes), by reference", corpus_statistics.rival_counts(instructions), None),
     )
     for title, counts, order in by_task:
         if counts:
             yield _count_table(title, "task", counts, [*every_task()], order or _found(counts))
 
 
-_RELATIONS = [*(one.name for one in (*RELATIONS, *COUNTED_STEPS, *STEPS)), "neighbor"]
+_RELATIONS = [
+    *(one.name for one in (*RELATIONS, *COUNTED_STEPS, *STEPS)),
+    "neighbor",
+    *(
+        f"{one.name}, {step}"
+        for step in ("total", "difference")
+        for one in open_reasoning.TWO_STEP_RELATIONS
+    ),
+    *(one.words for one in open_reasoning.COMPARATIVES.everything),
+    "favorite",
+    "not the favorite",
+]
 
 
 def expression_table(counts: ClassCounts) -> Table:

@@ -14,6 +14,8 @@ UNKNOWN = "unknown"
 """Label of instructions whose records do not say what is asked."""
 RIVAL, NO_RIVAL = "recency rival", "no recency rival"
 COMPETING = "competing distractor"
+SINGLED = "one of two"
+"""Before the kind of words that single out one of two values."""
 
 
 class MentionNotes(Protocol):
@@ -149,6 +151,12 @@ def _slots(record: InstructionNotes) -> tuple[str, ...]:
     return (str(hidden),) if hidden else ()
 
 
+def _reference(record: InstructionNotes) -> tuple[str, ...]:
+    """Return how an instruction with a rival singles one of the two values out."""
+    reference = record.metadata.get("rival_reference")
+    return () if reference is None else (f"{SINGLED}: {reference}",)
+
+
 def _rival(record: InstructionNotes) -> tuple[str, ...]:
     metadata, expressions = record.metadata, _expressions(record)
     distractor = metadata.get("distractor", UNKNOWN)
@@ -189,9 +197,9 @@ BREAKDOWNS: Mapping[str, Breakdown] = {
         Breakdown(
             "rival",
             "recency rival",
-            _rival,
-            "Only commands that say “it”: with a recency rival, the last remark before the command "
-            "is about one other thing.",
+            lambda record: _reference(record) or _rival(record),
+            "Commands that say “it”: with a recency rival, the last remark before the command "
+            "is about one other thing. With a rival: how the words single one of two values out.",
         ),
     )
 }

@@ -3,8 +3,9 @@
 The forgetful listener hears only the final command and chooses uniformly among the goals that fit
 it, or among all goals if none fits. Its expected success is the chance level. It follows without
 playing, assuming flawless execution: the share of these goals that have the stages of the right
-one. A shortcut listener draws its goal by a surface rule; its expected success is the probability
-that this goal is right. Nothing is estimated.
+one. Where the words leave two values, as with a rival, it is a guess among these. A shortcut
+listener draws its goal by a surface rule; its expected success is the probability that this goal is
+right. Nothing is estimated.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ _TIE = 0.01
 """Meters; the same words may mean things that differ by less."""
 
 
-class Comparison(NamedTuple):
+class PlaceComparison(NamedTuple):
     """An order of two things.
 
     Attributes:
@@ -30,17 +30,19 @@ class Comparison(NamedTuple):
     sign: int
 
 
-def read_comparison(text: str) -> Comparison | None:
+def read_comparison(text: str) -> PlaceComparison | None:
     """Return the comparison in the words for one thing; None if there is none."""
     found = _COMPARATIVE.search(text)
     if found is None:
         return None
     if found["side"]:
-        return Comparison(1, 1 if found["side"] == "left" else -1)
-    return Comparison(0, -1 if found["near"] else 1)
+        return PlaceComparison(1, 1 if found["side"] == "left" else -1)
+    return PlaceComparison(0, -1 if found["near"] else 1)
 
 
-def compared_colors(comparison: Comparison, scene: Scene, excluded: Collection[str]) -> set[str]:
+def compared_colors(
+    comparison: PlaceComparison, scene: Scene, excluded: Collection[str]
+) -> set[str]:
     """Return the colors that a comparison of the two things of other colors can mean.
 
     Args:
@@ -65,7 +67,7 @@ def _remaining(colors: list[str], excluded: Collection[str]) -> Iterator[set[str
     yield from map(set, itertools.combinations(colors, len(colors) - 1))
 
 
-def _foremost(comparison: Comparison, items: list[SceneObject]) -> list[SceneObject]:
+def _foremost(comparison: PlaceComparison, items: list[SceneObject]) -> list[SceneObject]:
     if not items:
         return []
     places = [comparison.sign * item.position[comparison.axis] for item in items]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Literal, NamedTuple
 
-from roboirg.language.interpreter.comparisons import Comparison, read_comparison
+from roboirg.language.interpreter.comparisons import PlaceComparison, read_comparison
 from roboirg.language.interpreter.places import NamedPlace, read_places
 from roboirg.language.interpreter.temporal_relations import Time, mentioned_times
 from roboirg.language.interpreter.tokens import (
@@ -59,7 +59,7 @@ class Description(NamedTuple):
     place: NamedPlace | None = None
     times: frozenset[Time] = frozenset()
     position: int | None = None
-    comparison: Comparison | None = None
+    comparison: PlaceComparison | None = None
 
 
 _THAN = re.compile(

@@ -11,7 +11,7 @@ from roboirg.core.instruction_options import DEFAULT_DISTRACTOR, DEFAULT_RIVAL
 from roboirg.episodes.splits import split_episodes
 from roboirg.language.instruction import Instruction
 from roboirg.language.landmarks import Landmark
-from roboirg.language.pairs.balance import draw_balanced
+from roboirg.language.pairs.balanced_draw import draw_balanced
 from roboirg.language.patterns import REFERENCE
 from roboirg.language.request import COLOR_SLOTS, GoalValue, InstructionRequest
 from roboirg.language.templates import rivals as templates

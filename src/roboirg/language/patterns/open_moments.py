@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from roboirg.language.pairs.balance import draw_balanced
+from roboirg.language.pairs.balanced_draw import draw_balanced
 from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
 from roboirg.language.phrases import anaphor, antecedent, fill
 from roboirg.language.request import InstructionRequest
