@@ -215,7 +215,7 @@ class LocalConnection:
 LOCAL = Transport("local", f"{__name__}:LocalConnection", f"{__name__}:open_local")
 
 
-def open_local(service, metadata, host, port, key):
+def open_local(service, metadata, options):
     LocalConnection.handler = service.connection()
     raise OSError("there is nothing to listen to")
 

@@ -20,6 +20,7 @@ from roboirg.core.errors import InvalidValueError, PolicyReplyError, UnknownName
 from roboirg.policies import make_policy
 from roboirg.policies.protocols import protocols_by_scheme
 from roboirg.policies.serving.policy_server import open_server
+from roboirg.policies.serving.server_options import ServerOptions
 
 HERE = f"{__name__}:Recorder"
 
@@ -60,8 +61,8 @@ def _forget():
 
 
 @contextmanager
-def served(spec, protocol, **options):
-    server = open_server(spec, protocol, **options)
+def served(spec, protocol, *, seed=0, **options):
+    server = open_server(spec, protocol, ServerOptions(**options), seed=seed)
     thread = threading.Thread(target=server.listening.serve_forever)
     thread.start()
     try:
@@ -275,7 +276,8 @@ def test_the_http_interface_tells_what_is_wrong():
 )
 def test_what_cannot_be_served_is_told(options, error, words):
     with pytest.raises(error, match=words):
-        open_server(**{"spec": "random", "protocol": "openpi", **options})
+        spec, protocol = options.pop("spec", "random"), options.pop("protocol", "openpi")
+        open_server(spec, protocol, ServerOptions(**options))
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])

@@ -12,6 +12,7 @@ from roboirg.policies.remote.endpoints import Endpoint, RemoteOptions
 FIRST_PAUSE, MAX_PAUSE = 0.1, 5.0
 """Seconds between two attempts to connect; each pause is twice the one before."""
 _MAX_ERROR_LENGTH = 300
+_MAX_TRACEBACK_END = 4096
 
 
 class ConnectionSpec(NamedTuple):
@@ -100,6 +101,7 @@ def read_reply(spec: ConnectionSpec, data: bytes) -> dict[str, Any]:
 
 def error_reply(spec: ConnectionSpec, text: str) -> PolicyReplyError:
     """Return the error for a server's traceback, of which the last line says most."""
-    lines = [line.strip() for line in text.splitlines() if line.strip()]
-    words = lines[-1][:_MAX_ERROR_LENGTH].rstrip(".") if lines else "an empty text"
+    # Only the end is split into lines: there may be millions.
+    lines = text[-_MAX_TRACEBACK_END:].rstrip().splitlines()
+    words = lines[-1].strip()[:_MAX_ERROR_LENGTH].rstrip(".") if lines else "an empty text"
     return PolicyReplyError(f"{spec} replied with an error: {words}.")

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from roboirg.core.errors import MissingDependencyError
+from roboirg.policies.remote.message_size import MessageSizeError, check_size
 
 try:
     import msgpack
@@ -27,6 +28,7 @@ _UNSUPPORTED = "VOc"
 """Kinds of dtype that are not sent: structures, Python objects, complex numbers."""
 _MALFORMED = (ValueError, TypeError, OverflowError, RecursionError, SyntaxError)
 """Raised by msgpack and NumPy for malformed bytes."""
+_MAX_AXES, _MAX_DTYPE_LENGTH = 32, 32
 
 
 class CodecError(ValueError):
@@ -53,7 +55,10 @@ def unpack(data: bytes) -> dict[str, Any]:
         CodecError: the bytes are malformed.
     """
     try:
+        check_size(data)
         message = msgpack.unpackb(data, object_hook=_decode)
+    except MessageSizeError as error:
+        raise CodecError(str(error)) from error
     except (*_MALFORMED, msgpack.exceptions.UnpackException) as error:
         words = " ".join(str(error).split()) or type(error).__name__
         raise CodecError(f"the bytes are not a msgpack message ({words})") from error
@@ -98,6 +103,8 @@ def _array(found: dict[Any, Any]) -> np.ndarray[Any, Any]:
         raise ValueError(f"the data of an array is {type(data).__name__}, not bytes")
     if not isinstance(shape, list) or not all(type(size) is int and size >= 0 for size in shape):
         raise ValueError(f"the shape of an array is {shape!r}")
+    if len(shape) > _MAX_AXES:
+        raise ValueError(f"an array has {len(shape)} axes; at most {_MAX_AXES} are accepted")
     # Python's integers do not overflow, so no shape can claim more bytes than there are.
     if math.prod(shape) * dtype.itemsize != len(data):
         raise ValueError(f"an array {dtype.str} of shape {shape} has {len(data)} bytes")
@@ -108,8 +115,8 @@ def _array(found: dict[Any, Any]) -> np.ndarray[Any, Any]:
 
 def _dtype(found: dict[Any, Any]) -> np.dtype[Any]:
     text = found.get(b"dtype")
-    if not isinstance(text, str):
-        raise ValueError(f"the dtype of an array is {text!r}")
+    if not isinstance(text, str) or len(text) > _MAX_DTYPE_LENGTH:
+        raise ValueError(f"the dtype of an array is {str(text)[:_MAX_DTYPE_LENGTH]!r}")
     dtype = np.dtype(text)
     if dtype.kind in _UNSUPPORTED:
         raise ValueError(f"arrays of dtype {text!r} are not accepted")

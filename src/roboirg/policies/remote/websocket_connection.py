@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import socket
-import time
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
 from roboirg.core.errors import (
@@ -28,7 +26,7 @@ from roboirg.policies.remote.connections import (
     read_reply,
 )
 from roboirg.policies.remote.message_codec import pack
-from roboirg.policies.remote.write_timeout import WriteTimeout
+from roboirg.policies.remote.socket_deadline import SocketDeadline
 
 try:
     from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
@@ -59,19 +57,20 @@ class WebsocketConnection:
     """
 
     def __init__(self, spec: ConnectionSpec) -> None:
-        self._spec = spec
+        self._spec, options = spec, spec.options
         self._closing = contextlib.ExitStack()
-        self._socket: ClientConnection | None = connect_with_retries(spec, self._attempt)
-        self._write_timed_out = False
-        # The library has no time limit for sending. The socket's own would also end the receiving
-        # thread, and it starts again with every piece that the peer takes in.
-        self._write_timeout = WriteTimeout(
-            spec.options.timeout, partial(self._abort_write, self._socket)
-        )
-        self._closing.callback(self._write_timeout.close)
-        self.metadata: Mapping[str, Any] = self._receive(
-            "its metadata", spec.options.connect, time.monotonic() + spec.options.connect
-        )
+        # The library has a time limit for receiving only, and a peer that does not read may hold
+        # its lock, which closing needs too.
+        self._deadline = SocketDeadline(min(options.timeout, options.connect, CLOSE_TIMEOUT))
+        self._socket: ClientConnection | None = None
+        try:
+            self._socket = connect_with_retries(spec, self._attempt)
+            self._deadline.add(self._socket.socket)
+            with self._deadline.limit(options.connect):
+                self.metadata: Mapping[str, Any] = self._receive("its metadata", options.connect)
+        except BaseException:
+            self.close()
+            raise
 
     def request(self, message: Mapping[str, Any]) -> dict[str, Any]:
         """Send a message and return the reply; any error closes the connection.
@@ -81,15 +80,21 @@ class WebsocketConnection:
             PolicyTimeoutError: the server took too long.
             PolicyReplyError: the server replied with an error, or with no message.
         """
-        seconds = self._spec.options.timeout
-        deadline = time.monotonic() + seconds
-        self._send(pack(message))
-        return self._receive("a reply", seconds, deadline)
+        data, seconds = pack(message), self._spec.options.timeout
+        try:
+            with self._deadline.limit(seconds):
+                self._send(data)
+                return self._receive("a reply", seconds)
+        except RoboIRGError:
+            self.close()
+            raise
 
     def close(self) -> None:
         """Close the connection; repeated calls do nothing."""
         self._socket = None
-        self._closing.close()
+        with self._deadline.limit(CLOSE_TIMEOUT):
+            self._closing.close()
+        self._deadline.close()
 
     def _attempt(self, left: float) -> ClientConnection:
         spec, options = self._spec, self._spec.options
@@ -125,16 +130,10 @@ class WebsocketConnection:
         connection = self._open()
         try:
             self._reject_surplus(connection)
-            with self._write_timeout.watching():
-                connection.send(data)
+            connection.send(data)
         except ConnectionClosed as error:
-            raise self._broken(error) from error
-
-    def _abort_write(self, connection: ClientConnection) -> None:
-        """Shut the socket down, from another thread, to wake the thread that sends."""
-        self._write_timed_out = True
-        with contextlib.suppress(OSError):
-            connection.socket.shutdown(socket.SHUT_RDWR)
+            late = f"did not take in a message within {self._spec.options.timeout:g} s"
+            raise self._broken(error, late) from error
 
     def _reject_surplus(self, connection: ClientConnection) -> None:
         """Raise if an unrequested reply has come, which would be taken for the next one."""
@@ -142,46 +141,32 @@ class WebsocketConnection:
             surplus = connection.recv(timeout=0)
         except TimeoutError:
             return
-        self.close()
         if isinstance(surplus, str):
             raise error_reply(self._spec, surplus)
         raise PolicyReplyError(f"{self._spec} sent a message without a request.")
 
-    def _receive(self, what: str, seconds: float, deadline: float) -> dict[str, Any]:
-        connection = self._open()
+    def _receive(self, what: str, seconds: float) -> dict[str, Any]:
         try:
-            data = connection.recv(timeout=max(deadline - time.monotonic(), 0.0))
-        except TimeoutError as error:
-            self.close()
-            raise PolicyTimeoutError(
-                f"{self._spec} did not send {what} within {seconds:g} s."
-            ) from error
+            data = self._open().recv()
         except ConnectionClosed as error:
-            raise self._broken(error) from error
-        try:
-            if isinstance(data, str):
-                raise error_reply(self._spec, data)
-            return read_reply(self._spec, data)
-        except PolicyReplyError:
-            self.close()
-            raise
+            raise self._broken(error, f"did not send {what} within {seconds:g} s") from error
+        if isinstance(data, str):
+            raise error_reply(self._spec, data)
+        return read_reply(self._spec, data)
 
     def _open(self) -> ClientConnection:
         if self._socket is None:
             raise PolicyConnectionError(f"The connection to {self._spec} is closed; call reset().")
         return self._socket
 
-    def _broken(self, error: ConnectionClosed) -> RoboIRGError:
-        """Close, and return the error for a connection that has ended."""
-        self.close()
+    def _broken(self, error: ConnectionClosed, late: str) -> RoboIRGError:
+        """Return the error for a connection that has ended."""
+        if self._deadline.passed:
+            return PolicyTimeoutError(f"{self._spec} {late}.")
         if error.sent is not None and error.sent.code == _TOO_BIG:
             return PolicyReplyError(
-                f"{self._spec} sent a reply of more than {self._spec.options.max_reply_mib:g} MiB; "
-                "option max_reply_mib raises that limit."
-            )
-        if self._write_timed_out:
-            return PolicyTimeoutError(
-                f"{self._spec} did not take in a message within {self._spec.options.timeout:g} s."
+                f"{self._spec} sent a reply in too many pieces, or of more than "
+                f"{self._spec.options.max_reply_mib:g} MiB; option max_reply_mib raises that limit."
             )
         code = f"close code {error.rcvd.code}" if error.rcvd else "without a close code"
         return PolicyConnectionError(f"{self._spec} ended the connection ({code}).")
