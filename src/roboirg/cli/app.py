@@ -25,6 +25,7 @@ from roboirg.cli.options import Distractor, Frame, Split, Stages, Tasks, Video, 
 from roboirg.cli.real_commands import real_app
 from roboirg.cli.run_commands import INTERRUPTED, USAGE_ERROR, Out
 from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.core.printable import printable
 from roboirg.core.version import __version__
 
 # Heavy modules are imported inside the commands, so that --help is fast.
@@ -240,7 +241,7 @@ def main() -> None:
     try:
         code = app(prog_name="roboirg", standalone_mode=False)
     except RoboIRGError as error:
-        typer.echo(f"roboirg: {error}", err=True)
+        typer.echo(f"roboirg: {printable(str(error))}", err=True)
         sys.exit(USAGE_ERROR)
     except _WrongUsage as error:
         sys.exit(_print_usage_error(error))

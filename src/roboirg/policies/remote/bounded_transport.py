@@ -36,11 +36,10 @@ class BoundedTransport(httpx.BaseTransport):
     Args:
         max_bytes: size limit of a response's body.
         shortest: seconds of the shortest limit of time.
-        proxy: URL of a proxy, or None.
     """
 
-    def __init__(self, max_bytes: int, shortest: float, proxy: str | None = None) -> None:
-        self._max_bytes, self._shortest, self._proxy = max_bytes, shortest, proxy
+    def __init__(self, max_bytes: int, shortest: float) -> None:
+        self._max_bytes, self._shortest = max_bytes, shortest
         self._open()
 
     @contextlib.contextmanager
@@ -85,7 +84,7 @@ class BoundedTransport(httpx.BaseTransport):
         self._inner.close()
 
     def _open(self) -> None:
-        self._inner = httpx.HTTPTransport(trust_env=False, proxy=self._proxy)
+        self._inner = httpx.HTTPTransport(trust_env=False)
         self._deadline = SocketDeadline(self._shortest)
 
     def _note_socket(self, event: str, info: dict[str, Any]) -> None:

@@ -22,6 +22,7 @@ from roboirg.policies.planning.model_content import (
 )
 from roboirg.policies.planning.models.bounded_wait import call_with_timeout, timeout_error
 from roboirg.policies.planning.models.model import ModelOptions, ModelQuery, ModelReply
+from roboirg.policies.planning.models.response_limits import PLAIN_HEADERS, limit_response
 
 OPENAI = "https://api.openai.com/v1"
 BUSY = frozenset({408, 409, 429, 502, 503, 504})
@@ -49,6 +50,8 @@ class OpenAIModel:
             base_url=options.base_url or OPENAI,
             timeout=options.timeout_s,
             max_retries=options.retries,
+            default_headers=PLAIN_HEADERS,
+            http_client=openai.DefaultHttpxClient(event_hooks={"response": [limit_response]}),
         )
 
     def answer(self, query: ModelQuery) -> ModelReply:
