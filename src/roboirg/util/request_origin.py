@@ -37,7 +37,7 @@ def is_own_host(host: str, names: Collection[str]) -> bool:
         name, _ = parts.hostname or "", parts.port
     except ValueError:
         return False
-    return parts.netloc == host and (name in names or _is_address(name))
+    return parts.netloc == host and "@" not in host and (name in names or _is_address(name))
 
 
 def names_of_this_machine() -> frozenset[str]:

@@ -62,6 +62,12 @@ class SocketDeadline:
             with self._lock:
                 self._deadline = None
 
+    def abort(self) -> None:
+        """Shut the sockets down now."""
+        with self._lock:
+            for connection in self._sockets:
+                _shut_down(connection)
+
     def close(self) -> None:
         """End the thread; repeated calls do nothing."""
         self._closed.set()

@@ -30,6 +30,7 @@ from roboirg.policies.remote.socket_deadline import SocketDeadline
 
 try:
     from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
+    from websockets.protocol import State
     from websockets.sync.client import ClientConnection, connect
 except ImportError as error:
     raise MissingDependencyError(
@@ -38,6 +39,8 @@ except ImportError as error:
 
 CLOSE_TIMEOUT = 2.0
 """Seconds to wait for a server's closing frame."""
+_CHECK_S = 1.0
+"""Seconds between two looks at whether the library has refused what the server sends."""
 _TOO_BIG = 1009
 """Websocket close code for a message above the size limit."""
 _RETRYABLE = frozenset({408, 425, 429, 500, 502, 503, 504})
@@ -146,8 +149,13 @@ class WebsocketConnection:
         raise PolicyReplyError(f"{self._spec} sent a message without a request.")
 
     def _receive(self, what: str, seconds: float) -> dict[str, Any]:
+        connection, data = self._open(), None
         try:
-            data = self._open().recv()
+            while data is None:
+                with contextlib.suppress(TimeoutError):
+                    data = connection.recv(timeout=_CHECK_S)
+                if data is None and connection.protocol.state is not State.OPEN:
+                    self._deadline.abort()  # the server does not end what the library has refused
         except ConnectionClosed as error:
             raise self._broken(error, f"did not send {what} within {seconds:g} s") from error
         if isinstance(data, str):
