@@ -7,6 +7,7 @@ Guaranteed on a local POSIX file system:
   torn last line is never read as a record; the next writer moves it to ``records.torn`` (copied
   and synced there before it is removed here) and reports it.
 - A damaged line in the middle is skipped and reported; all other lines are read.
+- Verdicts of two versions of a policy's server do not get into one file.
 - There is one writer at a time: the lock is the kernel's (`flock`), so it is released when its
   owner dies and never goes stale.
 
@@ -20,7 +21,7 @@ import contextlib
 import fcntl
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple, Self, TypeVar
@@ -105,6 +106,7 @@ class RecordStore:
                     identity_key(one): one for one in lines.parse(read_index_entry)
                 }
                 self.torn, self.damaged = lines.torn, tuple(lines.damaged)
+                self._server_versions = _server_versions(self.stored.values())
                 self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
                 undo.callback(os.close, self._file)
                 self._repair_tail()
@@ -117,8 +119,10 @@ class RecordStore:
         """Write one record; when this returns, it is on disk.
 
         Raises:
-            StoreError: the record cannot be written; the file is unchanged.
+            StoreError: the record cannot be written, or the policy's server is now another version
+                than in earlier verdicts; the file is unchanged.
         """
+        self._check_server_version(record)
         size = os.fstat(self._file).st_size
         try:
             line = record.model_dump_json().encode()
@@ -128,6 +132,7 @@ class RecordStore:
             os.ftruncate(self._file, size)
             raise StoreError(f"Cannot write to {self.path}: {error.strerror}.") from error
         self.stored[identity_key(record)] = read_index_entry(line, self.path, 0)
+        self._server_versions.update(_server_versions([record]))
 
     def close(self) -> None:
         """Close the file and release the lock."""
@@ -139,6 +144,15 @@ class RecordStore:
 
     def __exit__(self, *_exception: object) -> None:
         self.close()
+
+    def _check_server_version(self, record: Record) -> None:
+        for policy, version in _server_versions([record]).items():
+            before = self._server_versions.get(policy, version)
+            if before != version:
+                raise StoreError(
+                    f"{self.folder} holds episodes of {policy} whose server told "
+                    f"{_told(before)}, but now it tells {_told(version)}; choose another --out."
+                )
 
     def _take_lock(self) -> None:
         try:
@@ -182,6 +196,8 @@ def read_contents(path: Path) -> StoreContents:
 
 def read_records(folder: Path) -> tuple[Record, ...]:
     """Read the records of a run's folder: the newest of each identity, in the order of the file.
+
+    An episode that ended in an error before the server told its version has that of the others.
 
     Raises:
         StoreError: there are none, or a line is not a record of this schema version.
@@ -276,7 +292,22 @@ def _read_newest(folder: Path, kind: type[ResultType]) -> tuple[ResultType, ...]
         raise StoreError(
             f"There are no records in {folder}; give the --out folder of a `roboirg run`."
         )
-    return tuple(newest.values())
+    told = _server_versions(newest.values())
+    return tuple(
+        one.model_copy(update={"server_version": told[one.policy]})
+        if one.outcome == "error" and one.server_version is None and one.policy in told
+        else one
+        for one in newest.values()
+    )
+
+
+def _server_versions(records: Iterable[Result | RecordIndexEntry]) -> dict[str, str | None]:
+    """Return what each policy's server told; errors, which are in no rate, do not count."""
+    return {one.policy: one.server_version for one in records if one.outcome != "error"}
+
+
+def _told(version: str | None) -> str:
+    return "no version" if version is None else f"version {version}"
 
 
 def _write_all(descriptor: int, data: bytes) -> None:
