@@ -194,6 +194,11 @@ def test_a_bad_websocket_server_is_an_error_in_time_and_within_memory(attack, go
     check(attack, "openpi", good)
 
 
+@pytest.mark.parametrize("attack", WEBSOCKET[:1], ids=["maps"])
+def test_a_bad_model_server_of_vla_eval_is_an_error_within_memory(attack, good):
+    check(attack, "vla-eval", good)
+
+
 @pytest.mark.parametrize("attack", HTTP, ids=[one[0] for one in HTTP])
 def test_a_bad_http_server_is_an_error_in_time_and_within_memory(attack, good):
     check(attack, "challenge+http", good)

@@ -38,9 +38,11 @@ class ProtocolHelpCommand(TyperCommand):
         from roboirg.policies.protocols import protocols_by_scheme
 
         urls = ", ".join(f"{scheme}://…" for scheme in url_schemes())
+        schemes = protocols_by_scheme().items()
+        served_schemes = [scheme for scheme, protocol in schemes if protocol.service is not None]
         for parameter in self.params:
             words = getattr(parameter, "help", None) or ""
-            words = words.replace(_PROTOCOLS, ", ".join(protocols_by_scheme()))
+            words = words.replace(_PROTOCOLS, ", ".join(served_schemes))
             vars(parameter)["help"] = words.replace(_URL_SCHEMES, urls)
         return super().get_help(ctx)
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 from roboirg.core.errors import PolicyConnectionError, PolicyReplyError
 from roboirg.policies.remote.endpoints import Endpoint, RemoteOptions
+
+if TYPE_CHECKING:
+    from roboirg.policies.remote.message_codec import ArrayKeys
 
 FIRST_PAUSE, MAX_PAUSE = 0.1, 5.0
 """Seconds between two attempts to connect; each pause is twice the one before."""
@@ -85,16 +88,16 @@ def connect_with_retries(spec: ConnectionSpec, attempt: Callable[[float], Opened
         pause = min(2 * pause, MAX_PAUSE)
 
 
-def read_reply(spec: ConnectionSpec, data: bytes) -> dict[str, Any]:
-    """Return the message in a reply.
+def read_reply(spec: ConnectionSpec, data: bytes, keys: ArrayKeys | None = None) -> dict[str, Any]:
+    """Return the message in a reply; its arrays are described by `keys`, or by the usual ones.
 
     Raises:
         PolicyReplyError: the bytes are no message.
     """
-    from roboirg.policies.remote.message_codec import CodecError, unpack
+    from roboirg.policies.remote.message_codec import BYTES_KEYS, CodecError, unpack
 
     try:
-        return unpack(data)
+        return unpack(data, keys or BYTES_KEYS)
     except CodecError as error:
         raise PolicyReplyError(f"{spec} sent something other than a message: {error}.") from error
 

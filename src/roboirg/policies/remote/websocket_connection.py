@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import socket
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NoReturn
 
 from roboirg.core.errors import (
     MissingDependencyError,
@@ -60,7 +60,7 @@ class WebsocketConnection:
     """
 
     def __init__(self, spec: ConnectionSpec) -> None:
-        self._spec, options = spec, spec.options
+        self.spec, options = spec, spec.options
         self._closing = contextlib.ExitStack()
         # The library has a time limit for receiving only, and a peer that does not read may hold
         # its lock, which closing needs too.
@@ -70,7 +70,7 @@ class WebsocketConnection:
             self._socket = connect_with_retries(spec, self._attempt)
             self._deadline.add(self._socket.socket)
             with self._deadline.limit(options.connect):
-                self.metadata: Mapping[str, Any] = self._receive("its metadata", options.connect)
+                self.metadata: Mapping[str, Any] = self.read_metadata(options.connect)
         except BaseException:
             self.close()
             raise
@@ -83,11 +83,10 @@ class WebsocketConnection:
             PolicyTimeoutError: the server took too long.
             PolicyReplyError: the server replied with an error, or with no message.
         """
-        data, seconds = pack(message), self._spec.options.timeout
+        seconds = self.spec.options.timeout
         try:
             with self._deadline.limit(seconds):
-                self._send(data)
-                return self._receive("a reply", seconds)
+                return self.exchange(message, seconds)
         except RoboIRGError:
             self.close()
             raise
@@ -99,8 +98,27 @@ class WebsocketConnection:
             self._closing.close()
         self._deadline.close()
 
+    def read_metadata(self, seconds: float) -> Mapping[str, Any]:
+        """Return what the server says about itself, which it does first."""
+        return read_reply(self.spec, self.receive("its metadata", seconds))
+
+    def exchange(self, message: Mapping[str, Any], seconds: float) -> dict[str, Any]:
+        """Send a message and return the reply, within a limit that is being watched."""
+        self.send(pack(message))
+        return read_reply(self.spec, self.receive("a reply", seconds))
+
+    def refuse_surplus(self, surplus: str | bytes) -> NoReturn:
+        """Raise, as an unrequested reply would be taken for the next one.
+
+        Raises:
+            PolicyReplyError: always.
+        """
+        if isinstance(surplus, str):
+            raise error_reply(self.spec, surplus)
+        raise PolicyReplyError(f"{self.spec} sent a message without a request.")
+
     def _attempt(self, left: float) -> ClientConnection:
-        spec, options = self._spec, self._spec.options
+        spec, options = self.spec, self.spec.options
         try:
             return self._closing.enter_context(
                 connect(
@@ -129,26 +147,19 @@ class WebsocketConnection:
         except (OSError, EOFError, WebSocketException) as error:
             raise RetryableError(_describe(error)) from error
 
-    def _send(self, data: bytes) -> None:
+    def send(self, data: bytes) -> None:
+        """Send a message."""
         connection = self._open()
         try:
-            self._reject_surplus(connection)
+            with contextlib.suppress(TimeoutError):
+                self.refuse_surplus(connection.recv(timeout=0))
             connection.send(data)
         except ConnectionClosed as error:
-            late = f"did not take in a message within {self._spec.options.timeout:g} s"
+            late = f"did not take in a message within {self.spec.options.timeout:g} s"
             raise self._broken(error, late) from error
 
-    def _reject_surplus(self, connection: ClientConnection) -> None:
-        """Raise if an unrequested reply has come, which would be taken for the next one."""
-        try:
-            surplus = connection.recv(timeout=0)
-        except TimeoutError:
-            return
-        if isinstance(surplus, str):
-            raise error_reply(self._spec, surplus)
-        raise PolicyReplyError(f"{self._spec} sent a message without a request.")
-
-    def _receive(self, what: str, seconds: float) -> dict[str, Any]:
+    def receive(self, what: str, seconds: float) -> bytes:
+        """Return the next message; `what` and `seconds` are for the error if there is none."""
         connection, data = self._open(), None
         try:
             while data is None:
@@ -159,25 +170,25 @@ class WebsocketConnection:
         except ConnectionClosed as error:
             raise self._broken(error, f"did not send {what} within {seconds:g} s") from error
         if isinstance(data, str):
-            raise error_reply(self._spec, data)
-        return read_reply(self._spec, data)
+            raise error_reply(self.spec, data)
+        return data
 
     def _open(self) -> ClientConnection:
         if self._socket is None:
-            raise PolicyConnectionError(f"The connection to {self._spec} is closed; call reset().")
+            raise PolicyConnectionError(f"The connection to {self.spec} is closed; call reset().")
         return self._socket
 
     def _broken(self, error: ConnectionClosed, late: str) -> RoboIRGError:
         """Return the error for a connection that has ended."""
         if self._deadline.passed:
-            return PolicyTimeoutError(f"{self._spec} {late}.")
+            return PolicyTimeoutError(f"{self.spec} {late}.")
         if error.sent is not None and error.sent.code == _TOO_BIG:
             return PolicyReplyError(
-                f"{self._spec} sent a reply in too many pieces, or of more than "
-                f"{self._spec.options.max_reply_mib:g} MiB; option max_reply_mib raises that limit."
+                f"{self.spec} sent a reply in too many pieces, or of more than "
+                f"{self.spec.options.max_reply_mib:g} MiB; option max_reply_mib raises that limit."
             )
         code = f"close code {error.rcvd.code}" if error.rcvd else "without a close code"
-        return PolicyConnectionError(f"{self._spec} ended the connection ({code}).")
+        return PolicyConnectionError(f"{self.spec} ended the connection ({code}).")
 
 
 def _describe(error: BaseException) -> str:

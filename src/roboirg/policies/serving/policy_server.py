@@ -52,6 +52,9 @@ def open_server(
     protocols = protocols_by_scheme()
     if protocol not in protocols:
         raise UnknownNameError("protocol", protocol, protocols)
+    service = protocols[protocol].service
+    if service is None:
+        raise InvalidValueError(f"{protocol}:// is for clients only: no policy is served with it.")
     if not 0 <= options.port <= _MAX_PORT:
         raise InvalidValueError(f"The port is {options.port}; it must be 0 to {_MAX_PORT}.")
     load_policy_class(spec)
@@ -68,7 +71,7 @@ def open_server(
     metadata = {"policy": spec, "version": policy_version(spec), "protocol": protocol}
     listen = found.clients[protocol].transport.load_server()
     try:
-        listening = listen(found.service(make), metadata, options)
+        listening = listen(service(make), metadata, options)
     except OSError as error:
         raise InvalidValueError(
             f"Cannot listen at {options.host}:{options.port} ({error})."
