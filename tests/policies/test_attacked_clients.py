@@ -17,7 +17,10 @@ from attackers import (
 )
 from wire_servers import WireServer
 
+from roboirg.core.errors import PolicyServerError
 from roboirg.core.printable import printable
+from roboirg.policies.planning.model_content import ChatTurn
+from roboirg.policies.planning.models import ModelOptions, ModelQuery, make_model
 from roboirg.policies.remote.message_codec import CodecError, unpack
 from roboirg.policies.remote.message_size import MAX_DEPTH, MAX_ELEMENTS
 
@@ -214,6 +217,30 @@ def check(attack, scheme, good):
     assert place in message
     assert message.isprintable()
     assert mib <= MAX_MIB
+
+
+@pytest.mark.parametrize("provider", ["openai", "google"])
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        (responds(gzip.compress(b"{}"), "Content-Encoding: gzip"), "the response is compressed"),
+        (responds(b"x", "Content-Encoding: gzip, gzip"), "the response is compressed"),
+        (chunks, "the response has more than 64 MiB"),
+        (answers(b"HTTP/1.1 400 No\r\nContent-Length: 4\r\n\r\n\x1b[2J"), r"\x1b[2J"),
+    ],
+    ids=["gzip", "gzip-in-gzip", "chunks", "escapes"],
+)
+def test_a_bad_model_endpoint_is_a_named_error(provider, answer, words):
+    with answering(answer) as place:
+        options = ModelOptions(
+            provider=provider, model="m", base_url=f"http://{place}", retries=0, timeout_s=200
+        )
+        model = make_model(options)
+        with pytest.raises(PolicyServerError) as caught:
+            model.answer(ModelQuery("", (ChatTurn("user", ("hello",)),)))
+        model.close()
+    assert words in str(caught.value)
+    assert str(caught.value).isprintable()
 
 
 def test_what_the_longest_message_holds_is_accepted():

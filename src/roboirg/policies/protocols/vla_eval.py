@@ -71,9 +71,9 @@ class VlaEvalPolicy(RemotePolicy):
         Raises:
             InvalidValueError: the server wants what this client's options leave out.
         """
-        self._check_wishes()
+        self._check_params()
         self._subgoal = None
-        shows = self.options.video and self._wishes("send_video_history")
+        shows = self.options.video and self._wants("send_video_history")
         self._demonstration = demonstration if shows else None
         self.request({"type": "episode_start", "payload": {"task": TASK}})
         self._in_episode = True
@@ -93,11 +93,11 @@ class VlaEvalPolicy(RemotePolicy):
     def request_actions(self, observation: Observation) -> NDArray[np.floating[Any]]:
         """Send an observation; return the action of the reply, one row."""
         images = {"agentview": observation["front_rgb"]}
-        wrist = self.options.wrist and self._wishes("send_wrist_image")
+        wrist = self.options.wrist and self._wants("send_wrist_image")
         if wrist:
             images["wrist"] = observation["wrist_rgb"]
         shown: dict[str, Any] = {"images": images, "task_description": self.instruction}
-        if self.options.state and self._wishes("send_state"):
+        if self.options.state and self._wants("send_state"):
             shown["states"] = proprioception(observation["joint_positions"], observation["gripper"])
         demonstration, self._demonstration = self._demonstration, None
         if demonstration is not None and len(demonstration["joint_positions"]):
@@ -109,14 +109,14 @@ class VlaEvalPolicy(RemotePolicy):
             shown["subgoal"] = self._subgoal
         return self.read_actions(_as_rows(self.request({"type": "observation", "payload": shown})))
 
-    def _wishes(self, name: str) -> bool:
+    def _wants(self, name: str) -> bool:
         """Return whether the server wants to be shown something; by default it does."""
-        wishes = self.metadata.get("observation_params")
-        return not isinstance(wishes, Mapping) or bool(wishes.get(name, True))
+        params = self.metadata.get("observation_params")
+        return not isinstance(params, Mapping) or bool(params.get(name, True))
 
-    def _check_wishes(self) -> None:
-        wishes = self.metadata.get("observation_params")
-        wanted = wishes.get("action_space") if isinstance(wishes, Mapping) else None
+    def _check_params(self) -> None:
+        params = self.metadata.get("observation_params")
+        wanted = params.get("action_space") if isinstance(params, Mapping) else None
         if wanted not in (None, self.actions):
             raise InvalidValueError(
                 f"The server acts in the action space {str(wanted)[:80]!r}, but the policy's URL "

@@ -54,7 +54,9 @@ class HttpConnection:
         self._spec, self._closed = spec, False
         options = spec.options
         headers = {**options.headers, "Accept": MSGPACK}
-        self._transport = BoundedTransport(options.max_reply, min(options.timeout, options.connect))
+        self._transport = BoundedTransport(
+            options.max_reply, min(options.timeout, options.connect), tls=options.tls
+        )
         self._client: httpx.Client = httpx.Client(
             base_url=f"{'https' if options.tls else 'http'}://{spec.endpoint}",
             headers=headers,

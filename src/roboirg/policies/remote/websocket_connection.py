@@ -29,12 +29,17 @@ from roboirg.policies.remote.message_codec import pack
 from roboirg.policies.remote.socket_deadline import SocketDeadline
 
 try:
-    from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
+    from websockets.exceptions import (
+        ConnectionClosed,
+        InvalidStatus,
+        TooManyFragments,
+        WebSocketException,
+    )
     from websockets.protocol import State
     from websockets.sync.client import ClientConnection, connect
 except ImportError as error:
     raise MissingDependencyError(
-        "Remote policies need websockets 15 or newer; install roboirgbench[remote]."
+        "Remote policies need websockets 17.4 or newer; install roboirgbench[remote]."
     ) from error
 
 CLOSE_TIMEOUT = 2.0
@@ -182,10 +187,12 @@ class WebsocketConnection:
         """Return the error for a connection that has ended."""
         if self._deadline.passed:
             return PolicyTimeoutError(f"{self.spec} {late}.")
+        if isinstance(error.__cause__, TooManyFragments):
+            return PolicyReplyError(f"{self.spec} sent a reply in too many pieces.")
         if error.sent is not None and error.sent.code == _TOO_BIG:
             return PolicyReplyError(
-                f"{self.spec} sent a reply in too many pieces, or of more than "
-                f"{self.spec.options.max_reply_mib:g} MiB; option max_reply_mib raises that limit."
+                f"{self.spec} sent a reply of more than {self.spec.options.max_reply_mib:g} MiB; "
+                "option max_reply_mib raises that limit."
             )
         code = f"close code {error.rcvd.code}" if error.rcvd else "without a close code"
         return PolicyConnectionError(f"{self.spec} ended the connection ({code}).")

@@ -123,9 +123,11 @@ class OpenAIModel:
         openai = self._openai
         if isinstance(error, openai.APITimeoutError):
             return timeout_error(self._name, self._options.timeout_s)
-        words = " ".join(str(error).replace(self._key, "…").split())[:MAX_ERROR_LENGTH]
-        if isinstance(error, openai.APIConnectionError):
-            reason = error.__cause__ or error
+        # The library says nothing about a connection that failed; its cause does.
+        unreachable = isinstance(error, openai.APIConnectionError)
+        reason = (error.__cause__ or error) if unreachable else error
+        words = " ".join(str(reason).replace(self._key, "…").split())[:MAX_ERROR_LENGTH]
+        if unreachable:
             return PolicyConnectionError(
                 f"{self._name} cannot be reached ({type(reason).__name__}: {words})."
             )
