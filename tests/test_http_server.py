@@ -214,6 +214,7 @@ def test_half_a_request_is_not_waited_for(make, tmp_path, capfd):
             while request_threads() and time.monotonic() < deadline:
                 time.sleep(0.01)
             assert not request_threads()
+        server.connections.limits = ConnectionLimits()
         assert get(port, path)[0].status == 200
     assert capfd.readouterr() == ("", "")
 

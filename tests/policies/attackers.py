@@ -12,6 +12,8 @@ import sys
 import threading
 from contextlib import contextmanager, suppress
 
+import httpx
+
 PATIENCE = 300
 """Seconds; far more than anything here takes on a loaded machine."""
 MAX_MIB = 300
@@ -69,6 +71,10 @@ class Served:
 
     def peak_mib(self):
         return self.status("VmHWM") // 1024
+
+    def is_healthy(self):
+        address = f"http://127.0.0.1:{self.port}/healthz"
+        return httpx.get(address, trust_env=False, timeout=PATIENCE).text == "OK\n"
 
     def connect(self, data=b""):
         raw = socket.create_connection(("127.0.0.1", self.port), timeout=PATIENCE)

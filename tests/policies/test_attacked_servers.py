@@ -10,6 +10,7 @@ import pytest
 from attackers import (
     MAX_MIB,
     PATIENCE,
+    UPGRADE,
     frame,
     opening,
     read_all,
@@ -96,7 +97,7 @@ def test_half_a_request_is_not_waited_for(scheme):
         for data in half:
             with server.connect(data) as raw:
                 read_all(raw)  # ends
-        begin(server.url).close()
+        assert server.is_healthy()
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -108,7 +109,7 @@ def test_dripped_requests_are_not_waited_for(scheme):
                 raw.sendall(bytes([byte]))
                 time.sleep(0.05)
             pytest.fail("the server has waited for the whole head")
-        begin(server.url).close()
+        assert server.is_healthy()
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -135,7 +136,25 @@ def test_a_body_without_a_key_is_not_read(scheme):
         # the connection is cut.
         assert answer.startswith(b"HTTP/1.1 401 ") or ("http" not in scheme and not answer)
         assert server.peak_mib() - before <= MAX_MIB
-        assert httpx.get(f"http://127.0.0.1:{server.port}/healthz", trust_env=False).is_success
+        assert server.is_healthy()
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_malformed_request_gets_an_answer(scheme):
+    with serving(scheme) as server:
+        for headers, status in (
+            ("Content-Length: \xb2\r\n", 400),
+            (f"Content-Length: {'9' * 5000}\r\n", 400),
+            ("Content-Length: -1\r\n", 400),
+            (f"X: {'y' * 70_000}\r\n", 431),
+        ):
+            if "http" in scheme:
+                request = f"POST /reset HTTP/1.1\r\nHost: 127.0.0.1\r\n{headers}\r\n"
+            else:
+                request = f"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n{UPGRADE}{headers}\r\n"
+            with server.connect(request.encode("latin-1")) as raw:
+                assert raw.recv(65536).startswith(f"HTTP/1.1 {status} ".encode()), headers
+        assert server.is_healthy()
 
 
 def test_a_body_is_asked_for_only_with_the_key():

@@ -135,6 +135,8 @@ class WebsocketConnection:
                     close_timeout=CLOSE_TIMEOUT,
                     ping_interval=None,
                     proxy=None,
+                    # An explicit address is never redirected to another one.
+                    address=(spec.endpoint.host, spec.endpoint.port),
                 )
             )
         except InvalidStatus as error:
@@ -151,6 +153,8 @@ class WebsocketConnection:
             ) from error
         except (OSError, EOFError, WebSocketException) as error:
             raise RetryableError(_describe(error)) from error
+        except ValueError as error:
+            raise PolicyConnectionError(f"{spec} refused: {_describe(error)}.") from error
 
     def send(self, data: bytes) -> None:
         """Send a message."""

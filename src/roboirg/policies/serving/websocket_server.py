@@ -17,7 +17,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 from websockets.asyncio.server import ServerConnection, serve
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import ConnectionClosed, InvalidMessage
 
 from roboirg.policies.remote.message_codec import pack, unpack
 from roboirg.policies.serving.server_options import ServerOptions
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 BACKLOG = 128
 CLOSE_TIMEOUT_S = 2.0
 _INTERNAL_ERROR = 1011
+_BAD_REQUEST = b"HTTP/1.1 400 Bad Request\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
 _CONTROL_FRAME = 131
 """Size of the largest, bytes."""
 _SWEEPS = 4
@@ -44,7 +45,7 @@ class _LimitedConnection(ServerConnection):
 
     def __init__(self, protocol: ServerProtocol, server: Server, **options: Any) -> None:  # noqa: ANN401
         self.table: ConnectionTable[_LimitedConnection] = options.pop("table")
-        self._receiving = False
+        self._receiving = self._refused = False
         super().__init__(protocol, server, **options)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -62,6 +63,13 @@ class _LimitedConnection(ServerConnection):
             self._receiving = False
             self.table.expect(self, self.table.limits.body_s)
         super().data_received(data)
+
+    def send_data(self) -> None:
+        # The library ends a connection that sends no valid request without a word.
+        if isinstance(self.protocol.handshake_exc, InvalidMessage) and not self._refused:
+            self._refused = True
+            self.transport.write(_BAD_REQUEST)
+        super().send_data()
 
     def expect_message(self) -> None:
         """Wait for a message, no longer than a connection may be idle."""
