@@ -21,7 +21,7 @@ import contextlib
 import fcntl
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple, Self, TypeVar
@@ -37,6 +37,11 @@ from roboirg.records.record_codec import (
     read_index_entry,
     read_instruction,
     read_line,
+)
+from roboirg.records.server_versions import (
+    adopt_told_versions,
+    check_told_version,
+    told_versions,
 )
 from roboirg.util.atomic_write import sync_to_disk
 
@@ -106,7 +111,7 @@ class RecordStore:
                     identity_key(one): one for one in lines.parse(read_index_entry)
                 }
                 self.torn, self.damaged = lines.torn, tuple(lines.damaged)
-                self._server_versions = _server_versions(self.stored.values())
+                self._told = told_versions(self.stored.values())
                 self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
                 undo.callback(os.close, self._file)
                 self._repair_tail()
@@ -122,7 +127,7 @@ class RecordStore:
             StoreError: the record cannot be written, or the policy's server is now another version
                 than in earlier verdicts; the file is unchanged.
         """
-        self._check_server_version(record)
+        check_told_version(self.folder, self._told, record)
         size = os.fstat(self._file).st_size
         try:
             line = record.model_dump_json().encode()
@@ -132,7 +137,7 @@ class RecordStore:
             os.ftruncate(self._file, size)
             raise StoreError(f"Cannot write to {self.path}: {error.strerror}.") from error
         self.stored[identity_key(record)] = read_index_entry(line, self.path, 0)
-        self._server_versions.update(_server_versions([record]))
+        self._told |= told_versions([record])
 
     def close(self) -> None:
         """Close the file and release the lock."""
@@ -144,15 +149,6 @@ class RecordStore:
 
     def __exit__(self, *_exception: object) -> None:
         self.close()
-
-    def _check_server_version(self, record: Record) -> None:
-        for policy, version in _server_versions([record]).items():
-            before = self._server_versions.get(policy, version)
-            if before != version:
-                raise StoreError(
-                    f"{self.folder} holds episodes of {policy} whose server told "
-                    f"{_told(before)}, but now it tells {_told(version)}; choose another --out."
-                )
 
     def _take_lock(self) -> None:
         try:
@@ -292,22 +288,7 @@ def _read_newest(folder: Path, kind: type[ResultType]) -> tuple[ResultType, ...]
         raise StoreError(
             f"There are no records in {folder}; give the --out folder of a `roboirg run`."
         )
-    told = _server_versions(newest.values())
-    return tuple(
-        one.model_copy(update={"server_version": told[one.policy]})
-        if one.outcome == "error" and one.server_version is None and one.policy in told
-        else one
-        for one in newest.values()
-    )
-
-
-def _server_versions(records: Iterable[Result | RecordIndexEntry]) -> dict[str, str | None]:
-    """Return what each policy's server told; errors, which are in no rate, do not count."""
-    return {one.policy: one.server_version for one in records if one.outcome != "error"}
-
-
-def _told(version: str | None) -> str:
-    return "no version" if version is None else f"version {version}"
+    return adopt_told_versions(newest.values())
 
 
 def _write_all(descriptor: int, data: bytes) -> None:
