@@ -1,5 +1,6 @@
 """The HTTP servers over real sockets: clients that disconnect, limits of bodies, loopback only."""
 
+import contextlib
 import http.client
 import socket
 import struct
@@ -14,6 +15,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.policies.serving.policy_server import open_server
 from roboirg.real.pages.score_server import ScoreServer
 from roboirg.real.study.study_plan import make_study, write_study
+from roboirg.util.connection_table import ConnectionLimits
 from roboirg.util.http_server import LoopbackRequestHandler, LoopbackServer
 
 VIDEO_BYTES = 64 << 20
@@ -130,15 +132,30 @@ def test_an_error_of_the_server_prints_its_traceback(make, tmp_path, capfd, monk
     assert "RuntimeError: a bug" in capfd.readouterr().err
 
 
-@pytest.mark.parametrize("length", ["70000", "-1", "1e3", "\xb2", "9" * 5000, "9" * 17])
-def test_bodies_have_a_limit(length, tmp_path, capfd):
-    server, _, path = score_server(tmp_path)
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ("Content-Length: 9999999999", 413),
+        (f"Content-Length: {'9' * 17}", 413),
+        ("Content-Length: -1", 400),
+        ("Content-Length: 1e3", 400),
+        ("Content-Length: \xb2", 400),
+        (f"Content-Length: {'9' * 5000}", 400),
+        ("Content-Length: 5\r\nContent-Length: 6", 400),
+        ("Transfer-Encoding: chunked", 411),
+        ("\r\n".join(f"X-{n}: {'x' * 1000}" for n in range(90)), 431),
+    ],
+)
+@pytest.mark.parametrize("make", [score_server, policy_server])
+def test_bodies_and_heads_have_limits(make, headers, status, tmp_path, capfd):
+    server, _, path = make(tmp_path)
     with running(server) as port:
         with socket.create_connection(("127.0.0.1", port), timeout=600) as raw:
-            head = f"POST /score HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nContent-Length: {length}"
+            address = "/infer" if make is policy_server else "/score"
+            head = f"POST {address} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n{headers}"
             raw.sendall(f"{head}\r\n\r\n".encode("latin-1"))
             answer = b"".join(iter(lambda: raw.recv(65536), b""))
-        assert answer.startswith(b"HTTP/1.1 413 ")
+        assert answer.startswith(f"HTTP/1.1 {status} ".encode())
         assert get(port, path)[0].status == 200
     assert capfd.readouterr().err == ""
 
@@ -149,8 +166,9 @@ def test_pages_are_for_this_machine_only(make, tmp_path):
     with running(server) as port:
         for host, origin, status in (
             (f"localhost:{port}", None, 200),
-            (f"127.0.0.1:{port}", f"http://localhost:{port}", 200),
-            (f"127.0.0.1:{port}", "null", 200),
+            (f"127.0.0.1:{port}", f"http://127.0.0.1:{port}", 200),
+            (f"127.0.0.1:{port}", f"http://localhost:{port}", 403),
+            (f"127.0.0.1:{port}", "null", 403),
             (f"evil.example:{port}", None, 403),
             ("127.0.0.1", None, 403),
             (f"127.0.0.1:{port}", "http://evil.example", 403),
@@ -168,3 +186,48 @@ def test_a_port_in_use_is_an_error():
         for port in (server.port, 70_000, -1):
             with pytest.raises(InvalidValueError, match=f"Port {port} is not available"):
                 LoopbackServer(port, LoopbackRequestHandler)
+
+
+@pytest.mark.parametrize("make", SERVERS)
+def test_half_a_request_is_not_waited_for(make, tmp_path, capfd):
+    server, long_request, path = make(tmp_path)
+    server.connections.limits = ConnectionLimits(request_s=0.5, body_s=0.5, idle_s=0.5)
+    with running(server) as port:
+        host = f"Host: 127.0.0.1:{port}\r\n"
+        for request in (
+            "",
+            "GET",
+            f"GET {path} HTTP/1.1\r\nHost: 127",
+            f"GET {path} HTTP/1.1\r\n{host}",
+            f"POST /score HTTP/1.1\r\n{host}Content-Length: 60000\r\n\r\nchoice=",
+            f"POST /reset HTTP/1.1\r\n{host}Content-Length: 60000\r\n\r\nx",
+            f"GET {path} HTTP/1.1\r\n{host}\r\n",
+        ):
+            with socket.create_connection(("127.0.0.1", port), timeout=600) as raw:
+                raw.sendall(request.encode())
+                while raw.recv(65536):
+                    pass
+        # A client that does not take in what it asked for.
+        with socket.create_connection(("127.0.0.1", port), timeout=600) as raw:
+            raw.sendall(f"{long_request} HTTP/1.1\r\n{host}\r\n".encode() * 50)
+            deadline = time.monotonic() + 600
+            while request_threads() and time.monotonic() < deadline:
+                time.sleep(0.01)
+            assert not request_threads()
+        server.connections.limits = ConnectionLimits()
+        assert get(port, path)[0].status == 200
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("make", SERVERS)
+def test_idle_connections_keep_no_one_out(make, tmp_path, capfd):
+    server, _, path = make(tmp_path)
+    with running(server) as port, contextlib.ExitStack() as idle:
+        before = threading.active_count()
+        for number in range(300):
+            raw = socket.create_connection(("127.0.0.1", port), timeout=600)
+            idle.enter_context(raw)
+            raw.sendall(b"GET / HTTP/1.1\r\nHost" if number % 2 else b"")
+        assert get(port, path)[0].status == 200
+        assert threading.active_count() - before <= server.connections.limits.connections + 5
+    assert capfd.readouterr() == ("", "")

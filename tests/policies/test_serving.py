@@ -20,8 +20,10 @@ from roboirg.core.errors import InvalidValueError, PolicyReplyError, UnknownName
 from roboirg.policies import make_policy
 from roboirg.policies.protocols import protocols_by_scheme
 from roboirg.policies.serving.policy_server import open_server
+from roboirg.policies.serving.server_options import ServerOptions
 
 HERE = f"{__name__}:Recorder"
+SERVED = [scheme for scheme, protocol in protocols_by_scheme().items() if protocol.service]
 
 
 class Recorder:
@@ -60,8 +62,8 @@ def _forget():
 
 
 @contextmanager
-def served(spec, protocol, **options):
-    server = open_server(spec, protocol, **options)
+def served(spec, protocol, *, seed=0, **options):
+    server = open_server(spec, protocol, ServerOptions(**options), seed=seed)
     thread = threading.Thread(target=server.listening.serve_forever)
     thread.start()
     try:
@@ -83,7 +85,7 @@ SEEN = {
 }
 
 
-@pytest.mark.parametrize("protocol", protocols_by_scheme())
+@pytest.mark.parametrize("protocol", SERVED)
 def test_a_served_policy_gets_what_the_client_was_given(protocol):
     first, later = moment(3, history=()), moment(5, history=(moment(4), moment(5)))
     with served(HERE, protocol, seed=7) as url:
@@ -113,7 +115,7 @@ def test_a_served_policy_gets_what_the_client_was_given(protocol):
         same(given, kept, shown)
 
 
-@pytest.mark.parametrize("protocol", protocols_by_scheme())
+@pytest.mark.parametrize("protocol", SERVED)
 def test_a_served_policy_hears_what_the_prompt_says_next(protocol):
     said = ["this one is red.", "please note.", "take it."]
     chunks = [(moment(1), moment(2)), (moment(3),), (moment(4), moment(5))]
@@ -223,7 +225,7 @@ def test_errors_are_a_traceback_and_close_1011(message, words):
         client.close()
 
 
-@pytest.mark.parametrize("protocol", protocols_by_scheme())
+@pytest.mark.parametrize("protocol", SERVED)
 def test_what_a_policy_raises_is_the_clients_error(protocol):
     with served(HERE, protocol) as url:
         client = make_policy(url, 0)
@@ -235,7 +237,7 @@ def test_what_a_policy_raises_is_the_clients_error(protocol):
         client.close()
 
 
-@pytest.mark.parametrize("protocol", protocols_by_scheme())
+@pytest.mark.parametrize("protocol", SERVED)
 def test_health_and_keys(protocol, monkeypatch):
     with served(HERE, protocol, key="sesame") as url:
         place = url.split("://")[1]
@@ -269,13 +271,15 @@ def test_the_http_interface_tells_what_is_wrong():
         ({"spec": "oracle"}, InvalidValueError, "cannot be served"),
         ({"spec": "randon"}, UnknownNameError, "Did you mean 'random'"),
         ({"protocol": "mmevla"}, UnknownNameError, "Did you mean 'mme-vla'"),
+        ({"protocol": "vla-eval"}, InvalidValueError, "vla-eval:// is for clients only"),
         ({"port": 70000}, InvalidValueError, "port is 70000"),
         ({"host": "192.0.2.1"}, InvalidValueError, "Cannot listen at 192"),
     ],
 )
 def test_what_cannot_be_served_is_told(options, error, words):
+    place = ServerOptions(**{name: options[name] for name in options if name in ("host", "port")})
     with pytest.raises(error, match=words):
-        open_server(**{"spec": "random", "protocol": "openpi", **options})
+        open_server(options.get("spec", "random"), options.get("protocol", "openpi"), place)
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])

@@ -285,3 +285,85 @@ class ChallengeHttpServer:
             return self.send(handler, 200, pack(fault or self.policy.answer(message)))
         except Exception:  # noqa: BLE001
             return self.send(handler, 500, traceback.format_exc().encode(), "text/plain")
+
+
+class VlaEvalServer(WireServer):
+    """A model server of vla-eval: envelopes, texts as keys, one action per observation.
+
+    `payloads` are the payloads it got, by type; an `answer` is the payload of an action. The faults
+    "other-type", "other-number" and "late-error" change an envelope; a dictionary is the payload.
+    """
+
+    hello = {  # noqa: RUF012
+        "harness_version": "0.8.0", "protocol_version": 1, "model_server": "Test",
+        "capabilities": {},
+    }  # fmt: skip
+
+    def __init__(self, *args, **kwargs):
+        super().__init__(*args, **kwargs)
+        self.payloads, self.step = [], 0
+
+    def answer(self, message):
+        self.step += 1
+        return {"actions": np.full(8, self.step, np.float32)}
+
+    async def _handle(self, websocket):
+        self.connections += 1
+        self.open += 1
+        try:
+            async for data in websocket:
+                await self._respond(websocket, msgpack.unpackb(data, object_hook=decode_texts))
+        except ConnectionClosed:
+            pass
+        finally:
+            self.open -= 1
+
+    async def _respond(self, websocket, message):
+        assert set(message) == {"type", "payload", "seq", "timestamp"}
+        kind, number = message["type"], message["seq"]
+        self.payloads.append((kind, message["payload"]))
+        if kind == "hello":
+            await websocket.send(envelope("hello", self.hello, number))
+        elif kind == "episode_start":
+            self.step = 0
+            if self.faults[:1] == ["late-error"]:
+                await websocket.send(envelope("error", {"error": "cannot start"}, number))
+        elif kind == "observation":
+            fault = self.faults.pop(0) if self.faults else None
+            if fault == "stall":
+                await self._stop.wait()
+            await websocket.send(self._reply(message["payload"], number, fault))
+
+    def _reply(self, shown, number, fault):
+        if fault == "other-type":
+            return envelope("hello", self.answer(shown), number)
+        if fault == "other-number":
+            return envelope("action", self.answer(shown), number + 1)
+        if isinstance(fault, bytes) or fault == "text":
+            return fault
+        try:
+            payload = fault if isinstance(fault, dict) else self.answer(shown)
+        except Exception as error:  # noqa: BLE001
+            return envelope("error", {"error": str(error)}, number)
+        return envelope("action", payload, number)
+
+
+def envelope(kind, payload, number):
+    message = {"type": kind, "payload": payload, "seq": number, "timestamp": time.time()}
+    return msgpack.packb(message, default=encode_texts)
+
+
+def encode_texts(value):
+    if not isinstance(value, np.ndarray):
+        raise TypeError(type(value))
+    return {
+        "__ndarray__": True, "data": value.tobytes(), "dtype": value.dtype.str,
+        "shape": list(value.shape),
+    }  # fmt: skip
+
+
+def decode_texts(value):
+    if "__ndarray__" in value:
+        flat = np.frombuffer(value["data"], np.dtype(value["dtype"]))
+        return flat.reshape(value["shape"])
+    return value

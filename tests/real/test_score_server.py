@@ -95,7 +95,7 @@ def test_only_pages_of_this_server_are_answered(served):
     assert len(read_records(served.folder)) == 1
     status, headers, _ = ask(served, f"/?token={served.token}")
     assert status == 200
-    assert headers["Referrer-Policy"] == "no-referrer"
+    assert headers["Referrer-Policy"] == "same-origin"
     assert "default-src 'none'" in headers["Content-Security-Policy"]
 
 

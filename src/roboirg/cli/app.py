@@ -36,6 +36,7 @@ from roboirg.cli.options import (
 from roboirg.cli.real_commands import real_app
 from roboirg.cli.run_commands import INTERRUPTED, USAGE_ERROR, Out
 from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.core.printable import printable
 from roboirg.core.version import __version__
 from roboirg.util.plurals import counted
 
@@ -260,7 +261,7 @@ def main() -> None:
     try:
         code = app(prog_name="roboirg", standalone_mode=False)
     except RoboIRGError as error:
-        typer.echo(f"roboirg: {error}", err=True)
+        typer.echo(f"roboirg: {printable(str(error))}", err=True)
         sys.exit(USAGE_ERROR)
     except _WrongUsage as error:
         sys.exit(_print_usage_error(error))

@@ -12,11 +12,13 @@ import typer
 from typer.core import TyperCommand
 
 from roboirg.cli.import_path import add_working_directory
-from roboirg.core.errors import InvalidValueError
+from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.util.connection_table import ConnectionLimits
+from roboirg.util.request_origin import LOOPBACK, LOOPBACK_NAMES
 
 FAILED = 2
 _STOPPED = {signal.SIGINT: 130, signal.SIGTERM: 143}
-_LOOPBACK = "127.0.0.1"
+_LIMITS = ConnectionLimits()
 
 _PROTOCOLS, _URL_SCHEMES = "PROTOCOLS", "SCHEMES"
 """Stand for the protocols, and for the schemes of all policy URLs, in help texts."""
@@ -36,9 +38,11 @@ class ProtocolHelpCommand(TyperCommand):
         from roboirg.policies.protocols import protocols_by_scheme
 
         urls = ", ".join(f"{scheme}://…" for scheme in url_schemes())
+        schemes = protocols_by_scheme().items()
+        served_schemes = [scheme for scheme, protocol in schemes if protocol.service is not None]
         for parameter in self.params:
             words = getattr(parameter, "help", None) or ""
-            words = words.replace(_PROTOCOLS, ", ".join(protocols_by_scheme()))
+            words = words.replace(_PROTOCOLS, ", ".join(served_schemes))
             vars(parameter)["help"] = words.replace(_URL_SCHEMES, urls)
         return super().get_help(ctx)
 
@@ -48,30 +52,51 @@ def serve(
     protocol: Annotated[
         str, typer.Option(help=f"Protocol of the clients: one of {_PROTOCOLS}.")
     ] = "mme-vla",
-    host: Annotated[str, typer.Option(help="Address to listen at.")] = _LOOPBACK,
+    host: Annotated[str, typer.Option(help="Address to listen at.")] = LOOPBACK,
     port: Annotated[int, typer.Option(help="0 for any free port.")] = 8000,
     seed: Annotated[int, typer.Option(help="Of the policy's random choices.")] = 0,
     api_key_env: Annotated[
         str | None,
         typer.Option(help="Environment variable with the key that clients must send."),
     ] = None,
+    allow_host: Annotated[
+        list[str] | None,
+        typer.Option(help="Another name under which clients reach this machine; repeatable."),
+    ] = None,
+    max_connections: Annotated[
+        int, typer.Option(min=1, help="Connections at once.")
+    ] = _LIMITS.connections,
+    request_timeout_s: Annotated[
+        float, typer.Option(min=0.1, help="Seconds for the headers of a request.")
+    ] = _LIMITS.request_s,
+    message_timeout_s: Annotated[
+        float, typer.Option(min=0.1, help="Seconds for a message to arrive, or to be taken in.")
+    ] = _LIMITS.body_s,
+    idle_timeout_s: Annotated[
+        float, typer.Option(min=0.1, help="Seconds a connection may be idle.")
+    ] = _LIMITS.idle_s,
 ) -> None:
     """Serve a policy to this benchmark and other clients of a protocol."""
     from roboirg.policies.serving.policy_server import open_server
+    from roboirg.policies.serving.server_options import ServerOptions
 
     add_working_directory()
     key = None if api_key_env is None else os.environ.get(api_key_env)
     if api_key_env is not None and not key:
         raise InvalidValueError(f"The environment variable {api_key_env} holds no key.")
-    server = open_server(policy, protocol, host, port, seed=seed, key=key)
+    limits = ConnectionLimits(max_connections, request_timeout_s, message_timeout_s, idle_timeout_s)
+    options = ServerOptions(host, port, key, tuple(allow_host or ()), limits)
+    server = open_server(policy, protocol, options, seed=seed)
     for number in _STOPPED:
         signal.signal(number, _stop)
-    if host not in (_LOOPBACK, "localhost", "::1") and key is None:
+    if host not in LOOPBACK_NAMES and key is None:
         typer.echo(
             f"Every client that reaches {host} can use it, as there is no --api-key-env.", err=True
         )
     typer.echo(f"{policy} at {server.url}; Ctrl-C stops.")
     server.listening.serve_forever()
+    # Only a signal ends it, and that ends the process.
+    raise RoboIRGError(f"The server at {server.url} has stopped by itself.")
 
 
 def check_policy(

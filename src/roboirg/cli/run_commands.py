@@ -12,6 +12,7 @@ from roboirg.cli import plan_options as options
 from roboirg.cli.import_path import add_working_directory
 from roboirg.cli.options import Workers
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.printable import printable
 from roboirg.util.plurals import counted
 
 if TYPE_CHECKING:
@@ -230,7 +231,7 @@ def report_problems(summary: RunSummary, folder: Path) -> None:
         typer.echo(
             f"roboirg: {len(summary.errors):,} of {counted(summary.total, 'episode')} ended in an "
             f"error and are not counted in the rates; the first ({first.task} "
-            f"{first.split}/{first.episode} {first.setting}): {first.cause}",
+            f"{first.split}/{first.episode} {first.setting}): {printable(str(first.cause))}",
             err=True,
         )
     if summary.missing:

@@ -19,6 +19,8 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+from roboirg.core.printable import printable
+
 
 class RoboIRGError(Exception):
     """Base class of errors that are reported as one sentence, without a traceback."""
@@ -67,13 +69,24 @@ class MotionPlanningError(RoboIRGError, RuntimeError):
     """No collision-free straight motion within the joint limits was found."""
 
 
-class PolicyConnectionError(RoboIRGError, ConnectionError):
+class PolicyServerError(RoboIRGError):
+    """The server or model of a policy failed; what it said itself is safe to print.
+
+    Args:
+        message: may quote the server.
+    """
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(printable(message))
+
+
+class PolicyConnectionError(PolicyServerError, ConnectionError):
     """The server or model of a policy cannot be reached, or the connection was lost."""
 
 
-class PolicyTimeoutError(RoboIRGError, TimeoutError):
+class PolicyTimeoutError(PolicyServerError, TimeoutError):
     """The server or model of a policy did not answer in time."""
 
 
-class PolicyReplyError(RoboIRGError, RuntimeError):
+class PolicyReplyError(PolicyServerError, RuntimeError):
     """The server or model of a policy answered with an error or an invalid reply."""

@@ -14,6 +14,7 @@ from roboirg.core.errors import (
     RenderDeviceError,
     RoboIRGError,
 )
+from roboirg.core.printable import printable
 from roboirg.records.record import ErrorKind
 
 ErrorSource = Literal["policy", "environment"]
@@ -33,8 +34,9 @@ class EpisodeError(Exception):
     def __init__(self, kind: ErrorKind, message: str, details: str) -> None:
         super().__init__(message)
         self.kind = kind
-        self.cause = format_cause(kind, message)
-        self.details = details
+        # A server may have chosen the words, and both are printed.
+        self.cause = format_cause(kind, printable(message))
+        self.details = printable(details)
 
 
 def format_cause(kind: ErrorKind, message: str) -> str:

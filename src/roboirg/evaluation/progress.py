@@ -13,6 +13,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
+from roboirg.core.printable import printable
 from roboirg.records.record import Record
 from roboirg.util.plurals import counted
 
@@ -129,14 +130,14 @@ class ConsoleReporter:
             )
             return
         self._console.print(
-            f"\\[{self._done}/{self._total}] {escape(_summary(record))} ({left} left)",
+            f"\\[{self._done}/{self._total}] {escape(printable(_summary(record)))} ({left} left)",
             soft_wrap=True,
             highlight=False,
         )
 
     def warn(self, text: str) -> None:
         """Print a line on stderr, above the bar."""
-        sys.stderr.write(f"{text}\n")
+        sys.stderr.write(f"{printable(text)}\n")
 
     def __enter__(self) -> Self:
         if self._console.is_terminal:

@@ -22,7 +22,7 @@ from roboirg.evaluation.code_fingerprint import code_fingerprint
 from roboirg.evaluation.plan import instruct_job
 from roboirg.judging import Event, attribute_failure
 from roboirg.language.settings import EXPLICIT
-from roboirg.policies.loading import is_privileged, policy_version
+from roboirg.policies.loading import is_privileged, policy_version, server_version
 from roboirg.records.record import (
     Attribution,
     ErrorKind,
@@ -160,6 +160,7 @@ def make_record(
         metadata=json.loads(json.dumps(dict(instruction.metadata))),
         privileged=is_privileged(job.policy_spec),
         policy_version=policy_version(job.policy_spec),
+        server_version=server_version(result.policy_metadata),
         policy_metadata=result.policy_metadata,
         events=tuple(result.events),
         video=video,

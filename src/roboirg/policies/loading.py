@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
@@ -77,3 +78,17 @@ def policy_version(spec: str) -> str:
     except (InvalidValueError, OSError, TypeError):
         return "unknown"
     return short_hash(source)
+
+
+def server_version(metadata: Mapping[str, Any]) -> str | None:
+    """Return the version that a policy's server told; None if there is none, or it told none.
+
+    Args:
+        metadata: of the policy, or of a planner and a policy, after `reset`. Those of clients hold
+            the address of the ``server`` and what it told, such as its ``version``.
+    """
+    for told in (metadata, metadata.get("policy")):
+        if isinstance(told, Mapping) and "server" in told:
+            version = told.get("version")
+            return None if version in (None, "", "unknown") else str(version)
+    return None

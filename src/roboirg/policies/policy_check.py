@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from roboirg.core.actions import ActionSpace, check_chunk
 from roboirg.core.errors import MissingDependencyError, RoboIRGError
+from roboirg.core.printable import printable
 from roboirg.policies.base import Policy, close_policy, tell_policy
 from roboirg.policies.loading import make_policy
 from roboirg.policies.requirements import (
@@ -91,6 +92,7 @@ def check_policy(policy: str | Policy, *, seed: int = 0) -> list[CheckResult]:
 
 def print_check_results(results: list[CheckResult], console: Console) -> None:
     """Print a table of results, and how many checks failed."""
+    from rich.markup import escape
     from rich.table import Table
 
     styles = {PASS: "green", FAIL: "bold red", NOTE: "yellow"}
@@ -99,7 +101,9 @@ def print_check_results(results: list[CheckResult], console: Console) -> None:
         table.add_column(heading)
     for result in results:
         table.add_row(
-            result.check, f"[{styles[result.verdict]}]{result.verdict}[/]", result.message
+            result.check,
+            f"[{styles[result.verdict]}]{result.verdict}[/]",
+            escape(printable(result.message)),
         )
     console.print(table, highlight=False)
     failed = sum(result.verdict == FAIL for result in results)

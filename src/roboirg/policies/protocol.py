@@ -18,14 +18,14 @@ class Protocol:
         summary: which servers speak it, in a few words.
         memory: what a server remembers between requests, in a few words.
         clients: the policy class of each URL scheme; the class names the transport.
-        service: answers the messages of clients with any policy.
+        service: answers the messages of clients with any policy; None if only a client exists.
     """
 
     name: str
     summary: str
     memory: str
     clients: Mapping[str, type[RemotePolicy]]
-    service: type[Service]
+    service: type[Service] | None = None
 
     @property
     def schemes(self) -> tuple[str, ...]:

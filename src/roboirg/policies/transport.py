@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
 
 if TYPE_CHECKING:
     from roboirg.policies.remote.connections import Connection, ConnectionSpec
+    from roboirg.policies.serving.server_options import ServerOptions
     from roboirg.policies.serving.service import Service
 
 
 class ListeningServer(Protocol):
-    """What the servers of websockets and of http.server have in common."""
+    """What the servers of all transports have in common."""
 
     socket: Any
 
@@ -24,8 +25,8 @@ class ListeningServer(Protocol):
 
 
 Connect = Callable[["ConnectionSpec"], "Connection"]
-Listen = Callable[["Service", Mapping[str, Any], str, int, str | None], ListeningServer]
-"""Called with the service, the metadata, host, port (0: any free one), and the key or None."""
+Listen = Callable[["Service", Mapping[str, Any], "ServerOptions"], ListeningServer]
+"""Called with the service, the metadata, and where to listen and whom to answer."""
 
 
 class Transport(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -79,6 +79,7 @@ def _check_versions(runs: Sequence[tuple[Path, Sequence[Record]]]) -> None:
                 (("language version",), record.language_version),
                 (("environment version",), record.environment_version),
                 (("version", "of policy", record.policy), record.policy_version),
+                *_server_version(record),
                 (("seed", "of", record.task, record.split, record.episode), record.seed),
             ):
                 there, expected = first.setdefault(what, (folder, value))
@@ -88,6 +89,12 @@ def _check_versions(runs: Sequence[tuple[Path, Sequence[Record]]]) -> None:
                         f"{' '.join(map(str, what))} is {value!r} in the first and "
                         f"{expected!r} in the second."
                     )
+
+
+def _server_version(record: Record) -> Iterator[tuple[tuple[object, ...], object]]:
+    """Yield the version of the policy's server, if the episode has a verdict."""
+    if record.outcome != "error":
+        yield ("version", "of the server of", record.policy), record.server_version
 
 
 def _copy_video(record: Record, source: Path, target: Path) -> Record:

@@ -38,6 +38,7 @@ _TEXT_COLUMNS = [
     "error",
     "cause",
     "policy_version",
+    "server_version",
     "language_version",
     "package_version",
     "code",

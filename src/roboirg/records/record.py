@@ -248,6 +248,8 @@ class Result(Job):
             (``planned``), or ``none``.
         privileged: whether the policy has access to the simulator's state (it has ``attach``).
         policy_version: distinguishes versions of a policy of the same name.
+        server_version: the version that the policy's server told; None if there is no server, or
+            it told none, or the episode ended before.
         language_version: version of the instruction generator.
         environment_version: version of scenes, rules and physics.
         package_version: version of roboirg.
@@ -267,6 +269,7 @@ class Result(Job):
     demonstration_source: DemonstrationSource = "none"
     privileged: bool
     policy_version: str = "unknown"
+    server_version: str | None = None
     language_version: str
     environment_version: int
     package_version: str

@@ -73,6 +73,7 @@ class RecordIndexEntry(msgspec.Struct, frozen=True, gc=False):
     meshes: str = DEFAULT_MESHES
     wordings: str | None = None
     policy_version: str = "unknown"
+    server_version: str | None = None
     cause: str | None = None
     attempt: int = 1
     duration_s: float = 0.0

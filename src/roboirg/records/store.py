@@ -7,6 +7,7 @@ Guaranteed on a local POSIX file system:
   torn last line is never read as a record; the next writer moves it to ``records.torn`` (copied
   and synced there before it is removed here) and reports it.
 - A damaged line in the middle is skipped and reported; all other lines are read.
+- Verdicts of two versions of a policy's server do not get into one file.
 - There is one writer at a time: the lock is the kernel's (`flock`), so it is released when its
   owner dies and never goes stale.
 
@@ -36,6 +37,11 @@ from roboirg.records.record_codec import (
     read_index_entry,
     read_instruction,
     read_line,
+)
+from roboirg.records.server_versions import (
+    adopt_told_versions,
+    check_told_version,
+    told_versions,
 )
 from roboirg.util.atomic_write import sync_to_disk
 
@@ -105,6 +111,7 @@ class RecordStore:
                     identity_key(one): one for one in lines.parse(read_index_entry)
                 }
                 self.torn, self.damaged = lines.torn, tuple(lines.damaged)
+                self._told = told_versions(self.stored.values())
                 self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
                 undo.callback(os.close, self._file)
                 self._repair_tail()
@@ -117,8 +124,10 @@ class RecordStore:
         """Write one record; when this returns, it is on disk.
 
         Raises:
-            StoreError: the record cannot be written; the file is unchanged.
+            StoreError: the record cannot be written, or the policy's server is now another version
+                than in earlier verdicts; the file is unchanged.
         """
+        check_told_version(self.folder, self._told, record)
         size = os.fstat(self._file).st_size
         try:
             line = record.model_dump_json().encode()
@@ -128,6 +137,7 @@ class RecordStore:
             os.ftruncate(self._file, size)
             raise StoreError(f"Cannot write to {self.path}: {error.strerror}.") from error
         self.stored[identity_key(record)] = read_index_entry(line, self.path, 0)
+        self._told |= told_versions([record])
 
     def close(self) -> None:
         """Close the file and release the lock."""
@@ -182,6 +192,8 @@ def read_contents(path: Path) -> StoreContents:
 
 def read_records(folder: Path) -> tuple[Record, ...]:
     """Read the records of a run's folder: the newest of each identity, in the order of the file.
+
+    An episode that ended in an error before the server told its version has that of the others.
 
     Raises:
         StoreError: there are none, or a line is not a record of this schema version.
@@ -276,7 +288,7 @@ def _read_newest(folder: Path, kind: type[ResultType]) -> tuple[ResultType, ...]
         raise StoreError(
             f"There are no records in {folder}; give the --out folder of a `roboirg run`."
         )
-    return tuple(newest.values())
+    return adopt_told_versions(newest.values())
 
 
 def _write_all(descriptor: int, data: bytes) -> None:

@@ -2,23 +2,33 @@
 
 from __future__ import annotations
 
+import contextlib
+import http.client
 import mimetypes
 import os
 import re
+import socket
 import sys
+import time
 from collections.abc import Mapping
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple, cast
 from urllib.parse import parse_qsl
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.util.connection_table import OUT_OF_FILES, ConnectionLimits, ConnectionTable
+from roboirg.util.request_origin import LOOPBACK, LOOPBACK_NAMES, is_own_request
 
-LOOPBACK = "127.0.0.1"
-LOOPBACK_NAMES = (LOOPBACK, "localhost")
 TEXT_TYPE = "text/plain; charset=utf-8"
 HTML_TYPE = "text/html; charset=utf-8"
 CHUNK_BYTES = 1 << 16
+MAX_HEAD_BYTES = 1 << 16
+"""Size of a request's headers, taken together."""
+LINGER_S = 2.0
+"""How long a client that was refused may go on sending, so that it gets to read why."""
+_BUSY = b"HTTP/1.1 503 Service Unavailable\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
+_PAUSE_S = 0.1
 
 
 class ByteRange(NamedTuple):
@@ -29,18 +39,72 @@ class ByteRange(NamedTuple):
 
 
 class HTTPServerBase(ThreadingHTTPServer):
-    """A server with a thread for each connection.
+    """A server with a thread for each connection, within `ConnectionLimits`.
 
     A client that disconnects or stalls in the middle of a request ends its own connection, without
     a traceback on the terminal.
+
+    Args:
+        address: host and port.
+        handler: class of the request handler.
+        limits: of the connections.
+
+    Attributes:
+        connections: that are open.
     """
 
     daemon_threads = True
+    request_queue_size = 128
+
+    def __init__(
+        self,
+        address: tuple[str, int],
+        handler: type[RequestHandler],
+        limits: ConnectionLimits | None = None,
+    ) -> None:
+        self.connections: ConnectionTable[socket.socket] = ConnectionTable(
+            limits or ConnectionLimits(), _shut_down
+        )
+        super().__init__(address, handler)
+
+    def get_request(self) -> tuple[socket.socket, Any]:
+        """Accept a connection.
+
+        Raises:
+            OSError: there is none, or no place for it; the server goes on.
+        """
+        try:
+            connection, address = super().get_request()
+        except OSError as error:
+            if error.errno in OUT_OF_FILES and not self.connections.make_room():
+                time.sleep(_PAUSE_S)
+            raise
+        if not self.connections.add(connection):
+            with contextlib.suppress(OSError):
+                connection.send(_BUSY)
+            connection.close()
+            raise ConnectionRefusedError("too many connections")
+        return connection, address
+
+    def service_actions(self) -> None:
+        """End the connections that are late; called by `serve_forever` twice a second."""
+        self.connections.end_late()
+
+    def shutdown_request(self, request: Any) -> None:  # noqa: ANN401 - type of the base class
+        """Close a connection."""
+        self.connections.discard(request)
+        super().shutdown_request(request)
 
     def handle_error(self, request: Any, client_address: Any) -> None:  # noqa: ANN401
         """Print the traceback of an error, unless the client caused it by disconnecting."""
         if not isinstance(sys.exc_info()[1], ConnectionError | TimeoutError):
             super().handle_error(request, client_address)
+
+
+def _shut_down(connection: socket.socket) -> None:
+    """Wake the thread of a connection, which then ends."""
+    with contextlib.suppress(OSError):
+        connection.shutdown(socket.SHUT_RDWR)
 
 
 class LoopbackServer(HTTPServerBase):
@@ -77,6 +141,59 @@ class RequestHandler(BaseHTTPRequestHandler):
     # Send head and body together: in two packets, the second one waits for the client's answer.
     wbufsize = -1
     disable_nagle_algorithm = True
+    server: HTTPServerBase
+
+    def setup(self) -> None:
+        """Prepare a connection."""
+        super().setup()
+        self._unread = False
+
+    def handle_one_request(self) -> None:
+        """Wait for a request, and answer it within the limits of the server."""
+        connections, limits = self.server.connections, self.server.connections.limits
+        proven = connections.is_proven(self.connection)
+        connections.expect(self.connection, limits.idle_s if proven else limits.request_s)
+        # Returns with the first byte.
+        cast("Any", self.rfile).peek(1)
+        connections.expect(self.connection, limits.request_s)
+        super().handle_one_request()
+
+    def parse_request(self) -> bool:
+        """Read the head of a request; returns whether to answer it."""
+        stream = self.rfile
+        self.rfile = cast("Any", _HeadReader(stream))
+        try:
+            if not super().parse_request():
+                return False
+        finally:
+            self.rfile = stream
+        if not self.server.connections.has(self.connection):
+            self.close_connection = True  # too late: what was read is not the whole head
+            return False
+        self.server.connections.expect(self.connection, None)
+        # Until it is read; the next request on this connection cannot be found before.
+        self._unread = self.headers.get("Content-Length", "0") != "0"
+        self.close_connection |= self._unread and self.command != "POST"
+        if "Transfer-Encoding" in self.headers:
+            self._unread = True
+            self.send_refusal(HTTPStatus.LENGTH_REQUIRED)
+            return False
+        return True
+
+    def handle_expect_100(self) -> bool:
+        """Say nothing yet: `read_body` asks for the body once it is wanted."""
+        return True
+
+    def finish(self) -> None:
+        """End a connection; a client that still sends gets to read the refusal."""
+        with contextlib.suppress(OSError):
+            if self._unread:
+                self.wfile.flush()
+                self.connection.shutdown(socket.SHUT_WR)
+                self.server.connections.expect(self.connection, LINGER_S)
+                while self.connection.recv(CHUNK_BYTES):
+                    pass
+        super().finish()
 
     def common_headers(self) -> dict[str, str]:
         """Return the headers of every response."""
@@ -90,6 +207,8 @@ class RequestHandler(BaseHTTPRequestHandler):
     ) -> None:
         """Send the status and headers of a response of `length` bytes."""
         self.send_response(status)
+        if self._unread:
+            self.send_header("Connection", "close")  # which sets `close_connection` too
         head = {"Content-Length": str(length), **self.common_headers(), **(headers or {})}
         for name, value in head.items():
             self.send_header(name, value)
@@ -105,7 +224,7 @@ class RequestHandler(BaseHTTPRequestHandler):
         """Send a response; without its body in answer to HEAD."""
         self.send_head(status, len(body), {"Content-Type": content_type, **(headers or {})})
         if self.command != "HEAD":
-            self.wfile.write(body)
+            self._write(memoryview(body))
 
     def send_text(
         self, text: str, content_type: str = TEXT_TYPE, status: HTTPStatus = HTTPStatus.OK
@@ -155,8 +274,15 @@ class RequestHandler(BaseHTTPRequestHandler):
         file.seek(begin)
         left = end - begin
         while left and (data := file.read(min(CHUNK_BYTES, left))):
-            self.wfile.write(data)
+            self._write(memoryview(data))
             left -= len(data)
+
+    def _write(self, data: memoryview) -> None:
+        """Send a part of a response, piece by piece, each within its time."""
+        connections = self.server.connections
+        for start in range(0, len(data), CHUNK_BYTES):
+            connections.expect(self.connection, connections.limits.request_s)
+            self.wfile.write(data[start : start + CHUNK_BYTES])
 
     def read_body(self, limit: int, *, message: str = "") -> bytes | None:
         """Return the body of a request.
@@ -167,18 +293,29 @@ class RequestHandler(BaseHTTPRequestHandler):
 
         Returns:
             None if the body has no valid length, is too large (both are refused here) or is cut
-            short by a client that disconnects.
+            short by a client that disconnects or is late.
         """
-        length = self.headers.get("Content-Length", "0")
-        if not re.fullmatch(r"[0-9]{1,18}", length) or int(length) > limit:
-            # The body is not read, so the next request on this connection cannot be found.
-            self.close_connection = True
+        lengths = set(self.headers.get_all("Content-Length", ["0"]))
+        length = lengths.pop()
+        if lengths or not re.fullmatch(r"[0-9]{1,18}", length):
+            self._unread = True
+            self.send_refusal(HTTPStatus.BAD_REQUEST)
+            return None
+        if int(length) > limit:
             self.send_refusal(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, message)
             return None
+        if self.headers.get("Expect", "").lower() == "100-continue":
+            self.send_response_only(HTTPStatus.CONTINUE)
+            self.end_headers()
+            self.wfile.flush()
+        connections = self.server.connections
+        connections.expect(self.connection, connections.limits.body_s)
         body = self.rfile.read(int(length))
         if len(body) < int(length):
             self.close_connection = True
             return None
+        connections.expect(self.connection, None)
+        self._unread = False
         return body
 
     def read_form(self, limit: int, *, message: str = "") -> dict[str, str] | None:
@@ -195,15 +332,25 @@ class LoopbackRequestHandler(RequestHandler):
     server: LoopbackServer
 
     def is_local(self) -> bool:
-        """Return whether a request comes from a page of this server.
-
-        Both names are checked: a name of another site may resolve to this machine (Host), and a
-        page of another site may send a form here (Origin).
-        """
+        """Return whether a request comes from this machine, and from no page of another site."""
+        hosts = self.headers.get_all("Host", [])
+        origins = self.headers.get_all("Origin", [])
         known = {f"{name}:{self.server.port}" for name in LOOPBACK_NAMES}
-        # Browsers send "null" from a page with the policy "no-referrer".
-        origins = {None, "null", *(f"http://{name}" for name in known)}
-        return self.headers.get("Host", "") in known and self.headers.get("Origin") in origins
+        return known.issuperset(hosts) and is_own_request(hosts, origins, LOOPBACK_NAMES)
+
+
+class _HeadReader:
+    """Reads lines of a request's head, up to `MAX_HEAD_BYTES` of them."""
+
+    def __init__(self, stream: Any) -> None:  # noqa: ANN401 - the base class has no narrower type
+        self._stream, self._left = stream, MAX_HEAD_BYTES
+
+    def readline(self, size: int) -> bytes:
+        line: bytes = self._stream.readline(min(size, self._left + 1))
+        self._left -= len(line)
+        if self._left < 0:
+            raise http.client.LineTooLong("header")  # answered with status 431
+        return line
 
 
 def parse_range(header: str | None, size: int) -> ByteRange | None:

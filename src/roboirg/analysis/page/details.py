@@ -135,8 +135,9 @@ def _conditions(record: Record) -> str:
         for name in ("actions", "demonstration_frames", "observe_every")
         if getattr(record, name) is not None
     ]
+    server = "" if record.server_version is None else f" (server {record.server_version})"
     versions = (
-        f"policy {record.policy_version}, language {record.language_version}, environment "
+        f"policy {record.policy_version}{server}, language {record.language_version}, environment "
         f"{record.environment_version}, roboirg {record.package_version}"
     )
     return f"{', '.join(parts)}; {versions}"

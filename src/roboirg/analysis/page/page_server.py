@@ -14,7 +14,8 @@ from typing import BinaryIO
 from urllib.parse import unquote, urlsplit
 
 from roboirg.records.store import RECORDS_FILE
-from roboirg.util.http_server import HTML_TYPE, LOOPBACK, LoopbackRequestHandler, LoopbackServer
+from roboirg.util.http_server import HTML_TYPE, LoopbackRequestHandler, LoopbackServer
+from roboirg.util.request_origin import LOOPBACK
 
 
 class PageServer(LoopbackServer):

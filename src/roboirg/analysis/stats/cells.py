@@ -83,7 +83,12 @@ class Versions(NamedTuple):
     @classmethod
     def of(cls, result: Result) -> Versions:
         """Return the versions of a result."""
-        return cls(result.policy_version, result.language_version, result.environment_version)
+        policy, server = result.policy_version, result.server_version
+        return cls(
+            policy if server is None else f"{policy} (server {server})",
+            result.language_version,
+            result.environment_version,
+        )
 
 
 class PolicyRun(NamedTuple):

@@ -37,6 +37,7 @@ from roboirg.analysis.stats.run_summary import (
 from roboirg.analysis.tables.table import ERROR_MARK, MISSING_MARK
 from roboirg.analysis.tables.table_notes import where_played
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.printable import printable
 from roboirg.records.record import Job, Result
 from roboirg.util.plurals import counted
 
@@ -135,7 +136,7 @@ def failure_text(record: Result) -> str:
     mark = f" {ERROR_MARK}" if record.outcome == "error" else ""
     where = f"{record.task} {record.split}/{record.episode} {options_label(record.options)}"
     seed = f" (policy seed {record.policy_seed})" if record.policy_seed else ""
-    return f"{where}{seed}: {record.cause or record.outcome}{mark}"
+    return f"{where}{seed}: {printable(record.cause or record.outcome)}{mark}"
 
 
 def gap_text(overlap: Overlap) -> str:

@@ -19,10 +19,11 @@ from roboirg.core.errors import PolicyConnectionError
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.policies.base import Policy, close_policy
 from roboirg.policies.protocol import Protocol
-from roboirg.policies.remote.endpoints import ActionSpaceName, RemoteOptions
+from roboirg.policies.remote.endpoints import MIB, ActionSpaceName, RemoteOptions
 from roboirg.policies.remote.remote_policy import RemotePolicy, proprioception
 from roboirg.policies.serving.service import (
     Handler,
+    MakePolicy,
     Message,
     Service,
     act,
@@ -90,21 +91,26 @@ class OpenpiPolicy(RemotePolicy):
 class OpenpiService(Service):
     """Answers requests for actions, with one policy per connection."""
 
+    max_request_bytes: ClassVar[int] = 64 * MIB
+
     def new_handler(self) -> Handler:
         """Return a handler with a policy of its own."""
-        return _OpenpiConversation(self.make_policy()).handle
+        return _OpenpiConversation(self.make_policy).handle
 
 
 class _OpenpiConversation:
     """One connection: a policy that is reset whenever the prompt changes."""
 
-    def __init__(self, policy: Policy) -> None:
-        self._policy = policy
+    def __init__(self, make_policy: MakePolicy) -> None:
+        self._make_policy = make_policy
+        self._policy: Policy | None = None
         self._prompt: str | None = None
 
     def handle(self, message: Message) -> dict[str, Any]:
         """Return the reply to a request for actions."""
         observation = read_request(message)
+        if self._policy is None:
+            self._policy = self._make_policy()
         if observation["instruction"] != self._prompt:
             if self._prompt is not None:
                 close_policy(self._policy)

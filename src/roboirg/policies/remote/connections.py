@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 from roboirg.core.errors import PolicyConnectionError, PolicyReplyError
 from roboirg.policies.remote.endpoints import Endpoint, RemoteOptions
 
+if TYPE_CHECKING:
+    from roboirg.policies.remote.message_codec import ArrayKeys
+
 FIRST_PAUSE, MAX_PAUSE = 0.1, 5.0
 """Seconds between two attempts to connect; each pause is twice the one before."""
 _MAX_ERROR_LENGTH = 300
+_MAX_TRACEBACK_END = 4096
 
 
 class ConnectionSpec(NamedTuple):
@@ -84,22 +88,23 @@ def connect_with_retries(spec: ConnectionSpec, attempt: Callable[[float], Opened
         pause = min(2 * pause, MAX_PAUSE)
 
 
-def read_reply(spec: ConnectionSpec, data: bytes) -> dict[str, Any]:
-    """Return the message in a reply.
+def read_reply(spec: ConnectionSpec, data: bytes, keys: ArrayKeys | None = None) -> dict[str, Any]:
+    """Return the message in a reply; its arrays are described by `keys`, or by the usual ones.
 
     Raises:
         PolicyReplyError: the bytes are no message.
     """
-    from roboirg.policies.remote.message_codec import CodecError, unpack
+    from roboirg.policies.remote.message_codec import BYTES_KEYS, CodecError, unpack
 
     try:
-        return unpack(data)
+        return unpack(data, keys or BYTES_KEYS)
     except CodecError as error:
         raise PolicyReplyError(f"{spec} sent something other than a message: {error}.") from error
 
 
 def error_reply(spec: ConnectionSpec, text: str) -> PolicyReplyError:
     """Return the error for a server's traceback, of which the last line says most."""
-    lines = [line.strip() for line in text.splitlines() if line.strip()]
-    words = lines[-1][:_MAX_ERROR_LENGTH].rstrip(".") if lines else "an empty text"
+    # Only the end is split into lines: there may be millions.
+    lines = text[-_MAX_TRACEBACK_END:].rstrip().splitlines()
+    words = lines[-1].strip()[:_MAX_ERROR_LENGTH].rstrip(".") if lines else "an empty text"
     return PolicyReplyError(f"{spec} replied with an error: {words}.")

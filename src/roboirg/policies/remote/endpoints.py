@@ -57,7 +57,7 @@ class RemoteOptions(UrlOptions):
     shared: bool = False
     tls: bool = False
     api_key_env: str | None = Field(None, min_length=1)
-    max_reply_mib: float = Field(64.0, gt=0)
+    max_reply_mib: float = Field(16.0, gt=0)
     version: str | None = Field(None, min_length=1)
 
     @property

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,6 +10,11 @@ from roboirg.core.errors import (
     PolicyConnectionError,
     PolicyReplyError,
     PolicyTimeoutError,
+)
+from roboirg.policies.remote.bounded_transport import (
+    BoundedTransport,
+    RequestTimeoutError,
+    ResponseTooLargeError,
 )
 from roboirg.policies.remote.connections import (
     ConnectionSpec,
@@ -48,10 +52,15 @@ class HttpConnection:
 
     def __init__(self, spec: ConnectionSpec) -> None:
         self._spec, self._closed = spec, False
+        options = spec.options
+        headers = {**options.headers, "Accept": MSGPACK}
+        self._transport = BoundedTransport(
+            options.max_reply, min(options.timeout, options.connect), tls=options.tls
+        )
         self._client: httpx.Client = httpx.Client(
-            base_url=f"{'https' if spec.options.tls else 'http'}://{spec.endpoint}",
-            headers={**spec.options.headers, "Accept": MSGPACK},
-            timeout=httpx.Timeout(spec.options.timeout),
+            base_url=f"{'https' if options.tls else 'http'}://{spec.endpoint}",
+            headers=headers,
+            transport=self._transport,
             trust_env=False,
         )
         try:
@@ -73,7 +82,7 @@ class HttpConnection:
         path = "/reset" if "reset" in message else "/infer"
         try:
             return self._exchange("POST", path, pack(message), self._spec.options.timeout)
-        except httpx.TransportError as error:
+        except (httpx.TransportError, RetryableError) as error:
             self.close()
             raise PolicyConnectionError(f"{self._spec} ended the connection ({error}).") from error
         except (PolicyConnectionError, PolicyTimeoutError, PolicyReplyError):
@@ -95,38 +104,28 @@ class HttpConnection:
         self, method: str, path: str, body: bytes | None, seconds: float
     ) -> dict[str, Any]:
         """Send one request; the caller handles the errors of the transport."""
-        spec, deadline = self._spec, time.monotonic() + seconds
-        headers = {"Content-Type": MSGPACK} if body is not None else {}
+        spec, headers = self._spec, {"Content-Type": MSGPACK} if body is not None else {}
+        limits = httpx.Timeout(seconds)
         try:
-            with self._client.stream(
-                method, path, content=body, headers=headers, timeout=httpx.Timeout(seconds)
-            ) as response:
-                data = self._read(response, deadline, seconds)
+            with self._transport.within(seconds):
+                response = self._client.request(
+                    method, path, content=body, headers=headers, timeout=limits
+                )
         except httpx.ConnectTimeout as error:
             raise RetryableError(f"no answer within {seconds:g} s") from error
-        except httpx.TimeoutException as error:
+        except (httpx.TimeoutException, RequestTimeoutError) as error:
             raise PolicyTimeoutError(f"{spec} did not answer within {seconds:g} s.") from error
+        except ResponseTooLargeError as error:
+            raise PolicyReplyError(
+                f"{spec} sent a compressed reply, or one of more than "
+                f"{spec.options.max_reply_mib:g} MiB; option max_reply_mib raises that limit."
+            ) from error
         if response.status_code in _STARTING and body is None:
             raise RetryableError(f"HTTP status {response.status_code}")
         if response.status_code == _SERVER_ERROR:
-            raise error_reply(spec, data.decode("utf-8", "replace"))
+            raise error_reply(spec, response.content.decode("utf-8", "replace"))
         if response.status_code != _OK:
             raise PolicyConnectionError(
                 f"{spec} answered {path} with HTTP status {response.status_code}."
             )
-        return read_reply(spec, data)
-
-    def _read(self, response: httpx.Response, deadline: float, seconds: float) -> bytes:
-        """Read the body within its limits; httpx limits only the time between two pieces."""
-        parts, size, options = [], 0, self._spec.options
-        for part in response.iter_bytes():
-            size += len(part)
-            if size > options.max_reply:
-                raise PolicyReplyError(
-                    f"{self._spec} sent a reply of more than {options.max_reply_mib:g} MiB; "
-                    "option max_reply_mib raises that limit."
-                )
-            if time.monotonic() > deadline:
-                raise PolicyTimeoutError(f"{self._spec} did not answer within {seconds:g} s.")
-            parts.append(part)
-        return b"".join(parts)
+        return read_reply(spec, response.content)

@@ -2,18 +2,20 @@
 
 An array is a map with four keys of type bytes: ``__ndarray__`` (true), ``data`` (C order),
 ``dtype`` (such as ``<f4``) and ``shape``; a NumPy scalar one with ``__npgeneric__``, ``data`` and
-``dtype``. Nothing is unpickled.
+``dtype``. vla-eval's keys are texts, and its scalars plain numbers. Nothing is unpickled.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from roboirg.core.errors import MissingDependencyError
+from roboirg.policies.remote.message_size import MessageSizeError, check_size
 
 try:
     import msgpack
@@ -22,38 +24,56 @@ except ImportError as error:
         "Remote policies need msgpack; install roboirgbench[remote]."
     ) from error
 
-_ARRAY, _SCALAR = b"__ndarray__", b"__npgeneric__"
 _UNSUPPORTED = "VOc"
 """Kinds of dtype that are not sent: structures, Python objects, complex numbers."""
 _MALFORMED = (ValueError, TypeError, OverflowError, RecursionError, SyntaxError)
 """Raised by msgpack and NumPy for malformed bytes."""
+_MAX_AXES, _MAX_DTYPE_LENGTH = 32, 32
+_MAX_SHOWN = 80
+
+
+class ArrayKeys(NamedTuple):
+    """Keys of the maps that stand for arrays and scalars; without `scalar`, those are numbers."""
+
+    array: str | bytes
+    scalar: str | bytes | None
+    data: str | bytes
+    dtype: str | bytes
+    shape: str | bytes
+
+
+BYTES_KEYS = ArrayKeys(b"__ndarray__", b"__npgeneric__", b"data", b"dtype", b"shape")
+TEXT_KEYS = ArrayKeys("__ndarray__", None, "data", "dtype", "shape")
 
 
 class CodecError(ValueError):
     """Malformed bytes, or a message that cannot be encoded."""
 
 
-def pack(message: Mapping[str, Any]) -> bytes:
+def pack(message: Mapping[str, Any], keys: ArrayKeys = BYTES_KEYS) -> bytes:
     """Return a message as bytes; maps keep their order.
 
     Raises:
         CodecError: it holds something that cannot be encoded.
     """
     try:
-        packed: bytes = msgpack.packb(message, default=_encode)
+        packed: bytes = msgpack.packb(message, default=partial(_encode, keys))
     except (TypeError, ValueError, OverflowError) as error:
         raise CodecError(f"the message cannot be encoded ({error})") from error
     return packed
 
 
-def unpack(data: bytes) -> dict[str, Any]:
+def unpack(data: bytes, keys: ArrayKeys = BYTES_KEYS) -> dict[str, Any]:
     """Return the message in bytes; its arrays are read-only views of them.
 
     Raises:
         CodecError: the bytes are malformed.
     """
     try:
-        message = msgpack.unpackb(data, object_hook=_decode)
+        check_size(data)
+        message = msgpack.unpackb(data, object_hook=partial(_decode, keys))
+    except MessageSizeError as error:
+        raise CodecError(str(error)) from error
     except (*_MALFORMED, msgpack.exceptions.UnpackException) as error:
         words = " ".join(str(error).split()) or type(error).__name__
         raise CodecError(f"the bytes are not a msgpack message ({words})") from error
@@ -61,43 +81,47 @@ def unpack(data: bytes) -> dict[str, Any]:
         raise CodecError(f"the message is of type {type(message).__name__}, not a map")
     for key in message:
         if not isinstance(key, str):
-            raise CodecError(f"the message has a key {key!r} that is not a text")
+            raise CodecError(f"the message has a key {repr(key)[:_MAX_SHOWN]} that is not a text")
     return message
 
 
-def _encode(value: object) -> dict[bytes, Any]:
+def _encode(keys: ArrayKeys, value: object) -> object:
     if not isinstance(value, np.ndarray | np.generic):
         raise TypeError(f"type {type(value).__name__} cannot be encoded")
     if value.dtype.kind in _UNSUPPORTED:
         raise ValueError(f"arrays of dtype {value.dtype} are not sent")
     if isinstance(value, np.ndarray):
         return {
-            _ARRAY: True,
+            keys.array: True,
             # A view, as pictures are large: a contiguous array is copied once, into the message.
-            b"data": np.ascontiguousarray(value).reshape(-1).view(np.uint8).data,
-            b"dtype": value.dtype.str,
-            b"shape": value.shape,
+            keys.data: np.ascontiguousarray(value).reshape(-1).view(np.uint8).data,
+            keys.dtype: value.dtype.str,
+            keys.shape: value.shape,
         }
-    return {_SCALAR: True, b"data": value.item(), b"dtype": value.dtype.str}
+    if keys.scalar is None:
+        return value.item()
+    return {keys.scalar: True, keys.data: value.item(), keys.dtype: value.dtype.str}
 
 
-def _decode(found: dict[Any, Any]) -> object:
-    if _ARRAY in found:
-        return _array(found)
-    if _SCALAR in found:
-        dtype, data = _dtype(found), found.get(b"data")
+def _decode(keys: ArrayKeys, found: dict[Any, Any]) -> object:
+    if keys.array in found:
+        return _array(keys, found)
+    if keys.scalar is not None and keys.scalar in found:
+        dtype, data = _dtype(keys, found), found.get(keys.data)
         if not isinstance(data, int | float | str):
             raise ValueError(f"a NumPy scalar holds {type(data).__name__}")
         return dtype.type(data)
     return found
 
 
-def _array(found: dict[Any, Any]) -> np.ndarray[Any, Any]:
-    dtype, shape, data = _dtype(found), found.get(b"shape"), found.get(b"data")
+def _array(keys: ArrayKeys, found: dict[Any, Any]) -> np.ndarray[Any, Any]:
+    dtype, shape, data = _dtype(keys, found), found.get(keys.shape), found.get(keys.data)
     if not isinstance(data, bytes):
         raise ValueError(f"the data of an array is {type(data).__name__}, not bytes")
     if not isinstance(shape, list) or not all(type(size) is int and size >= 0 for size in shape):
-        raise ValueError(f"the shape of an array is {shape!r}")
+        raise ValueError(f"the shape of an array is {repr(shape)[:_MAX_SHOWN]}")
+    if len(shape) > _MAX_AXES:
+        raise ValueError(f"an array has {len(shape)} axes; at most {_MAX_AXES} are accepted")
     # Python's integers do not overflow, so no shape can claim more bytes than there are.
     if math.prod(shape) * dtype.itemsize != len(data):
         raise ValueError(f"an array {dtype.str} of shape {shape} has {len(data)} bytes")
@@ -106,10 +130,10 @@ def _array(found: dict[Any, Any]) -> np.ndarray[Any, Any]:
     return array
 
 
-def _dtype(found: dict[Any, Any]) -> np.dtype[Any]:
-    text = found.get(b"dtype")
-    if not isinstance(text, str):
-        raise ValueError(f"the dtype of an array is {text!r}")
+def _dtype(keys: ArrayKeys, found: dict[Any, Any]) -> np.dtype[Any]:
+    text = found.get(keys.dtype)
+    if not isinstance(text, str) or len(text) > _MAX_DTYPE_LENGTH:
+        raise ValueError(f"the dtype of an array is {str(text)[:_MAX_DTYPE_LENGTH]!r}")
     dtype = np.dtype(text)
     if dtype.kind in _UNSUPPORTED:
         raise ValueError(f"arrays of dtype {text!r} are not accepted")

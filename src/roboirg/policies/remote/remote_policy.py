@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from roboirg.core.actions import JOINT_ANGLE, check_chunk, find_action_space
 from roboirg.core.errors import InvalidActionError, PolicyReplyError
 from roboirg.core.observations import CAMERAS, Demonstration, Observation
+from roboirg.core.printable import printable
 from roboirg.policies.policy_urls import read_options, split_url
 from roboirg.policies.remote.endpoints import RemoteOptions, read_endpoints
 from roboirg.policies.remote.server_session import ServerSession
@@ -184,7 +185,7 @@ def proprioception(joints: NDArray[Any], gripper: NDArray[Any]) -> NDArray[np.fl
 def as_json(value: object) -> Any:  # noqa: ANN401 - JSON has no narrower type
     """Return a message's content as JSON values; large arrays are described, long texts cut."""
     if isinstance(value, Mapping):
-        return {str(key): as_json(held) for key, held in value.items()}
+        return {printable(str(key)): as_json(held) for key, held in value.items()}
     if isinstance(value, np.ndarray) and value.size > _MAX_LISTED:
         return f"array of shape {value.shape}, {value.dtype}"
     if isinstance(value, np.ndarray | np.generic):
@@ -194,4 +195,4 @@ def as_json(value: object) -> Any:  # noqa: ANN401 - JSON has no narrower type
     plain = value is None or isinstance(value, bool | int)
     if plain or (isinstance(value, float) and np.isfinite(value)):
         return value
-    return str(value)[:_MAX_TEXT_LENGTH]
+    return printable(str(value)[:_MAX_TEXT_LENGTH])

@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import contextlib
 import socket
-import time
 from collections.abc import Mapping
-from functools import partial
-from typing import Any
+from typing import Any, NoReturn
 
 from roboirg.core.errors import (
     MissingDependencyError,
@@ -28,18 +26,26 @@ from roboirg.policies.remote.connections import (
     read_reply,
 )
 from roboirg.policies.remote.message_codec import pack
-from roboirg.policies.remote.write_timeout import WriteTimeout
+from roboirg.policies.remote.socket_deadline import SocketDeadline
 
 try:
-    from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
+    from websockets.exceptions import (
+        ConnectionClosed,
+        InvalidStatus,
+        TooManyFragments,
+        WebSocketException,
+    )
+    from websockets.protocol import State
     from websockets.sync.client import ClientConnection, connect
 except ImportError as error:
     raise MissingDependencyError(
-        "Remote policies need websockets 15 or newer; install roboirgbench[remote]."
+        "Remote policies need websockets 17.4 or newer; install roboirgbench[remote]."
     ) from error
 
 CLOSE_TIMEOUT = 2.0
 """Seconds to wait for a server's closing frame."""
+_CHECK_S = 1.0
+"""Seconds between two looks at whether the library has refused what the server sends."""
 _TOO_BIG = 1009
 """Websocket close code for a message above the size limit."""
 _RETRYABLE = frozenset({408, 425, 429, 500, 502, 503, 504})
@@ -59,19 +65,20 @@ class WebsocketConnection:
     """
 
     def __init__(self, spec: ConnectionSpec) -> None:
-        self._spec = spec
+        self.spec, options = spec, spec.options
         self._closing = contextlib.ExitStack()
-        self._socket: ClientConnection | None = connect_with_retries(spec, self._attempt)
-        self._write_timed_out = False
-        # The library has no time limit for sending. The socket's own would also end the receiving
-        # thread, and it starts again with every piece that the peer takes in.
-        self._write_timeout = WriteTimeout(
-            spec.options.timeout, partial(self._abort_write, self._socket)
-        )
-        self._closing.callback(self._write_timeout.close)
-        self.metadata: Mapping[str, Any] = self._receive(
-            "its metadata", spec.options.connect, time.monotonic() + spec.options.connect
-        )
+        # The library has a time limit for receiving only, and a peer that does not read may hold
+        # its lock, which closing needs too.
+        self._deadline = SocketDeadline(min(options.timeout, options.connect, CLOSE_TIMEOUT))
+        self._socket: ClientConnection | None = None
+        try:
+            self._socket = connect_with_retries(spec, self._attempt)
+            self._deadline.add(self._socket.socket)
+            with self._deadline.limit(options.connect):
+                self.metadata: Mapping[str, Any] = self.read_metadata(options.connect)
+        except BaseException:
+            self.close()
+            raise
 
     def request(self, message: Mapping[str, Any]) -> dict[str, Any]:
         """Send a message and return the reply; any error closes the connection.
@@ -81,18 +88,42 @@ class WebsocketConnection:
             PolicyTimeoutError: the server took too long.
             PolicyReplyError: the server replied with an error, or with no message.
         """
-        seconds = self._spec.options.timeout
-        deadline = time.monotonic() + seconds
-        self._send(pack(message))
-        return self._receive("a reply", seconds, deadline)
+        seconds = self.spec.options.timeout
+        try:
+            with self._deadline.limit(seconds):
+                return self.exchange(message, seconds)
+        except RoboIRGError:
+            self.close()
+            raise
 
     def close(self) -> None:
         """Close the connection; repeated calls do nothing."""
         self._socket = None
-        self._closing.close()
+        with self._deadline.limit(CLOSE_TIMEOUT):
+            self._closing.close()
+        self._deadline.close()
+
+    def read_metadata(self, seconds: float) -> Mapping[str, Any]:
+        """Return what the server says about itself, which it does first."""
+        return read_reply(self.spec, self.receive("its metadata", seconds))
+
+    def exchange(self, message: Mapping[str, Any], seconds: float) -> dict[str, Any]:
+        """Send a message and return the reply, within a limit that is being watched."""
+        self.send(pack(message))
+        return read_reply(self.spec, self.receive("a reply", seconds))
+
+    def refuse_surplus(self, surplus: str | bytes) -> NoReturn:
+        """Raise, as an unrequested reply would be taken for the next one.
+
+        Raises:
+            PolicyReplyError: always.
+        """
+        if isinstance(surplus, str):
+            raise error_reply(self.spec, surplus)
+        raise PolicyReplyError(f"{self.spec} sent a message without a request.")
 
     def _attempt(self, left: float) -> ClientConnection:
-        spec, options = self._spec, self._spec.options
+        spec, options = self.spec, self.spec.options
         try:
             return self._closing.enter_context(
                 connect(
@@ -104,6 +135,8 @@ class WebsocketConnection:
                     close_timeout=CLOSE_TIMEOUT,
                     ping_interval=None,
                     proxy=None,
+                    # An explicit address is never redirected to another one.
+                    address=(spec.endpoint.host, spec.endpoint.port),
                 )
             )
         except InvalidStatus as error:
@@ -120,71 +153,53 @@ class WebsocketConnection:
             ) from error
         except (OSError, EOFError, WebSocketException) as error:
             raise RetryableError(_describe(error)) from error
+        except ValueError as error:
+            raise PolicyConnectionError(f"{spec} refused: {_describe(error)}.") from error
 
-    def _send(self, data: bytes) -> None:
+    def send(self, data: bytes) -> None:
+        """Send a message."""
         connection = self._open()
         try:
-            self._reject_surplus(connection)
-            with self._write_timeout.watching():
-                connection.send(data)
+            with contextlib.suppress(TimeoutError):
+                self.refuse_surplus(connection.recv(timeout=0))
+            connection.send(data)
         except ConnectionClosed as error:
-            raise self._broken(error) from error
+            late = f"did not take in a message within {self.spec.options.timeout:g} s"
+            raise self._broken(error, late) from error
 
-    def _abort_write(self, connection: ClientConnection) -> None:
-        """Shut the socket down, from another thread, to wake the thread that sends."""
-        self._write_timed_out = True
-        with contextlib.suppress(OSError):
-            connection.socket.shutdown(socket.SHUT_RDWR)
-
-    def _reject_surplus(self, connection: ClientConnection) -> None:
-        """Raise if an unrequested reply has come, which would be taken for the next one."""
+    def receive(self, what: str, seconds: float) -> bytes:
+        """Return the next message; `what` and `seconds` are for the error if there is none."""
+        connection, data = self._open(), None
         try:
-            surplus = connection.recv(timeout=0)
-        except TimeoutError:
-            return
-        self.close()
-        if isinstance(surplus, str):
-            raise error_reply(self._spec, surplus)
-        raise PolicyReplyError(f"{self._spec} sent a message without a request.")
-
-    def _receive(self, what: str, seconds: float, deadline: float) -> dict[str, Any]:
-        connection = self._open()
-        try:
-            data = connection.recv(timeout=max(deadline - time.monotonic(), 0.0))
-        except TimeoutError as error:
-            self.close()
-            raise PolicyTimeoutError(
-                f"{self._spec} did not send {what} within {seconds:g} s."
-            ) from error
+            while data is None:
+                with contextlib.suppress(TimeoutError):
+                    data = connection.recv(timeout=_CHECK_S)
+                if data is None and connection.protocol.state is not State.OPEN:
+                    self._deadline.abort()  # the server does not end what the library has refused
         except ConnectionClosed as error:
-            raise self._broken(error) from error
-        try:
-            if isinstance(data, str):
-                raise error_reply(self._spec, data)
-            return read_reply(self._spec, data)
-        except PolicyReplyError:
-            self.close()
-            raise
+            raise self._broken(error, f"did not send {what} within {seconds:g} s") from error
+        if isinstance(data, str):
+            raise error_reply(self.spec, data)
+        return data
 
     def _open(self) -> ClientConnection:
         if self._socket is None:
-            raise PolicyConnectionError(f"The connection to {self._spec} is closed; call reset().")
+            raise PolicyConnectionError(f"The connection to {self.spec} is closed; call reset().")
         return self._socket
 
-    def _broken(self, error: ConnectionClosed) -> RoboIRGError:
-        """Close, and return the error for a connection that has ended."""
-        self.close()
+    def _broken(self, error: ConnectionClosed, late: str) -> RoboIRGError:
+        """Return the error for a connection that has ended."""
+        if self._deadline.passed:
+            return PolicyTimeoutError(f"{self.spec} {late}.")
+        if isinstance(error.__cause__, TooManyFragments):
+            return PolicyReplyError(f"{self.spec} sent a reply in too many pieces.")
         if error.sent is not None and error.sent.code == _TOO_BIG:
             return PolicyReplyError(
-                f"{self._spec} sent a reply of more than {self._spec.options.max_reply_mib:g} MiB; "
+                f"{self.spec} sent a reply of more than {self.spec.options.max_reply_mib:g} MiB; "
                 "option max_reply_mib raises that limit."
             )
-        if self._write_timed_out:
-            return PolicyTimeoutError(
-                f"{self._spec} did not take in a message within {self._spec.options.timeout:g} s."
-            )
         code = f"close code {error.rcvd.code}" if error.rcvd else "without a close code"
-        return PolicyConnectionError(f"{self._spec} ended the connection ({code}).")
+        return PolicyConnectionError(f"{self.spec} ended the connection ({code}).")
 
 
 def _describe(error: BaseException) -> str:

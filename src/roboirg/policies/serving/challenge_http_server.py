@@ -9,82 +9,87 @@ from typing import Any
 
 from roboirg.policies.remote.http_connection import MSGPACK
 from roboirg.policies.remote.message_codec import pack, unpack
+from roboirg.policies.serving.server_options import ServerOptions
 from roboirg.policies.serving.service import Service
-from roboirg.policies.serving.websocket_server import LARGEST_REQUEST, is_authorized
 from roboirg.util.http_server import HTTPServerBase, RequestHandler
-
-CLIENT_TIMEOUT_S = 60.0
-"""How long a client may take for a piece of its request."""
 
 
 class _ChallengeHTTPServer(HTTPServerBase):
     """Answers with a service.
 
     Args:
-        address: host and port.
         service: answers requests.
         metadata: response to ``/metadata``.
-        key: that clients send, or None.
+        options: address, key and limits.
     """
 
     def __init__(
-        self,
-        address: tuple[str, int],
-        service: Service,
-        metadata: Mapping[str, Any],
-        key: str | None,
+        self, service: Service, metadata: Mapping[str, Any], options: ServerOptions
     ) -> None:
-        super().__init__(address, _ChallengeRequestHandler)
-        self.answer, self.metadata, self.key = service.connection(), metadata, key
+        super().__init__((options.host, options.port), _ChallengeRequestHandler, options.limits)
+        self.answer, self.metadata, self.options = service.connection(), metadata, options
+        self.max_request_bytes = service.max_request_bytes
 
 
 def open_http(
-    service: Service, metadata: Mapping[str, Any], host: str, port: int, key: str | None
+    service: Service, metadata: Mapping[str, Any], options: ServerOptions
 ) -> HTTPServerBase:
     """Return a listening server; it answers once `serve_forever` is called.
 
     Args:
         service: answers requests.
         metadata: response to ``/metadata``.
-        host: to listen at.
-        port: to listen at; 0 for any free port.
-        key: that clients send, or None.
+        options: address, key and limits.
 
     Raises:
         OSError: the address is in use or is not this computer's.
     """
-    return _ChallengeHTTPServer((host, port), service, metadata, key)
+    return _ChallengeHTTPServer(service, metadata, options)
 
 
 class _ChallengeRequestHandler(RequestHandler):
     """Handle ``/healthz``, ``/metadata``, ``/reset`` and ``/infer``."""
 
     server: _ChallengeHTTPServer
-    timeout = CLIENT_TIMEOUT_S
 
     def do_GET(self) -> None:  # noqa: N802 - name of the base class
+        """Answer without a key, as the challenge's clients send none with these requests."""
+        if not self._check_origin():
+            return
         if self.path == "/healthz":
             self.send_text("OK\n")
-        elif self._check_key():
-            if self.path == "/metadata":
-                self.send_bytes(pack(self.server.metadata), MSGPACK)
-            else:
-                self.send_refusal(HTTPStatus.NOT_FOUND, "There is no such page.")
+        elif self.path == "/metadata":
+            self.send_bytes(pack(self.server.metadata), MSGPACK)
+        else:
+            self.send_refusal(HTTPStatus.NOT_FOUND, "There is no such page.")
 
     def do_POST(self) -> None:  # noqa: N802 - name of the base class
-        body = self.read_body(LARGEST_REQUEST, message="Too large.")
-        if body is None or not self._check_key():
+        """Answer a request that has the key; without it, the body is not read."""
+        if not self._check_origin() or not self._check_key():
             return
         if self.path not in ("/reset", "/infer"):
             self.send_refusal(HTTPStatus.NOT_FOUND, "There is no such page.")
-        elif self.path == "/infer" and not body:
+            return
+        body = self.read_body(self.server.max_request_bytes, message="Too large.")
+        if body is None:
+            return
+        if self.path == "/infer" and not body:
             self.send_refusal(HTTPStatus.BAD_REQUEST, "The request is empty.")
-        else:
-            self._answer(body)
+            return
+        self.server.connections.prove(self.connection)
+        self._answer(body)
+
+    def _check_origin(self) -> bool:
+        """Return whether no page of another site caused the request; refuse it if one did."""
+        hosts, origins = self.headers.get_all("Host", []), self.headers.get_all("Origin", [])
+        refusal = self.server.options.refusal(hosts, origins)
+        if refusal is not None:
+            self.send_refusal(HTTPStatus.FORBIDDEN, refusal)
+        return refusal is None
 
     def _check_key(self) -> bool:
         """Return whether the client sent the key; refuse the request if not."""
-        authorized = is_authorized(self.server.key, self.headers.get("Authorization"))
+        authorized = self.server.options.is_authorized(self.headers.get("Authorization"))
         if not authorized:
             self.send_refusal(HTTPStatus.UNAUTHORIZED, "The key is missing or wrong.")
         return authorized

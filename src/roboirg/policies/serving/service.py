@@ -6,7 +6,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from threading import Lock
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from roboirg.core.actions import check_chunk
 from roboirg.core.observations import Observation
 from roboirg.policies.base import Policy, tell_policy
+from roboirg.policies.remote.endpoints import MIB
 from roboirg.policies.requirements import wanted_actions
 
 Message = Mapping[str, Any]
@@ -29,12 +30,17 @@ _PICTURE_AXES = 3
 class Service(ABC):
     """Answers messages with policies, one message at a time over all connections.
 
+    Connections may be many and idle: make a policy with the first message, not before.
+
     Args:
         make_policy: makes a fresh policy.
 
     Attributes:
         make_policy: makes a fresh policy.
+        max_request_bytes: size limit of a message.
     """
+
+    max_request_bytes: ClassVar[int] = 1024 * MIB
 
     def __init__(self, make_policy: MakePolicy) -> None:
         self.make_policy = make_policy

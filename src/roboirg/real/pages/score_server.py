@@ -18,7 +18,8 @@ from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.real.pages.score_page import check_page_support, page_address, render_trial
 from roboirg.real.study.study_plan import PlannedTrial, StudyPlan
 from roboirg.real.study.trial_log import TrialLog
-from roboirg.util.http_server import HTML_TYPE, LOOPBACK, LoopbackRequestHandler, LoopbackServer
+from roboirg.util.http_server import HTML_TYPE, LoopbackRequestHandler, LoopbackServer
+from roboirg.util.request_origin import LOOPBACK
 
 MAX_FORM_BYTES = 65_536
 NO_CONTENT_POLICY = "default-src 'none'; frame-ancestors 'none'; base-uri 'none'"
@@ -113,7 +114,6 @@ class _ScoreHandler(LoopbackRequestHandler):
     """Handle requests for trials' pages, verdicts and undo."""
 
     server: ScoreServer
-    timeout = 30
 
     def do_GET(self) -> None:  # noqa: N802 - name of the base class
         """Send the page of a trial."""
@@ -140,6 +140,9 @@ class _ScoreHandler(LoopbackRequestHandler):
 
     def do_POST(self) -> None:  # noqa: N802 - name of the base class
         """Store a verdict or undo one, then redirect: reloading the page must not repeat it."""
+        if not self.is_local():
+            self._refuse()
+            return
         form = self.read_form(MAX_FORM_BYTES, message="This is not a form of this page.")
         if form is None or not self._is_allowed(form.get("token", "")):
             return
@@ -160,11 +163,14 @@ class _ScoreHandler(LoopbackRequestHandler):
         self.send_redirect(page_address(query))
 
     def common_headers(self) -> dict[str, str]:
-        """Return headers that forbid caching, referrers with the token, and foreign content."""
+        """Return headers that forbid caching, referrers with the token, and foreign content.
+
+        With the policy ``no-referrer``, browsers would hide the origin of the page's own forms.
+        """
         return {
             **super().common_headers(),
             "Cache-Control": "no-store",
-            "Referrer-Policy": "no-referrer",
+            "Referrer-Policy": "same-origin",
             "Content-Security-Policy": NO_CONTENT_POLICY,
         }
 
@@ -174,10 +180,13 @@ class _ScoreHandler(LoopbackRequestHandler):
             token.encode(), self.server.token.encode()
         )
         if not allowed:
-            self.send_refusal(
-                HTTPStatus.FORBIDDEN, "Open the address that roboirg real score has printed."
-            )
+            self._refuse()
         return allowed
+
+    def _refuse(self) -> None:
+        self.send_refusal(
+            HTTPStatus.FORBIDDEN, "Open the address that roboirg real score has printed."
+        )
 
 
 def _select_trial(trial_log: TrialLog, name: str) -> PlannedTrial:

@@ -13,6 +13,7 @@ from roboirg.core.errors import (
 from roboirg.policies.planning.model_content import Part, Picture, encode_png
 from roboirg.policies.planning.models.bounded_wait import call_with_timeout, timeout_error
 from roboirg.policies.planning.models.model import ModelOptions, ModelQuery, ModelReply
+from roboirg.policies.planning.models.response_limits import PLAIN_HEADERS, limit_response
 
 if TYPE_CHECKING:
     from google.genai import types
@@ -42,6 +43,8 @@ class GoogleModel:
         self._errors = errors
         self._name = f"Model {options.model!r} at {options.address()}"
         http = types.HttpOptions(
+            headers=dict(PLAIN_HEADERS),
+            client_args={"event_hooks": {"response": [limit_response]}},
             base_url=options.base_url,
             timeout=int(1000 * options.timeout_s),
             retry_options=types.HttpRetryOptions(

@@ -22,6 +22,7 @@ from roboirg.policies.planning.model_content import (
 )
 from roboirg.policies.planning.models.bounded_wait import call_with_timeout, timeout_error
 from roboirg.policies.planning.models.model import ModelOptions, ModelQuery, ModelReply
+from roboirg.policies.planning.models.response_limits import PLAIN_HEADERS, limit_response
 
 OPENAI = "https://api.openai.com/v1"
 BUSY = frozenset({408, 409, 429, 502, 503, 504})
@@ -49,6 +50,8 @@ class OpenAIModel:
             base_url=options.base_url or OPENAI,
             timeout=options.timeout_s,
             max_retries=options.retries,
+            default_headers=PLAIN_HEADERS,
+            http_client=openai.DefaultHttpxClient(event_hooks={"response": [limit_response]}),
         )
 
     def answer(self, query: ModelQuery) -> ModelReply:
@@ -120,9 +123,11 @@ class OpenAIModel:
         openai = self._openai
         if isinstance(error, openai.APITimeoutError):
             return timeout_error(self._name, self._options.timeout_s)
-        words = " ".join(str(error).replace(self._key, "…").split())[:MAX_ERROR_LENGTH]
-        if isinstance(error, openai.APIConnectionError):
-            reason = error.__cause__ or error
+        # The library says nothing about a connection that failed; its cause does.
+        unreachable = isinstance(error, openai.APIConnectionError)
+        reason = (error.__cause__ or error) if unreachable else error
+        words = " ".join(str(reason).replace(self._key, "…").split())[:MAX_ERROR_LENGTH]
+        if unreachable:
             return PolicyConnectionError(
                 f"{self._name} cannot be reached ({type(reason).__name__}: {words})."
             )

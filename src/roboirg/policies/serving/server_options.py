@@ -1,0 +1,50 @@
+"""Where a policy server listens, and whom it answers."""
+
+from __future__ import annotations
+
+import hmac
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from roboirg.util.connection_table import ConnectionLimits
+from roboirg.util.request_origin import LOOPBACK, is_own_request, names_of_this_machine
+
+
+@dataclass(frozen=True)
+class ServerOptions:
+    """Options of every policy server.
+
+    Attributes:
+        host: address to listen at.
+        port: port to listen at; 0 for any free one.
+        key: clients must send ``Authorization: Api-Key KEY``; None admits all clients.
+        names: further names under which clients reach this machine, beside its own.
+        limits: of connections and their times.
+    """
+
+    host: str = LOOPBACK
+    port: int = 0
+    key: str | None = field(default=None, repr=False)
+    names: tuple[str, ...] = ()
+    limits: ConnectionLimits = field(default_factory=ConnectionLimits)
+
+    def refusal(self, hosts: Sequence[str], origins: Sequence[str]) -> str | None:
+        """Return why a request must be refused that a page of another site may have caused.
+
+        Args:
+            hosts: values of the header ``Host``.
+            origins: values of the header ``Origin``.
+        """
+        names = {*names_of_this_machine(), self.host.lower(), *map(str.lower, self.names)}
+        if is_own_request(hosts, origins, names):
+            return None
+        return (
+            "The Origin or Host of this request is not this server's; if clients reach it under "
+            "another name, start roboirg serve with --allow-host NAME."
+        )
+
+    def is_authorized(self, header: str | None) -> bool:
+        """Return whether the header ``Authorization`` holds the key, or no key is needed."""
+        if self.key is None:
+            return True
+        return hmac.compare_digest((header or "").encode(), f"Api-Key {self.key}".encode())

@@ -1,0 +1,120 @@
+"""Verdicts of two versions of a policy's server do not get into one folder, table or merge."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from evaluation_fakes import FakePlay
+from wire_servers import ChallengeServer
+
+from roboirg.analysis.stats.cells import Versions, gather, labels
+from roboirg.evaluation.executors.executor import InProcess
+from roboirg.evaluation.plan import Plan, make_plan
+from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.runner import run_plan
+from roboirg.policies import make_policy
+from roboirg.policies.loading import server_version
+from roboirg.policies.planning.hierarchical_policy import HierarchicalPolicy
+from roboirg.records.merging import merge_runs
+from roboirg.records.record import Job, Record
+from roboirg.records.store import RecordStore, StoreError, read_records, read_results
+
+
+def plan_of(episodes: int) -> Plan:
+    return make_plan(("random",), tasks="PickXtimes", settings="explicit", episodes=str(episodes))
+
+
+class Told:
+    """Plays jobs with a server that tells these versions, one for each episode."""
+
+    def __init__(self, *versions: str | None) -> None:
+        self.versions = list(versions)
+
+    def __call__(self, job: Job) -> Record:
+        version = self.versions.pop(0)
+        if version == "refused":
+            result = RolloutResult("error", "connection", "connection: refused")
+            return make_record(job, result, started_at="now")
+        metadata = {"server": "localhost:1"} | ({} if version is None else {"version": version})
+        result = RolloutResult("success", cause=None, policy_metadata=metadata)
+        return make_record(job, result, started_at="now")
+
+
+def versions(folder: Path) -> list[str | None]:
+    return [one.server_version for one in read_records(folder)]
+
+
+def test_a_run_stops_when_the_server_is_another_version(tmp_path: Path) -> None:
+    plan = plan_of(4)
+    with pytest.raises(StoreError, match="whose server told version a, but now it tells version b"):
+        run_plan(plan, tmp_path, Told("a", "a", "b", "a"), InProcess())
+    assert versions(tmp_path) == ["a", "a"]
+    # Nor does it go on later with another one, or with one that tells none; with the same it does.
+    for other, words in (("b", "version b"), (None, "no version")):
+        with pytest.raises(StoreError, match=f"but now it tells {words}; choose another --out"):
+            run_plan(plan, tmp_path, Told(other, other), InProcess())
+    run_plan(plan, tmp_path, Told("a", "a"), InProcess())
+    assert versions(tmp_path) == ["a"] * 4
+
+
+def test_errors_before_the_server_told_its_version_do_not_count(tmp_path: Path) -> None:
+    plan = plan_of(3).model_copy(update={"tries": 1})
+    run_plan(plan, tmp_path, Told("refused", "a", "refused"), InProcess())
+    assert versions(tmp_path) == ["a"] * 3
+    cells = gather([("run", read_results(tmp_path))])
+    assert list(labels(cells).values()) == ["random"]
+    (cell,) = cells.values()
+    assert (cell.trials, cell.errors) == (1, 2)
+
+
+def test_a_folder_of_errors_takes_any_version(tmp_path: Path) -> None:
+    plan = plan_of(2).model_copy(update={"tries": 1})
+    run_plan(plan, tmp_path, Told("refused", "refused"), InProcess())
+    assert versions(tmp_path) == [None, None]
+    run_plan(plan, tmp_path, Told("b", "b"), InProcess())
+    assert versions(tmp_path) == ["b", "b"]
+
+
+def test_runs_of_two_versions_are_neither_merged_nor_averaged(tmp_path: Path) -> None:
+    first, second = plan_of(2).jobs()
+    for name, job in (("a", first), ("b", second)):
+        with RecordStore(tmp_path / name) as store:
+            store.append(Told(name)(job))
+    runs = [tmp_path / "a", tmp_path / "b"]
+    with pytest.raises(StoreError, match="version of the server of random is 'b' in the first"):
+        merge_runs(runs, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+    results = [(folder.name, read_results(folder)) for folder in runs]
+    found = labels(gather(results)).values()
+    assert {label.partition(" (server")[2] for label in found} == {" a)", " b)"}
+
+
+def test_policies_of_this_process_have_no_server_version(tmp_path: Path) -> None:
+    run_plan(plan_of(1), tmp_path, FakePlay(), InProcess())
+    assert versions(tmp_path) == [None]
+    (record,) = read_records(tmp_path)
+    assert Versions.of(record).policy == record.policy_version
+
+
+class Guide:
+    """A planner of this process."""
+
+    version = "7"
+    metadata = {"version": "7"}  # noqa: RUF012
+
+    def reset(self, instruction: str, demonstration: object) -> None:
+        pass
+
+
+def test_the_version_comes_from_the_server_also_behind_a_planner() -> None:
+    with ChallengeServer() as server:
+        client = make_policy(f"challenge://{server.place}?version=mine", 0)
+        client.reset("go", {})  # type: ignore[typeddict-item]
+        assert server_version(client.metadata) == "phase-1"  # type: ignore[attr-defined]
+        client.follow = print  # type: ignore[attr-defined]
+        system = HierarchicalPolicy(Guide(), client)  # type: ignore[arg-type]
+        assert server_version(system.metadata) == "phase-1"
+        client.close()  # type: ignore[attr-defined]
+    for told in ({}, {"version": "1"}, {"server": "x"}, {"server": "x", "version": "unknown"}):
+        assert server_version(told) is None

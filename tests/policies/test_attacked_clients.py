@@ -1,0 +1,297 @@
+"""Servers that flood, drip, stall or lie: a named error, in time and within memory."""
+
+import gzip
+import struct
+import time
+
+import msgpack
+import pytest
+from attackers import (
+    MAX_MIB,
+    answering,
+    attacked,
+    frame,
+    read_head,
+    shake_hands,
+    wait_for_end,
+)
+from wire_servers import WireServer
+
+from roboirg.core.errors import PolicyServerError
+from roboirg.core.printable import printable
+from roboirg.policies.planning.model_content import ChatTurn
+from roboirg.policies.planning.models import ModelOptions, ModelQuery, make_model
+from roboirg.policies.remote.message_codec import CodecError, unpack
+from roboirg.policies.remote.message_size import MAX_DEPTH, MAX_ELEMENTS
+
+MIB = 1 << 20
+EMPTY_MAPS = b"\x81\xa1a\xdd" + struct.pack(">I", 50 * MIB) + b"\x80" * (50 * MIB)
+MANY_AXES = msgpack.packb(
+    {
+        "actions": {
+            b"__ndarray__": True, b"data": b"x", b"dtype": "|u1",
+            b"shape": [2**60 + 1] * 400_000,
+        }
+    }
+)  # fmt: skip
+ESCAPES = "Error: \x1b[2J\x1b]0;owned\x07 \x9b2J \u202e gpj.exe"
+
+
+def says(data, opcode=2):
+    """Shake hands and send one frame instead of the metadata."""
+
+    def answer(peer):
+        shake_hands(peer)
+        peer.sendall(frame(data, opcode))
+        wait_for_end(peer)
+
+    return answer
+
+
+def replies(data, opcode=2):
+    """Send the metadata, and one frame in reply to the first message."""
+
+    def answer(peer):
+        shake_hands(peer)
+        peer.sendall(frame(b"\x80"))
+        peer.recv(1)
+        peer.sendall(frame(data, opcode))
+        wait_for_end(peer)
+
+    return answer
+
+
+def pings(peer):
+    shake_hands(peer)
+    peer.sendall(frame(b"\x80"))
+    while True:  # and read none of the answers
+        peer.sendall(frame(b"x" * 125, 9) * 100)
+
+
+def fragments(peer):
+    shake_hands(peer)
+    peer.sendall(frame(b"", final=False))
+    while True:
+        peer.sendall(frame(b"", 0, final=False) * 100)
+
+
+def half_a_frame(peer):
+    shake_hands(peer)
+    peer.sendall(frame(b"\x80" * 1000)[:-1])
+    wait_for_end(peer)
+
+
+def drips(text, piece):
+    """Send a text and then the same piece again and again, slowly."""
+
+    def answer(peer):
+        read_head(peer)
+        peer.sendall(text)
+        while True:
+            time.sleep(0.1)
+            peer.sendall(piece)
+
+    return answer
+
+
+def responds(body, *headers):
+    def answer(peer):
+        read_head(peer)
+        head = ["HTTP/1.1 200 OK", f"Content-Length: {len(body)}", *headers]
+        peer.sendall("\r\n".join(head).encode() + b"\r\n\r\n" + body)
+        wait_for_end(peer)
+
+    return answer
+
+
+def chunks(peer):
+    read_head(peer)
+    peer.sendall(b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n")
+    while True:
+        peer.sendall(b"10000\r\n" + b"\x80" * 65536 + b"\r\n")
+
+
+def answers(text):
+    def answer(peer):
+        read_head(peer)
+        peer.sendall(text)
+        wait_for_end(peer)
+
+    return answer
+
+
+TIMEOUT, REPLY, CONNECTION = "PolicyTimeoutError", "PolicyReplyError", "PolicyConnectionError"
+LARGE = "&max_reply_mib=64"
+QUICK = "?connect=1&timeout=1"
+PATIENT = "?connect=200&timeout=200"
+# Name, behavior, options, error, part of the message.
+WEBSOCKET = [
+    ("maps", says(EMPTY_MAPS), PATIENT + LARGE, REPLY, "more than 1,000,000 elements"),
+    ("map-replies", replies(EMPTY_MAPS), PATIENT + LARGE, REPLY, "more than 1,000,000 elements"),
+    ("large", says(EMPTY_MAPS), PATIENT, REPLY, "max_reply_mib"),
+    ("axes", replies(MANY_AXES), PATIENT, REPLY, "400000 axes; at most 32"),
+    ("nest", says(b"\x81\xa1x" + b"\x91" * 10**6), PATIENT, REPLY, "nests more than 64"),
+    ("announced", says(b"\xdd\xff\xff\xff\xff"), PATIENT, REPLY, "more than 1,000,000 elements"),
+    ("traceback", replies(b"a\n" * (25 * MIB), 1), PATIENT + LARGE, REPLY, "error: a."),
+    ("escapes", replies(ESCAPES.encode(), 1), PATIENT, REPLY, r"error: Error: \x1b[2J\x1b]0;"),
+    ("fragments", fragments, PATIENT, REPLY, "too many pieces"),
+    ("pings", pings, QUICK, TIMEOUT, "within 1 s"),
+    ("half", half_a_frame, QUICK, TIMEOUT, "did not send its metadata within 1 s"),
+    ("dripped-head", drips(b"HTTP/1.1 101 OK\r\nX: ", b"x"), QUICK, CONNECTION, "tried for 1 s"),
+    ("status", drips(b"", b"HTTP/1.1 102 OK\r\n\r\n"), QUICK, CONNECTION, "status 102"),
+    (
+        "length",
+        answers("HTTP/1.1 503 OK\r\nContent-Length: ²\r\n\r\n".encode()),
+        QUICK,
+        CONNECTION,
+        "cannot be reached",
+    ),
+]
+WEBSOCKET += [
+    (
+        "redirect",
+        answers(b"HTTP/1.1 302 Go\r\nLocation: ws://127.0.0.1:9/\r\nContent-Length: 0\r\n\r\n"),
+        PATIENT,
+        CONNECTION,
+        "follow",
+    ),
+]
+ZEROS = gzip.compress(b"\0" * (512 * MIB), 1)
+HTTP = [
+    ("maps", responds(EMPTY_MAPS), PATIENT + LARGE, REPLY, "more than 1,000,000 elements"),
+    ("large", responds(EMPTY_MAPS), PATIENT, REPLY, "max_reply_mib"),
+    ("chunks", chunks, PATIENT, REPLY, "max_reply_mib"),
+    ("gzip", responds(ZEROS, "Content-Encoding: gzip"), PATIENT, REPLY, "compressed"),
+    (
+        "gzip-in-gzip",
+        responds(gzip.compress(ZEROS, 9), "Content-Encoding: gzip, gzip"),
+        PATIENT,
+        REPLY,
+        "compressed",
+    ),
+    ("status", drips(b"", b"HTTP/1.1 102 OK\r\n\r\n"), QUICK, TIMEOUT, "within"),
+    ("dripped-head", drips(b"HTTP/1.1 200 OK\r\n", b"X: y\r\n"), QUICK, TIMEOUT, "within"),
+    (
+        "dripped-body",
+        drips(b"HTTP/1.1 200 OK\r\nContent-Length: 1000\r\n\r\n", b"\x80"),
+        QUICK,
+        TIMEOUT,
+        "within",
+    ),
+    (
+        "length",
+        answers("HTTP/1.1 200 OK\r\nContent-Length: ²\r\n\r\n".encode()),
+        QUICK,
+        CONNECTION,
+        "cannot be reached",
+    ),
+    (
+        "reason",
+        answers(b"HTTP/1.1 500 \x1b[2J\r\nContent-Length: 5\r\n\r\n\x1b[2J\x07"),
+        PATIENT,
+        "",
+        "",
+    ),
+]
+
+
+@pytest.fixture(scope="module")
+def good():
+    with WireServer() as server:
+        yield f"openpi://{server.place}"
+
+
+@pytest.mark.parametrize("attack", WEBSOCKET, ids=[one[0] for one in WEBSOCKET])
+def test_a_bad_websocket_server_is_an_error_in_time_and_within_memory(attack, good):
+    check(attack, "openpi", good)
+
+
+@pytest.mark.parametrize("attack", WEBSOCKET[:1], ids=["maps"])
+def test_a_bad_model_server_of_vla_eval_is_an_error_within_memory(attack, good):
+    check(attack, "vla-eval", good)
+
+
+@pytest.mark.parametrize("attack", HTTP, ids=[one[0] for one in HTTP])
+def test_a_bad_http_server_is_an_error_in_time_and_within_memory(attack, good):
+    check(attack, "challenge+http", good)
+
+
+def check(attack, scheme, good):
+    _, answer, options, kind, words = attack
+    with answering(answer) as place:
+        error, message, mib = attacked(f"{scheme}://{place}{options}", good)
+    if options == QUICK:  # on a loaded machine even the connection may take too long
+        assert error in (TIMEOUT, CONNECTION)
+        assert words in message or "tried for 1 s" in message
+    else:
+        assert kind in error
+        assert error.startswith("Policy")
+        assert words in message
+    assert place in message
+    assert message.isprintable()
+    assert mib <= MAX_MIB
+
+
+@pytest.mark.parametrize("provider", ["openai", "google"])
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        (responds(gzip.compress(b"{}"), "Content-Encoding: gzip"), "the response is compressed"),
+        (responds(b"x", "Content-Encoding: gzip, gzip"), "the response is compressed"),
+        (chunks, "the response has more than 64 MiB"),
+        (answers(b"HTTP/1.1 400 No\r\nContent-Length: 4\r\n\r\n\x1b[2J"), "refused or failed"),
+    ],
+    ids=["gzip", "gzip-in-gzip", "chunks", "escapes"],
+)
+def test_a_bad_model_endpoint_is_a_named_error(provider, answer, words):
+    with answering(answer) as place:
+        options = ModelOptions(
+            provider=provider, model="m", base_url=f"http://{place}", retries=0, timeout_s=200
+        )
+        model = make_model(options)
+        with pytest.raises(PolicyServerError) as caught:
+            model.answer(ModelQuery("", (ChatTurn("user", ("hello",)),)))
+        model.close()
+    assert words in str(caught.value)
+    assert str(caught.value).isprintable()
+
+
+def test_what_the_longest_message_holds_is_accepted():
+    frames = [{b"__ndarray__": True, b"data": b"", b"dtype": "|u1", b"shape": [0, 1, 3]}] * 1080
+    message = {f"list {n}": frames for n in range(9)}
+    assert unpack(msgpack.packb(message))["list 8"][1079].shape == (0, 1, 3)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [None, True, -33, -1, 127, 128, 2**16, 2**32, 2**63, -(2**15), -(2**31), -(2**63), 0.5,
+     "", "x" * 31, "x" * 32, "x" * 256, "x" * 65536, b"", b"x" * 256, b"x" * 65536,
+     msgpack.ExtType(5, b"x"), msgpack.ExtType(5, b"x" * 2), msgpack.ExtType(5, b"x" * 4),
+     msgpack.ExtType(5, b"x" * 8), msgpack.ExtType(5, b"x" * 16), msgpack.ExtType(5, b"x" * 17),
+     msgpack.ExtType(5, b"x" * 256), msgpack.ExtType(5, b"x" * 65536), [1] * 15, [1] * 16,
+     [1] * 65536, {str(n): n for n in range(15)}, {str(n): n for n in range(16)},
+     {str(n): n for n in range(65536)}],
+    ids=lambda value: f"{type(value).__name__}-{len(str(value))}",
+)  # fmt: skip
+def test_every_format_is_counted(value):
+    assert unpack(msgpack.packb({"x": value, "y": 1})) == {"x": value, "y": 1}
+
+
+def test_the_limits_are_exact():
+    message = {"x": [None] * (MAX_ELEMENTS - 3)}
+    assert len(unpack(msgpack.packb(message))["x"]) == MAX_ELEMENTS - 3
+    message["x"].append(None)
+    with pytest.raises(CodecError, match="more than 1,000,000 elements"):
+        unpack(msgpack.packb(message))
+    nest = None
+    for _ in range(MAX_DEPTH - 2):
+        nest = [nest]
+    unpack(msgpack.packb({"x": nest}))
+    with pytest.raises(CodecError, match="nests more than 64"):
+        unpack(msgpack.packb({"x": [nest]}))
+
+
+def test_only_what_is_printable_is_printed():
+    assert printable("naïve 你好 – ok\n\tend") == "naïve 你好 – ok\n\tend"
+    assert printable(ESCAPES) == (r"Error: \x1b[2J\x1b]0;owned\x07 \x9b2J \u202e gpj.exe")
+    assert printable("\ud800") == r"\ud800"

@@ -1,0 +1,299 @@
+"""Clients that idle, stall, drip, flood or come from foreign pages: other clients are served on."""
+
+import contextlib
+import threading
+import time
+from types import SimpleNamespace
+
+import httpx
+import pytest
+from attackers import (
+    MAX_MIB,
+    PATIENCE,
+    UPGRADE,
+    frame,
+    opening,
+    read_all,
+    serving,
+)
+from typer.testing import CliRunner
+from wire_episode import INSTRUCTION, moment, video
+from wire_servers import unpack
+
+from roboirg.cli.app import app
+from roboirg.core.errors import PolicyConnectionError
+from roboirg.policies import make_policy
+from roboirg.policies.protocols import protocols_by_scheme
+from roboirg.policies.serving import policy_server
+from roboirg.policies.serving.policy_server import PolicyServer, open_server
+from roboirg.policies.serving.server_options import ServerOptions
+from roboirg.util.connection_table import ConnectionLimits, ConnectionTable
+
+GIB = 1 << 30
+SCHEMES = [scheme for scheme, protocol in protocols_by_scheme().items() if protocol.service]
+WEBSOCKETS = [scheme for scheme in SCHEMES if "http" not in scheme]
+
+
+def begin(url):
+    policy = make_policy(url, 0)
+    policy.reset(INSTRUCTION, video(1))
+    assert len(policy.act(moment(0, history=()))) > 0
+    return policy
+
+
+def go_on(policy):
+    assert len(policy.act(moment(1, history=(moment(1),)))) > 0
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_300_idle_connections_keep_nothing_from_an_episode(scheme):
+    with serving(scheme) as server, contextlib.ExitStack() as idle:
+        policy = begin(server.url)
+        before = server.peak_mib()
+        whole = opening(scheme)
+        for number in range(300):
+            data = (b"", whole[:-20], whole)[number % 3]
+            with contextlib.suppress(ConnectionError):  # dropped for the sake of a newer one
+                idle.enter_context(server.connect(data))
+            if number % 50 == 0:
+                go_on(policy)
+        go_on(policy)
+        policy.close()
+        begin(server.url).close()
+        assert server.peak_mib() - before <= MAX_MIB
+        assert server.status("Threads") < 100
+        assert server.process.poll() is None
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_process_without_free_descriptors_serves_on(scheme):
+    with (
+        serving(scheme, "--max-connections", "1000", files=60) as server,
+        contextlib.ExitStack() as idle,
+    ):
+        policy = begin(server.url)
+        for _ in range(120):
+            idle.enter_context(server.connect())
+        go_on(policy)
+        policy.close()
+        begin(f"{server.url}?connect={PATIENCE}").close()
+        assert server.process.poll() is None
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_half_a_request_is_not_waited_for(scheme):
+    with serving(
+        scheme, "--request-timeout-s", "1", "--message-timeout-s", "1", "--idle-timeout-s", "2"
+    ) as server:
+        whole = opening(scheme)
+        half = [b"", whole[:1], whole[:-2]]
+        if "http" in scheme:
+            half.append(b"POST /reset HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9\r\n\r\nx")
+            half.append(whole)  # and no second request
+        else:
+            half.append(whole)
+            half.append(whole + frame(b"\x80" * 1000, mask=True)[:-1])
+            half.append(whole + frame(b"\x80", final=False, mask=True))
+        for data in half:
+            with server.connect(data) as raw:
+                read_all(raw)  # ends
+        assert server.is_healthy()
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_dripped_requests_are_not_waited_for(scheme):
+    with serving(scheme, "--request-timeout-s", "1") as server:
+        whole = opening(scheme, headers=f"X-Y: {'z' * 3000}\r\n")
+        with server.connect() as raw, contextlib.suppress(ConnectionError):
+            for byte in whole:
+                raw.sendall(bytes([byte]))
+                time.sleep(0.05)
+            pytest.fail("the server has waited for the whole head")
+        assert server.is_healthy()
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_body_without_a_key_is_not_read(scheme):
+    with serving(scheme, "--api-key-env", "KEY", KEY="sesame") as server:
+        before, data = server.peak_mib(), b"\0" * (1 << 20)
+        if "http" in scheme:
+            head = f"POST /infer HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: {GIB}\r\n\r\n"
+        else:
+            head = opening(scheme).decode()
+        raw = server.connect(head.encode())
+
+        def send():
+            with contextlib.suppress(OSError):
+                for _ in range(1024):
+                    raw.sendall(data)
+
+        sender = threading.Thread(target=send)
+        sender.start()
+        answer = read_all(raw)
+        raw.close()
+        sender.join()
+        # A websocket's client waits for the answer before it sends more; of one that does not,
+        # the connection is cut.
+        assert answer.startswith(b"HTTP/1.1 401 ") or ("http" not in scheme and not answer)
+        assert server.peak_mib() - before <= MAX_MIB
+        assert server.is_healthy()
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_malformed_request_gets_an_answer(scheme):
+    with serving(scheme) as server:
+        for headers, status in (
+            ("Content-Length: \xb2\r\n", 400),
+            (f"Content-Length: {'9' * 5000}\r\n", 400),
+            ("Content-Length: -1\r\n", 400),
+            (f"X: {'y' * 70_000}\r\n", 431),
+        ):
+            if "http" in scheme:
+                request = f"POST /reset HTTP/1.1\r\nHost: 127.0.0.1\r\n{headers}\r\n"
+            else:
+                request = f"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n{UPGRADE}{headers}\r\n"
+            with server.connect(request.encode("latin-1")) as raw:
+                assert raw.recv(65536).startswith(f"HTTP/1.1 {status} ".encode()), headers
+        assert server.is_healthy()
+
+
+def test_a_body_is_asked_for_only_with_the_key():
+    with serving("challenge+http", "--api-key-env", "KEY", KEY="sesame") as server:
+        head = (
+            "POST /infer HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 1\r\n"
+            "Expect: 100-continue\r\n"
+        )
+        with server.connect(f"{head}\r\n".encode()) as raw:
+            assert raw.recv(65536).startswith(b"HTTP/1.1 401 ")
+        with server.connect(f"{head}Authorization: Api-Key sesame\r\n\r\n".encode()) as raw:
+            assert raw.recv(65536) == b"HTTP/1.1 100 Continue\r\n\r\n"
+
+
+def test_metadata_need_no_key_over_http_as_the_challenges_client_sends_none():
+    with serving("challenge+http", "--api-key-env", "KEY", KEY="sesame") as server:
+        address = f"http://127.0.0.1:{server.port}"
+        found = httpx.get(f"{address}/metadata", trust_env=False)
+        assert unpack(found.content)["policy"] == "random"
+        assert httpx.post(f"{address}/reset", trust_env=False).status_code == 401
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_pages_of_other_sites_are_refused(scheme):
+    with serving(scheme, "--allow-host", "Robot-Lab") as server:
+        port = server.port
+        for host, headers, welcome in (
+            (f"127.0.0.1:{port}", "", True),
+            ("localhost:9", "", True),  # through a tunnel
+            ("192.0.2.7", "", True),
+            ("[::1]:8000", "", True),
+            ("robot-lab:8000", "", True),
+            (f"127.0.0.1:{port}", f"Origin: http://127.0.0.1:{port}\r\n", True),
+            (f"127.0.0.1:{port}", "Origin: http://evil.example\r\n", False),
+            (f"127.0.0.1:{port}", "Origin: null\r\n", False),
+            (f"127.0.0.1:{port}", f"Origin: https://127.0.0.1:{port}\r\n", False),
+            (f"evil.example:{port}", "", False),
+            (f"evil.example:{port}", f"Origin: http://evil.example:{port}\r\n", False),
+            ("127.0.0.1.evil.example", "", False),
+            ("evil.example@127.0.0.1", "", False),
+            ("127.0.0.1/evil.example", "", False),
+            (f"127.0.0.1:{port}", "Host: evil.example\r\n", False),
+            ("127.0.0.1:x", "", False),
+            ("", "", False),
+        ):
+            with server.connect(opening(scheme, host, headers)) as raw:
+                status = int(raw.recv(65536).split()[1])
+            assert (status == 403) is not welcome, (host, headers, status)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_one_connection_too_many_is_refused_while_all_others_play(scheme):
+    with serving(scheme, "--max-connections", "2") as server:
+        playing = [begin(f"{server.url}?shared=yes") for _ in range(2)]
+        with pytest.raises(PolicyConnectionError, match="cannot be reached"):
+            make_policy(f"{server.url}?shared=yes&connect=1", 0).reset(INSTRUCTION, video(0))
+        for policy in playing:
+            go_on(policy)
+        playing.pop().close()
+        begin(f"{server.url}?shared=yes&connect={PATIENCE}").close()
+        playing.pop().close()
+
+
+class Costly:
+    """A policy whose making is counted."""
+
+    made = 0
+
+    def __init__(self, seed=0):
+        type(self).made += 1
+
+    def reset(self, instruction, demonstration):
+        pass
+
+    def act(self, observation):
+        return [[0.0] * 8]
+
+
+@pytest.mark.parametrize("scheme", WEBSOCKETS)
+def test_connections_without_a_message_make_no_policy(scheme):
+    Costly.made = 0
+    server = open_server(f"{__name__}:Costly", scheme)
+    thread = threading.Thread(target=server.listening.serve_forever)
+    thread.start()
+    policies = [make_policy(f"{server.url}?shared=yes", 0) for _ in range(3)]
+    if scheme == "openpi":  # has no message to begin an episode
+        for policy in policies:
+            policy.reset(INSTRUCTION, video(0))
+        assert Costly.made == 0
+    policies[0].reset(INSTRUCTION, video(0))
+    policies[0].act(moment(0, history=()))
+    assert Costly.made == 1
+    for policy in policies:
+        policy.close()
+    server.listening.shutdown()
+    thread.join()
+
+
+def test_a_server_that_stops_by_itself_is_an_error(monkeypatch):
+    stopped = SimpleNamespace(serve_forever=lambda: None)
+    monkeypatch.setattr(
+        policy_server, "open_server", lambda *_, **__: PolicyServer(stopped, "openpi://here:1")
+    )
+    monkeypatch.setattr("signal.signal", lambda *_: None)
+    result = CliRunner().invoke(app, ["serve", "random"])
+    assert result.exit_code != 0
+    assert "openpi://here:1 has stopped by itself" in str(result.exception)
+
+
+def test_a_server_can_be_stopped_before_it_has_started():
+    for scheme in WEBSOCKETS:
+        server = open_server("random", scheme).listening
+        server.shutdown()
+        server.serve_forever()
+
+
+def test_the_table_ends_those_who_wait_and_spares_those_who_play():
+    ended = []
+    table = ConnectionTable(ConnectionLimits(connections=3, request_s=1e-9), ended.append)
+    for name in ("one", "two", "three"):
+        assert table.add(name)
+    table.prove("one")
+    table.expect("one", None)
+    table.expect("three", 1e9)
+    assert table.add("four")
+    assert ended == ["two"]
+    time.sleep(0.01)
+    table.end_late()
+    assert ended == ["two", "four"]
+    assert (len(table), table.has("three"), table.has("four")) == (2, True, False)
+    table.prove("three")
+    assert table.add("five")
+    table.prove("five")
+    assert not table.add("six")
+    assert not table.make_room()
+    table.discard("one")
+    table.discard("one")
+    assert table.add("seven")
+
+
+def test_a_key_is_not_shown():
+    assert "sesame" not in repr(ServerOptions(key="sesame"))

@@ -1,0 +1,242 @@
+"""vla-eval's model servers: what they are shown, what they answer, and what goes wrong."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+from wire_episode import INSTRUCTION, moment, video
+from wire_servers import VlaEvalServer
+
+import roboirg
+from roboirg.core.errors import InvalidValueError, PolicyReplyError, PolicyTimeoutError
+from roboirg.policies import make_policy, play
+from roboirg.policies.loading import server_version
+from roboirg.policies.policy_check import check_policy
+from roboirg.policies.remote.message_codec import TEXT_KEYS, CodecError, pack, unpack
+
+
+def client_of(server, query=""):
+    return make_policy(f"vla-eval://{server.place}{query}", 0)
+
+
+def kinds(server):
+    return [kind for kind, _ in server.payloads]
+
+
+def wait_for_messages(server, count):
+    deadline = time.monotonic() + 300
+    while len(server.payloads) < count and time.monotonic() < deadline:
+        time.sleep(0.01)
+
+
+def test_an_episode_is_what_the_harness_would_send():
+    with VlaEvalServer() as server:
+        client = client_of(server)
+        client.reset(INSTRUCTION, video(3))
+        rows = [client.act(moment(n, history=())) for n in (3, 4)]
+        client.close()
+        wait_for_messages(server, 5)
+    assert [one.tolist() for one in rows] == [[[1.0] * 8], [[2.0] * 8]]
+    assert kinds(server) == [
+        "hello", "episode_start", "observation", "observation", "episode_end"
+    ]  # fmt: skip
+    (_, hello), (_, start), (_, first), (_, later), (_, end) = server.payloads
+    assert hello["protocol_version"] == 1
+    assert set(start) == {"task"}
+    assert isinstance(start["task"]["name"], str)
+    assert end == {}
+    assert list(first) == [
+        "images", "task_description", "states", "video_history", "wrist_video_history",
+        "episode_restart",
+    ]  # fmt: skip
+    assert list(later) == ["images", "task_description", "states"]
+    for shown, given in ((first, moment(3)), (later, moment(4))):
+        assert list(shown["images"]) == ["agentview", "wrist"]
+        assert np.array_equal(shown["images"]["agentview"], given["front_rgb"])
+        assert np.array_equal(shown["images"]["wrist"], given["wrist_rgb"])
+        assert shown["task_description"] == INSTRUCTION
+        assert shown["states"].dtype == np.float32
+        assert shown["states"].tolist() == [*given["joint_positions"], given["gripper"][0]]
+    assert np.array_equal(first["video_history"], video(3)["front_rgb"])
+    assert np.array_equal(first["wrist_video_history"], video(3)["wrist_rgb"])
+    assert first["episode_restart"] is True
+
+
+def test_a_task_without_a_video_has_no_history_and_subgoals_are_passed_on():
+    with VlaEvalServer() as server:
+        client = client_of(server)
+        client.reset(INSTRUCTION, video(0))
+        client.follow("pick it up at <1, 2>")
+        client.act(moment(0))
+        client.act({**moment(1), "instruction": "said later"})
+        client.reset(INSTRUCTION, video(0))
+        client.act(moment(0))
+        client.close()
+    shown = [payload for kind, payload in server.payloads if kind == "observation"]
+    assert [one.get("subgoal") for one in shown] == ["pick it up at <1, 2>"] * 2 + [None]
+    assert shown[1]["task_description"] == "said later"
+    assert "video_history" not in shown[0]
+    assert "episode_restart" not in shown[0]
+
+
+@pytest.mark.parametrize(
+    ("query", "wishes"),
+    [
+        ("?wrist=no&state=no&video=no", {}),
+        (
+            "",
+            {
+                "send_wrist_image": False,
+                "send_state": False,
+                "send_video_history": False,
+                "action_space": "joint_angle",
+                "something": "else",
+            },
+        ),
+    ],
+)
+def test_what_is_shown_is_what_the_server_or_the_url_wishes(query, wishes):
+    with VlaEvalServer() as server:
+        server.hello = {**server.hello, "observation_params": wishes}
+        client = client_of(server, query)
+        assert client.cameras == (("front",) if query else ("front", "wrist"))
+        assert client.demonstration_frames == ("none" if query else "all")
+        client.reset(INSTRUCTION, video(2))
+        client.act(moment(0))
+        client.close()
+    ((_, shown),) = [one for one in server.payloads if one[0] == "observation"]
+    assert list(shown) == ["images", "task_description"]
+    assert list(shown["images"]) == ["agentview"]
+
+
+def test_another_action_space_or_protocol_is_refused():
+    with VlaEvalServer() as server:
+        server.hello = {**server.hello, "observation_params": {"action_space": "ee_pose"}}
+        with pytest.raises(InvalidValueError, match="'ee_pose', but the policy's URL says actions"):
+            client_of(server).reset(INSTRUCTION, video(0))
+        client = client_of(server, "?actions=ee_pose")
+        client.reset(INSTRUCTION, video(0))
+        client.close()
+        server.hello = {**server.hello, "protocol_version": 2}
+        with pytest.raises(PolicyReplyError, match="speaks version 2 of vla-eval's protocol"):
+            client_of(server).reset(INSTRUCTION, video(0))
+
+
+def test_the_server_is_told_apart_by_its_class_and_harness():
+    with VlaEvalServer() as server:
+        client = client_of(server)
+        client.reset(INSTRUCTION, video(0))
+        client.close()
+    assert client.metadata["model_server"] == "Test"
+    assert server_version(client.metadata) == "Test, vla-eval 0.8.0"
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ("other-type", "type 'hello' with number 3, where 'action' with number 3"),
+        ("other-number", "type 'action' with number 4, where 'action' with number 3"),
+        (b"\xc1", "something other than a message"),
+        ("text", "replied with an error: text"),
+        ({"actions": np.zeros(7)}, r"got shape \(1, 7\)"),
+        ({"actions": [float("nan")] * 8}, "finite"),
+        ({"actions": "left"}, "an action that is no array"),
+        ({"actions": [[1.0], [2.0, 3.0]]}, "an action that is no array"),
+        ({"other": 1}, "without 'actions'; it holds 'other'"),
+    ],
+)
+def test_a_malformed_reply_ends_the_episode_only(fault, words):
+    with VlaEvalServer(faults=[fault]) as server:
+        client = client_of(server)
+        client.reset(INSTRUCTION, video(0))
+        with pytest.raises(PolicyReplyError, match=words):
+            client.act(moment(0))
+        client.reset(INSTRUCTION, video(0))
+        assert len(client.act(moment(0))) == 1
+        client.close()
+
+
+@pytest.mark.parametrize("name", ["actions", "action"])
+@pytest.mark.parametrize("action", [[0.5] * 8, np.full((1, 8), 0.5), np.full(8, 0.5, np.float16)])
+def test_an_action_has_either_name_and_any_form(name, action):
+    with VlaEvalServer(faults=[{name: action}]) as server:
+        client = client_of(server)
+        client.reset(INSTRUCTION, video(0))
+        assert client.act(moment(0)).tolist() == [[0.5] * 8]
+        client.close()
+
+
+def test_errors_of_the_server_are_named_also_when_an_episode_cannot_begin():
+    class Failing(VlaEvalServer):
+        def answer(self, message):
+            raise RuntimeError("observation_failed: the weights melted \x1b[2J")
+
+    with Failing() as server:
+        client = client_of(server)
+        client.reset(INSTRUCTION, video(0))
+        with pytest.raises(PolicyReplyError, match=r"the weights melted \\x1b\[2J\.$"):
+            client.act(moment(0))
+        client.close()
+    with VlaEvalServer(faults=["late-error"]) as server:
+        client = client_of(server)
+        client.reset(INSTRUCTION, video(0))
+        with pytest.raises(PolicyReplyError, match="replied with an error: cannot start"):
+            client.act(moment(0))
+        client.close()
+
+
+def test_a_server_that_stalls_is_not_waited_for():
+    with VlaEvalServer(faults=["stall"]) as server:
+        client = client_of(server, "?timeout=2")
+        client.reset(INSTRUCTION, video(0))
+        with pytest.raises(PolicyTimeoutError, match=r"did not send a reply within 2 s"):
+            client.act(moment(0))
+        client.close()
+
+
+def test_two_episodes_at_once_have_a_connection_each():
+    with VlaEvalServer() as server:
+        clients = [client_of(server, "?shared=yes") for _ in range(2)]
+        for client in clients:
+            client.reset(INSTRUCTION, video(0))
+        threads = [threading.Thread(target=one.act, args=(moment(0),)) for one in clients]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        for client in clients:
+            client.close()
+        assert server.connections == 2
+
+
+def test_the_check_finds_nothing_wrong():
+    with VlaEvalServer() as server:
+        results = check_policy(f"vla-eval://{server.place}")
+    assert {one.verdict for one in results} == {"pass", "note"}
+
+
+@pytest.mark.sim
+def test_a_server_plays_an_episode():
+    with VlaEvalServer() as server:
+        client = client_of(server)
+        env = roboirg.make("VideoUnmask", max_steps=3, cameras=client.cameras)
+        info = play(env, client)
+        client.close()
+    assert (info["status"], info["steps"]) == ("timeout", 3)
+    shown = [payload for kind, payload in server.payloads if kind == "observation"]
+    assert len(shown) == 3
+    assert shown[0]["video_history"][0].shape == (256, 256, 3)
+
+
+def test_arrays_have_keys_of_text():
+    array = np.arange(6, dtype=np.float32).reshape(2, 3)
+    data = pack({"x": array, "y": np.float32(0.5), "z": np.bool_(True)}, TEXT_KEYS)
+    assert b"__npgeneric__" not in data
+    found = unpack(data, TEXT_KEYS)
+    assert np.array_equal(found["x"], array)
+    assert (found["y"], found["z"]) == (0.5, True)
+    assert set(unpack(data)["x"]) == {"__ndarray__", "data", "dtype", "shape"}
+    bad = pack({"x": {"__ndarray__": True, "data": b"12345", "dtype": "<f4", "shape": [2]}})
+    with pytest.raises(CodecError, match="has 5 bytes"):
+        unpack(bad, TEXT_KEYS)
