@@ -10,6 +10,7 @@ from roboirg.evaluation.executors.executor import InProcess
 from roboirg.evaluation.runner import run_plan
 from roboirg.records.merging import merge_runs
 from roboirg.records.record import Record
+from roboirg.records.record_codec import identity_key
 from roboirg.records.store import RecordStore, StoreError, read_records
 
 
@@ -48,7 +49,8 @@ def test_a_verdict_beats_an_error_and_the_first_verdict_a_later_one(tmp_path: Pa
         one.outcome,
         two.outcome,
     }
-    assert merged.conflicts == (disputed,)
+    (conflict,) = merged.conflicts
+    assert (identity_key(conflict), conflict.outcome) == (identity_key(two), other)
 
 
 def test_videos_are_copied(tmp_path: Path) -> None:

@@ -71,12 +71,14 @@ class EpisodeReplay:
             return max(self.last_step, self.policy_start_step)
         return max(self.expected_stages.index(self.expected_stage), self.policy_start_step)
 
-    def completed(self, step: int) -> Stage | None:
-        """Return the policy's stage that is completed at a step; None if none is."""
-        now = self.expected_stages[step]
-        later = step < self.last_step
-        after = self.expected_stages[step + 1] if later else self.expected_stage
-        return self.stages[now] if 0 <= now < after else None
+    def completions(self) -> Iterator[tuple[int, int]]:
+        """Yield the index of each completed stage of the policy, and the step that completed it."""
+        now = self.expected_stages[0]
+        for step, then in enumerate((*self.expected_stages[1:], self.expected_stage)):
+            if then != now:
+                if now >= 0:
+                    yield now, step
+                now = then
 
     def started(self, *roles: FactRole, after: int) -> Iterator[FactInterval]:
         """Yield the intervals of facts with some roles that start later than a step."""
@@ -108,9 +110,13 @@ def rejudge(
     facts = facts_by_step(events, elapsed_steps)
     judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
     expected_stages: list[int] = []
+    expected, before, due = -len(episode.demonstration), None, 0.0
     for step, now in enumerate(facts):
-        expected_stages.append(judge.index - len(episode.demonstration))
-        judge.update(step, now)
+        expected_stages.append(expected)
+        if now is not before or step >= due:
+            judge.update(step, now)
+            before, due = now, judge.next_change()
+            expected = judge.index - len(episode.demonstration)
     return EpisodeReplay(
         episode, policy_start_step, tuple(expected_stages), facts, _intervals(events), judge
     )
@@ -126,10 +132,13 @@ def facts_by_step(events: Sequence[Event], elapsed_steps: int) -> tuple[frozense
         by_step.setdefault(event.step, []).append(event)
     now: frozenset[Fact] = frozenset()
     all_facts: list[frozenset[Fact]] = []
-    for step in range(elapsed_steps + 1):
-        for event in by_step.get(step, ()):
-            now = now | {event.fact} if event.holds else now - {event.fact}
-        all_facts.append(now)
+    for step in sorted(step for step in by_step if 0 <= step <= elapsed_steps):
+        all_facts += [now] * (step - len(all_facts))
+        changed = set(now)
+        for event in by_step[step]:
+            (changed.add if event.holds else changed.discard)(event.fact)
+        now = frozenset(changed)
+    all_facts += [now] * (elapsed_steps + 1 - len(all_facts))
     return tuple(all_facts)
 
 

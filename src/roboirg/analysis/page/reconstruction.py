@@ -59,11 +59,7 @@ def stages_of(record: Record) -> tuple[StageMark, ...]:
         trace = rejudge(episode, events, turn, turn + last)
     except (RoboIRGError, KeyError):
         return ()  # a task that is no longer installed, or incomplete events
-    done = {
-        stage: step - turn
-        for step, stage in enumerate(trace.expected_stages)
-        if trace.completed(step) is not None
-    }
+    done = {stage: step - turn for stage, step in trace.completions()}
     return tuple(
         StageMark(stage.subgoal.replace(" {at}", ""), done.get(index))
         for index, stage in enumerate(trace.stages)
