@@ -9,7 +9,7 @@ from roboirg.core.conditions import facts_of
 from roboirg.core.episode import Episode
 from roboirg.episodes.splits import get_episode
 from roboirg.judging import Event, Judge
-from roboirg.judging.episode_replay import facts_by_step, rejudge
+from roboirg.judging.episode_replay import completed_stages, facts_by_step, rejudge
 from roboirg.tasks import all_tasks
 
 EPISODES = 12
@@ -55,6 +55,8 @@ def test_judging_again_agrees_with_an_evaluation_of_every_step(task: str) -> Non
         found = replay.judge
         assert (found.index, found.status, found.cause) == (judge.index, judge.status, judge.cause)
         assert found.violation == judge.violation
+        done = dict(replay.completions())
+        assert completed_stages(episode, events, last) == done
         ends.add(judge.index)
     # Not all of them stand still at the first stage.
     assert max(ends) > 0
