@@ -12,6 +12,7 @@ from typing import NamedTuple
 import msgspec
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.records.episode_log import log_path, logged_slugs
 from roboirg.records.record_codec import (
     RecordIndexEntry,
     StoreError,
@@ -45,7 +46,7 @@ _decoder = msgspec.json.Decoder(_MergeEntry)
 
 
 def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
-    """Copy the records and videos of several runs into one folder.
+    """Copy the records, videos and logs of several runs into one folder.
 
     If several runs have the same episode, the first verdict is kept; a verdict replaces an error.
     Records are checked and copied one by one; the memory holds only their index entries.
@@ -116,8 +117,14 @@ def _check_versions(runs: Sequence[tuple[Path, Iterable[RecordIndexEntry]]]) -> 
 def _lines(
     run: StoredRun[_MergeEntry], wanted: Sequence[_MergeEntry], source: Path, target: Path
 ) -> Iterator[bytes]:
-    """Yield the lines of records and copy their videos; a missing file is removed from its line."""
+    """Yield the lines of records and copy their videos and logs.
+
+    A video whose file is missing is removed from its line.
+    """
+    logs = logged_slugs(source)
     for one, line in zip(wanted, run.lines(wanted), strict=True):
+        if logs and (slug := one.slug) in logs:
+            _copy_log(log_path(source, slug), log_path(target, slug))
         if one.video is None or _copy_video(one.video, source, target):
             yield line
         else:
@@ -136,6 +143,12 @@ def _copy_video(name: str, source: Path, target: Path) -> bool:
         with contextlib.suppress(FileNotFoundError):
             _copy_file(video.with_suffix(".jpg"), copy.with_suffix(".jpg"))
     return True
+
+
+def _copy_log(log: Path, copy: Path) -> None:
+    copy.parent.mkdir(parents=True, exist_ok=True)
+    copy.unlink(missing_ok=True)  # of an error that this record replaces
+    _copy_file(log, copy)
 
 
 def _copy_file(path: Path, copy: Path) -> None:

@@ -89,6 +89,8 @@ def make_columns(
         found.words.append(searched_texts(record, found.strings))
         text = resolved.of(entry, record)
         details = details_of(record, found.strings, video, text, embeds=videos.embeds)
+        if (log := entry.log) is not None:
+            details["log"] = log
         found.details.append(json.dumps(details, separators=(",", ":")))
         if progress is not None:
             progress(done, len(entries.all))

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
+from urllib.parse import quote
 
 from roboirg.analysis.stats.breakdowns import InstructionNotes
 from roboirg.analysis.stats.cells import (
@@ -21,6 +22,7 @@ from roboirg.analysis.stats.cells import (
 )
 from roboirg.analysis.stats.option_labels import options_sort_key
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.records.episode_log import log_path
 from roboirg.records.record import Job, Record
 from roboirg.records.record_codec import EpisodeSummary
 from roboirg.records.store import StoredRun
@@ -39,6 +41,7 @@ class Run:
         planned: jobs that should have a record.
         link: prefix of the paths of videos that are not in the page.
         stored: holds the whole records; None if `records` are whole.
+        logs: slugs of the episodes that have a log.
     """
 
     name: str
@@ -47,6 +50,7 @@ class Run:
     planned: Sequence[Job] = ()
     link: str = ""
     stored: StoredRun[EpisodeSummary] | None = None
+    logs: frozenset[str] = frozenset()
 
     def whole(self, records: Iterable[Summary]) -> Iterator[Record]:
         """Yield the whole records of some of its records, each read when it is asked for."""
@@ -81,6 +85,13 @@ class EpisodeEntry:
     def options(self) -> InstructionOptions:
         """The instruction options."""
         return self.record.options
+
+    @property
+    def log(self) -> str | None:
+        """Address of the episode's log, as seen from the page; None without one."""
+        if not self.run.logs or (slug := self.record.slug) not in self.run.logs:
+            return None
+        return quote(f"{self.run.link}{log_path(Path(), slug).as_posix()}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ from roboirg.analysis.tables.table import Table
 from roboirg.core.errors import MissingDependencyError
 from roboirg.evaluation.video_writer import LAST_FRAME_REPEATS, VideoOptions
 from roboirg.language.settings import EXPLICIT, all_settings
+from roboirg.records.episode_log import logged_slugs
 from roboirg.records.record import Job, Record
 from roboirg.records.store import read_summaries
 from roboirg.util.atomic_write import write_atomically
@@ -231,7 +232,8 @@ def _environment() -> jinja2.Environment:
 def _run(folder: Path, planned: Sequence[Job], *, videos: bool, link: str = "") -> Run:
     stored = read_summaries(folder)
     media = folder if videos else None
-    return Run(folder.resolve().name, stored.newest, media, planned, link, stored)
+    logs = logged_slugs(folder)
+    return Run(folder.resolve().name, stored.newest, media, planned, link, stored, logs)
 
 
 def _distinct(runs: Sequence[Run], *folders: Path | None) -> list[Run]:

@@ -23,8 +23,9 @@ from typing import NamedTuple
 from roboirg.core.errors import MissingDependencyError, RenderDeviceError, RoboIRGError
 from roboirg.evaluation.episode_errors import format_cause
 from roboirg.evaluation.executors.watchdog import Phase, Watchdog, use_watchdog, watched
-from roboirg.evaluation.rollout import PlayJob
+from roboirg.evaluation.rollout import EpisodeRunner, PlayJob
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
+from roboirg.records.episode_log import log_path, logged_output
 from roboirg.records.record import ErrorKind, Job, Record
 
 GRACE_S = 2.0
@@ -244,7 +245,7 @@ def _worker_main(
         except EOFError:
             return
         try:
-            with watched("environment"):
+            with watched("environment"), _logged(play, job):
                 reply: Record | _FatalError = play(job)
         except RoboIRGError as error:
             reply = _FatalError(type(error).__name__, str(error))
@@ -252,6 +253,13 @@ def _worker_main(
             connection.send(reply)
         except BrokenPipeError:
             return
+
+
+def _logged(play: PlayJob, job: Job) -> contextlib.AbstractContextManager[None]:
+    """Send what is printed during a job to its log, if the run has a folder."""
+    if isinstance(play, EpisodeRunner):
+        return logged_output(log_path(play.folder, job.slug))
+    return contextlib.nullcontext()
 
 
 def _exit_with_parent(parent: int) -> None:
