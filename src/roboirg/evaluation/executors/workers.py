@@ -95,6 +95,7 @@ class Worker:
     def assign(self, job: Job) -> None:
         """Send the next job to an idle worker."""
         self.job, self.started, self.started_at = job, time.monotonic(), utc_now()
+        self.watchdog.begin_job()
         # If the process has already died, the next receive notices it.
         with contextlib.suppress(BrokenPipeError):
             self.connection.send(job)
@@ -123,14 +124,16 @@ class Worker:
     def kill_if_overdue(self, episode_timeout_s: float) -> Record | None:
         """Kill the process and return an error record if its job has exceeded a time limit."""
         if self.watchdog.is_overdue:
-            message = f"the {self.watchdog.phase} did not return in time"
-        elif time.monotonic() - self.started > episode_timeout_s:
+            message = f"the {self.watchdog.phase} did not return within {self.watchdog.limit_s:g} s"
+        elif time.monotonic() - self.started - self.watchdog.queued_s > episode_timeout_s:
             message = (
                 f"the episode took longer than {episode_timeout_s:g} s "
                 f"(now in the {self.watchdog.phase})"
             )
         else:
             return None
+        if self.watchdog.awaited:
+            message += f", waiting for {self.watchdog.awaited}"
         self.process.kill()
         self.process.join()
         self.connection.close()
