@@ -62,6 +62,8 @@ class Judge:
             return math.inf
         if self._evaluated != self.index:
             return self._history.step + 1
+        if not self._elapsed and not stage.lasting:
+            return math.inf
         changes = [self._history.next_change(one) for one in self._elapsed]
         if stage.lasting and self._met_since is not None:
             changes.append(self._met_since + stage.lasting)
