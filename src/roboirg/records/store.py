@@ -137,7 +137,7 @@ class RecordStore:
                 _write_all(self._file, line + b"\n")
                 added[identity_key(entry)] = entry
             os.fsync(self._file)
-        except BaseException as error:
+        except Exception as error:  # not an interrupt: what is written by then is complete
             os.ftruncate(self._file, size)
             if isinstance(error, OSError):
                 raise StoreError(f"Cannot write to {self.path}: {error.strerror}.") from error
