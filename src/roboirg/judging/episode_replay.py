@@ -140,11 +140,11 @@ def _evaluations(judge: Judge, events: Sequence[Event], elapsed_steps: int) -> I
     spans = _changing_facts(events, elapsed_steps)
     ends = [*(start for start, _ in spans[1:]), elapsed_steps + 1]
     for (step, facts), end in zip(spans, ends, strict=True):
-        due = float(step)
-        while due < end:
-            judge.update(int(due), facts)
-            yield int(due)
-            due = judge.next_change()
+        moment = float(step)
+        while moment < end:
+            judge.update(int(moment), facts)
+            yield int(moment)
+            moment = judge.next_change()
 
 
 def facts_by_step(events: Sequence[Event], elapsed_steps: int) -> tuple[frozenset[Fact], ...]:

@@ -7,10 +7,11 @@ episode is opened.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, get_args
+
+import msgspec
 
 from roboirg.analysis.page.details import Strings, details_of, searched_texts
 from roboirg.analysis.page.entries import EpisodeEntries, EpisodeEntry, Summary
@@ -91,7 +92,7 @@ def make_columns(
         details = details_of(record, found.strings, video, text, embeds=videos.embeds)
         if (log := entry.log) is not None:
             details["log"] = log
-        found.details.append(json.dumps(details, separators=(",", ":")))
+        found.details.append(msgspec.json.encode(details).decode())
         if progress is not None:
             progress(done, len(entries.all))
     return found
