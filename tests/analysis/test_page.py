@@ -14,10 +14,11 @@ import pytest
 
 from roboirg.analysis.page.entries import Run
 from roboirg.analysis.page.page_server import PageServer
-from roboirg.analysis.page.report import make_view, render, render_runs
+from roboirg.analysis.page.report import make_view, render, render_runs, write_report
 from roboirg.evaluation.plan import Plan
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.video_writer import VideoWriter
+from roboirg.records.episode_log import EpisodeLog, log_path
 from roboirg.records.record import Attribution, EventRecord, Record
 from roboirg.records.store import RecordStore
 
@@ -348,6 +349,34 @@ def test_a_film_beside_the_page_plays_from_a_file(open_page: Any, run: Path) -> 
     path.write_text(render_runs([Run("a", records(), run)], embed=False))
     with open_page(path.as_uri()) as page:
         check_seeking(page)
+
+
+@pytest.mark.parametrize("served", [True, False])
+def test_what_the_policy_printed_is_a_click_away(
+    open_page: Any, tmp_path: Path, served: bool
+) -> None:
+    loud, silent = records()[:2]
+    with RecordStore(tmp_path) as store:
+        store.append(loud)
+        store.append(silent)
+    with EpisodeLog(log_path(tmp_path, loud.slug)) as log:
+        log.append(b"<b>some words</b>")
+    with PageServer(tmp_path, lambda: make_view(tmp_path)) as server:
+        thread = threading.Thread(target=server.serve_forever, daemon=True)
+        thread.start()
+        address = server.address if served else write_report(tmp_path).as_uri()
+        with open_page(address) as page:
+            for row in (0, 1):
+                page.locator("#rows h3 button").nth(row).click()
+            (link,) = page.get_by_text("what was printed").all()
+            target = link.get_attribute("href")
+            assert (tmp_path / target).read_text() == "<b>some words</b>"
+            if served:
+                answer = page.request.get(server.address + target)
+                assert answer.text() == "<b>some words</b>"
+                assert answer.headers["content-type"] == "text/plain"
+        server.shutdown()
+        thread.join()
 
 
 def test_two_policies_are_compared_episode_by_episode(page: Any) -> None:

@@ -121,6 +121,13 @@ def test_episodes_that_are_all_alike_leave_room_for_others() -> None:
     assert gap_of(cell("1"), cell("0")).interval is None
 
 
+@given(st.lists(st.floats(0, 1), min_size=1, max_size=60))
+def test_holm_is_that_of_statsmodels(p_values: list[float]) -> None:
+    from statsmodels.stats.multitest import multipletests
+
+    assert holm(p_values) == tuple(multipletests(p_values, method="holm")[1].tolist())
+
+
 def test_holm_by_hand() -> None:
     """0.01 · 4; then at least that: 0.02 · 3, 0.03 · 2 (raised to 0.06), 0.5 · 1."""
     assert holm([0.03, 0.5, 0.01, 0.02]) == pytest.approx((0.06, 0.5, 0.04, 0.06))

@@ -21,6 +21,7 @@ from roboirg.cli.report_commands import report
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.evaluation.plan import Plan, write_plan
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.records.episode_log import EpisodeLog, log_path
 from roboirg.records.record import Attribution, EventRecord, MentionSpan, Record, UtteranceRecord
 from roboirg.records.store import RecordStore, StoreError
 
@@ -321,6 +322,21 @@ def test_films_are_inside_or_beside(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert page.details[0]["film"] == "videos/a%20b.mp4"
     assert page.details[0]["poster"] == "videos/a%20b.jpg"
     assert "plays them from the folder" in page.text
+
+
+def test_what_was_printed_is_linked_to(tmp_path: Path) -> None:
+    loud, silent = records()[:2]
+    folder = store(tmp_path / "a run", [loud, silent])
+    with EpisodeLog(log_path(folder, loud.slug)) as log:
+        log.append(b"words")
+    link = log_path(Path(), loud.slug).as_posix()
+    assert [one.get("log") for one in Page(write_report(folder).read_text()).details] == [
+        link,
+        None,
+    ]
+    other = store(tmp_path / "other", [loud])
+    page = Page(write_report(other, against=folder, videos=False).read_text())
+    assert [one.get("log") for one in page.details] == [None, f"../a%20run/{link}", None]
 
 
 def test_the_served_page_never_holds_films(tmp_path: Path) -> None:

@@ -11,7 +11,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from roboirg.core.errors import RenderDeviceError
+from roboirg.core.waiting import waiting
 from roboirg.evaluation.executors.executor import LocalProcesses
+from roboirg.evaluation.executors.watchdog import watched
 from roboirg.evaluation.plan import Plan
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.runner import run_plan
@@ -69,6 +71,31 @@ class FakePlayer:
         video.parent.mkdir(exist_ok=True)
         video.write_text(job.slug)
         return record.model_copy(update={"video": f"videos/{video.name}"})
+
+
+@dataclass(frozen=True)
+class WaitingPlay:
+    """Plays nothing: one episode waits for its turn, the others for a reply that never comes.
+
+    Attributes:
+        queued_episode: the one that waits for its turn.
+        queue_s: for how long.
+        limit_s: of the policy's call.
+    """
+
+    queued_episode: int
+    queue_s: float
+    limit_s: float
+
+    def __call__(self, job: Job) -> Record:
+        if job.episode == self.queued_episode:
+            turn = waiting("a free server", is_queue=True)
+            with watched("policy's reset()", self.limit_s), turn:
+                time.sleep(self.queue_s)
+            return FakePlay()(job)
+        with watched("policy's act()", self.limit_s), waiting("the reply of openpi://there:8000"):
+            time.sleep(3600)
+        raise AssertionError("it was not killed")
 
 
 def fake_result(job: Job) -> RolloutResult:

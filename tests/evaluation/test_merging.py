@@ -8,8 +8,10 @@ from evaluation_fakes import FakePlay, small_plan
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.executors.executor import InProcess
 from roboirg.evaluation.runner import run_plan
+from roboirg.records.episode_log import EpisodeLog, log_path
 from roboirg.records.merging import merge_runs
 from roboirg.records.record import Record
+from roboirg.records.record_codec import identity_key
 from roboirg.records.store import RecordStore, StoreError, read_records
 
 
@@ -48,7 +50,8 @@ def test_a_verdict_beats_an_error_and_the_first_verdict_a_later_one(tmp_path: Pa
         one.outcome,
         two.outcome,
     }
-    assert merged.conflicts == (disputed,)
+    (conflict,) = merged.conflicts
+    assert (identity_key(conflict), conflict.outcome) == (identity_key(two), other)
 
 
 def test_videos_are_copied(tmp_path: Path) -> None:
@@ -62,6 +65,24 @@ def test_videos_are_copied(tmp_path: Path) -> None:
     assert (tmp_path / "out/videos/x.mp4").read_bytes() == b"video"
     assert (tmp_path / "out/videos/x.jpg").read_bytes() == b"poster"
     assert [record.video for record in read_records(tmp_path / "out")] == ["videos/x.mp4", None]
+
+
+def test_logs_are_copied_with_the_records_that_are_kept(tmp_path: Path) -> None:
+    one, two, *_ = some()
+    error = one.model_copy(update={"outcome": "error", "error": "connection"})
+    sources = [fill(tmp_path / "a", error, two), fill(tmp_path / "b", one, two)]
+    for source, record, words in (
+        (sources[0], one, "of the error"),
+        (sources[0], two, "of the first verdict"),
+        (sources[1], one, "of the verdict"),
+        (sources[1], two, "of the second verdict"),
+    ):
+        with EpisodeLog(log_path(source, record.slug)) as log:
+            log.append(words.encode())
+    merge_runs(sources, tmp_path / "out")
+    found = [log_path(tmp_path / "out", record.slug).read_text() for record in (one, two)]
+    assert found == ["of the verdict", "of the first verdict"]
+    assert log_path(sources[0], one.slug).read_text() == "of the error"
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ import pytest
 from evaluation_fakes import comparable
 
 from roboirg.evaluation.plan import read_plan
+from roboirg.records.episode_log import log_path
 from roboirg.records.store import RECORDS_FILE, read_records
 
 pytestmark = pytest.mark.sim
@@ -25,6 +26,26 @@ class Broken:
     def act(self, observation):
         self.calls += 1
         return np.zeros((3, 8)) if self.calls == 1 else np.full((1, 8), np.nan)
+"""
+
+
+LOUD = """
+import os
+import numpy as np
+
+class Loud:
+    cameras = ()
+    def __init__(self, seed=0): print("made")
+    def reset(self, instruction, demonstration): print("told:", instruction)
+    def act(self, observation):
+        os.write(2, b"asked\\n")
+        if observation["joint_positions"].sum() > 1e9: return None
+        return np.tile(np.append(observation["joint_positions"], 1.0), (10, 1))
+
+class Deadly(Loud):
+    def act(self, observation):
+        print("my last words")
+        os.kill(os.getpid(), 11)
 """
 
 
@@ -48,6 +69,24 @@ def test_an_invalid_action_is_recorded_and_told(tmp_path: Path) -> None:
     assert "invalid action: " in said.stderr
     for record in read_records(tmp_path / "out"):
         assert (record.outcome, record.steps) == ("error", 3)
+
+
+def test_what_policies_print_goes_to_a_log_of_each_episode(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(LOUD)
+    words = ("--policy", "mine:Loud,mine:Deadly", "--tasks", "PickXtimes", "--settings", "direct")
+    told = command(
+        "run", *words, "--episodes", "2", "--max-steps", "20", "--out", "o", "--workers", "1",
+        cwd=tmp_path,
+    )  # fmt: skip
+    records = read_records(tmp_path / "o")
+    assert len(records) == 4
+    for record in records:
+        log = log_path(tmp_path / "o", record.slug).read_text()
+        said = f"made\ntold: {' '.join(one.text for one in record.instruction)}\n"
+        end = "my last words\n" if record.policy == "mine:Deadly" else "asked\nasked\n"
+        assert log == said + end
+    for words_of_a_policy in ("told:", "asked", "last words"):
+        assert words_of_a_policy not in told.stdout + told.stderr
 
 
 def test_a_video_of_a_real_episode(tmp_path: Path) -> None:

@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import ctypes
+import multiprocessing
 import os
 import re
 import signal
 import time
 from collections import Counter
 from pathlib import Path
+from types import SimpleNamespace
 
 import chaos_policy
 import pytest
-from evaluation_fakes import FakePlay, comparable, small_plan
+from evaluation_fakes import FakePlay, WaitingPlay, comparable, small_plan
 
 from roboirg.core.errors import RoboIRGError
+from roboirg.core.waiting import Wait, waiting
 from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
+from roboirg.evaluation.executors import watchdog
 from roboirg.evaluation.executors.executor import LocalProcesses
 from roboirg.evaluation.executors.workers import Worker
 from roboirg.evaluation.plan import Plan
-from roboirg.evaluation.rollout import EpisodeRunner, load_policy
+from roboirg.evaluation.rollout import EpisodeRunner, _CallGuard, load_policy
+from roboirg.evaluation.rollout_result import RolloutResult
 from roboirg.evaluation.runner import UNREACHABLE_AFTER, RunSummary, run_plan
 from roboirg.records.record import Job, Record
 from roboirg.records.store import read_records
@@ -91,8 +96,8 @@ def test_a_policy_of_chaos_costs_its_own_episodes_and_nothing_else(
             assert record.cause.startswith(chaos_policy.KINDS[misdeed].replace("_", " ") + ": ")
             assert "\n" not in record.cause
     causes = {misdeed: wild[job].cause for job, misdeed in _misdeeds(plan).items()}
-    assert causes["hang"] == "timeout: the policy's act() did not return in time"
-    assert causes["hang in reset"] == "timeout: the policy's reset() did not return in time"
+    assert causes["hang"] == "timeout: the policy's act() did not return within 3 s"
+    assert causes["hang in reset"] == "timeout: the policy's reset() did not return within 3 s"
     crash = f"policy: the process died of signal {signal.SIGSEGV:d} in the policy's act()"
     assert causes["crash"] == crash
     assert causes["die"] == "policy: the process ended with exit code 0 in the policy's act()"
@@ -162,6 +167,65 @@ def test_processes_that_cannot_start_end_the_run(tmp_path: Path) -> None:
     with pytest.raises(RoboIRGError, match=words):
         run_plan(small_plan(50), tmp_path, Homeless(), LocalProcesses(2))
     assert len(read_records(tmp_path)) < 10
+
+
+def test_a_queue_is_not_the_policys_time_and_a_timeout_says_what_was_waited_for(
+    tmp_path: Path,
+) -> None:
+    plan = small_plan(episodes=2)
+    plan = plan.model_copy(update={"settings": ("explicit",), "tries": 1})
+    play = WaitingPlay(queued_episode=0, queue_s=7.0, limit_s=5.0)
+    run_plan(plan, tmp_path, play, LocalProcesses(1, episode_timeout_s=600))
+    queued, stuck = sorted(read_records(tmp_path), key=lambda record: record.episode)
+    assert (queued.outcome, queued.error) == ("success", None)
+    assert (stuck.outcome, stuck.error) == ("error", "timeout")
+    assert stuck.cause == (
+        "timeout: the policy's act() did not return within 5 s, waiting for the reply of "
+        "openpi://there:8000"
+    )
+
+
+def test_deadlines_stand_still_in_a_queue(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [100.0]
+    monkeypatch.setattr(watchdog, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    board = watchdog.Watchdog(multiprocessing.get_context("spawn"))
+    board.begin_job()
+    board.write("policy's reset()", 10.0)
+    now[0] += 9
+    board.write_wait(Wait("a free server", is_queue=True, since=now[0]))
+    now[0] += 1000
+    assert not board.is_overdue
+    assert (board.queued_s, board.awaited) == (1000.0, "a free server")
+    board.write_wait(None)
+    assert (board.queued_s, board.awaited, board.is_overdue) == (1000.0, "", False)
+    # What is left of the limit is as it was before; a reply counts.
+    board.write_wait(Wait("the reply of a server", is_queue=False, since=now[0]))
+    now[0] += 0.9
+    assert not board.is_overdue
+    now[0] += 0.2
+    assert board.is_overdue
+    assert (board.queued_s, board.awaited) == (1000.0, "the reply of a server")
+    board.write("environment")
+    board.begin_job()
+    assert (board.queued_s, board.awaited, board.is_overdue) == (0.0, "", False)
+
+
+def test_long_words_for_what_is_waited_for_are_cut() -> None:
+    board = watchdog.Watchdog(multiprocessing.get_context("spawn"))
+    board.write_wait(Wait("é" * 1000, is_queue=False, since=0.0))
+    assert board.awaited.startswith("é" * 90)
+    assert len(board.awaited.encode()) <= watchdog.MAX_WAIT_LENGTH + 3
+
+
+def test_time_in_a_queue_has_a_timing_of_its_own() -> None:
+    result = RolloutResult()
+    guard = _CallGuard(result, None)
+    start = time.perf_counter()
+    with guard.policy("policy's reset()", "policy_reset"), waiting("a server", is_queue=True):
+        time.sleep(0.3)
+    total = time.perf_counter() - start
+    assert result.timings["policy_queue"] >= 0.3
+    assert result.timings["policy_reset"] <= total - 0.3 + 1e-6
 
 
 def test_an_overdue_worker_is_killed() -> None:

@@ -10,7 +10,9 @@ import pytest
 from wire_episode import INSTRUCTION, moment, video
 from wire_servers import MmeVlaServer, WireServer
 
+from roboirg.core import waiting
 from roboirg.core.errors import PolicyConnectionError, PolicyTimeoutError
+from roboirg.core.waiting import queued_seconds
 from roboirg.policies import make_policy
 from roboirg.policies.remote.endpoints import Endpoint
 from roboirg.policies.remote.server_lock import lock_server
@@ -50,6 +52,19 @@ def test_another_process_waits_takes_another_server_or_inherits(holder, tmp_path
     os.kill(holder.pid, signal.SIGKILL)
     assert lock_server([ONE, TWO], wait=10, folder=tmp_path).endpoint == ONE
     lock.release()
+
+
+def test_waiting_for_a_server_is_told_and_counted_as_waiting(holder, tmp_path, monkeypatch):
+    told = []
+    monkeypatch.setattr(waiting, "_listeners", [told.append])
+    before = queued_seconds()
+    lock_server([TWO], wait=5, folder=tmp_path).release()
+    assert (told, queued_seconds()) == ([], before)
+    with pytest.raises(PolicyTimeoutError):
+        lock_server([ONE], wait=0.2, folder=tmp_path)
+    (wait, end) = told
+    assert (wait.what, wait.is_queue, end) == ("a free server: h:8001", True, None)
+    assert queued_seconds() - before >= 0.2
 
 
 def test_those_who_share_do_not_exclude_each_other(tmp_path):

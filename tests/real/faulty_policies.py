@@ -1,5 +1,7 @@
 """Policies that go wrong in one way each; importable in the processes in which they run."""
 
+import time
+
 import numpy as np
 
 HORIZON = 20
@@ -46,6 +48,14 @@ class Thoughtful(Still):
     @property
     def latency_s(self):
         return 0.25 if self.calls > 1 else 0.0
+
+
+class Slow(Still):
+    """Takes its time, of which it reports nothing: the machine is loaded."""
+
+    def act(self, observation):
+        time.sleep(0.3)
+        return super().act(observation)
 
 
 class Raises(Still):

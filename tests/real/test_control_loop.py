@@ -122,6 +122,41 @@ def test_a_late_policy_is_waited_for_at_rest_and_then_given_up():
     assert np.abs(joints - robot._hold[:7]).max() < 0.01
 
 
+@pytest.mark.parametrize("worker", [PolicyThread, PolicyProcess])
+def test_in_virtual_time_a_slow_machine_is_not_a_slow_policy(worker):
+    result, _, loop = play("Slow", limits=Limits(policy_timeout_s=0.05), worker=worker())
+    assert (result.outcome, result.error, result.steps) == ("failure", None, JOB.max_steps)
+    assert loop.held == 0
+
+
+def test_a_policy_that_never_replies_is_given_up_and_named():
+    class Mute(PolicyThread):
+        """Its policy acts, but the replies are lost."""
+
+        def send(self, method, *args):
+            self.lost = method == "act"
+            super().send(method, *args)
+
+        def receive(self, timeout_s):
+            return None if self.lost else super().receive(timeout_s)
+
+    robot, worker = Watched(), Mute()
+    loop = ControlLoop(robot, worker, Limits())
+    make = worker.send
+
+    def limited(method, *args):
+        # Loading and resetting may take long on this machine.
+        loop.reply_timeout_s = 0.2 if method == "act" else 600.0
+        make(method, *args)
+
+    worker.send = limited
+    result = loop.play(JOB, "faulty_policies:Still", 0, "Do it.")
+    worker.close()
+    assert (result.outcome, result.error) == ("error", "timeout")
+    assert result.cause == "timeout: policy's act() did not return within 0.2 s"
+    assert robot.last_command() == -math.inf
+
+
 def test_a_policy_that_thinks_for_a_while_is_waited_for():
     result, _, loop = play("Thoughtful")
     assert result.error is None

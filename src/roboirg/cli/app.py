@@ -119,7 +119,7 @@ def demo(
     plan = make_plan(DEMO_POLICIES, episodes=episodes, video=video)
     check_report_support()
     summary = run_commands.play(plan, folder, choose_executor(workers), retry=True)
-    run_commands.print_tables_of(folder)
+    run_commands.print_tables_of(folder, run_commands.planned_jobs(folder))
     typer.echo(_write_page(folder, videos=True))
     run_commands.report_problems(summary, folder)
 

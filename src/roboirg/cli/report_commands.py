@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from roboirg.analysis.stats.breakdowns import Breakdown, Labels
     from roboirg.analysis.stats.cells import Cells
     from roboirg.analysis.tables.table import Table
-    from roboirg.records.record import Job, Result
+    from roboirg.records.record import Job
+    from roboirg.records.record_codec import AnyResult
 
 # Heavy modules are imported inside the commands, so that --help answers at once.
 
@@ -42,17 +43,21 @@ def report(
     """Print the table of a run and write RUN/report.html, one self-contained page."""
     from roboirg.analysis.page.report import check_report_support, write_report
     from roboirg.cli import run_commands
+    from roboirg.cli.progress_bar import progress_bar
 
     path, other = run_commands.folder_of(folder), None if against is None else Path(against)
     check_report_support()
-    run_commands.print_tables_of(path)
-    page = write_report(
-        path,
-        planned=run_commands.planned_jobs(path),
-        videos=videos,
-        against=other,
-        planned_against=() if other is None else run_commands.planned_jobs(other),
-    )
+    planned = run_commands.planned_jobs(path)
+    run_commands.print_tables_of(path, planned)
+    with progress_bar("episodes of the page") as progress:
+        page = write_report(
+            path,
+            planned=planned,
+            videos=videos,
+            against=other,
+            planned_against=() if other is None else run_commands.planned_jobs(other),
+            progress=progress,
+        )
     typer.echo(page)
 
 
@@ -64,11 +69,13 @@ def view(
     from roboirg.analysis.page.page_server import PageServer
     from roboirg.analysis.page.report import make_view
     from roboirg.cli import run_commands
+    from roboirg.cli.progress_bar import progress_bar
 
     path = run_commands.folder_of(folder)
 
     def make_page() -> str:
-        return make_view(path, run_commands.planned_jobs(path))
+        with progress_bar("episodes of the page") as progress:
+            return make_view(path, run_commands.planned_jobs(path), progress)
 
     with PageServer(path, make_page, port) as server:
         # Problems of the run are errors here, not in the browser.
@@ -272,7 +279,7 @@ def _cells(runs: list[str]) -> Cells:
     return gather(*_runs(runs))
 
 
-def _runs(runs: list[str]) -> tuple[list[tuple[str, Sequence[Result]]], list[Job]]:
+def _runs(runs: list[str]) -> tuple[list[tuple[str, Sequence[AnyResult]]], list[Job]]:
     """Return the results of runs, each with its folder, and the jobs of their plans."""
     from roboirg.evaluation.plan import read_plan
     from roboirg.records.store import read_results
@@ -281,7 +288,7 @@ def _runs(runs: list[str]) -> tuple[list[tuple[str, Sequence[Result]]], list[Job
     planned = [
         job for folder in folders if (plan := read_plan(folder)) is not None for job in plan.jobs()
     ]
-    results: list[tuple[str, Sequence[Result]]] = [
+    results: list[tuple[str, Sequence[AnyResult]]] = [
         (str(folder), read_results(folder)) for folder in folders
     ]
     return results, planned

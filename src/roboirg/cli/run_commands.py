@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -119,7 +120,7 @@ def run(
         _print_estimate(made, folder, workers)
         return
     summary = play(made, folder, _executor(made, executor, address, workers), retry=retry_errors)
-    print_tables_of(folder)
+    print_tables_of(folder, planned_jobs(folder))
     report_problems(summary, folder)
 
 
@@ -150,12 +151,14 @@ def export_records(
 ) -> None:
     """Export the records of a run as a Parquet table (columns: see docs/running.md)."""
     from roboirg.records.parquet import check_parquet_support, write_parquet
-    from roboirg.records.store import read_records
+    from roboirg.records.record_codec import read_index_entry
+    from roboirg.records.store import StoredRun
 
     check_parquet_support()
     if out.is_dir() or not out.parent.is_dir():
         raise InvalidValueError(f"{str(out)!r} is not a file in an existing folder.")
-    count = write_parquet(read_records(folder_of(run)), out)
+    stored = StoredRun(folder_of(run), read_index_entry)
+    count = write_parquet(stored.records(stored.newest), out)
     typer.echo(f"{counted(count, 'record')}: {out}")
 
 
@@ -195,8 +198,8 @@ def play(plan: Plan, out: Path, executor: Executor, *, retry: bool) -> RunSummar
         sys.exit(TERMINATED if isinstance(interrupt, Terminated) else INTERRUPTED)
 
 
-def print_tables_of(folder: Path) -> None:
-    """Print the table of a run and its unsuccessful episodes."""
+def print_tables_of(folder: Path, planned: Sequence[Job]) -> None:
+    """Print the table of a run with its planned jobs, and its unsuccessful episodes."""
     from rich.console import Console
 
     from roboirg.analysis.tables.run_tables import (
@@ -206,7 +209,7 @@ def print_tables_of(folder: Path) -> None:
     )
 
     results, console = _results(folder), Console()
-    print_run_tables(make_run_tables(results, planned_jobs(folder)), console)
+    print_run_tables(make_run_tables(results, planned), console)
     print_failures(results, console)
 
 

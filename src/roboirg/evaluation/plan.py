@@ -185,12 +185,17 @@ class Plan(BaseModel):
 
     def jobs(self) -> tuple[Job, ...]:
         """Return every job, ordered by policy, task, episode, setting, form, stages and seed."""
+        # The settings of an episode are slow to find, so all policies share them.
+        settings = {
+            (task, episode): self.settings_of(task, episode)
+            for task in self.tasks
+            for episode in self.episodes
+        }
         return tuple(
             job
             for policy in self.specs.items()
-            for task in self.tasks
-            for episode in self.episodes
-            for job in self._jobs_of(policy, task, episode, seeds=self.policy_seeds)
+            for where, expressible in settings.items()
+            for job in self._jobs_of(policy, *where, expressible, seeds=self.policy_seeds)
         )
 
     def settings_of(self, task: str, episode: int) -> tuple[str, ...]:
@@ -200,10 +205,16 @@ class Plan(BaseModel):
         return self.settings
 
     def _jobs_of(
-        self, policy: tuple[str, str], task: str, episode: int, *, seeds: tuple[int, ...]
+        self,
+        policy: tuple[str, str],
+        task: str,
+        episode: int,
+        settings: Iterable[str],
+        *,
+        seeds: tuple[int, ...],
     ) -> Iterator[Job]:
         name, spec = policy
-        for setting in self.settings_of(task, episode):
+        for setting in settings:
             for options in self._options_of(setting):
                 if self._is_left_out(task, episode, options):
                     continue
@@ -261,7 +272,8 @@ class Plan(BaseModel):
         )
         for task in self.tasks:
             for episode in self.episodes[:1] if usual else self.episodes:
-                yield from self._jobs_of(("", ""), task, episode, seeds=(0,))
+                settings = self.settings_of(task, episode)
+                yield from self._jobs_of(("", ""), task, episode, settings, seeds=(0,))
 
     def _check_options(self) -> None:
         _check_names("form", self.forms, FORMS)

@@ -31,6 +31,7 @@ from roboirg.core.actions import ActionSpace, check_chunk
 from roboirg.core.delivery import SpokenInstruction
 from roboirg.core.errors import InvalidActionError, InvalidValueError
 from roboirg.core.observations import DemonstrationFrames, Observation
+from roboirg.core.waiting import queued_seconds
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors, one_line
 from roboirg.evaluation.executors.watchdog import Phase, watched
@@ -167,12 +168,18 @@ class _CallGuard:
 
     @contextlib.contextmanager
     def _timed(self, name: str) -> Iterator[None]:
-        start = time.perf_counter()
+        start, queued = time.perf_counter(), queued_seconds()
         try:
             yield
         finally:
-            spent = self._timings.get(name, 0.0) + time.perf_counter() - start
-            self._timings[name] = round(spent, 6)
+            # Waiting for one's turn is not thinking.
+            queued = queued_seconds() - queued
+            self._add(name, time.perf_counter() - start - queued)
+            if queued:
+                self._add("policy_queue", queued)
+
+    def _add(self, name: str, seconds: float) -> None:
+        self._timings[name] = round(self._timings.get(name, 0.0) + seconds, 6)
 
 
 def play_episode(

@@ -71,12 +71,14 @@ class EpisodeReplay:
             return max(self.last_step, self.policy_start_step)
         return max(self.expected_stages.index(self.expected_stage), self.policy_start_step)
 
-    def completed(self, step: int) -> Stage | None:
-        """Return the policy's stage that is completed at a step; None if none is."""
-        now = self.expected_stages[step]
-        later = step < self.last_step
-        after = self.expected_stages[step + 1] if later else self.expected_stage
-        return self.stages[now] if 0 <= now < after else None
+    def completions(self) -> Iterator[tuple[int, int]]:
+        """Yield the index of each completed stage of the policy, and the step that completed it."""
+        now = self.expected_stages[0]
+        for step, then in enumerate((*self.expected_stages[1:], self.expected_stage)):
+            if then != now:
+                if now >= 0:
+                    yield now, step
+                now = then
 
     def started(self, *roles: FactRole, after: int) -> Iterator[FactInterval]:
         """Yield the intervals of facts with some roles that start later than a step."""
@@ -108,12 +110,41 @@ def rejudge(
     facts = facts_by_step(events, elapsed_steps)
     judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
     expected_stages: list[int] = []
-    for step, now in enumerate(facts):
-        expected_stages.append(judge.index - len(episode.demonstration))
-        judge.update(step, now)
+    expected = -len(episode.demonstration)
+    for step in _evaluations(judge, events, elapsed_steps):
+        expected_stages += [expected] * (step + 1 - len(expected_stages))
+        expected = judge.index - len(episode.demonstration)
+    expected_stages += [expected] * (len(facts) - len(expected_stages))
     return EpisodeReplay(
         episode, policy_start_step, tuple(expected_stages), facts, _intervals(events), judge
     )
+
+
+def completed_stages(
+    episode: Episode, events: Sequence[Event], elapsed_steps: int
+) -> dict[int, int]:
+    """Return the steps that completed stages of the policy, by index; faster than `rejudge`.
+
+    Raises:
+        KeyError: a fact ceases to hold that did not.
+    """
+    judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
+    found: dict[int, int] = {}
+    for step in _evaluations(judge, events, elapsed_steps):
+        found.setdefault(judge.index - len(episode.demonstration) - 1, step)
+    return {stage: step for stage, step in found.items() if stage >= 0}
+
+
+def _evaluations(judge: Judge, events: Sequence[Event], elapsed_steps: int) -> Iterator[int]:
+    """Evaluate at each step at which anything may change, and yield the step."""
+    spans = _changing_facts(events, elapsed_steps)
+    ends = [*(start for start, _ in spans[1:]), elapsed_steps + 1]
+    for (step, facts), end in zip(spans, ends, strict=True):
+        moment = float(step)
+        while moment < end:
+            judge.update(int(moment), facts)
+            yield int(moment)
+            moment = judge.next_change()
 
 
 def facts_by_step(events: Sequence[Event], elapsed_steps: int) -> tuple[frozenset[Fact], ...]:
@@ -121,16 +152,28 @@ def facts_by_step(events: Sequence[Event], elapsed_steps: int) -> tuple[frozense
 
     Steps without an event share one set.
     """
-    by_step: dict[int, list[Event]] = {}
+    all_facts: list[frozenset[Fact]] = []
+    before: frozenset[Fact] = frozenset()
+    for step, facts in _changing_facts(events, elapsed_steps):
+        all_facts += [before] * (step - len(all_facts))
+        before = facts
+    return (*all_facts, *[before] * (elapsed_steps + 1 - len(all_facts)))
+
+
+def _changing_facts(
+    events: Sequence[Event], elapsed_steps: int
+) -> list[tuple[int, frozenset[Fact]]]:
+    """Return all facts that hold from step 0 and from each step with an event."""
+    by_step: dict[int, list[Event]] = {0: []}
     for event in events:
         by_step.setdefault(event.step, []).append(event)
-    now: frozenset[Fact] = frozenset()
-    all_facts: list[frozenset[Fact]] = []
-    for step in range(elapsed_steps + 1):
-        for event in by_step.get(step, ()):
-            now = now | {event.fact} if event.holds else now - {event.fact}
-        all_facts.append(now)
-    return tuple(all_facts)
+    now: set[Fact] = set()
+    spans = []
+    for step in sorted(step for step in by_step if 0 <= step <= elapsed_steps):
+        for event in by_step[step]:
+            (now.add if event.holds else now.remove)(event.fact)
+        spans.append((step, frozenset(now)))
+    return spans
 
 
 def _intervals(events: Sequence[Event]) -> tuple[FactInterval, ...]:

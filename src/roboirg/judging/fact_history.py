@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bisect
+import math
 from collections.abc import Set as AbstractSet
 
 from roboirg.core.conditions import All, Condition, Elapsed, Fact, FactCount, OccurrenceCount
@@ -47,6 +48,16 @@ class FactHistory:
                 return start is not None and _within(self.step - start, least, most)
             case All(of):
                 return all(self.holds(part) for part in of)
+
+    def next_change(self, condition: Elapsed) -> float:
+        """Return the next step at which the condition begins or ceases to be met; or infinity."""
+        start = 0 if condition.timer is None else self._timers.get(condition.timer)
+        if start is None:
+            return math.inf
+        steps = [start + condition.least]
+        if condition.most is not None:
+            steps.append(start + condition.most + 1)
+        return min((step for step in steps if step > self.step), default=math.inf)
 
     def _occurrences(self, fact: Fact, until: int | None) -> int:
         """Return how many times a fact has started to hold, at or before a step if one is given."""

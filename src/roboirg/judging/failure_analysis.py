@@ -154,8 +154,10 @@ def _wasted_occurrences(replay: EpisodeReplay, rule: Rule) -> Iterator[_Deviatio
 def _completes_stage(replay: EpisodeReplay, interval: FactInterval) -> bool:
     """Return whether an interval completes a stage."""
     end = replay.last_step + 1 if interval.end is None else interval.end
-    completed = map(replay.completed, range(interval.start, end))
-    return any(stage is not None and stage.expects == interval.fact for stage in completed)
+    return any(
+        interval.start <= step < end and replay.stages[stage].expects == interval.fact
+        for stage, step in replay.completions()
+    )
 
 
 def _last_stages(replay: EpisodeReplay) -> dict[Rule, int]:

@@ -7,11 +7,12 @@ step.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from enum import StrEnum
 
-from roboirg.core.conditions import Fact, Rule
+from roboirg.core.conditions import All, Condition, Elapsed, Fact, Rule
 from roboirg.core.episode import Scene, Stage
 from roboirg.judging.fact_history import FactHistory
 
@@ -50,7 +51,23 @@ class Judge:
         self.cause: str | None = None
         self.violation: Fact | Rule | None = None
         self._history = FactHistory()
-        self._held_since: int | None = None
+        self._met_since: int | None = None
+        self._evaluated = -1
+        self._elapsed: tuple[Elapsed, ...] = ()
+
+    def next_change(self) -> float:
+        """Return the next step at which an evaluation may change something though no fact does."""
+        stage = self.current
+        if self.status is not Status.ONGOING or stage is None:
+            return math.inf
+        if self._evaluated != self.index:
+            return self._history.step + 1
+        if not self._elapsed and not stage.lasting:
+            return math.inf
+        changes = [self._history.next_change(one) for one in self._elapsed]
+        if stage.lasting and self._met_since is not None:
+            changes.append(self._met_since + stage.lasting)
+        return min(changes, default=math.inf)
 
     @property
     def current(self) -> Stage | None:
@@ -71,12 +88,15 @@ class Judge:
         self._history.update(step, facts)
         if stage.timer is not None:
             self._history.start_timer(stage.timer)
+        is_first = self._evaluated != self.index
+        if is_first:
+            self._evaluated, self._met_since = self.index, None
+            self._elapsed = tuple(_elapsed_parts(stage))
         self.violation = next((rule for rule in stage.forbids if self._is_violated(rule)), None)
         if self.violation is not None:
             self.fail(describe_violation(self.violation, stage, self._scene))
-        elif self._completed(step, stage):
+        elif self._completed(step, stage, is_first=is_first):
             self.index += 1
-            self._held_since = None
             if self.index == len(self.stages):
                 self.status, self.published = Status.SUCCESS, None
         return self.status
@@ -89,13 +109,25 @@ class Judge:
     def _is_violated(self, rule: Fact | Rule) -> bool:
         return self._history.holds(rule.condition if isinstance(rule, Rule) else rule)
 
-    def _completed(self, step: int, stage: Stage) -> bool:
+    def _completed(self, step: int, stage: Stage, *, is_first: bool) -> bool:
         met = self._history.holds(stage.expects)
         if stage.lasting == 0:
             return met
-        if self._held_since is None or not met:
-            self._held_since = step
-        return step - self._held_since >= stage.lasting
+        if not met:
+            self._met_since = None
+            return False
+        if self._met_since is None:
+            self._met_since = step if is_first else step - 1
+        return step - self._met_since >= stage.lasting
+
+
+def _elapsed_parts(stage: Stage) -> Iterator[Elapsed]:
+    """Yield the parts of a stage's conditions that depend on the time."""
+    conditions: list[Condition] = [stage.expects]
+    conditions += [one.condition if isinstance(one, Rule) else one for one in stage.forbids]
+    for one in conditions:
+        parts = one.of if isinstance(one, All) else (one,)
+        yield from (part for part in parts if isinstance(part, Elapsed))
 
 
 def describe_violation(violation: Fact | Rule, stage: Stage, scene: Scene) -> str:

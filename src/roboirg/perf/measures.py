@@ -6,7 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from roboirg.perf import engine_costs, process_costs, remote_rates, reset_times, step_times
+from roboirg.perf import (
+    engine_costs,
+    large_run_costs,
+    process_costs,
+    remote_rates,
+    reset_times,
+    step_times,
+)
 from roboirg.perf.workloads import Workload, as_in_demonstrations, over_the_table
 from roboirg.simulation.rendering.render_settings import LIGHT
 
@@ -44,6 +51,7 @@ def measures() -> tuple[Measure, ...]:
         *_floor_measures(table),
         *_reset_measures(),
         *_process_measures(),
+        *_large_run_measures(),
     )
 
 
@@ -130,4 +138,15 @@ def _process_measures() -> tuple[Measure, ...]:
             unit="1/s",
             inverse=True,
         ),
+    )
+
+
+def _large_run_measures() -> tuple[Measure, ...]:
+    time, memory = large_run_costs.command_time, large_run_costs.command_memory
+    return (
+        Measure("tables of 50,000 records, CPU", partial(time, "tables"), None, "", 5, "s"),
+        Measure("merge of 50,000 records, CPU", partial(time, "merge"), None, "", 20, "s"),
+        Measure("... memory", partial(memory, "merge"), None, "", 0.5, "GiB"),
+        Measure("report of 50,000 records, CPU", partial(time, "report"), None, "", 60, "s"),
+        Measure("... memory", partial(memory, "report"), None, "", 1, "GiB"),
     )

@@ -5,14 +5,21 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+import msgspec
+
 from roboirg.core.errors import InvalidValueError
-from roboirg.records.record import Record
-from roboirg.records.record_codec import RecordKey, StoreError, identity_key
-from roboirg.records.store import RecordStore, read_records
+from roboirg.records.episode_log import log_path, logged_slugs
+from roboirg.records.record_codec import (
+    RecordIndexEntry,
+    StoreError,
+    identity_key,
+    read_line,
+)
+from roboirg.records.store import RecordStore, StoredRun
 
 
 class MergeSummary(NamedTuple):
@@ -26,13 +33,23 @@ class MergeSummary(NamedTuple):
 
     added: int
     duplicates: int
-    conflicts: tuple[Record, ...]
+    conflicts: tuple[RecordIndexEntry, ...]
+
+
+class _MergeEntry(RecordIndexEntry, frozen=True):
+    """An index entry with the path of the video."""
+
+    video: str | None = None
+
+
+_decoder = msgspec.json.Decoder(_MergeEntry)
 
 
 def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
-    """Copy the records and videos of several runs into one folder.
+    """Copy the records, videos and logs of several runs into one folder.
 
     If several runs have the same episode, the first verdict is kept; a verdict replaces an error.
+    Records are checked and copied one by one; the memory holds only their index entries.
 
     Args:
         folders: output folders of the runs; they are not changed.
@@ -44,43 +61,50 @@ def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
     """
     if out.resolve() in {folder.resolve() for folder in folders}:
         raise InvalidValueError(f"{out} is one of the runs to be merged; choose another --out.")
-    runs = [(folder, read_records(folder)) for folder in folders]
-    _check_versions(runs)
-    added, duplicates, conflicts = 0, 0, []
+    runs = [(folder, StoredRun(folder, _read_entry)) for folder in folders]
+    entries = [(folder, run.newest) for folder, run in runs]
+    _check_versions(entries)
+    added, duplicates = 0, 0
+    conflicts: list[RecordIndexEntry] = []
     with RecordStore(out) as store:
-        kept: dict[RecordKey, Record] = {}
-        if store.stored:
-            stored = read_records(out)
-            _check_versions([(out, stored), *runs])
-            kept = {identity_key(record): record for record in stored}
-        for folder, records in runs:
-            for record in records:
-                before = kept.get(identity_key(record))
+        kept = dict(store.stored)
+        _check_versions([(out, kept.values()), *entries])
+        for folder, run in runs:
+            wanted = []
+            for one in run.newest:
+                before = kept.get(identity_key(one))
                 if before is not None:
                     duplicates += 1
                     if before.outcome != "error":
-                        if record.outcome not in ("error", before.outcome):
-                            conflicts.append(record)
+                        if one.outcome not in ("error", before.outcome):
+                            conflicts.append(one)
                         continue
-                    if record.outcome == "error":
+                    if one.outcome == "error":
                         continue
-                store.append(_copy_video(record, folder, out))
-                kept[identity_key(record)] = record
+                wanted.append(one)
+                kept[identity_key(one)] = one
                 added += before is None
+            store.extend(_lines(run, wanted, folder, out))
     return MergeSummary(added, duplicates, tuple(conflicts))
 
 
-def _check_versions(runs: Sequence[tuple[Path, Sequence[Record]]]) -> None:
+def _read_entry(line: bytes, path: Path, number: int) -> _MergeEntry:
+    """Check that a line is a whole record and return its entry."""
+    read_line(line, path, number)
+    return _decoder.decode(line)
+
+
+def _check_versions(runs: Sequence[tuple[Path, Iterable[RecordIndexEntry]]]) -> None:
     """Refuse records of different versions, as a run does."""
     first: dict[object, tuple[Path, object]] = {}
-    for folder, records in runs:
-        for record in records:
+    for folder, entries in runs:
+        for one in entries:
             for what, value in (
-                (("language version",), record.language_version),
-                (("environment version",), record.environment_version),
-                (("version", "of policy", record.policy), record.policy_version),
-                *_server_version(record),
-                (("seed", "of", record.task, record.split, record.episode), record.seed),
+                (("language version",), one.language_version),
+                (("environment version",), one.environment_version),
+                (("version", "of policy", one.policy), one.policy_version),
+                *_server_version(one),
+                (("seed", "of", one.task, one.split, one.episode), one.seed),
             ):
                 there, expected = first.setdefault(what, (folder, value))
                 if value != expected:
@@ -91,26 +115,47 @@ def _check_versions(runs: Sequence[tuple[Path, Sequence[Record]]]) -> None:
                     )
 
 
-def _server_version(record: Record) -> Iterator[tuple[tuple[object, ...], object]]:
+def _server_version(record: RecordIndexEntry) -> Iterator[tuple[tuple[object, ...], object]]:
     """Yield the version of the policy's server, if the episode has a verdict."""
     if record.outcome != "error":
         yield ("version", "of the server of", record.policy), record.server_version
 
 
-def _copy_video(record: Record, source: Path, target: Path) -> Record:
-    """Copy the record's video and return the record, without a video if the file is missing."""
-    if record.video is None:
-        return record
-    video, copy = source / record.video, target / record.video
+def _lines(
+    run: StoredRun[_MergeEntry], wanted: Sequence[_MergeEntry], source: Path, target: Path
+) -> Iterator[bytes]:
+    """Yield the lines of records and copy their videos and logs.
+
+    A video whose file is missing is removed from its line.
+    """
+    logs = logged_slugs(source)
+    for one, line in zip(wanted, run.lines(wanted), strict=True):
+        if logs and (slug := one.slug) in logs:
+            _copy_log(log_path(source, slug), log_path(target, slug))
+        if one.video is None or _copy_video(one.video, source, target):
+            yield line
+        else:
+            record = next(run.records([one]))
+            yield record.model_copy(update={"video": None}).model_dump_json().encode()
+
+
+def _copy_video(name: str, source: Path, target: Path) -> bool:
+    """Copy a video and its poster; return whether the video exists."""
+    video, copy = source / name, target / name
     if not video.is_file():
-        return record.model_copy(update={"video": None})
-    if copy.exists():
-        return record
+        return False
+    if not copy.exists():
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        _copy_file(video, copy)
+        with contextlib.suppress(FileNotFoundError):
+            _copy_file(video.with_suffix(".jpg"), copy.with_suffix(".jpg"))
+    return True
+
+
+def _copy_log(log: Path, copy: Path) -> None:
     copy.parent.mkdir(parents=True, exist_ok=True)
-    _copy_file(video, copy)
-    with contextlib.suppress(FileNotFoundError):
-        _copy_file(video.with_suffix(".jpg"), copy.with_suffix(".jpg"))
-    return record
+    copy.unlink(missing_ok=True)  # of an error that this record replaces
+    _copy_file(log, copy)
 
 
 def _copy_file(path: Path, copy: Path) -> None:

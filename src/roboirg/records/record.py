@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Mapping
 from typing import Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, JsonValue
@@ -145,15 +146,21 @@ class Job(_RecordModel):
     @property
     def slug(self) -> str:
         """Short unique name that is safe in file names."""
-        words = (self.policy, self.task, self.split, str(self.episode), self.setting, self.form)
-        readable = re.sub(r"[^A-Za-z0-9]+", "-", "-".join(words)).strip("-")[:100]
         # Only from the identity, so that a record (which is a job) has its job's slug.
-        identity = repr([(name, getattr(self, name)) for name in IDENTITY])
-        return f"{readable}-{hashlib.sha256(identity.encode()).hexdigest()[:8]}"
+        return slug_of({name: getattr(self, name) for name in IDENTITY})
 
 
 IDENTITY = tuple(name for name in Job.model_fields if name not in {"spec", "wordings_file"})
 """The fields that identify a job."""
+
+
+def slug_of(identity: Mapping[str, object]) -> str:
+    """Return the slug of a job, given the fields in `IDENTITY` in their order."""
+    names = ("policy", "task", "split", "episode", "setting", "form")
+    words = "-".join(str(identity[name]) for name in names)
+    readable = re.sub(r"[^A-Za-z0-9]+", "-", words).strip("-")[:100]
+    digest = hashlib.sha256(repr(list(identity.items())).encode()).hexdigest()
+    return f"{readable}-{digest[:8]}"
 
 
 class UtteranceRecord(_RecordModel):

@@ -21,14 +21,14 @@ import contextlib
 import fcntl
 import json
 import os
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import NamedTuple, Self, TypeVar
+from typing import Generic, NamedTuple, Self, TypeVar
 
-from roboirg.records.record import Record, Result
+from roboirg.records.record import Job, Record
 from roboirg.records.record_codec import (
     DamagedLineError,
+    EpisodeSummary,
     RecordIndexEntry,
     RecordKey,
     StoredInstruction,
@@ -37,6 +37,7 @@ from roboirg.records.record_codec import (
     read_index_entry,
     read_instruction,
     read_line,
+    read_summary,
 )
 from roboirg.records.server_versions import (
     adopt_told_versions,
@@ -49,6 +50,7 @@ __all__ = [
     "RecordStore",
     "StoreContents",
     "StoreError",
+    "StoredRun",
     "read_contents",
     "read_records",
     "read_results",
@@ -61,8 +63,8 @@ LOCK_FILE = ".lock"
 _BUFFER = 1 << 20
 """Bytes to read at a time."""
 
-ResultType = TypeVar("ResultType", bound=Result)
 Parsed = TypeVar("Parsed")
+Identified = TypeVar("Identified", bound=Job | RecordIndexEntry)
 
 
 class StoreContents(NamedTuple):
@@ -127,17 +129,33 @@ class RecordStore:
             StoreError: the record cannot be written, or the policy's server is now another version
                 than in earlier verdicts; the file is unchanged.
         """
-        check_told_version(self.folder, self._told, record)
+        self.extend([record.model_dump_json().encode()])
+
+    def extend(self, lines: Iterable[bytes]) -> None:
+        """Write records as JSON lines, without newlines; when this returns, all are on disk.
+
+        Raises:
+            StoreError: a record cannot be written, a line is not one, or a policy's server is now
+                another version than in earlier verdicts; the file is unchanged.
+        """
         size = os.fstat(self._file).st_size
+        added: dict[RecordKey, RecordIndexEntry] = {}
+        told = dict(self._told)
         try:
-            line = record.model_dump_json().encode()
-            _write_all(self._file, line + b"\n")
+            for line in lines:
+                entry = read_index_entry(line, self.path, 0)
+                check_told_version(self.folder, told, entry)
+                told |= told_versions([entry])
+                _write_all(self._file, line + b"\n")
+                added[identity_key(entry)] = entry
             os.fsync(self._file)
-        except OSError as error:
+        except Exception as error:  # not an interrupt: what is written by then is complete
             os.ftruncate(self._file, size)
-            raise StoreError(f"Cannot write to {self.path}: {error.strerror}.") from error
-        self.stored[identity_key(record)] = read_index_entry(line, self.path, 0)
-        self._told |= told_versions([record])
+            if isinstance(error, OSError):
+                raise StoreError(f"Cannot write to {self.path}: {error.strerror}.") from error
+            raise
+        self.stored |= added
+        self._told = told
 
     def close(self) -> None:
         """Close the file and release the lock."""
@@ -186,7 +204,7 @@ def read_contents(path: Path) -> StoreContents:
         StoreError: a line is not a record of this schema version.
     """
     lines = _RecordsFile(path)
-    records = tuple(lines.parse(partial(read_line, kind=Record)))
+    records = tuple(lines.parse(read_line))
     return StoreContents(records, lines.torn, tuple(lines.damaged))
 
 
@@ -198,16 +216,25 @@ def read_records(folder: Path) -> tuple[Record, ...]:
     Raises:
         StoreError: there are none, or a line is not a record of this schema version.
     """
-    return _read_newest(folder, Record)
+    return StoredRun(folder, read_line).newest
 
 
-def read_results(folder: Path) -> tuple[Result, ...]:
-    """Read the results of a run's folder: like `read_records`, but faster and smaller.
+def read_results(folder: Path) -> tuple[EpisodeSummary, ...]:
+    """Read the results of a run's folder: like `read_records`, but much faster and smaller.
 
     Raises:
         StoreError: there are none, or a line is not a record of this schema version.
     """
-    return _read_newest(folder, Result)
+    return read_summaries(folder).newest
+
+
+def read_summaries(folder: Path) -> StoredRun[EpisodeSummary]:
+    """Read the summaries of a run's folder; its records are read again one by one.
+
+    Raises:
+        StoreError: there are none, or a line is not a record of this schema version.
+    """
+    return StoredRun(folder, read_summary)
 
 
 def read_instructions(folder: Path) -> Iterator[StoredInstruction]:
@@ -233,16 +260,86 @@ def read_index(folder: Path) -> dict[RecordKey, RecordIndexEntry]:
     }
 
 
+class LinePlace(NamedTuple):
+    """Where a line is: its number from 1, its first byte, and its bytes without the newline."""
+
+    number: int
+    start: int
+    size: int
+
+
+class StoredRun(Generic[Identified]):
+    """The newest record of each identity in a run's folder, of which only a part is in memory.
+
+    Takes no lock, so a run may be writing to the folder.
+
+    Args:
+        folder: of the run.
+        parse_line: returns what is kept of a line, given its bytes, path and number.
+
+    Attributes:
+        newest: what is kept of each record, in the order of the file.
+
+    Raises:
+        StoreError: there are no records, or a line is not a record of this schema version.
+    """
+
+    def __init__(self, folder: Path, parse_line: Callable[[bytes, Path, int], Identified]) -> None:
+        self._path = folder / RECORDS_FILE
+        lines = _RecordsFile(self._path)
+        kept: dict[RecordKey, tuple[Identified, LinePlace]] = {}
+        for one in lines.parse(parse_line):
+            kept[identity_key(one)] = (one, lines.place)
+        if not kept:
+            raise StoreError(
+                f"There are no records in {folder}; give the --out folder of a `roboirg run`."
+            )
+        self.newest: tuple[Identified, ...] = adopt_told_versions(one for one, _ in kept.values())
+        self._places = {key: place for key, (_, place) in kept.items()}
+
+    def lines(self, wanted: Iterable[Identified]) -> Iterator[bytes]:
+        """Yield the lines of some records, without newlines."""
+        with self._path.open("rb", buffering=_BUFFER) as file:
+            for place in (self._places[identity_key(one)] for one in wanted):
+                file.seek(place.start)
+                yield file.read(place.size)
+
+    def records(self, wanted: Iterable[Identified]) -> Iterator[Record]:
+        """Yield some whole records, each read when it is asked for.
+
+        Raises:
+            StoreError: a line is not a record.
+        """
+        return self._parsed(wanted, read_line)
+
+    def instructions(self) -> Iterator[StoredInstruction]:
+        """Yield what tells the instructions of all records apart, each read when it is asked for.
+
+        Raises:
+            StoreError: a line is not a record.
+        """
+        return self._parsed(self.newest, read_instruction)
+
+    def _parsed(
+        self, wanted: Iterable[Identified], parse_line: Callable[[bytes, Path, int], Parsed]
+    ) -> Iterator[Parsed]:
+        wanted = list(wanted)
+        for one, line in zip(wanted, self.lines(wanted), strict=True):
+            yield parse_line(line, self._path, self._places[identity_key(one)].number)
+
+
 class _RecordsFile:
     """Reads a records file line by line.
 
     Attributes:
+        place: of the line that `parse` yielded last.
         torn: bytes of an unfinished last line, set by `parse`.
         damaged: numbers of lines that are not JSON, set by `parse`.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
+        self.place = LinePlace(0, 0, 0)
         self.torn = b""
         self.damaged: list[int] = []
 
@@ -259,14 +356,18 @@ class _RecordsFile:
         except OSError as error:
             raise StoreError(f"Cannot read {self._path}: {error.strerror}.") from error
         with file:
+            start = 0
             for number, line in enumerate(file, start=1):
                 # No proper prefix of a JSON object is valid JSON: if the last line lacks only its
                 # newline, the record is complete.
                 if not line.endswith(b"\n") and not _is_json(line):
                     self.torn = line
                     return
+                content = line.removesuffix(b"\n")
+                self.place = LinePlace(number, start, len(content))
+                start += len(line)
                 try:
-                    yield parse_line(line.removesuffix(b"\n"), self._path, number)
+                    yield parse_line(content, self._path, number)
                 except DamagedLineError:
                     self.damaged.append(number)
 
@@ -277,18 +378,6 @@ def _is_json(line: bytes) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _read_newest(folder: Path, kind: type[ResultType]) -> tuple[ResultType, ...]:
-    lines = _RecordsFile(folder / RECORDS_FILE)
-    newest: dict[RecordKey, ResultType] = {}
-    for one in lines.parse(partial(read_line, kind=kind)):
-        newest[identity_key(one)] = one
-    if not newest:
-        raise StoreError(
-            f"There are no records in {folder}; give the --out folder of a `roboirg run`."
-        )
-    return adopt_told_versions(newest.values())
 
 
 def _write_all(descriptor: int, data: bytes) -> None:

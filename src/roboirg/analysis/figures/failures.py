@@ -18,7 +18,7 @@ from roboirg.analysis.stats.cells import PolicyRun
 from roboirg.analysis.stats.option_labels import options_label, options_sort_key
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
-from roboirg.records.record import Result
+from roboirg.records.record_codec import AnyResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -87,7 +87,7 @@ def draw_failures(content: FigureData) -> Figure | None:
     return figure
 
 
-def failure_name(result: Result) -> str:
+def failure_name(result: AnyResult) -> str:
     """Return the name of a result's failure."""
     return UNKNOWN if result.attribution is None else result.attribution.failure
 

@@ -7,14 +7,16 @@ episode is opened.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, get_args
 
+import msgspec
+
 from roboirg.analysis.page.details import Strings, details_of, searched_texts
-from roboirg.analysis.page.entries import EpisodeEntries, EpisodeEntry
+from roboirg.analysis.page.entries import EpisodeEntries, EpisodeEntry, Summary
 from roboirg.analysis.page.episode_videos import EpisodeVideo, EpisodeVideos
+from roboirg.analysis.page.reconstruction import resolved_form
 from roboirg.analysis.stats.cells import FAIRNESS, task_order
 from roboirg.analysis.stats.option_labels import options_label, options_sort_key
 from roboirg.core.episode import DIFFICULTIES
@@ -28,6 +30,8 @@ UNATTRIBUTED = "not attributed"
 ERROR = "error"
 
 Row = dict[str, int | str]
+Progress = Callable[[int, int], None]
+"""Told after each episode: how many are done, and how many there are."""
 
 
 class FilterOption(NamedTuple):
@@ -65,26 +69,32 @@ class Columns:
     videos: dict[str, EpisodeVideo] = field(default_factory=dict)
 
 
-def make_columns(entries: EpisodeEntries, videos: EpisodeVideos) -> Columns:
-    """Make the data of all episodes."""
+def make_columns(
+    entries: EpisodeEntries, videos: EpisodeVideos, progress: Progress | None = None
+) -> Columns:
+    """Make the data of all episodes, whose whole records are read one after the other."""
     found = Columns(_choices(entries))
     index = {
         choice.name: {value: number for number, value in enumerate(choice.values)}
         for choice in found.choices
     }
     numbers: dict[tuple[object, ...], int] = {}
-    resolved = _resolved_texts(entries.all)
-    for entry in entries.all:
+    resolved = _ResolvedTexts(entries)
+    for done, (entry, record) in enumerate(zip(entries.all, entries.whole(), strict=True), 1):
         row = _row(entry, entries, index, numbers)
         for name, value in row.items():
             found.columns.setdefault(name, []).append(value)
         video = videos.video(entry)
         if video is not None and videos.embeds:
             found.videos[entry.key] = video
-        found.words.append(searched_texts(entry.record, found.strings))
-        text = resolved.get(_instruction_key(entry))
-        details = details_of(entry.record, found.strings, video, text, embeds=videos.embeds)
-        found.details.append(json.dumps(details, separators=(",", ":")))
+        found.words.append(searched_texts(record, found.strings))
+        text = resolved.of(entry, record)
+        details = details_of(record, found.strings, video, text, embeds=videos.embeds)
+        if (log := entry.log) is not None:
+            details["log"] = log
+        found.details.append(msgspec.json.encode(details).decode())
+        if progress is not None:
+            progress(done, len(entries.all))
     return found
 
 
@@ -180,7 +190,7 @@ def _row(
     }
 
 
-def _fairness(record: Record) -> tuple[object, ...]:
+def _fairness(record: Summary) -> tuple[object, ...]:
     """Return what two episodes must share to be compared, besides scene and instruction."""
     return tuple(getattr(record, name) for name in FAIRNESS)
 
@@ -203,10 +213,30 @@ def _instruction_key(entry: EpisodeEntry) -> tuple[object, ...]:
     )
 
 
-def _resolved_texts(entries: Iterable[EpisodeEntry]) -> dict[tuple[object, ...], str]:
-    """Return the instructions of the resolved form, if it was played."""
-    return {
-        _instruction_key(entry): " ".join(turn.text for turn in entry.record.instruction)
-        for entry in entries
-        if entry.options.form == "resolved"
-    }
+class _ResolvedTexts:
+    """The resolved form of instructions: as it was played, else derived once for each."""
+
+    def __init__(self, entries: EpisodeEntries) -> None:
+        played = {
+            _instruction_key(entry): entry
+            for entry in entries.all
+            if entry.options.form == "resolved"
+        }
+        self._played = {
+            key: " ".join(turn.text for turn in record.instruction)
+            for key, entry in played.items()
+            for record in entry.run.whole([entry.record])
+        }
+        self._derived: dict[tuple[object, ...], str | None] = {}
+
+    def of(self, entry: EpisodeEntry, record: Record) -> str | None:
+        """Return the resolved form of an episode's instruction, or None."""
+        if record.form == "resolved":
+            return None
+        key = _instruction_key(entry)
+        if key in self._played:
+            return self._played[key]
+        own = (*key, record.wordings_file)
+        if own not in self._derived:
+            self._derived[own] = resolved_form(record)
+        return self._derived[own]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from roboirg.analysis.page.episode_videos import EpisodeVideo
-from roboirg.analysis.page.reconstruction import resolved_form, stages_of
+from roboirg.analysis.page.reconstruction import stages_of
 from roboirg.analysis.stats.option_labels import words_label
 from roboirg.core.fact_traits import fact_traits
 from roboirg.language.settings import EXPLICIT
@@ -60,12 +60,10 @@ def details_of(
         record: of the episode.
         strings: to which the texts are added.
         video: of the episode.
-        resolved: its resolved form, if that was played too.
+        resolved: the resolved form of its instruction; None if it has that form or none.
         embeds: whether the video is part of the page.
     """
     index, optional_index = strings.index, strings.optional_index
-    if resolved is None or record.form == "resolved":
-        resolved = resolved_form(record)
     found: Details = {
         "turns": [[index(turn.stage), index(turn.text)] for turn in record.instruction],
         "mentions": _mentions(record, strings),

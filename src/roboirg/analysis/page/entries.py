@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
+from urllib.parse import quote
 
+from roboirg.analysis.stats.breakdowns import InstructionNotes
 from roboirg.analysis.stats.cells import (
     CellKey,
     CellResults,
@@ -19,7 +22,12 @@ from roboirg.analysis.stats.cells import (
 )
 from roboirg.analysis.stats.option_labels import options_sort_key
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.records.episode_log import log_path
 from roboirg.records.record import Job, Record
+from roboirg.records.record_codec import EpisodeSummary
+from roboirg.records.store import StoredRun
+
+Summary = Record | EpisodeSummary
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,17 +36,33 @@ class Run:
 
     Attributes:
         name: of the run.
-        records: one for each identity.
+        records: one for each identity; the whole records unless they are in `stored`.
         folder: of its videos; None leaves them out.
         planned: jobs that should have a record.
         link: prefix of the paths of videos that are not in the page.
+        stored: holds the whole records; None if `records` are whole.
+        logs: slugs of the episodes that have a log.
     """
 
     name: str
-    records: Sequence[Record]
+    records: Sequence[Summary]
     folder: Path | None = None
     planned: Sequence[Job] = ()
     link: str = ""
+    stored: StoredRun[EpisodeSummary] | None = None
+    logs: frozenset[str] = frozenset()
+
+    def whole(self, records: Iterable[Summary]) -> Iterator[Record]:
+        """Yield the whole records of some of its records, each read when it is asked for."""
+        if self.stored is None:
+            return (one for one in records if isinstance(one, Record))
+        return self.stored.records(one for one in records if not isinstance(one, Record))
+
+    def instructions(self) -> Iterable[InstructionNotes]:
+        """Return what tells its instructions apart."""
+        if self.stored is None:
+            return [one for one in self.records if isinstance(one, Record)]
+        return self.stored.instructions()
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,13 +71,13 @@ class EpisodeEntry:
 
     Attributes:
         key: short, unique on the page, the same in every page about the run.
-        record: of the episode.
+        record: of the episode, or a part of it.
         policy_run: that played it.
         run: that it belongs to.
     """
 
     key: str
-    record: Record
+    record: Summary
     policy_run: PolicyRun
     run: Run
 
@@ -61,6 +85,13 @@ class EpisodeEntry:
     def options(self) -> InstructionOptions:
         """The instruction options."""
         return self.record.options
+
+    @property
+    def log(self) -> str | None:
+        """Address of the episode's log, as seen from the page; None without one."""
+        if not self.run.logs or (slug := self.record.slug) not in self.run.logs:
+            return None
+        return quote(f"{self.run.link}{log_path(Path(), slug).as_posix()}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +108,12 @@ class EpisodeEntries:
     cells: Cells
     names: Mapping[PolicyRun, str]
 
+    def whole(self) -> Iterator[Record]:
+        """Yield the whole records of all episodes in order, each read when it is asked for."""
+        for _, entries in groupby(self.all, key=lambda entry: id(entry.run)):
+            own = list(entries)
+            yield from own[0].run.whole(entry.record for entry in own)
+
 
 def make_entries(runs: Sequence[Run]) -> EpisodeEntries:
     """Sort the episodes of one run, or of two runs to compare."""
@@ -88,15 +125,16 @@ def make_entries(runs: Sequence[Run]) -> EpisodeEntries:
         for record in run.records:
             key = record.slug.rpartition("-")[2] + ("" if number == 0 else f"-{number + 1}")
             entries.append(EpisodeEntry(key, record, PolicyRun.of(record, name), run))
-    jobs: list[Job] = [job for run in runs for job in (*run.planned, *run.records)]
-    policies = list(dict.fromkeys(job.policy for job in jobs))
+    policies = list(
+        dict.fromkeys(job.policy for run in runs for job in (*run.planned, *run.records))
+    )
     cells = sort_cells(found, policy_order(found, policies, [run.name for run in runs]))
     privileged = {entry.record.policy for entry in entries if entry.record.privileged}
     names = labels(cells, privileged)
     return EpisodeEntries(_sorted(entries, list(names)), cells, names)
 
 
-def gather_run(name: str, records: Sequence[Record], planned: Sequence[Job] = ()) -> Cells:
+def gather_run(name: str, records: Sequence[Summary], planned: Sequence[Job] = ()) -> Cells:
     """Gather the records of one run; its policy runs bear the given name."""
     return {
         key._replace(policy_run=key.policy_run._replace(run=name)): cell

@@ -15,7 +15,7 @@ from roboirg.core.errors import RoboIRGError
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.plan import instruct_job
 from roboirg.judging import Event
-from roboirg.judging.episode_replay import rejudge
+from roboirg.judging.episode_replay import completed_stages
 from roboirg.language.settings import EXPLICIT
 from roboirg.records.record import Record
 
@@ -56,17 +56,12 @@ def stages_of(record: Record) -> tuple[StageMark, ...]:
     last = max(record.steps, *(event.step for event in record.events))
     try:
         episode = get_episode(record.task, record.split, record.episode)
-        trace = rejudge(episode, events, turn, turn + last)
+        done = completed_stages(episode, events, turn + last)
     except (RoboIRGError, KeyError):
         return ()  # a task that is no longer installed, or incomplete events
-    done = {
-        stage: step - turn
-        for step, stage in enumerate(trace.expected_stages)
-        if trace.completed(step) is not None
-    }
     return tuple(
-        StageMark(stage.subgoal.replace(" {at}", ""), done.get(index))
-        for index, stage in enumerate(trace.stages)
+        StageMark(stage.subgoal.replace(" {at}", ""), done[index] - turn if index in done else None)
+        for index, stage in enumerate(episode.stages)
     )
 
 

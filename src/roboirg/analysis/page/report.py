@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+import itertools
 import json
 import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from roboirg.analysis.page.columns import Columns, make_columns
+from roboirg.analysis.page.columns import Columns, Progress, make_columns
 from roboirg.analysis.page.entries import EpisodeEntries, Run, make_entries
 from roboirg.analysis.page.episode_videos import EpisodeVideos
 from roboirg.analysis.page.matrix import make_matrix
@@ -19,8 +21,9 @@ from roboirg.analysis.tables.table import Table
 from roboirg.core.errors import MissingDependencyError
 from roboirg.evaluation.video_writer import LAST_FRAME_REPEATS, VideoOptions
 from roboirg.language.settings import EXPLICIT, all_settings
+from roboirg.records.episode_log import logged_slugs
 from roboirg.records.record import Job, Record
-from roboirg.records.store import read_records
+from roboirg.records.store import read_summaries
 from roboirg.util.atomic_write import write_atomically
 
 if TYPE_CHECKING:
@@ -55,6 +58,7 @@ def write_report(
     videos: bool = True,
     against: Path | None = None,
     planned_against: Sequence[Job] = (),
+    progress: Progress | None = None,
 ) -> Path:
     """Write ``report.html`` into a run's folder atomically.
 
@@ -64,6 +68,7 @@ def write_report(
         videos: whether to embed the videos.
         against: folder of another run, to compare with episode by episode.
         planned_against: planned jobs of the other run.
+        progress: told after each episode.
 
     Returns:
         The path of the page.
@@ -78,23 +83,24 @@ def write_report(
     if against is not None:
         link = f"{os.path.relpath(against, folder)}/"
         runs.append(_run(against, planned_against, videos=videos, link=link))
-    write_atomically(path, render_runs(_distinct(runs, folder, against)))
+    write_atomically(path, render_runs(_distinct(runs, folder, against), progress=progress))
     return path
 
 
-def make_view(folder: Path, planned: Sequence[Job] = ()) -> str:
+def make_view(folder: Path, planned: Sequence[Job] = (), progress: Progress | None = None) -> str:
     """Return the page of a run as it is served, with links to its videos.
 
     Args:
         folder: of the run.
         planned: jobs that should have a record.
+        progress: told after each episode.
 
     Raises:
         StoreError: there are no readable records.
         MissingDependencyError: Jinja is not installed.
     """
     check_report_support()
-    return render_runs([_run(folder, planned, videos=True)], embed=False)
+    return render_runs([_run(folder, planned, videos=True)], embed=False, progress=progress)
 
 
 def render(
@@ -120,12 +126,15 @@ def render(
     return render_runs([Run(name, records, folder, planned)])
 
 
-def render_runs(runs: Sequence[Run], *, embed: bool = True) -> str:
+def render_runs(
+    runs: Sequence[Run], *, embed: bool = True, progress: Progress | None = None
+) -> str:
     """Return the page of one run, or of two runs to compare.
 
     Args:
         runs: one or two.
         embed: whether to embed the videos unless they are too large.
+        progress: told after each episode.
 
     Raises:
         MissingDependencyError: Jinja is not installed.
@@ -133,7 +142,7 @@ def render_runs(runs: Sequence[Run], *, embed: bool = True) -> str:
     template = _environment().get_template(TEMPLATE)
     entries = make_entries(runs)
     videos = EpisodeVideos.of(entries.all, embed=embed)
-    columns = make_columns(entries, videos)
+    columns = make_columns(entries, videos, progress)
     return template.render(
         styles=STYLES,
         scripts=SCRIPTS,
@@ -141,7 +150,7 @@ def render_runs(runs: Sequence[Run], *, embed: bool = True) -> str:
         count=len(entries.all),
         facts=facts_of(runs),
         warnings=run_warnings(entries),
-        breakdowns=_breakdown_tables(entries),
+        breakdowns=_breakdown_tables(runs, entries),
         videos_are_linked=videos.count > 0 and not videos.embeds,
         videos=columns.videos,
         data=_json(_data(entries, columns)),
@@ -179,10 +188,11 @@ def _data(entries: EpisodeEntries, columns: Columns) -> dict[str, Any]:
     }
 
 
-def _breakdown_tables(entries: EpisodeEntries) -> list[Table]:
+def _breakdown_tables(runs: Sequence[Run], entries: EpisodeEntries) -> list[Table]:
     """Return the tables of gaps by kind of instruction that have rows."""
     breakdowns = tuple(BREAKDOWNS.values())
-    labels = label_instructions(breakdowns, (entry.record for entry in entries.all))
+    instructions = itertools.chain.from_iterable(run.instructions() for run in runs)
+    labels = label_instructions(breakdowns, instructions)
     tables = [
         make_breakdown_table(one, entries.cells, labels[one.name], entries.names)
         for one in breakdowns
@@ -220,8 +230,10 @@ def _environment() -> jinja2.Environment:
 
 
 def _run(folder: Path, planned: Sequence[Job], *, videos: bool, link: str = "") -> Run:
+    stored = read_summaries(folder)
     media = folder if videos else None
-    return Run(folder.resolve().name, read_records(folder), media, planned, link)
+    logs = logged_slugs(folder)
+    return Run(folder.resolve().name, stored.newest, media, planned, link, stored, logs)
 
 
 def _distinct(runs: Sequence[Run], *folders: Path | None) -> list[Run]:
@@ -229,6 +241,6 @@ def _distinct(runs: Sequence[Run], *folders: Path | None) -> list[Run]:
     if len({run.name for run in runs}) == len(runs):
         return list(runs)
     return [
-        Run(str(folder), run.records, run.folder, run.planned, run.link)
+        dataclasses.replace(run, name=str(folder))
         for run, folder in zip(runs, [one for one in folders if one is not None], strict=True)
     ]

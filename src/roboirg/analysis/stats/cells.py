@@ -26,8 +26,8 @@ from roboirg.analysis.stats.intervals import (
 from roboirg.analysis.stats.option_labels import options_sort_key, words_label
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import DemonstrationFrames
-from roboirg.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, Job, Result
-from roboirg.records.record_codec import RecordKey, identity_key
+from roboirg.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, Job
+from roboirg.records.record_codec import AnyResult, RecordIndexEntry, RecordKey, identity_key
 from roboirg.tasks import all_tasks
 
 
@@ -50,7 +50,7 @@ class EvalConditions(NamedTuple):
     wordings: str | None = None
 
     @classmethod
-    def of(cls, job: Job) -> EvalConditions:
+    def of(cls, job: Job | RecordIndexEntry) -> EvalConditions:
         """Return the conditions of a job."""
         return cls(**{name: getattr(job, name) for name in cls._fields})
 
@@ -81,7 +81,7 @@ class Versions(NamedTuple):
     environment: int
 
     @classmethod
-    def of(cls, result: Result) -> Versions:
+    def of(cls, result: AnyResult) -> Versions:
         """Return the versions of a result."""
         policy, server = result.policy_version, result.server_version
         return cls(
@@ -107,7 +107,7 @@ class PolicyRun(NamedTuple):
     run: str = ""
 
     @classmethod
-    def of(cls, result: Result, run: str = "") -> PolicyRun:
+    def of(cls, result: AnyResult, run: str = "") -> PolicyRun:
         """Return the policy run of a result."""
         return cls(result.policy, EvalConditions.of(result), Versions.of(result), run)
 
@@ -199,7 +199,7 @@ def cell_interval(cell: CellResults, rng: np.random.Generator) -> Interval | Non
     return wilson_interval(cell.successes, cell.trials) if cell.trials else None
 
 
-def gather(runs: Sequence[tuple[str, Sequence[Result]]], planned: Iterable[Job] = ()) -> Cells:
+def gather(runs: Sequence[tuple[str, Sequence[AnyResult]]], planned: Iterable[Job] = ()) -> Cells:
     """Gather the results of one or several runs into cells.
 
     Args:
@@ -320,12 +320,12 @@ def _version_labels(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> 
     return found
 
 
-def _played_twice(runs: Sequence[tuple[str, Sequence[Result]]]) -> set[str]:
+def _played_twice(runs: Sequence[tuple[str, Sequence[AnyResult]]]) -> set[str]:
     """Return the policies of which several runs hold the same episode."""
-    seen: set[Job] = set()
+    seen: set[RecordKey] = set()
     twice: set[str] = set()
     for _, results in runs:
-        own = {result.identity for result in results}
-        twice |= {job.policy for job in own & seen}
-        seen |= own
+        own = {identity_key(result): result.policy for result in results}
+        twice |= {policy for key, policy in own.items() if key in seen}
+        seen |= own.keys()
     return twice

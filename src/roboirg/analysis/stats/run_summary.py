@@ -1,7 +1,7 @@
 """Summary of results: each policy and option set on each task, each suite and all tasks.
 
 `group_by_scope` only counts, which is all that the terminal table needs; `summarize` adds
-intervals and tests, which need SciPy and statsmodels.
+intervals and tests, which need SciPy.
 """
 
 from __future__ import annotations

@@ -38,7 +38,8 @@ from roboirg.analysis.tables.table import ERROR_MARK, MISSING_MARK
 from roboirg.analysis.tables.table_notes import where_played
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.printable import printable
-from roboirg.records.record import Job, Result
+from roboirg.records.record import Job
+from roboirg.records.record_codec import AnyResult
 from roboirg.util.plurals import counted
 
 MINIMUM_WIDTH = 100
@@ -75,7 +76,7 @@ class RunTable:
     privileged: bool = False
 
 
-def make_run_tables(records: Sequence[Result], planned: Sequence[Job] = ()) -> list[RunTable]:
+def make_run_tables(records: Sequence[AnyResult], planned: Sequence[Job] = ()) -> list[RunTable]:
     """Make a table for each policy run, in the order of the plan.
 
     Args:
@@ -111,10 +112,10 @@ def print_run_tables(tables: Sequence[RunTable], console: Console) -> None:
 
 
 def print_failures(
-    records: Iterable[Result], console: Console, max_failures: int = MAX_FAILURES
+    records: Iterable[AnyResult], console: Console, max_failures: int = MAX_FAILURES
 ) -> None:
     """List the episodes of each policy without success and the cause; count the rest."""
-    by_policy: dict[str, list[Result]] = {}
+    by_policy: dict[str, list[AnyResult]] = {}
     for record in records:
         if record.outcome != "success":
             by_policy.setdefault(record.policy, []).append(record)
@@ -131,7 +132,7 @@ def print_failures(
             console.print(f"  and {len(failures) - max_failures} more", highlight=False)
 
 
-def failure_text(record: Result) -> str:
+def failure_text(record: AnyResult) -> str:
     """Return the episode, its instruction options and the cause of its failure."""
     mark = f" {ERROR_MARK}" if record.outcome == "error" else ""
     where = f"{record.task} {record.split}/{record.episode} {options_label(record.options)}"

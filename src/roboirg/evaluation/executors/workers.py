@@ -23,8 +23,9 @@ from typing import NamedTuple
 from roboirg.core.errors import MissingDependencyError, RenderDeviceError, RoboIRGError
 from roboirg.evaluation.episode_errors import format_cause
 from roboirg.evaluation.executors.watchdog import Phase, Watchdog, use_watchdog, watched
-from roboirg.evaluation.rollout import PlayJob
+from roboirg.evaluation.rollout import EpisodeRunner, PlayJob
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
+from roboirg.records.episode_log import log_path, logged_output
 from roboirg.records.record import ErrorKind, Job, Record
 
 GRACE_S = 2.0
@@ -94,6 +95,7 @@ class Worker:
     def assign(self, job: Job) -> None:
         """Send the next job to an idle worker."""
         self.job, self.started, self.started_at = job, time.monotonic(), utc_now()
+        self.watchdog.begin_job()
         # If the process has already died, the next receive notices it.
         with contextlib.suppress(BrokenPipeError):
             self.connection.send(job)
@@ -122,14 +124,16 @@ class Worker:
     def kill_if_overdue(self, episode_timeout_s: float) -> Record | None:
         """Kill the process and return an error record if its job has exceeded a time limit."""
         if self.watchdog.is_overdue:
-            message = f"the {self.watchdog.phase} did not return in time"
-        elif time.monotonic() - self.started > episode_timeout_s:
+            message = f"the {self.watchdog.phase} did not return within {self.watchdog.limit_s:g} s"
+        elif time.monotonic() - self.started - self.watchdog.queued_s > episode_timeout_s:
             message = (
                 f"the episode took longer than {episode_timeout_s:g} s "
                 f"(now in the {self.watchdog.phase})"
             )
         else:
             return None
+        if self.watchdog.awaited:
+            message += f", waiting for {self.watchdog.awaited}"
         self.process.kill()
         self.process.join()
         self.connection.close()
@@ -244,7 +248,7 @@ def _worker_main(
         except EOFError:
             return
         try:
-            with watched("environment"):
+            with watched("environment"), _logged(play, job):
                 reply: Record | _FatalError = play(job)
         except RoboIRGError as error:
             reply = _FatalError(type(error).__name__, str(error))
@@ -252,6 +256,13 @@ def _worker_main(
             connection.send(reply)
         except BrokenPipeError:
             return
+
+
+def _logged(play: PlayJob, job: Job) -> contextlib.AbstractContextManager[None]:
+    """Send what is printed during a job to its log, if the run has a folder."""
+    if isinstance(play, EpisodeRunner):
+        return logged_output(log_path(play.folder, job.slug))
+    return contextlib.nullcontext()
 
 
 def _exit_with_parent(parent: int) -> None:

@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from roboirg.core.errors import MissingDependencyError, PolicyConnectionError, PolicyTimeoutError
+from roboirg.core.waiting import waiting
 from roboirg.policies.remote.endpoints import Endpoint
 
 _PAUSE = 0.05
@@ -76,13 +77,20 @@ def lock_server(
     # Processes start at different servers, which spreads those that share.
     start = os.getpid() % len(endpoints)
     order = [*endpoints[start:], *endpoints[:start]]
-    deadline, logged = time.monotonic() + wait, False
+    lock = _try_each(order, folder, shared=shared)
+    if lock is not None:
+        return lock
+    with waiting(f"a free server: {_listed(endpoints)}", is_queue=True):
+        return _wait_for_lock(endpoints, folder, wait, shared=shared)
+
+
+def _wait_for_lock(
+    endpoints: Sequence[Endpoint], folder: Path, wait: float, *, shared: bool
+) -> ServerLock:
+    paths = [_path(endpoint, folder) for endpoint in endpoints]
+    deadline = time.monotonic() + wait
+    _log.info("%s locked; this episode waits for up to %g s.", _names(endpoints), wait)
     while True:
-        for endpoint in order:
-            lock = _try_lock(endpoint, folder, shared=shared)
-            if lock is not None:
-                return lock
-        paths = [_path(endpoint, folder) for endpoint in endpoints]
         if all(_held.get(path) == threading.get_ident() for path in paths):
             raise PolicyConnectionError(
                 f"{_names(endpoints)} locked by another policy of this thread; close() it."
@@ -92,10 +100,15 @@ def lock_server(
                 f"{_names(endpoints)} used by other episodes for {wait:g} s; give each worker a "
                 "server of its own (host:8001,host:8002), use fewer workers, or raise wait=."
             )
-        if not logged:
-            logged = True
-            _log.info("%s locked; this episode waits for up to %g s.", _names(endpoints), wait)
         time.sleep(min(_PAUSE, max(0.0, deadline - time.monotonic())))
+        lock = _try_each(endpoints, folder, shared=shared)
+        if lock is not None:
+            return lock
+
+
+def _try_each(endpoints: Sequence[Endpoint], folder: Path, *, shared: bool) -> ServerLock | None:
+    locks = (_try_lock(endpoint, folder, shared=shared) for endpoint in endpoints)
+    return next((lock for lock in locks if lock is not None), None)
 
 
 def lock_folder() -> Path:
@@ -141,5 +154,9 @@ def _path(endpoint: Endpoint, folder: Path) -> Path:
 
 
 def _names(endpoints: Sequence[Endpoint]) -> str:
-    names = ", ".join(map(str, endpoints))
+    names = _listed(endpoints)
     return f"Policy server {names} was" if len(endpoints) == 1 else f"Policy servers {names} were"
+
+
+def _listed(endpoints: Sequence[Endpoint]) -> str:
+    return ", ".join(map(str, endpoints))

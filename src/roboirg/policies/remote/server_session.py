@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from roboirg.core.errors import PolicyConnectionError
+from roboirg.core.waiting import waiting
 from roboirg.policies.remote.connections import Connection, ConnectionSpec
 from roboirg.policies.remote.endpoints import Endpoint, RemoteOptions
 from roboirg.policies.remote.server_lock import ServerLock, lock_server
@@ -40,6 +41,10 @@ class ServerSession:
         endpoint = self._endpoints[0] if self._lock is None else self._lock.endpoint
         return ConnectionSpec(self._scheme, endpoint, self._options)
 
+    @property
+    def _address(self) -> str:
+        return f"{self._scheme}://{self.spec.endpoint}"
+
     def begin(self) -> Mapping[str, Any]:
         """Lock a server, connect, and return its metadata.
 
@@ -53,7 +58,8 @@ class ServerSession:
             self._endpoints, wait=self._options.wait, shared=self._options.shared
         )
         try:
-            self._connection = self._connect(self.spec)
+            with waiting(f"a connection to {self._address}"):
+                self._connection = self._connect(self.spec)
         except BaseException:
             self.end()
             raise
@@ -69,7 +75,8 @@ class ServerSession:
         """
         if self._connection is None:
             raise PolicyConnectionError(f"{self.spec} is not connected; call reset() first.")
-        return self._connection.request(message)
+        with waiting(f"the reply of {self._address}"):
+            return self._connection.request(message)
 
     def reconnect(self) -> None:
         """Connect to the same server again.
@@ -81,7 +88,8 @@ class ServerSession:
         """
         if self._connection is not None:
             self._connection.close()
-            self._connection = self._connect(self.spec)
+            with waiting(f"a connection to {self._address}"):
+                self._connection = self._connect(self.spec)
 
     def end(self) -> None:
         """Disconnect and unlock the server; repeated calls do nothing."""

@@ -16,6 +16,7 @@ which it is detected, before anything else happens.
 from __future__ import annotations
 
 import contextlib
+import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -36,8 +37,11 @@ from roboirg.records.record import Job
 
 REPLY_WAIT_SHARE = 0.5
 """Share of a control period that the loop waits for a reply before it holds the arm."""
-SETUP_TIMEOUT_S = 600.0
-"""For loading a policy and its reset; the arm is at rest."""
+REPLY_TIMEOUT_S = 600.0
+"""Of the machine's time, for loading a policy and its reset, when the arm is at rest; and for a
+reply in virtual time, which the policy's limit does not measure."""
+POLL_S = 0.25
+"""How often the operator is heard while a policy computes in virtual time."""
 _SLACK = 1e-9
 
 
@@ -55,6 +59,8 @@ class ControlLoop:
         limits: of commands and times.
         cameras: names of the cameras that the policy uses.
         stop_requested: returns whether the operator has ended the trial; called in every period.
+        reply_timeout_s: seconds of the machine's time after which a policy hangs; in virtual time
+            the limits measure only the time that the policy reports.
         held: control periods in which the arm waited for the policy.
         overruns: control periods that took longer than a period.
     """
@@ -64,6 +70,7 @@ class ControlLoop:
     limits: Limits
     cameras: Sequence[str] = ()
     stop_requested: Callable[[], bool] = _never
+    reply_timeout_s: float = REPLY_TIMEOUT_S
     held: int = 0
     overruns: int = 0
     _actions: deque[Command] = field(default_factory=deque)
@@ -204,8 +211,11 @@ class ControlLoop:
             self.worker.send("act", observation)
         if self._reply is None:
             # Virtual time stands still while a policy computes; the reply holds its latency.
-            timeout = REPLY_WAIT_SHARE * period if clock.is_real else self._virtual_timeout()
-            self._reply = self.worker.receive(timeout)
+            self._reply = (
+                self.worker.receive(REPLY_WAIT_SHARE * period)
+                if clock.is_real
+                else self._receive("act()", self.stop_requested)
+            )
         if self._reply is None:
             return
         waited = clock.now() - self._requested_at
@@ -215,13 +225,6 @@ class ControlLoop:
         with attribute_errors("policy"):
             self._actions.extend(check_chunk(rows)[:HORIZON])
         self._requested_at = self._reply = None
-
-    def _virtual_timeout(self) -> float:
-        """Return the real seconds to wait in virtual time: the whole time limit, but only once."""
-        is_first = (
-            self._requested_at is not None and self.robot.clock.now() - self._requested_at <= _SLACK
-        )
-        return self.limits.policy_timeout_s if is_first else 0.0
 
     def _check_policy_timeout(self) -> None:
         if self._requested_at is None:
@@ -234,10 +237,20 @@ class ControlLoop:
     def _request(self, method: str, *args: Any) -> Any:  # noqa: ANN401
         """Call a method of the policy while the arm is at rest, and return its result."""
         self.worker.send(method, *args)
-        reply = self.worker.receive(SETUP_TIMEOUT_S)
-        if reply is None:
-            stack = "".join(traceback.format_stack(limit=3))
-            raise EpisodeError(
-                "timeout", f"policy's {method} took longer than {SETUP_TIMEOUT_S:g} s", stack
-            )
-        return reply.result()
+        reply = self._receive(f"{method}()")
+        return None if reply is None else reply.result()
+
+    def _receive(self, what: str, stopped: Callable[[], bool] = _never) -> PolicyReply | None:
+        """Wait for a reply in the machine's time; None if the operator ends the trial.
+
+        Raises:
+            EpisodeError: there is none within `reply_timeout_s`.
+        """
+        deadline = time.monotonic() + self.reply_timeout_s
+        while (left := deadline - time.monotonic()) > 0:
+            reply = self.worker.receive(min(POLL_S, left))
+            if reply is not None or stopped():
+                return reply
+        stack = "".join(traceback.format_stack(limit=3))
+        limit = f"{self.reply_timeout_s:g} s"
+        raise EpisodeError("timeout", f"policy's {what} did not return within {limit}", stack)

@@ -8,6 +8,7 @@ from concurrent.futures import Future
 from typing import TypeVar
 
 from roboirg.core.errors import PolicyTimeoutError
+from roboirg.core.waiting import waiting
 
 Value = TypeVar("Value")
 
@@ -31,7 +32,8 @@ def call_with_timeout(seconds: float, call: Callable[[], Value], what: str) -> V
 
     threading.Thread(target=work, daemon=True, name=f"query of {what}").start()
     try:
-        return future.result(timeout=seconds)
+        with waiting(f"the reply of {what}"):
+            return future.result(timeout=seconds)
     except TimeoutError:
         if future.done():  # raised by the call
             raise

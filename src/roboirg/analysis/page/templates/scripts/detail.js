@@ -76,5 +76,7 @@ const detailOf = (row) => {
     timelineOf(row, details, media?.film),
     details.traceback === undefined ? null
       : h("details", {}, h("summary", {}, "traceback"), h("pre", { tabindex: "0" }, strings[details.traceback])),
+    details.log === undefined ? null
+      : h("p", { class: "link" }, h("a", { href: details.log }, "what was printed")),
     sceneMatesOf(row));
 };

@@ -1,0 +1,163 @@
+"""What a policy prints in an episode, in a file of bounded size beside the records.
+
+The file is found by the slug of the episode's job, so records do not mention it. Output goes
+straight into the file, not through a pipe: it is there after a crash, and a policy that prints
+while it holds the interpreter's lock cannot wait for its own reader.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from roboirg.core.errors import RoboIRGError
+
+LOG_FOLDER = "logs"
+LOG_SUFFIX = ".txt"
+MAX_LOG_BYTES = 262_144
+"""Size of a log; of longer output the beginning and the end are kept."""
+
+_HEAD_SHARE, _TAIL_SHARE = 0.5, 0.25
+_PERIOD_S = 0.25
+"""How often the size is checked while a log is written."""
+_STREAMS = (1, 2)
+"""Descriptors of stdout and stderr."""
+
+
+def log_path(folder: Path, slug: str) -> Path:
+    """Return the path of an episode's log in the folder of its run."""
+    return folder / LOG_FOLDER / f"{slug}{LOG_SUFFIX}"
+
+
+def logged_slugs(folder: Path) -> frozenset[str]:
+    """Return the slugs of the episodes of a run that have a log."""
+    with contextlib.suppress(FileNotFoundError), os.scandir(folder / LOG_FOLDER) as found:
+        return frozenset(
+            one.name.removesuffix(LOG_SUFFIX)
+            for one in found
+            if one.name.endswith(LOG_SUFFIX) and one.is_file() and one.stat().st_size
+        )
+    return frozenset()
+
+
+class EpisodeLog:
+    """The log of one episode, open for appending; use as a context manager.
+
+    A file that stays empty is removed. An earlier log of the same episode is replaced.
+
+    Args:
+        path: of the file; its folder is created.
+        limit: size of the file, bytes. It may be exceeded for a quarter of a second.
+
+    Attributes:
+        descriptor: of the file; all that is written to it is appended.
+
+    Raises:
+        RoboIRGError: the file cannot be created.
+    """
+
+    def __init__(self, path: Path, limit: int = MAX_LOG_BYTES) -> None:
+        self.path, self._limit = path, limit
+        self._left_out = self._note_size = 0
+        self._finished = threading.Event()
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.unlink(missing_ok=True)
+            self.descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+        except OSError as error:
+            raise RoboIRGError(f"Cannot write the log {path}: {error.strerror}.") from error
+        self._thread = threading.Thread(target=self._watch, name="episode log", daemon=True)
+
+    def append(self, output: bytes) -> None:
+        """Append what was printed elsewhere."""
+        os.write(self.descriptor, output)
+
+    def trim(self) -> None:
+        """Replace the middle of a log that is too long by a line that says how much it was."""
+        size = os.fstat(self.descriptor).st_size
+        if size <= self._limit:
+            return
+        head, length = int(self._limit * _HEAD_SHARE), int(self._limit * _TAIL_SHARE)
+        tail = os.pread(self.descriptor, length, size - length)
+        self._left_out += size - head - len(tail) - self._note_size
+        note = (
+            f"\n[roboirg: {self._left_out:,} bytes are left out here; a log has at most "
+            f"{self._limit:,}]\n"
+        ).encode()
+        os.ftruncate(self.descriptor, head)
+        os.write(self.descriptor, note + tail)
+        self._note_size = len(note)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._finished.set()
+        self._thread.join()
+        # A policy may have closed the descriptor; its log must not end the run.
+        with contextlib.suppress(OSError):
+            self.trim()
+            if not os.fstat(self.descriptor).st_size:
+                self.path.unlink(missing_ok=True)
+            os.close(self.descriptor)
+
+    def _watch(self) -> None:
+        with contextlib.suppress(OSError):
+            while not self._finished.wait(_PERIOD_S):
+                self.trim()
+
+
+@contextlib.contextmanager
+def logged_output(path: Path, limit: int = MAX_LOG_BYTES) -> Iterator[None]:
+    """Write to a log what this process and its new children print while the block runs.
+
+    Covers `print`, `logging`, warnings, and native code: the descriptors of stdout and stderr lead
+    to the file. They are those of the whole process, so only one log can be open this way.
+
+    Raises:
+        RoboIRGError: the file cannot be created.
+    """
+    with EpisodeLog(path, limit) as log, contextlib.ExitStack() as undo:
+        _flush()
+        for stream in _STREAMS:
+            kept = os.dup(stream)
+            undo.callback(_restore, kept, stream)
+            os.dup2(log.descriptor, stream)
+        for text in (sys.stdout, sys.stderr):
+            # A file is written in blocks, which a killed process would lose.
+            if isinstance(text, io.TextIOWrapper):
+                undo.callback(_set_line_buffering, text, text.line_buffering)
+                _set_line_buffering(text, True)
+        undo.callback(_flush)
+        yield
+
+
+def _flush() -> None:
+    for text in (sys.stdout, sys.stderr):
+        # A policy may have closed or replaced them.
+        with contextlib.suppress(Exception):
+            text.flush()
+
+
+def _set_line_buffering(text: io.TextIOWrapper, wanted: bool) -> None:
+    with contextlib.suppress(ValueError):  # closed
+        text.reconfigure(line_buffering=wanted)
+
+
+def _restore(kept: int, stream: int) -> None:
+    with contextlib.suppress(OSError):
+        os.dup2(kept, stream)
+        os.close(kept)

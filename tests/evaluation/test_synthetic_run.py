@@ -1,0 +1,70 @@
+"""A run of made-up records is read in parts with the same results as in whole."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from roboirg.analysis.page.entries import Run
+from roboirg.analysis.page.report import make_view, render_runs
+from roboirg.analysis.stats.cells import gather
+from roboirg.evaluation.plan import read_plan
+from roboirg.perf.synthetic_run import write_synthetic_run
+from roboirg.records.merging import merge_runs
+from roboirg.records.record_codec import identity_key
+from roboirg.records.store import RECORDS_FILE, read_records, read_results
+
+pytest.importorskip("jinja2")
+
+COUNT = 300
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("large") / "run"
+    write_synthetic_run(folder, COUNT)
+    return folder
+
+
+def test_its_records_are_those_of_its_plan(run: Path, tmp_path: Path) -> None:
+    records, plan = read_records(run), read_plan(run)
+    assert plan is not None
+    assert [identity_key(one) for one in records] == [
+        identity_key(job) for job in plan.jobs()[:COUNT]
+    ]
+    assert {one.outcome for one in records} == {"success", "failure", "error"}
+    assert len({one.events for one in records}) > COUNT / 2
+    write_synthetic_run(tmp_path, COUNT)
+    assert (tmp_path / RECORDS_FILE).read_bytes() == (run / RECORDS_FILE).read_bytes()
+
+
+def test_parts_of_records_give_the_cells_of_whole_records(run: Path) -> None:
+    plan = read_plan(run)
+    assert plan is not None
+    runs = [
+        gather([("", records)], plan.jobs()) for records in (read_records(run), read_results(run))
+    ]
+    assert runs[0] == runs[1]
+    assert list(runs[0]) == list(runs[1])
+
+
+def test_a_page_of_records_read_one_by_one_is_that_of_all_in_memory(run: Path) -> None:
+    told: list[tuple[int, int]] = []
+    plan = read_plan(run)
+    assert plan is not None
+    planned = plan.jobs()[: 2 * COUNT]
+    page = make_view(run, planned, lambda done, total: told.append((done, total)))
+    whole = Run(run.name, read_records(run), run, planned)
+    assert page == render_runs([whole], embed=False)
+    assert told == [(done, COUNT) for done in range(1, COUNT + 1)]
+
+
+def test_merging_copies_lines(run: Path, tmp_path: Path) -> None:
+    lines = (run / RECORDS_FILE).read_bytes().splitlines(keepends=True)
+    for name, part in (("a", lines[:200]), ("b", lines[100:])):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / RECORDS_FILE).write_bytes(b"".join(part))
+    merged = merge_runs([tmp_path / "a", tmp_path / "b"], tmp_path / "out")
+    assert (merged.added, merged.duplicates, merged.conflicts) == (COUNT, 100, ())
+    assert (tmp_path / "out" / RECORDS_FILE).read_bytes() == b"".join(lines)

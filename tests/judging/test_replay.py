@@ -1,0 +1,62 @@
+"""Judging again from events skips evaluations without changing what a full evaluation finds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from roboirg.core.conditions import facts_of
+from roboirg.core.episode import Episode
+from roboirg.episodes.splits import get_episode
+from roboirg.judging import Event, Judge
+from roboirg.judging.episode_replay import completed_stages, facts_by_step, rejudge
+from roboirg.tasks import all_tasks
+
+EPISODES = 12
+
+
+def random_events(episode: Episode, rng: np.random.Generator) -> list[Event]:
+    """Facts that the stages expect, in order and held for long, among any of those they name."""
+    stages = (*episode.demonstration, *episode.stages)
+    named = [fact for one in stages for part in (one.expects, *one.forbids)
+             for fact in (facts_of(part) or ())]  # fmt: skip
+    events, step, held = [], 0, set()
+    for stage in stages:
+        wanted = facts_of(stage.expects)
+        if rng.random() < 0.05:
+            wanted = (named[rng.integers(len(named))], *wanted)
+        for fact in wanted:
+            step += int(rng.integers(0, 30))
+            if fact not in held:
+                events.append(Event(step, fact, True))
+                held.add(fact)
+            step += stage.lasting + int(rng.integers(0, 3))
+            if rng.random() < 0.8:
+                events.append(Event(step, fact, False))
+                held.discard(fact)
+    return events
+
+
+@pytest.mark.parametrize("task", all_tasks())
+def test_judging_again_agrees_with_an_evaluation_of_every_step(task: str) -> None:
+    rng = np.random.default_rng(3)
+    ends = set()
+    for index in range(EPISODES):
+        episode = get_episode(task, "test", index)
+        events = random_events(episode, rng)
+        last = events[-1].step + 20
+        judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
+        expected = []
+        for step, facts in enumerate(facts_by_step(events, last)):
+            expected.append(judge.index - len(episode.demonstration))
+            judge.update(step, facts)
+        replay = rejudge(episode, events, 0, last)
+        assert replay.expected_stages == tuple(expected)
+        found = replay.judge
+        assert (found.index, found.status, found.cause) == (judge.index, judge.status, judge.cause)
+        assert found.violation == judge.violation
+        done = dict(replay.completions())
+        assert completed_stages(episode, events, last) == done
+        ends.add(judge.index)
+    # Not all of them stand still at the first stage.
+    assert max(ends) > 0
