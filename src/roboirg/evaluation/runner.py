@@ -16,10 +16,10 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.executors.executor import Executor
 from roboirg.evaluation.plan import Plan, write_plan
+from roboirg.evaluation.policy_descriptions import describe_policy
 from roboirg.evaluation.progress import Reporter, SilentReporter
 from roboirg.evaluation.rollout import PlayJob
 from roboirg.language import LANGUAGE_VERSION
-from roboirg.policies.loading import policy_version
 from roboirg.records.record import Job, Record
 from roboirg.records.record_codec import RecordIndexEntry, identity_key
 from roboirg.records.store import TORN_FILE, RecordStore, StoreError
@@ -220,9 +220,9 @@ def _check_versions(records: Iterable[RecordIndexEntry], folder: Path) -> None:
 
 def _check_policies(plan: Plan, records: Iterable[RecordIndexEntry], folder: Path) -> None:
     """Refuse records of another version of a policy of the same name."""
-    versions = {name: policy_version(spec) for name, spec in plan.specs.items()}
+    specs = plan.specs
     for policy, version in {(record.policy, record.policy_version) for record in records}:
-        now = versions.get(policy, version)
+        now = describe_policy(specs[policy]).version if policy in specs else version
         if version != now:
             raise StoreError(
                 f"{folder} holds episodes of {policy} version {version}, but the policy is now "

@@ -11,7 +11,10 @@ from roboirg.policies.base import Policy
 from roboirg.policies.planning import policy_specs
 from roboirg.policies.policy_classes import BUILTIN, find_class, make_from_class
 from roboirg.policies.policy_urls import is_url
+from roboirg.util.plain_text import clip_text
 from roboirg.util.short_hash import short_hash
+
+_MAX_VERSION_LENGTH = 200
 
 
 def load_policy_class(spec: str) -> type[Any]:
@@ -69,10 +72,11 @@ def policy_version(spec: str) -> str:
     try:
         policy_class = load_policy_class(spec)
         if is_url(spec):
-            return str(getattr(policy_class(spec), "version", "unknown"))
-        version = getattr(policy_class, "version", None)
+            version = getattr(policy_class(spec), "version", "unknown")
+        else:
+            version = getattr(policy_class, "version", None)
         if version is not None:
-            return str(version)
+            return clip_text(str(version), _MAX_VERSION_LENGTH)
         source = Path(inspect.getfile(policy_class)).read_bytes()
     except (InvalidValueError, OSError, TypeError):
         return "unknown"

@@ -16,6 +16,7 @@ from typing import Literal, get_args
 Phase = Literal[
     "worker startup",
     "environment",
+    "host's reply",
     "policy's constructor",
     "policy's reset()",
     "policy's hear()",
