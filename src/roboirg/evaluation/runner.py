@@ -14,6 +14,7 @@ from typing import NamedTuple
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError
 from roboirg.episodes.splits import get_episode
+from roboirg.evaluation.episode_errors import MAX_CAUSE_LENGTH, format_cause
 from roboirg.evaluation.executors.executor import Executor
 from roboirg.evaluation.plan import Plan, write_plan
 from roboirg.evaluation.policy_descriptions import describe_policy
@@ -149,6 +150,7 @@ class _RunLoop:
         return [job for job in again if job.policy not in self.unreachable]
 
     def _store_record(self, job: Job, record: Record) -> None:
+        record = _refuse_contradiction(record)
         before = self._store.stored.get(identity_key(job))
         if before is not None:
             record = record.model_copy(update={"attempt": before.attempt + 1})
@@ -175,6 +177,18 @@ class _RunLoop:
             f"{record.policy} could not be reached in {UNREACHABLE_AFTER} episodes in a row "
             f"({record.cause}); this run skips its remaining episodes."
         )
+
+
+def _refuse_contradiction(record: Record) -> Record:
+    """Return a record; a success with a cause becomes an error.
+
+    Only code in the world's process can write one, such as a policy that patches the judge.
+    """
+    if record.outcome != "success" or record.cause is None:
+        return record
+    cause = format_cause("policy", f"a success came with a cause ({record.cause})")
+    refused = {"outcome": "error", "error": "policy", "cause": cause[:MAX_CAUSE_LENGTH]}
+    return record.model_copy(update=refused)
 
 
 def _should_play(stored: RecordIndexEntry | None, *, retry_errors: bool) -> bool:

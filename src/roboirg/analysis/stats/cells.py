@@ -7,7 +7,7 @@ environment, go to cells of their own and are never averaged with the rest.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import NamedTuple
@@ -94,17 +94,20 @@ class PolicyRun(NamedTuple):
         conditions: under which it played.
         versions: None before it has played.
         run: name of the run if several runs hold the same episodes, else empty.
+        is_privileged: whether the policy read the simulator's state.
     """
 
     policy: str
     conditions: EvalConditions
     versions: Versions | None
     run: str = ""
+    is_privileged: bool = False
 
     @classmethod
     def of(cls, result: Result, run: str = "") -> PolicyRun:
         """Return the policy run of a result."""
-        return cls(result.policy, EvalConditions.of(result), Versions.of(result), run)
+        versions = Versions.of(result)
+        return cls(result.policy, EvalConditions.of(result), versions, run, result.privileged)
 
 
 class CellKey(NamedTuple):
@@ -275,16 +278,14 @@ def sort_cells(cells: Cells, policy_runs: Sequence[PolicyRun]) -> Cells:
     return {key: cells[key] for key in keys}
 
 
-def labels(cells: Cells, privileged: Collection[str] = ()) -> dict[PolicyRun, str]:
+def labels(cells: Cells) -> dict[PolicyRun, str]:
     """Return a label for each policy run, with what distinguishes runs of the same policy.
 
-    Args:
-        cells: of the policy runs.
-        privileged: names of policies that are marked as privileged.
+    Privileged policies are marked, because their rates are no rates of policies.
     """
     policy_runs = list(dict.fromkeys(key.policy_run for key in cells))
     return {
-        one: _label(one, policy_runs) + (" (privileged)" if one.policy in privileged else "")
+        one: _label(one, policy_runs) + (" (privileged)" if one.is_privileged else "")
         for one in policy_runs
     }
 

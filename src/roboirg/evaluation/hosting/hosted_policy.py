@@ -125,8 +125,9 @@ class HostedPolicy:
 
     def close(self) -> None:
         """End the episode; repeated calls do nothing."""
+        is_open, self._is_open = self._is_open, False
         with self._end:
-            if self._is_open:
+            if is_open:
                 self._call("close", {})
 
     def _call(self, method: str, call: Message) -> Message:
