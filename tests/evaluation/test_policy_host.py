@@ -26,8 +26,9 @@ from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.hosting.payload import BLOCK_SIZE, pack_payload, unpack_payload
 from roboirg.evaluation.plan import Plan
-from roboirg.evaluation.policy_descriptions import describe_policy, is_foreign, needs_host
+from roboirg.evaluation.policy_descriptions import describe_policy
 from roboirg.evaluation.runner import run_plan
+from roboirg.policies.loading import is_foreign, needs_host
 from roboirg.records.record import Job, Record
 from roboirg.records.store import RECORDS_FILE, read_contents, read_records
 

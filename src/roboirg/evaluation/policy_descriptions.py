@@ -7,11 +7,12 @@ from typing import Any, NamedTuple
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.evaluation.hosting.host_process import MISSING
 from roboirg.evaluation.hosting.policy_child import ChildLostError, PolicyChild
-from roboirg.policies.loading import is_privileged, load_policy_class, policy_version
-from roboirg.policies.planning.policy_specs import BUILDERS, SYSTEM
-from roboirg.policies.planning.systems import find_system
-from roboirg.policies.policy_classes import BUILTIN, CHECKPOINTS
-from roboirg.policies.policy_urls import is_url, parse_query
+from roboirg.policies.loading import (
+    is_foreign,
+    is_privileged,
+    load_policy_class,
+    policy_version,
+)
 from roboirg.util.plain_text import clip_text
 
 _MAX_LENGTH = 2000
@@ -31,32 +32,6 @@ class PolicyDescription(NamedTuple):
 
 _known: dict[str, PolicyDescription] = {}
 """Descriptions of this run's policies, so that error records need not load them again."""
-
-
-def is_foreign(spec: str) -> bool:
-    """Return whether a spec names code that does not come with this package or a protocol.
-
-    Raises:
-        InvalidValueError: it is a system that cannot be read.
-    """
-    kind, colon, rest = spec.partition(":")
-    if spec in BUILTIN or is_url(spec) or not colon:
-        return False
-    if kind == SYSTEM:
-        name, _, query = rest.partition("?")
-        return is_foreign(find_system(name, parse_query(spec, query)).policy)
-    return kind not in BUILDERS
-
-
-def needs_host(spec: str) -> bool:
-    """Return whether a policy gets a process of its own, unless it is privileged.
-
-    Built-in policies and the clients of remote ones are our own code and run beside the world.
-
-    Raises:
-        InvalidValueError: it is a system that cannot be read.
-    """
-    return is_foreign(spec) or (is_url(spec) and spec.partition("://")[0] in CHECKPOINTS)
 
 
 def describe_policy(spec: str, *, again: bool = False) -> PolicyDescription:

@@ -40,11 +40,12 @@ from roboirg.evaluation.hosting.host_pool import HostAddress, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.plan import VideoMode
 from roboirg.evaluation.policy_calls import next_actions, policy_metadata, policy_usage
-from roboirg.evaluation.policy_descriptions import PolicyDescription, describe_here, needs_host
+from roboirg.evaluation.policy_descriptions import PolicyDescription, describe_here
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.video_writer import VideoOptions, VideoWriter
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.policies.base import Policy, PrivilegedPolicy, close_policy, tell_policy
+from roboirg.policies.loading import needs_host
 from roboirg.policies.requirements import (
     wanted_actions,
     wanted_calibration,

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import random
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from multiprocessing.shared_memory import SharedMemory
-from types import TracebackType
 from typing import Any, cast
 
-import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.observations import Observation
@@ -22,50 +18,11 @@ from roboirg.evaluation.hosting.payload import (
 from roboirg.evaluation.policy_calls import check_rows, policy_metadata, policy_usage
 from roboirg.policies.base import close_policy, tell_policy
 from roboirg.policies.loading import is_privileged, make_policy, policy_version
+from roboirg.policies.random_state import RandomState
 from roboirg.policies.requirements import REQUIREMENTS, wanted_actions
 
 Ask = Callable[[Message], Message]
 """Sends a question to the world of an episode in a call, and returns its answer."""
-
-
-class RandomState:
-    """The global random generators of this process, as one episode left them; a context.
-
-    Episodes take turns in a process: without this, one would change the random numbers of others.
-
-    Args:
-        seed: of all generators at the beginning of the episode.
-    """
-
-    def __init__(self, seed: int) -> None:
-        self._seed = seed
-        self._python = random.Random(seed).getstate()
-        self._numpy: Any = np.random.RandomState(seed % 2**32).get_state()
-        self._torch: tuple[Any, ...] | None = None
-
-    def __enter__(self) -> None:
-        random.setstate(self._python)
-        np.random.set_state(self._numpy)  # noqa: NPY002 - what policies may use
-        torch = sys.modules.get("torch")
-        if torch is not None and self._torch is None:
-            torch.manual_seed(self._seed)
-        elif torch is not None and self._torch is not None:
-            processor, *devices = self._torch
-            torch.set_rng_state(processor)
-            if devices:
-                torch.cuda.set_rng_state_all(devices)
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._python, self._numpy = random.getstate(), np.random.get_state()  # noqa: NPY002
-        torch = sys.modules.get("torch")
-        if torch is not None:
-            devices = torch.cuda.get_rng_state_all() if torch.cuda.is_initialized() else ()
-            self._torch = (torch.get_rng_state(), *devices)
 
 
 class HostedDemonstration(Mapping[str, NDArray[Any]]):
