@@ -29,6 +29,7 @@ from roboirg.evaluation.plan import Plan
 from roboirg.evaluation.policy_descriptions import describe_policy
 from roboirg.evaluation.runner import run_plan
 from roboirg.policies.loading import is_foreign, needs_host
+from roboirg.policies.requirements import wanted_cameras, wanted_history
 from roboirg.records.record import Job, Record
 from roboirg.records.store import RECORDS_FILE, read_contents, read_records
 
@@ -114,7 +115,8 @@ class It:
 """,
     )
     policy = HostedPolicy(pool.address, spec, 5)
-    assert (policy.observe_every, list(policy.cameras)) == (4, ["front", "wrist"])  # type: ignore[attr-defined]
+    assert (wanted_history(policy), wanted_cameras(policy)) == (4, ("front", "wrist"))
+    assert not hasattr(policy, "cameras")  # it has not said which
     frames = np.random.default_rng(0).integers(0, 255, (30, 256, 256, 3), np.uint8)
     assert frames.nbytes > 2 * BLOCK_SIZE
     policy.reset("Pick it.", {"front_rgb": frames, "joint_positions": np.zeros((30, 7))})

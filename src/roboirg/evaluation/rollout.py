@@ -197,7 +197,8 @@ class _CallGuard:
     @contextlib.contextmanager
     def policy(self, phase: Phase, name: str) -> Iterator[None]:
         # Whatever ends this process while it waits for a host, it is not the policy.
-        watching = watched("host's reply") if self._is_hosted else watched(phase, self._limit_s)
+        hosted: Phase = "wait for the policy's host"
+        watching = watched(hosted) if self._is_hosted else watched(phase, self._limit_s)
         with attribute_errors("policy"), watching, self._timed(name):
             yield
 

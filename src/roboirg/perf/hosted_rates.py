@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.core.observations import CAMERAS, Demonstration, Observation
+from roboirg.core.observations import FRONT, Demonstration, Observation
 from roboirg.evaluation.executors.executor import LocalProcesses
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
@@ -28,7 +28,7 @@ _HOUR_S = 3600
 class SlowPolicy:
     """Swings the arm, takes batches, and thinks 50 ms about each, as a model on a GPU does."""
 
-    cameras: ClassVar[tuple[str, ...]] = CAMERAS
+    cameras: ClassVar[tuple[str, ...]] = (FRONT,)
     demonstration_frames: ClassVar[str] = "none"
     version = "1"
 

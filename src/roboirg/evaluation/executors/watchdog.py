@@ -16,7 +16,7 @@ from typing import Literal, get_args
 Phase = Literal[
     "worker startup",
     "environment",
-    "host's reply",
+    "wait for the policy's host",
     "policy's constructor",
     "policy's reset()",
     "policy's hear()",

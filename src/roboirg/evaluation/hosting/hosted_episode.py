@@ -96,9 +96,10 @@ class HostedEpisode:
 
     def describe(self, spec: str) -> Message:
         """Return what the world must know of the policy."""
-        needs = {name: read(self.policy) for name, read in REQUIREMENTS.items()}
+        own = {name: one for name, one in REQUIREMENTS.items() if hasattr(self.policy, name)}
         return {
-            "needs": {**needs, "actions": self._space.name},
+            "needs": {name: read(self.policy) for name, read in own.items() if name != "actions"},
+            "actions": self._space.name,
             "version": policy_version(spec),
             "privileged": is_privileged(spec),
             "together": callable(getattr(self.policy, "act_together", None)),

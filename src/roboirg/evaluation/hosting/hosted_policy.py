@@ -186,7 +186,9 @@ class HostedPolicy:
         """Take what the environment must provide, each under the name of the attribute."""
         with _reading():
             for name in REQUIREMENTS:
-                setattr(self, name, found["needs"][name])
+                if name in found["needs"]:
+                    setattr(self, name, found["needs"][name])
+            self.actions = str(found["actions"])
             self.version = clip_text(str(found["version"]), _MAX_TEXT_LENGTH)
             self._reads = tuple(map(str, found["reads"]))
 
