@@ -92,6 +92,33 @@ def test_an_episode_begins_where_the_run_began(
             policy.close()
 
 
+@pytest.mark.parametrize(("process", "elsewhere"), [("own", False), ("shared", True)])
+def test_a_policy_is_imported_only_in_its_own_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, process: str, elsewhere: bool
+) -> None:
+    (tmp_path / "tattler.py").write_text(
+        "import os, sys\nimport numpy as np\n"
+        "with open('imports', 'a') as file: file.write(f'{sys.orig_argv}\\n')\n"
+        "class It:\n    cameras = ()\n    def reset(self, i, d): pass\n"
+        "    def act(self, o): return np.ones((24, 8))\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    options = {"tasks": "PickXtimes", "settings": "direct", "policy_process": process}
+    sys.path.insert(0, str(tmp_path))
+    try:
+        plan = make_plan(["tattler:It"], **options)  # type: ignore[arg-type]
+        for _ in range(2):  # the second run compares versions
+            run_plan(plan, tmp_path, paper_runner(plan, tmp_path), LocalProcesses(2))
+            plan = make_plan(["tattler:It"], **options, max_steps=9)  # type: ignore[arg-type]
+    finally:
+        sys.modules.pop("tattler", None)
+    imports = (tmp_path / "imports").read_text().splitlines()
+    assert imports
+    assert any("host_process" not in one for one in imports) == elsewhere
+    assert {record.outcome for record in read_records(tmp_path)} == {"success"}
+
+
 def memory_of(pid: int, needle: bytes) -> bool:
     """Return whether the readable memory of a process holds some bytes."""
     with Path(f"/proc/{pid}/mem").open("rb", 0) as memory:

@@ -86,6 +86,10 @@ class Versions(NamedTuple):
         return cls(result.policy_version, result.language_version, result.environment_version)
 
 
+PRIVILEGED = " (privileged)"
+"""Mark of policies that read the simulator's state."""
+
+
 class PolicyRun(NamedTuple):
     """One policy under one set of conditions and versions: results that may be averaged.
 
@@ -108,6 +112,11 @@ class PolicyRun(NamedTuple):
         """Return the policy run of a result."""
         versions = Versions.of(result)
         return cls(result.policy, EvalConditions.of(result), versions, run, result.privileged)
+
+    @property
+    def marked_policy(self) -> str:
+        """The policy's name, marked if it is privileged."""
+        return self.policy + PRIVILEGED * self.is_privileged
 
 
 class CellKey(NamedTuple):
@@ -284,10 +293,7 @@ def labels(cells: Cells) -> dict[PolicyRun, str]:
     Privileged policies are marked, because their rates are no rates of policies.
     """
     policy_runs = list(dict.fromkeys(key.policy_run for key in cells))
-    return {
-        one: _label(one, policy_runs) + (" (privileged)" if one.is_privileged else "")
-        for one in policy_runs
-    }
+    return {one: _label(one, policy_runs) + PRIVILEGED * one.is_privileged for one in policy_runs}
 
 
 def _label(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> str:
