@@ -56,7 +56,7 @@ PLAN = Plan(
 
 def played(job: Job) -> Record:
     """The forgetful policy fails in every implicit instruction that says *it*, and in no other."""
-    record = make_record(job, RolloutResult("success", None), started_at="now")
+    record = make_record(job, RolloutResult("success", cause=None), started_at="now")
     says_it = any(one.expression == "it" for one in record.mentions)
     if job.policy == "listener" or not says_it:
         return record
@@ -179,7 +179,7 @@ def test_only_the_command_s_expressions_count(records: tuple[Record, ...]) -> No
     assert "them" in said - found, "said of the referents in a reinforcement"
     resolved = make_record(
         PLAN.jobs()[0].model_copy(update={"setting": "contextual", "form": "resolved"}),
-        RolloutResult("success", None),
+        RolloutResult("success", cause=None),
         started_at="now",
     )
     assert any(mention.expression for mention in resolved.mentions)
@@ -279,7 +279,8 @@ def test_the_order_of_the_records_makes_no_difference(records: tuple[Record, ...
 # Commands
 
 
-def test_tables_by_everything(run: Path, tmp_path: Path) -> None:
+def test_tables_by_everything(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
     output = call("tables", run, "--by", "all")
     for breakdown in BREAKDOWNS.values():
         assert f"Gap to explicit by {breakdown.title}" in output

@@ -160,8 +160,8 @@ def test_the_context_is_compared_on_the_same_tasks(
 def test_what_is_incomplete_is_called_so(tmp_path: Path) -> None:
     write_figures(content(results()[:-2], planned=PLAN.jobs()), tmp_path, ["averages"])
     drawn = texts(tmp_path / "averages.svg")
-    assert "<!-- forgetful (incomplete)" in drawn
-    assert "<!-- listener -->" in drawn
+    assert "<!-- forgetful (privileged) (incomplete)" in drawn
+    assert "<!-- listener (privileged) -->" in drawn
 
 
 def test_every_failure_has_a_color_of_its_own() -> None:
@@ -172,8 +172,10 @@ def test_every_failure_has_a_color_of_its_own() -> None:
 def test_runs_that_hold_the_same_episodes_stand_apart(tmp_path: Path) -> None:
     both = FigureData.of([("one", results()), ("two", results())])
     assert set(both.names.values()) == {
-        "listener, one", "listener, two", "forgetful, one", "forgetful, two",
-    }  # fmt: skip
+        f"{policy}, {run} (privileged)"
+        for policy in ("listener", "forgetful")
+        for run in ("one", "two")
+    }
     assert {who.run for who, _ in both.results} == {"one", "two"}
     write_figures(both, tmp_path, ["failures"])
     assert "<!-- forgetful, two" in texts(tmp_path / "failures.svg")

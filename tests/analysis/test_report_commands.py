@@ -96,7 +96,7 @@ def test_what_the_run_lacks_is_said(run: Path, tmp_path: Path) -> None:
 
 def test_two_policies_of_a_run_are_compared(run: Path) -> None:
     output = call("compare", f"{run}:listener", f"{run}:forgetful")
-    assert "direct: listener is better, +100.0 points" in output
+    assert "direct: listener (privileged) is better, +100.0 points" in output
     assert "explicit: no clear difference" in output
     assert call("compare", f"{run}:listener", f"{run}:forgetful") == output
     with pytest.raises(UnknownNameError, match="Did you mean 'listener'"):
@@ -108,7 +108,7 @@ def test_two_policies_of_a_run_are_compared(run: Path) -> None:
 def test_two_runs_of_a_policy_are_told_apart_by_their_folders(run: Path, tmp_path: Path) -> None:
     write_run(tmp_path / "again", ("listener",), leave_out=3)
     output = call("compare", tmp_path / "again", f"{run}:listener")
-    assert f"listener ({tmp_path / 'again'}) against" in " ".join(output.split())
+    assert f"listener (privileged) ({tmp_path / 'again'}) against" in " ".join(output.split())
     assert "Incomplete: 3 trials" in output
     with pytest.raises(StoreError, match="no records in"):
         call("compare", tmp_path / "nowhere", run)

@@ -297,7 +297,7 @@ def test_wrong_cameras_of_an_object_are_the_policys_fault(
 
 def test_a_record_says_what_is_in_the_words_and_who_cheats() -> None:
     job = JOB.model_copy(update={"setting": "reasoning", "policy": "oracle"})
-    record = rollout.make_record(job, RolloutResult("success", None), started_at="now")
+    record = rollout.make_record(job, RolloutResult("success", cause=None), started_at="now")
     assert record.metadata["pattern"]
     assert record.metadata["templates"]
     assert record.privileged
@@ -307,7 +307,7 @@ def test_a_record_says_what_is_in_the_words_and_who_cheats() -> None:
 
 def test_a_record_has_the_words_that_were_spoken() -> None:
     spoken = instruct_job(JOB.model_copy(update={"setting": "spatial"}))
-    result = RolloutResult("success", None, instruction=spoken)
+    result = RolloutResult("success", cause=None, instruction=spoken)
     record = rollout.make_record(JOB, result, started_at="now")
     assert record.instruction[-1].text == spoken.utterances[-1].text
     # An episode that did not begin has the words that it would have had.

@@ -60,15 +60,15 @@ def plan_of_chaos() -> Plan:
 
 
 def play(plan: Plan, folder: Path) -> tuple[RunSummary, dict[Job, Record]]:
-    player = EpisodeRunner(folder, policy_timeout_s=plan.policy_timeout_s)
+    player = EpisodeRunner(folder, policy_timeout_s=plan.policy_timeout_s, hosting=plan.hosting)
     summary = run_plan(plan, folder, player, LocalProcesses(2, episode_timeout_s=600))
     return summary, {record.identity: record for record in read_records(folder)}
 
 
-@pytest.fixture
-def plan(monkeypatch: pytest.MonkeyPatch) -> Plan:
+@pytest.fixture(params=["own", "shared"])
+def plan(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Plan:
     monkeypatch.syspath_prepend(Path(chaos_policy.__file__).parent)
-    return plan_of_chaos()
+    return plan_of_chaos().model_copy(update={"policy_process": request.param})
 
 
 @pytest.mark.sim

@@ -17,7 +17,7 @@ def test_a_url_is_checked_without_loading():
     load_policy_class("lerobot://lerobot/some-checkpoint?device=cpu&execute=8")
     policy = make_policy("lerobot://./outputs/last?version=step-3", 0)
     assert isinstance(policy, Policy)
-    assert (policy.version, policy._place) == ("step-3", "./outputs/last")
+    assert (policy.version, policy.place) == ("step-3", "./outputs/last")
     assert policy_version("lerobot://x/y") == "unknown"
     with pytest.raises(UnknownNameError, match=r"Did you mean 'device'\?"):
         load_policy_class("lerobot://x/y?devise=cpu")
@@ -48,9 +48,11 @@ def checkpoint(monkeypatch):
         def eval(self):
             return self
 
-        def predict_action_chunk(self, batch):
+        def predict_action_chunk(self, batch, noise=None):
             self.batches.append(batch)
-            return batch["observation.state"][:, None].repeat(1, 6, 1) + torch.rand(1, 6, 1)
+            if noise is None:
+                noise = torch.rand(len(batch["task"]), 6, 1)
+            return batch["observation.state"][:, None].repeat(1, 6, 1) + noise[:, :6, :1]
 
     model = Model()
     config = SimpleNamespace(type="act", input_features={"observation.state": None})
@@ -91,6 +93,49 @@ def test_a_checkpoint_is_fed_its_own_names(checkpoint):
     again.reset(INSTRUCTION, video(0))
     assert np.array_equal(again.act(moment(1)), first)
     assert checkpoint.model.resets == 2
+
+
+def test_rows_of_a_batch_depend_on_their_own_episode(checkpoint):
+    checkpoint.config.chunk_size, checkpoint.config.max_action_dim = 6, 32
+    episodes = [make_policy("lerobot://x/y?batch=4", seed) for seed in range(5)]
+    for one in episodes:
+        one.reset(INSTRUCTION, video(0))
+    moments = [moment(number) for number in range(5)]
+    together = episodes[0].act_together(episodes, moments)
+    assert [len(batch["task"]) for batch in checkpoint.model.batches] == [4, 4]  # always as many
+    again = [make_policy("lerobot://x/y?batch=4", seed) for seed in range(5)]
+    for one, now, expected in zip(again, moments, together, strict=True):
+        one.reset(INSTRUCTION, video(0))
+        assert np.array_equal(one.act(now), expected)
+    assert not np.array_equal(again[0].act(moments[0]), together[0])  # other noise in each call
+
+
+def test_checkpoints_that_draw_their_own_noise_are_asked_one_by_one(checkpoint):
+    checkpoint.config.type = "diffusion"
+    episodes = [make_policy("lerobot://x/y?batch=4", seed) for seed in range(3)]
+    for one in episodes:
+        one.reset(INSTRUCTION, video(0))
+    together = episodes[0].act_together(episodes, [moment(1)] * 3)
+    assert [len(batch["task"]) for batch in checkpoint.model.batches] == [1, 1, 1]
+    alone = make_policy("lerobot://x/y?batch=4", 2)
+    alone.reset(INSTRUCTION, video(0))
+    assert np.array_equal(alone.act(moment(1)), together[2])
+
+
+def test_episodes_do_not_share_what_a_model_remembers(checkpoint):
+    model = checkpoint.model
+    model.reset = lambda: setattr(model, "queue", [])
+
+    def predict(batch):
+        model.queue.append(1)
+        return batch["observation.state"][:, None] * 0 + len(model.queue)
+
+    model.predict_action_chunk = predict
+    first, second = (make_policy("lerobot://x/y", seed) for seed in range(2))
+    first.reset(INSTRUCTION, video(0))
+    second.reset(INSTRUCTION, video(0))
+    counts = [one.act(moment(1))[0, 0] for one in (first, second, first, first, second)]
+    assert counts == [2, 2, 4, 6, 4]  # the stand-in doubles
 
 
 def test_a_checkpoint_that_wants_another_camera_is_told(checkpoint):

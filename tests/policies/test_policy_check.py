@@ -1,6 +1,7 @@
 """The conformance check finds what is wrong with a policy, and nothing where nothing is."""
 
 import sys
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -152,6 +153,7 @@ def test_a_sound_policy_passes_everything():
         "inputs unchanged",
         "deterministic",
         "reset forgets",
+        "turns",
         "broken sensors",
     ]
     assert all(result.message.endswith(".") for result in results)
@@ -240,8 +242,60 @@ def test_the_command_prints_a_table_and_an_exit_code(name, code, tmp_path, monke
     app.command()(command)
     result = CliRunner().invoke(app, [f"my_policy:{name}"])
     assert result.exit_code == code, result.output
-    assert ("11 checks, none failed." if code == 0 else "1 of 3 checks failed.") in result.output
+    assert ("12 checks, none failed." if code == 0 else "1 of 3 checks failed.") in result.output
     assert "Actions joint_angle" in result.output
+
+
+class Forgetful(Sound):
+    """Keeps what belongs to an episode where all episodes see it."""
+
+    seen: ClassVar[list[int]] = []
+
+    def reset(self, instruction, demonstration):
+        self.seen.clear()
+
+    def act(self, observation):
+        self.seen.append(1)
+        return np.full((5, 8), 0.1 * len(self.seen))
+
+
+class Batched:
+    cameras = ()
+
+    def begin(self, instruction, demonstration, seed):
+        return np.random.default_rng(seed)
+
+    def act_batch(self, states, observations):
+        return [state.standard_normal((5, 8)) for state in states]
+
+
+class Averaging(Batched):
+    """A chunk depends on the other episodes."""
+
+    def act_batch(self, states, observations):
+        return [np.full((5, 8), 0.1 * len(states))] * len(states)
+
+
+def test_a_policy_is_checked_for_what_a_host_relies_on():
+    assert not found(f"{__name__}:Sound", FAIL)
+    (words,) = found(f"{__name__}:Forgetful", FAIL).values()
+    assert words.startswith("Two episodes in turns differ by up to 0.3")
+    assert not found(f"{__name__}:Batched", FAIL)
+    assert {"turns", "batches"} <= set(found(f"{__name__}:Batched", PASS))
+    (words,) = found(f"{__name__}:Averaging", FAIL).values()
+    assert words.startswith("Two episodes together differ by up to 0.1")
+
+
+def test_global_random_numbers_belong_to_an_episode():
+    assert not found(f"{__name__}:GlobalDice", FAIL)
+
+
+class GlobalDice(Sound):
+    def reset(self, instruction, demonstration):
+        np.random.seed(7)  # noqa: NPY002
+
+    def act(self, observation):
+        return np.random.uniform(-0.1, 0.1, (5, 8))  # noqa: NPY002
 
 
 class Attentive(Sound):

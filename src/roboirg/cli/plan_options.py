@@ -82,6 +82,20 @@ Meshes = Annotated[
 Video = Annotated[
     str | None, typer.Option(help="Record videos of episodes: off, failures or all.  (off)")
 ]
+PolicyProcessOption = Annotated[
+    str | None,
+    typer.Option(
+        "--policy-process",
+        help="own: policies have processes of their own; shared: the world's, to debug.  (own)",
+    ),
+]
+Batch = Annotated[
+    int | None, typer.Option(help="Most episodes that a policy is asked about at once.  (16)")
+]
+Devices = Annotated[
+    str | None,
+    typer.Option(help="GPUs, such as 0,1; each policy has a process on each.  (one, on any)"),
+]
 PolicyTimeout = Annotated[
     float | None, typer.Option(help="Time limit of one policy call, seconds.  (600)")
 ]

@@ -173,7 +173,7 @@ def compare(
     labels = _labels(breakdowns, [_split(first)[0], _split(second)[0]])
     titled = {one.title: labels[one.name] for one in breakdowns}
     found = compare_cells(ours, theirs, np.random.default_rng(SEED), titled)
-    names = [found.first.policy, found.second.policy]
+    names = [found.first.marked_policy, found.second.marked_policy]
     if names[0] == names[1]:
         names = [f"{names[0]} ({first})", f"{names[1]} ({second})"]
     console = Console()

@@ -73,6 +73,9 @@ def run(
     observe_every: options.ObserveEvery = None,
     meshes: options.Meshes = None,
     video: options.Video = None,
+    policy_process: options.PolicyProcessOption = None,
+    batch: options.Batch = None,
+    devices: options.Devices = None,
     policy_timeout_s: options.PolicyTimeout = None,
     episode_timeout_s: options.EpisodeTimeout = None,
     tries: options.Tries = None,
@@ -108,6 +111,9 @@ def run(
         observe_every=observe_every,
         meshes=meshes,
         video=video,
+        policy_process=policy_process,
+        batch=batch,
+        devices=devices,
         policy_timeout_s=policy_timeout_s,
         episode_timeout_s=episode_timeout_s,
         tries=tries,
@@ -185,7 +191,11 @@ def play(plan: Plan, out: Path, executor: Executor, *, retry: bool) -> RunSummar
     if plan.video != "off":
         check_video_support()
     play_job = EpisodeRunner(
-        out, plan.video, policy_timeout_s=plan.policy_timeout_s, plan=plan.fingerprint
+        out,
+        plan.video,
+        policy_timeout_s=plan.policy_timeout_s,
+        plan=plan.fingerprint,
+        hosting=plan.hosting,
     )
     try:
         with ConsoleReporter(Console()) as reporter:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import signal
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,10 +17,13 @@ from roboirg.core.errors import (
 )
 from roboirg.core.printable import printable
 from roboirg.records.record import ErrorKind
+from roboirg.util.plain_text import clip_text
 
 ErrorSource = Literal["policy", "environment"]
 
 MAX_CAUSE_LENGTH = 400
+MAX_DETAILS_LENGTH = 20_000
+"""Most characters of a traceback; its end is kept."""
 
 
 class EpisodeError(Exception):
@@ -39,6 +43,19 @@ class EpisodeError(Exception):
         self.details = printable(details)
 
 
+class EpisodeLostError(Exception):
+    """The policy's process was lost through no fault of this episode, which is played again.
+
+    Attributes:
+        kind: kind of error, if it is lost again and again.
+        alone: whether the policy must be asked about this episode alone from now on.
+    """
+
+    def __init__(self, kind: ErrorKind, message: str, *, alone: bool) -> None:
+        super().__init__(message)
+        self.kind, self.alone = kind, alone
+
+
 def format_cause(kind: ErrorKind, message: str) -> str:
     """Return a record's cause: kind of error and message."""
     return f"{kind.replace('_', ' ')}: {message}"
@@ -50,16 +67,30 @@ def attribute_errors(source: ErrorSource) -> Iterator[None]:
 
     Raises:
         EpisodeError: an exception was raised.
+        EpisodeLostError: unchanged, because the episode is played again.
         RenderDeviceError: unchanged, because every other episode would end the same way.
         MissingDependencyError: likewise.
+        KeyboardInterrupt: unchanged, if it may be the user's.
     """
     try:
         yield
-    except (RenderDeviceError, MissingDependencyError, EpisodeError):
+    except (RenderDeviceError, MissingDependencyError, EpisodeError, EpisodeLostError):
         raise
-    except (Exception, SystemExit) as error:  # policies and simulators may raise anything
-        kind = _error_kind(source, error)
-        raise EpisodeError(kind, one_line(error), traceback.format_exc()) from error
+    except (Exception, SystemExit, GeneratorExit, KeyboardInterrupt) as error:
+        # Policies may raise anything. Where Ctrl-C is ignored, as in workers, it is not the user's.
+        if isinstance(error, KeyboardInterrupt) and signal.getsignal(signal.SIGINT) is not (
+            signal.SIG_IGN
+        ):
+            raise
+        raise describe_error(source, error) from error
+
+
+def describe_error(source: ErrorSource, error: BaseException) -> EpisodeError:
+    """Return the `EpisodeError` of an exception that is being handled."""
+    trace = traceback.format_exc()[-MAX_DETAILS_LENGTH:]
+    return EpisodeError(
+        _error_kind(source, error), one_line(error), clip_text(trace, MAX_DETAILS_LENGTH)
+    )
 
 
 def _error_kind(source: ErrorSource, error: BaseException) -> ErrorKind:
@@ -76,6 +107,12 @@ def _error_kind(source: ErrorSource, error: BaseException) -> ErrorKind:
 
 def one_line(error: BaseException) -> str:
     """Return an exception as one line that is the same in every process."""
-    words = str(error) if isinstance(error, RoboIRGError) else f"{type(error).__name__}: {error}"
-    words = re.sub(r"0x[0-9a-fA-F]{6,}", "0x…", " ".join(words.split())).rstrip(": ")
-    return words.encode("utf-8", "replace").decode()[:MAX_CAUSE_LENGTH]
+    try:
+        text = str(error)
+    except BaseException:  # noqa: BLE001 - a policy's own exceptions may raise anything
+        text = "its text cannot be read"
+    words = text if isinstance(error, RoboIRGError) else f"{type(error).__name__}: {text}"
+    # Splitting a text of a hundred megabytes would take minutes.
+    words = " ".join(words[: 10 * MAX_CAUSE_LENGTH].split())
+    words = re.sub(r"0x[0-9a-fA-F]{6,}", "0x…", words).rstrip(": ")
+    return clip_text(words, MAX_CAUSE_LENGTH)

@@ -31,6 +31,7 @@ from roboirg.core.observations import (
 )
 from roboirg.core.word_pools import POOLS
 from roboirg.episodes import splits
+from roboirg.evaluation.hosting.host_pool import DEFAULT_BATCH, HostSettings
 from roboirg.evaluation.plan_parsing import (
     ALL,
     means_all,
@@ -41,12 +42,14 @@ from roboirg.evaluation.plan_parsing import (
     parse_policies,
     parse_stage_sets,
 )
+from roboirg.evaluation.policy_descriptions import describe_policy
 from roboirg.language.generator import find_refusal
 from roboirg.language.instruction import FORMS, Instruction
 from roboirg.language.settings import all_settings
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, ERROR_KINDS, ErrorKind, Job
 from roboirg.util.atomic_write import write_atomically
+from roboirg.util.plain_text import is_encodable
 from roboirg.util.short_hash import short_hash
 
 PLAN_FILE = "plan.json"
@@ -56,6 +59,9 @@ REQUIRED = "required"
 
 VideoMode = Literal["off", "failures", "all"]
 VIDEO_MODES: tuple[VideoMode, ...] = get_args(VideoMode)
+
+PolicyProcessMode = Literal["own", "shared"]
+POLICY_PROCESSES: tuple[PolicyProcessMode, ...] = get_args(PolicyProcessMode)
 
 MESHES = ("faithful", "light")
 
@@ -91,6 +97,10 @@ class Plan(BaseModel):
         meshes: faithful or light.
         video: which episodes get a video. This and all that follows is not part of a record's
             identity.
+        policy_process: ``own``: each policy that is neither built in nor remote has a process of
+            its own; ``shared``: it runs in the world's, for debuggers.
+        batch: most episodes that a policy is asked about together.
+        devices: values of ``CUDA_VISIBLE_DEVICES``; each policy has a process on each of them.
         policy_timeout_s: seconds that one call of a policy may take.
         episode_timeout_s: seconds that an episode may take.
         tries: how often an episode is played if it ends in an error of a kind in `retry_on`.
@@ -121,6 +131,9 @@ class Plan(BaseModel):
     observe_every: int | None = None
     meshes: str = DEFAULT_MESHES
     video: VideoMode = "off"
+    policy_process: PolicyProcessMode = "own"
+    batch: int = DEFAULT_BATCH
+    devices: tuple[str, ...] = ()
     policy_timeout_s: float = 600.0
     episode_timeout_s: float = 7200.0
     tries: int = 2
@@ -154,6 +167,17 @@ class Plan(BaseModel):
         return specs
 
     @property
+    def hosting(self) -> HostSettings | None:
+        """How policies are hosted; None if they run in the world's process.
+
+        Raises:
+            InvalidValueError: the batch is less than 1.
+        """
+        if self.policy_process == "shared":
+            return None
+        return HostSettings(self.batch, self.devices, self.policy_timeout_s)
+
+    @property
     def fingerprint(self) -> str:
         """Hash of all fields."""
         return short_hash(self.model_dump_json())
@@ -166,8 +190,13 @@ class Plan(BaseModel):
                 nearest.
             InvalidValueError: a number is out of range, or a task lacks a setting.
         """
-        for spec in self.specs.values():
-            policies.load_policy_class(spec)
+        for name, spec in self.specs.items():
+            if not is_encodable(f"{name}={spec}"):
+                raise InvalidValueError(f"Policy {name!r} is not text: it has lone surrogates.")
+            if self.policy_process == "own":
+                describe_policy(spec, again=True)
+            else:
+                policies.load_policy_class(spec)
         self._check_options()
         for task in self.tasks:
             for index in (min(self.episodes), max(self.episodes)):
@@ -281,7 +310,7 @@ class Plan(BaseModel):
         _check_names("rival", (self.rival,), RIVALS)
         _check_names("reasoning", (self.reasoning,), REASONINGS)
         _check_names("kind of meshes", (self.meshes,), MESHES)
-        for name, least in (("max_steps", 1), ("tries", 1)):
+        for name, least in (("max_steps", 1), ("tries", 1), ("batch", 1)):
             if getattr(self, name) < least:
                 raise InvalidValueError(
                     f"{name} is {getattr(self, name)}; it must be at least {least}."
@@ -317,6 +346,7 @@ def make_plan(
     policy_seeds: str = "0",
     stages: str = "1-5",
     retry_on: str = ",".join(RETRYABLE),
+    devices: str = "",
     **options: object,
 ) -> Plan:
     """Return a checked plan from options as typed on the command line.
@@ -330,6 +360,7 @@ def make_plan(
         policy_seeds: a list of numbers.
         stages: a list of numbers, or several lists separated by semicolons.
         retry_on: kinds of errors separated by commas, or ``none``.
+        devices: names separated by commas; none for one process on any device.
         **options: other fields of `Plan`.
 
     Raises:
@@ -355,6 +386,7 @@ def make_plan(
             policy_seeds=parse_numbers("policy seed", policy_seeds),
             stages=parse_stage_sets(stages),
             retry_on=_error_kinds(retry_on),
+            devices=parse_names("device", devices) if devices else (),
             **options,  # type: ignore[arg-type]
         )
     except ValidationError as error:

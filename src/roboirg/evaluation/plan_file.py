@@ -26,6 +26,7 @@ _LISTS = frozenset(
         "policy_seeds",
         "stages",
         "retry_on",
+        "devices",
     }
 )
 """Keys whose values are lists on the command line."""

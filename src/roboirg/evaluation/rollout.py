@@ -14,32 +14,39 @@
 from __future__ import annotations
 
 import contextlib
-import json
-import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import JsonValue
 
 from roboirg import policies
-from roboirg.core.actions import ActionSpace, check_chunk
+from roboirg.core.actions import ActionSpace
 from roboirg.core.delivery import SpokenInstruction
-from roboirg.core.errors import InvalidActionError, InvalidValueError
-from roboirg.core.observations import DemonstrationFrames, Observation
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.observations import DemonstrationFrames
 from roboirg.core.waiting import queued_seconds
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors, one_line
+from roboirg.evaluation.episode_errors import (
+    EpisodeError,
+    EpisodeLostError,
+    attribute_errors,
+    format_cause,
+    one_line,
+)
 from roboirg.evaluation.executors.watchdog import Phase, watched
+from roboirg.evaluation.hosting.host_pool import HostAddress, HostSettings
+from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.plan import VideoMode
+from roboirg.evaluation.policy_calls import next_actions, policy_metadata, policy_usage
+from roboirg.evaluation.policy_descriptions import PolicyDescription, describe_here
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.video_writer import VideoOptions, VideoWriter
 from roboirg.language.wordings.wording_store import open_wordings
-from roboirg.policies.base import Policy, PrivilegedPolicy, tell_policy
+from roboirg.policies.base import Policy, PrivilegedPolicy, close_policy, tell_policy
+from roboirg.policies.loading import needs_host
 from roboirg.policies.requirements import (
     wanted_actions,
     wanted_calibration,
@@ -61,11 +68,8 @@ VIDEO_FOLDER = "videos"
 NO_RENDER_DEVICE = "none"
 """Name of the device of an environment that renders nothing."""
 
-MAX_ROWS = 10_000
-"""Most actions that a policy may return at once; an episode has 1300 steps."""
-
-MAX_METADATA_LENGTH = 65_536
-"""Most characters of JSON in a policy's metadata."""
+MAX_LOSSES = 20
+"""How often an episode is played again because other episodes broke the policy's process."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +82,8 @@ class EpisodeRunner:
         options: format of the videos.
         policy_timeout_s: seconds that one call of the policy may take, if a supervisor watches.
         plan: fingerprint of the plan, for the records.
+        hosting: how policies get processes of their own; None for policies in the world's process.
+        hosts: where to ask for them; an executor sets it.
     """
 
     folder: Path
@@ -85,10 +91,16 @@ class EpisodeRunner:
     options: VideoOptions = field(default_factory=VideoOptions)
     policy_timeout_s: float | None = None
     plan: str | None = None
+    hosting: HostSettings | None = None
+    hosts: HostAddress | None = None
 
     def in_folder(self, folder: Path) -> EpisodeRunner:
         """Return a copy that writes its videos to another folder."""
         return replace(self, folder=folder)
+
+    def with_hosts(self, hosts: HostAddress) -> EpisodeRunner:
+        """Return a copy that asks these hosts."""
+        return replace(self, hosts=hosts)
 
     def __call__(self, job: Job) -> Record:
         """Play one job.
@@ -98,10 +110,7 @@ class EpisodeRunner:
             MissingDependencyError: a package has to be installed first.
         """
         started_at, start = utc_now(), time.monotonic()
-        writer = None
-        if self.video != "off":
-            writer = VideoWriter(self.folder / VIDEO_FOLDER / f"{job.slug}.mp4", self.options)
-        result = play_episode(job, writer, self.policy_timeout_s)
+        writer, result = self._play(job)
         video = self._finish_video(writer, result)
         error = None if writer is None else writer.error
         return make_record(
@@ -113,6 +122,27 @@ class EpisodeRunner:
             duration_s=round(time.monotonic() - start, 3),
             plan=self.plan,
         )
+
+    def _play(self, job: Job) -> tuple[VideoWriter | None, RolloutResult]:
+        """Play a job, again from its beginning if the policy's process is lost meanwhile."""
+        alone = False
+        for losses in range(1, MAX_LOSSES + 1):
+            writer = None
+            if self.video != "off":
+                writer = VideoWriter(self.folder / VIDEO_FOLDER / f"{job.slug}.mp4", self.options)
+            try:
+                return writer, play_episode(
+                    job, writer, self.policy_timeout_s, self.hosts, alone=alone
+                )
+            except EpisodeLostError as error:
+                alone = alone or error.alone
+                if losses == MAX_LOSSES:
+                    result, message = RolloutResult(), f"{error}, {losses} times in a row"
+                    result.record_error(error.kind, format_cause(error.kind, message))
+                    return writer, result
+                if writer is not None:
+                    writer.discard()
+        raise AssertionError("the last loss returns")
 
     def _finish_video(self, writer: VideoWriter | None, result: RolloutResult) -> str | None:
         """Keep or discard the video; return its path relative to the folder, or None."""
@@ -150,15 +180,27 @@ class EnvRequirements(NamedTuple):
 
 
 class _CallGuard:
-    """Attributes errors of policy and environment calls, watches their time and measures it."""
+    """Attributes errors of policy and environment calls, watches their time and measures it.
 
-    def __init__(self, result: RolloutResult, policy_timeout_s: float | None) -> None:
+    Args:
+        result: gets the times.
+        policy_timeout_s: seconds that one call of the policy may take; None for no limit.
+        is_hosted: whether the policy's host watches the time instead.
+    """
+
+    def __init__(
+        self, result: RolloutResult, policy_timeout_s: float | None, *, is_hosted: bool = False
+    ) -> None:
         self._timings = result.timings
         self._limit_s = policy_timeout_s
+        self._is_hosted = is_hosted
 
     @contextlib.contextmanager
     def policy(self, phase: Phase, name: str) -> Iterator[None]:
-        with attribute_errors("policy"), watched(phase, self._limit_s), self._timed(name):
+        # Whatever ends this process while it waits for a host, it is not the policy.
+        hosted: Phase = "wait for the policy's host"
+        watching = watched(hosted) if self._is_hosted else watched(phase, self._limit_s)
+        with attribute_errors("policy"), watching, self._timed(name):
             yield
 
     @contextlib.contextmanager
@@ -183,7 +225,12 @@ class _CallGuard:
 
 
 def play_episode(
-    job: Job, writer: VideoWriter | None = None, policy_timeout_s: float | None = None
+    job: Job,
+    writer: VideoWriter | None = None,
+    policy_timeout_s: float | None = None,
+    hosts: HostAddress | None = None,
+    *,
+    alone: bool = False,
 ) -> RolloutResult:
     """Play one job; errors of the policy or the environment end up in the result.
 
@@ -191,8 +238,11 @@ def play_episode(
         job: what to play.
         writer: gets the frames of a video.
         policy_timeout_s: seconds that one call of the policy may take, if a supervisor watches.
+        hosts: where policies have processes of their own; None to run them in this process.
+        alone: whether a hosted policy must not be asked about this episode together with others.
 
     Raises:
+        EpisodeLostError: the policy's process was lost; the episode can be played again.
         RenderDeviceError: no Vulkan device can render.
         MissingDependencyError: a package has to be installed first.
         InvalidValueError: the job's wording file is missing or has changed.
@@ -200,11 +250,19 @@ def play_episode(
     if job.wordings is not None:
         open_wordings(job.wordings_file, job.wordings)
     result = RolloutResult()
-    guard = _CallGuard(result, policy_timeout_s)
-    policy, env = None, None
+    guard = _CallGuard(result, policy_timeout_s, is_hosted=hosts is not None)
+    policy: Policy | None = None
+    env = None
     try:
+        if hosts is not None and needs_host(job.policy_spec):
+            with guard.policy("policy's constructor", "policy_load"):
+                policy = _load_hosted(job, hosts, result, alone=alone)
+        if policy is None:
+            guard = _CallGuard(result, policy_timeout_s)
+            result.policy = describe_here(job.policy_spec)
+            with guard.policy("policy's constructor", "policy_load"):
+                policy = load_policy(job)
         with guard.policy("policy's constructor", "policy_load"):
-            policy = load_policy(job)
             needs = env_requirements(policy, job)
         with guard.environment("env_reset"):
             env = make_env(job, needs)
@@ -266,14 +324,29 @@ def make_env(job: Job, needs: EnvRequirements) -> RoboIRGEnv:
 
 
 def load_policy(job: Job) -> Policy:
-    """Return a new policy object, so that no state of an earlier episode remains.
+    """Return a new policy object, so that no state of an earlier episode remains."""
+    return policies.make_policy(job.policy_spec, seed=_policy_seed(job))
 
-    Its seed is derived from the run's policy seed and the episode's seed: the same in every
-    setting, another in every episode.
+
+def _load_hosted(
+    job: Job, hosts: HostAddress, result: RolloutResult, *, alone: bool
+) -> HostedPolicy | None:
+    """Return a new policy object in its host; None if it is privileged and must run here."""
+    policy = HostedPolicy(hosts, job.policy_spec, _policy_seed(job), alone=alone)
+    if policy.is_privileged:
+        return None
+    result.policy = PolicyDescription(policy.version, is_privileged=False)
+    return policy
+
+
+def _policy_seed(job: Job) -> int:
+    """Return the policy's seed: the same in every setting, another in every episode.
+
+    It is derived from the run's policy seed and the episode's seed.
     """
     episode = get_episode(job.task, job.split, job.episode)
     seeds = np.random.SeedSequence((job.policy_seed, episode.seed))
-    return policies.make_policy(job.policy_spec, seed=int(seeds.generate_state(1)[0]))
+    return int(seeds.generate_state(1)[0])
 
 
 def _play_to_end(
@@ -306,11 +379,11 @@ def _play_to_end(
         if isinstance(policy, PrivilegedPolicy):
             policy.attach(env)
         policy.reset(first, info["demonstration"])
-        result.policy_metadata = _policy_metadata(policy)
+        result.policy_metadata = policy_metadata(policy)
     status, cause = "ongoing", None
     while status == "ongoing":
         with guard.policy("policy's act()", "policy_act"):
-            rows = _next_actions(policy, observation, actions)
+            rows = next_actions(policy, observation, actions)
         with guard.environment("env_step"):
             observation, *_, info = env.step_chunk(rows)
         result.steps = int(info["steps"])
@@ -335,43 +408,20 @@ def _tell(
         writer.caption = " ".join(one["text"] for one in result.heard)
     with guard.policy("policy's hear()", "policy_hear"):
         tell_policy(policy, utterances)
-        result.policy_metadata = _policy_metadata(policy)
-
-
-def _next_actions(
-    policy: Policy, observation: dict[str, Any], space: ActionSpace
-) -> NDArray[np.float64]:
-    """Return the policy's next actions, checked.
-
-    Raises:
-        InvalidActionError: an action is invalid, or there are too many.
-    """
-    rows = policy.act(cast("Observation", observation))
-    count = len(rows) if hasattr(rows, "__len__") else 0
-    if count > MAX_ROWS:
-        raise InvalidActionError(f"{count} actions at once are too many; at most {MAX_ROWS}.")
-    return check_chunk(rows, space)
-
-
-def _policy_metadata(policy: Policy) -> dict[str, JsonValue]:
-    """Return the policy's metadata exactly as a reader of the record gets them."""
-    text = json.dumps(dict(getattr(policy, "metadata", {})), allow_nan=False)
-    if len(text) > MAX_METADATA_LENGTH:
-        raise InvalidValueError(
-            f"the policy's metadata have {len(text)} characters of JSON; "
-            f"at most {MAX_METADATA_LENGTH} are allowed."
-        )
-    return cast("dict[str, JsonValue]", json.loads(text))
+        result.policy_metadata = policy_metadata(policy)
 
 
 def _close_policy(policy: Policy, result: RolloutResult, guard: _CallGuard) -> None:
     """Read the policy's costs and close it; errors there do not change the outcome."""
     try:
         with guard.policy("policy's close()", "policy_close"):
-            if hasattr(policy, "usage"):
-                usage = {str(name): float(value) for name, value in policy.usage().items()}
-                result.usage = {name: cost for name, cost in usage.items() if math.isfinite(cost)}
-            if hasattr(policy, "close"):
-                policy.close()
+            try:
+                result.usage = policy_usage(policy)
+            finally:
+                close_policy(policy)
     except EpisodeError as error:
         result.details = result.details or error.details
+    except EpisodeLostError:
+        pass  # nothing is lost: the episode is over
+    if isinstance(policy, HostedPolicy):
+        result.timings["policy_wait"] = round(policy.waited_s, 6)

@@ -16,13 +16,15 @@ from roboirg import language
 from roboirg.core.conditions import Fact
 from roboirg.core.delivery import TURNS
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
+from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.observations import DemonstrationSource
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.code_fingerprint import code_fingerprint
 from roboirg.evaluation.plan import instruct_job
+from roboirg.evaluation.policy_descriptions import PolicyDescription, describe_policy
 from roboirg.judging import Event, attribute_failure
 from roboirg.language.settings import EXPLICIT
-from roboirg.policies.loading import is_privileged, policy_version, server_version
+from roboirg.policies.loading import server_version
 from roboirg.records.record import (
     Attribution,
     ErrorKind,
@@ -54,6 +56,7 @@ class RolloutResult:
         events: facts that became true or ceased to be.
         render_device: the driver's name; None if nothing was rendered.
         details: traceback of an error.
+        policy: its version and whether it is privileged; None if it was never loaded.
         policy_metadata: what the policy reports about itself.
         usage: what the policy reports that the episode cost.
         timings: seconds spent in the policy and in the environment, by phase.
@@ -73,6 +76,7 @@ class RolloutResult:
     events: list[EventRecord] = field(default_factory=list)
     render_device: str | None = None
     details: str | None = None
+    policy: PolicyDescription | None = None
     policy_metadata: dict[str, JsonValue] = field(default_factory=dict)
     usage: dict[str, float] = field(default_factory=dict)
     timings: dict[str, float] = field(default_factory=dict)
@@ -141,6 +145,7 @@ def make_record(
     # An episode that failed before its reset has a record with the words it would have had.
     instruction = result.instruction or instruct_job(job)
     explicit = instruct_job(job.model_copy(update={"setting": EXPLICIT}))
+    policy = result.policy or _describe(job)
     return Record(
         **dict(job),
         seed=episode.seed,
@@ -158,8 +163,8 @@ def make_record(
         goal=dict(episode.goal.as_mapping()),
         # Exactly what a reader of the file gets.
         metadata=json.loads(json.dumps(dict(instruction.metadata))),
-        privileged=is_privileged(job.policy_spec),
-        policy_version=policy_version(job.policy_spec),
+        privileged=policy.is_privileged,
+        policy_version=policy.version,
         server_version=server_version(result.policy_metadata),
         policy_metadata=result.policy_metadata,
         events=tuple(result.events),
@@ -177,6 +182,13 @@ def make_record(
         started_at=started_at,
         duration_s=duration_s,
     )
+
+
+def _describe(job: Job) -> PolicyDescription:
+    try:
+        return describe_policy(job.policy_spec)
+    except (InvalidValueError, MissingDependencyError):
+        return PolicyDescription("unknown", is_privileged=False)
 
 
 def _utterances(

@@ -14,12 +14,13 @@ from typing import NamedTuple
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError
 from roboirg.episodes.splits import get_episode
+from roboirg.evaluation.episode_errors import MAX_CAUSE_LENGTH, format_cause
 from roboirg.evaluation.executors.executor import Executor
 from roboirg.evaluation.plan import Plan, write_plan
+from roboirg.evaluation.policy_descriptions import describe_policy
 from roboirg.evaluation.progress import Reporter, SilentReporter
 from roboirg.evaluation.rollout import PlayJob
 from roboirg.language import LANGUAGE_VERSION
-from roboirg.policies.loading import policy_version
 from roboirg.records.record import Job, Record
 from roboirg.records.record_codec import RecordIndexEntry, identity_key
 from roboirg.records.store import TORN_FILE, RecordStore, StoreError
@@ -149,6 +150,7 @@ class _RunLoop:
         return [job for job in again if job.policy not in self.unreachable]
 
     def _store_record(self, job: Job, record: Record) -> None:
+        record = _refuse_contradiction(record)
         before = self._store.stored.get(identity_key(job))
         if before is not None:
             record = record.model_copy(update={"attempt": before.attempt + 1})
@@ -175,6 +177,18 @@ class _RunLoop:
             f"{record.policy} could not be reached in {UNREACHABLE_AFTER} episodes in a row "
             f"({record.cause}); this run skips its remaining episodes."
         )
+
+
+def _refuse_contradiction(record: Record) -> Record:
+    """Return a record; a success with a cause becomes an error.
+
+    Only code in the world's process can write one, such as a policy that patches the judge.
+    """
+    if record.outcome != "success" or record.cause is None:
+        return record
+    cause = format_cause("policy", f"a success came with a cause ({record.cause})")
+    refused = {"outcome": "error", "error": "policy", "cause": cause[:MAX_CAUSE_LENGTH]}
+    return record.model_copy(update=refused)
 
 
 def _should_play(stored: RecordIndexEntry | None, *, retry_errors: bool) -> bool:
@@ -220,9 +234,9 @@ def _check_versions(records: Iterable[RecordIndexEntry], folder: Path) -> None:
 
 def _check_policies(plan: Plan, records: Iterable[RecordIndexEntry], folder: Path) -> None:
     """Refuse records of another version of a policy of the same name."""
-    versions = {name: policy_version(spec) for name, spec in plan.specs.items()}
+    specs = plan.specs
     for policy, version in {(record.policy, record.policy_version) for record in records}:
-        now = versions.get(policy, version)
+        now = describe_policy(specs[policy]).version if policy in specs else version
         if version != now:
             raise StoreError(
                 f"{folder} holds episodes of {policy} version {version}, but the policy is now "

@@ -8,6 +8,7 @@ from functools import partial
 
 from roboirg.perf import (
     engine_costs,
+    hosted_rates,
     large_run_costs,
     process_costs,
     remote_rates,
@@ -118,6 +119,24 @@ def _process_measures() -> tuple[Measure, ...]:
             "in process",
             0.9,
             unit="1/s",
+            inverse=True,
+        ),
+        Measure(
+            "steps a second of a hosted policy",
+            hosted_rates.hosted,
+            remote_rates.in_process,
+            "in process",
+            0.9,
+            unit="1/s",
+            inverse=True,
+        ),
+        Measure(
+            "episodes an hour of 16 workers, 50 ms a call",
+            partial(hosted_rates.episodes_per_hour, 16),
+            partial(hosted_rates.episodes_per_hour, 1),
+            "1 worker",
+            6,
+            unit="1/h",
             inverse=True,
         ),
         Measure(

@@ -53,16 +53,16 @@ class WavingPolicy:
 
 def in_process() -> float:
     """Return steps per second without a server."""
-    return _rate(make_policy(f"{__name__}:WavingPolicy", 0))
+    return steps_per_second(make_policy(f"{__name__}:WavingPolicy", 0))
 
 
 def over_loopback() -> float:
     """Return steps per second with the same policy in a server process, over openpi's protocol."""
-    return _rate(make_policy(_server(), 0))
+    return steps_per_second(make_policy(_server(), 0))
 
 
-def _rate(policy: Policy) -> float:
-    """Return the median rate over some episodes, which is robust against hiccups."""
+def steps_per_second(policy: Policy) -> float:
+    """Return a policy's median rate over some episodes, which is robust against hiccups."""
     env = make(
         "PickXtimes",
         cameras=wanted_cameras(policy),

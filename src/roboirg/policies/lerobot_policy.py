@@ -9,7 +9,9 @@ open to -1 closed.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+import inspect
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -23,6 +25,9 @@ from roboirg.policies.policy_urls import UrlOptions, read_options, split_url
 PICTURE = "observation.images.{}"
 STATE = "observation.state"
 _MAX_BRIGHTNESS = 255.0
+_BATCH = 8
+_NOISELESS = frozenset({"act"})
+"""Types of checkpoints that draw no noise when they act."""
 
 
 class LeRobotPolicyOptions(UrlOptions):
@@ -30,11 +35,13 @@ class LeRobotPolicyOptions(UrlOptions):
 
     Attributes:
         device: of PyTorch.
+        batch: episodes that the checkpoint is asked about at once; None for 1 on the CPU, else 8.
         execute: actions of a chunk that are executed; None for all.
         version: of the checkpoint, for the records.
     """
 
     device: str = Field("cpu", min_length=1)
+    batch: int | None = Field(None, ge=1)
     execute: int | None = Field(None, ge=1)
     version: str | None = Field(None, min_length=1)
 
@@ -46,19 +53,46 @@ class LoadedCheckpoint(NamedTuple):
         model: LeRobot's policy.
         before: turns a batch into the model's inputs.
         after: turns the model's outputs into actions.
+        noise: shape of the noise that the model takes for each episode; None if it takes none.
+        is_noiseless: whether it is known to draw none either.
     """
 
     model: Any
     before: Callable[[dict[str, Any]], dict[str, Any]]
     after: Callable[[Any], Any]
+    noise: tuple[int, int] | None = None
+    is_noiseless: bool = False
+
+
+@dataclass
+class CheckpointEpisode:
+    """What belongs to one episode of a checkpoint.
+
+    Attributes:
+        seed: of its noise.
+        memory: attributes of the model that its reset sets anew, such as queues.
+        calls: how often it was asked.
+    """
+
+    seed: int
+    memory: dict[str, Any]
+    calls: int = 0
+
+    def next_seed(self) -> int:
+        """Return the seed of the next call, another one each time."""
+        self.calls += 1
+        return int(np.random.SeedSequence((self.seed, self.calls)).generate_state(1)[0])
 
 
 class LeRobotPolicy:
-    """A checkpoint of LeRobot, loaded at the first reset, once per process.
+    """A checkpoint of LeRobot, loaded when the first episode begins, once per process.
+
+    It takes batches: always of `batch` rows, whichever episodes wait, because a model's rounding
+    depends on the number of rows.
 
     Args:
         url: path or hub id, and options.
-        seed: of PyTorch's generator, from each reset on.
+        seed: unused; each episode has its own.
 
     Raises:
         UnknownNameError: the URL has an unknown option.
@@ -69,56 +103,98 @@ class LeRobotPolicy:
     demonstration_frames: ClassVar[str] = "none"
 
     def __init__(self, url: str, seed: int = 0) -> None:
+        del seed
         parts = split_url(url)
         self.options = read_options(parts, LeRobotPolicyOptions)
-        self._place, self._seed = parts.place, seed
+        self.place = parts.place
 
     @property
     def version(self) -> str:
         """The URL's option ``version``, else ``unknown``."""
         return self.options.version or "unknown"
 
-    def reset(self, instruction: str, demonstration: Demonstration) -> None:  # noqa: ARG002
+    def begin(
+        self,
+        instruction: str,  # noqa: ARG002 - it is in the observations
+        demonstration: Demonstration,  # noqa: ARG002
+        seed: int = 0,
+    ) -> CheckpointEpisode:
         """Load the checkpoint and begin an episode.
 
         Raises:
             MissingDependencyError: LeRobot or PyTorch is not installed.
             InvalidValueError: the checkpoint needs an input that does not exist.
         """
+        model = load(self.place, self.options.device).model
+        before = dict(vars(model))
+        model.reset()
+        own = {name: one for name, one in vars(model).items() if before.get(name) is not one}
+        return CheckpointEpisode(seed, own)
+
+    def act_batch(
+        self, states: Sequence[CheckpointEpisode], observations: Sequence[Observation]
+    ) -> list[NDArray[np.floating[Any]]]:
+        """Return the checkpoint's next actions, (n, 8) for each episode."""
         import torch
 
-        self._loaded = load(self._place, self.options.device)
-        self._loaded.model.reset()
-        torch.manual_seed(self._seed)
-
-    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
-        """Return the checkpoint's next actions, (n, 8)."""
-        import torch
-
+        size = self._rows(load(self.place, self.options.device))
+        chunks: list[NDArray[np.floating[Any]]] = []
         with torch.inference_mode():
-            batch = self._loaded.before(self._batch(observation))
-            try:
-                rows = self._loaded.model.predict_action_chunk(batch)
-            except NotImplementedError:  # a policy without chunks
-                rows = self._loaded.model.select_action(batch)[:, None]
-            rows = torch.stack(
-                [self._loaded.after(rows[:, index]) for index in range(rows.shape[1])], dim=1
-            )
-        actions: NDArray[np.float64] = rows[0].cpu().numpy().astype(np.float64)
-        return actions[: self.options.execute]
+            for start in range(0, len(states), size):
+                stop = start + size
+                chunks += self._ask(states[start:stop], observations[start:stop], size)
+        return chunks
 
-    def _batch(self, observation: Observation) -> dict[str, Any]:
-        """Return an observation in LeRobot's form: pictures (1, 3, H, W) in [0, 1]."""
+    def _rows(self, loaded: LoadedCheckpoint) -> int:
+        """Return how many episodes the model is asked about at once."""
+        if loaded.noise is None and not loaded.is_noiseless:
+            return 1  # the noise of an episode would depend on the others
+        return self.options.batch or (1 if self.options.device == "cpu" else _BATCH)
+
+    def _ask(
+        self, states: Sequence[CheckpointEpisode], observations: Sequence[Observation], size: int
+    ) -> list[NDArray[np.floating[Any]]]:
+        """Ask the model about at most `size` episodes; the last one fills up the batch."""
         import torch
 
-        state = np.append(observation["joint_positions"], observation["gripper"][0])
+        loaded, count = load(self.place, self.options.device), len(states)
+        seeds = [state.next_seed() for state in states]
+        padded = [*observations, *[observations[-1]] * (size - count)]
+        batch = loaded.before(self._batch(padded))
+        options = {}
+        if loaded.noise is None or size == 1:
+            torch.manual_seed(seeds[0])
+        else:
+            noise = [
+                torch.randn(loaded.noise, generator=torch.Generator().manual_seed(seed))
+                for seed in [*seeds, *[seeds[-1]] * (size - count)]
+            ]
+            options["noise"] = torch.stack(noise).to(self.options.device)
+        model, memory = loaded.model, states[0].memory if size == 1 else {}
+        vars(model).update(memory)
+        try:
+            rows = model.predict_action_chunk(batch, **options)
+        except NotImplementedError:  # a policy without chunks
+            rows = model.select_action(batch)[:, None]
+        memory.update({name: vars(model)[name] for name in memory})
+        rows = torch.stack([loaded.after(rows[:, i]) for i in range(rows.shape[1])], dim=1)
+        actions: NDArray[np.float64] = rows[:count].cpu().numpy().astype(np.float64)
+        return list(actions[:, : self.options.execute])
+
+    def _batch(self, observations: Sequence[Observation]) -> dict[str, Any]:
+        """Return observations in LeRobot's form: pictures (n, 3, H, W) in [0, 1]."""
+        import torch
+
+        states = [np.append(one["joint_positions"], one["gripper"][0]) for one in observations]
         batch: dict[str, Any] = {
-            STATE: torch.from_numpy(state.astype(np.float32))[None],
-            "task": [observation["instruction"]],
+            STATE: torch.from_numpy(np.stack(states).astype(np.float32)),
+            "task": [one["instruction"] for one in observations],
         }
         for camera in CAMERAS:
-            picture = torch.from_numpy(np.array(observation[f"{camera}_rgb"]))  # type: ignore[literal-required]
-            batch[PICTURE.format(camera)] = picture.permute(2, 0, 1)[None].float() / _MAX_BRIGHTNESS
+            pictures = np.stack([one[f"{camera}_rgb"] for one in observations])  # type: ignore[literal-required]
+            batch[PICTURE.format(camera)] = (
+                torch.from_numpy(pictures).permute(0, 3, 1, 2).float() / _MAX_BRIGHTNESS
+            )
         return {
             key: value if key == "task" else value.to(self.options.device)
             for key, value in batch.items()
@@ -149,7 +225,12 @@ def load(place: str, device: str) -> LoadedCheckpoint:
         pretrained_path=place,
         preprocessor_overrides={"device_processor": {"device": device}},
     )
-    return LoadedCheckpoint(model.to(device).eval(), before, after)
+    takes = inspect.signature(model.predict_action_chunk).parameters
+    shape = getattr(config, "chunk_size", None), getattr(config, "max_action_dim", None)
+    noise = (int(shape[0]), int(shape[1])) if "noise" in takes and None not in shape else None  # type: ignore[arg-type]
+    return LoadedCheckpoint(
+        model.to(device).eval(), before, after, noise, config.type in _NOISELESS
+    )
 
 
 def _check_features(place: str, features: dict[str, Any]) -> None:

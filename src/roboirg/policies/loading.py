@@ -10,9 +10,13 @@ from typing import Any, cast
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies.base import Policy
 from roboirg.policies.planning import policy_specs
-from roboirg.policies.policy_classes import BUILTIN, find_class, make_from_class
-from roboirg.policies.policy_urls import is_url
+from roboirg.policies.planning.systems import find_system
+from roboirg.policies.policy_classes import BUILTIN, CHECKPOINTS, find_class, make_from_class
+from roboirg.policies.policy_urls import is_url, parse_query
+from roboirg.util.plain_text import clip_text
 from roboirg.util.short_hash import short_hash
+
+_MAX_VERSION_LENGTH = 200
 
 
 def load_policy_class(spec: str) -> type[Any]:
@@ -49,6 +53,32 @@ def make_policy(spec: str, seed: int) -> Policy:
     return make_from_class(spec, load_policy_class(spec), seed)
 
 
+def is_foreign(spec: str) -> bool:
+    """Return whether a spec names code that does not come with this package or a protocol.
+
+    Raises:
+        InvalidValueError: it is a system that cannot be read.
+    """
+    kind, colon, rest = spec.partition(":")
+    if spec in BUILTIN or is_url(spec) or not colon:
+        return False
+    if kind == policy_specs.SYSTEM:
+        name, _, query = rest.partition("?")
+        return is_foreign(find_system(name, parse_query(spec, query)).policy)
+    return kind not in policy_specs.BUILDERS
+
+
+def needs_host(spec: str) -> bool:
+    """Return whether a policy gets a process of its own, unless it is privileged.
+
+    Built-in policies and the clients of remote ones are our own code and run beside the world.
+
+    Raises:
+        InvalidValueError: it is a system that cannot be read.
+    """
+    return is_foreign(spec) or (is_url(spec) and spec.partition("://")[0] in CHECKPOINTS)
+
+
 def is_privileged(spec: str) -> bool:
     """Return whether a spec names a policy that reads the simulator's state."""
     try:
@@ -70,10 +100,11 @@ def policy_version(spec: str) -> str:
     try:
         policy_class = load_policy_class(spec)
         if is_url(spec):
-            return str(getattr(policy_class(spec), "version", "unknown"))
-        version = getattr(policy_class, "version", None)
+            version = getattr(policy_class(spec), "version", "unknown")
+        else:
+            version = getattr(policy_class, "version", None)
         if version is not None:
-            return str(version)
+            return clip_text(str(version), _MAX_VERSION_LENGTH)
         source = Path(inspect.getfile(policy_class)).read_bytes()
     except (InvalidValueError, OSError, TypeError):
         return "unknown"

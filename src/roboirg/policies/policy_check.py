@@ -14,7 +14,7 @@ from roboirg.core.actions import ActionSpace, check_chunk
 from roboirg.core.errors import MissingDependencyError, RoboIRGError
 from roboirg.core.printable import printable
 from roboirg.policies.base import Policy, close_policy, tell_policy
-from roboirg.policies.loading import make_policy
+from roboirg.policies.loading import make_policy, needs_host
 from roboirg.policies.requirements import (
     wanted_actions,
     wanted_calibration,
@@ -24,6 +24,7 @@ from roboirg.policies.requirements import (
     wanted_history,
 )
 from roboirg.policies.synthetic_episodes import SyntheticEpisode, SyntheticEpisodes
+from roboirg.policies.turn_check import largest_difference, play_in_turns
 from roboirg.util.plurals import counted
 
 if TYPE_CHECKING:
@@ -131,6 +132,7 @@ class _PolicyChecker:
             self._check_inputs(with_video)
             self._check_determinism(policy, with_video, expected)
             self._check_reset(policy, without_video, with_video, expected)
+            self._check_turns(policy, without_video, with_video)
             self._check_hearing(policy, without_video)
             self._check_broken_sensors(without_video)
         finally:
@@ -257,6 +259,34 @@ class _PolicyChecker:
                 "A second episode with the same object differs by up to "
                 f"{_largest_difference(expected, after)} from the same episode played first.",
             )
+
+    def _check_turns(self, policy: Policy, *episodes: SyntheticEpisode) -> None:
+        """Check what a host relies on: episodes that share a process do not change each other."""
+        spec = self._source
+        if not isinstance(spec, str) or not needs_host(spec):
+            return
+        if not getattr(policy, "deterministic", True):
+            self._add("turns", NOTE, "Not checked: the policy is not deterministic.")
+            return
+        ways = [("turns", "in turns", "the object", False)]
+        if hasattr(policy, "act_together"):
+            ways.append(("batches", "together", "its state", True))
+        for check, how, where, together in ways:
+            try:
+                alone = [play_in_turns(spec, self._seed, [one])[0] for one in episodes]
+                shared = play_in_turns(spec, self._seed, episodes, together=together)
+            except Exception as error:
+                raise _CheckAbortedError(check, FAIL, _describe_error(error)) from error
+            difference = largest_difference(alone, shared)
+            if difference == 0:
+                self._add(check, PASS, f"Two episodes {how} have the actions that each has alone.")
+            else:
+                self._add(
+                    check,
+                    FAIL,
+                    f"Two episodes {how} differ by up to {difference:.3g} from each alone; what "
+                    f"belongs to an episode must be in {where}, not in the module.",
+                )
 
     def _check_hearing(self, policy: Policy, episode: SyntheticEpisode) -> None:
         if not hasattr(policy, "hear"):

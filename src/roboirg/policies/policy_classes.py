@@ -11,6 +11,7 @@ from typing import Any
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.policies.base import Policy
+from roboirg.policies.batch_policy import make_batched, takes_batches
 from roboirg.policies.policy_urls import is_url
 from roboirg.policies.protocols import protocols_by_scheme
 from roboirg.policies.requirements import REQUIREMENTS
@@ -70,21 +71,32 @@ def make_from_class(spec: str, policy_class: type[Any], seed: int) -> Policy:
     Args:
         spec: passed to the constructor if it is a URL.
         policy_class: called with ``seed=`` if it takes it, else without arguments.
-        seed: of the policy's own random choices.
+        seed: of the policy's own random choices. A policy that takes batches is made once, with
+            seed 0, and gets the seed of each episode in ``begin``.
     """
-    if is_url(spec):
-        remote: Policy = policy_class(spec, seed=seed)
-        return remote
-    policy: Policy = (
-        policy_class(seed=seed) if "seed" in _parameters(policy_class) else policy_class()
-    )
+    if takes_batches(policy_class):
+        return make_batched(
+            (spec, policy_class), lambda: _construct(spec, policy_class, seed=0), seed
+        )
+    policy: Policy = _construct(spec, policy_class, seed)
     return policy
+
+
+def _construct(spec: str, policy_class: type[Any], seed: int) -> Any:  # noqa: ANN401
+    if is_url(spec):
+        return policy_class(spec, seed=seed)
+    return policy_class(seed=seed) if "seed" in _parameters(policy_class) else policy_class()
 
 
 def _check_class(spec: str, policy_class: type[Any]) -> None:
     """Raise for a class with which every episode would end in an error."""
     name = policy_class.__name__
-    for method in ("reset", "act"):
+    if takes_batches(policy_class) and hasattr(policy_class, "attach"):
+        raise InvalidValueError(
+            f"Policy {spec!r}: class {name} has attach() and act_batch(); a privileged policy is "
+            "asked about one episode at a time."
+        )
+    for method in () if takes_batches(policy_class) else ("reset", "act"):
         if not hasattr(policy_class, method):
             raise InvalidValueError(f"Policy {spec!r}: class {name} has no method {method}().")
         if not callable(getattr(policy_class, method)):

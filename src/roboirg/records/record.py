@@ -10,9 +10,9 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Mapping
-from typing import Literal, get_args
+from typing import Literal, Self, get_args
 
-from pydantic import BaseModel, ConfigDict, JsonValue
+from pydantic import BaseModel, ConfigDict, JsonValue, model_validator
 
 from roboirg.core.instruction_options import (
     ALL_STAGES,
@@ -283,6 +283,12 @@ class Result(Job):
     code: str = "unknown"
     plan: str | None = None
     attempt: int = 1
+
+    @model_validator(mode="after")
+    def _refuse_success_with_cause(self) -> Self:
+        if self.outcome == "success" and self.cause is not None:
+            raise ValueError(f"a success has no cause, but there is {self.cause!r}")
+        return self
 
     @property
     def identity(self) -> Job:

@@ -129,8 +129,7 @@ def make_entries(runs: Sequence[Run]) -> EpisodeEntries:
         dict.fromkeys(job.policy for run in runs for job in (*run.planned, *run.records))
     )
     cells = sort_cells(found, policy_order(found, policies, [run.name for run in runs]))
-    privileged = {entry.record.policy for entry in entries if entry.record.privileged}
-    names = labels(cells, privileged)
+    names = labels(cells)
     return EpisodeEntries(_sorted(entries, list(names)), cells, names)
 
 

@@ -7,7 +7,7 @@ environment, go to cells of their own and are never averaged with the rest.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import NamedTuple
@@ -91,6 +91,10 @@ class Versions(NamedTuple):
         )
 
 
+PRIVILEGED = " (privileged)"
+"""Mark of policies that read the simulator's state."""
+
+
 class PolicyRun(NamedTuple):
     """One policy under one set of conditions and versions: results that may be averaged.
 
@@ -99,17 +103,25 @@ class PolicyRun(NamedTuple):
         conditions: under which it played.
         versions: None before it has played.
         run: name of the run if several runs hold the same episodes, else empty.
+        is_privileged: whether the policy read the simulator's state.
     """
 
     policy: str
     conditions: EvalConditions
     versions: Versions | None
     run: str = ""
+    is_privileged: bool = False
 
     @classmethod
     def of(cls, result: AnyResult, run: str = "") -> PolicyRun:
         """Return the policy run of a result."""
-        return cls(result.policy, EvalConditions.of(result), Versions.of(result), run)
+        versions = Versions.of(result)
+        return cls(result.policy, EvalConditions.of(result), versions, run, result.privileged)
+
+    @property
+    def marked_policy(self) -> str:
+        """The policy's name, marked if it is privileged."""
+        return self.policy + PRIVILEGED * self.is_privileged
 
 
 class CellKey(NamedTuple):
@@ -280,18 +292,13 @@ def sort_cells(cells: Cells, policy_runs: Sequence[PolicyRun]) -> Cells:
     return {key: cells[key] for key in keys}
 
 
-def labels(cells: Cells, privileged: Collection[str] = ()) -> dict[PolicyRun, str]:
+def labels(cells: Cells) -> dict[PolicyRun, str]:
     """Return a label for each policy run, with what distinguishes runs of the same policy.
 
-    Args:
-        cells: of the policy runs.
-        privileged: names of policies that are marked as privileged.
+    Privileged policies are marked, because their rates are no rates of policies.
     """
     policy_runs = list(dict.fromkeys(key.policy_run for key in cells))
-    return {
-        one: _label(one, policy_runs) + (" (privileged)" if one.policy in privileged else "")
-        for one in policy_runs
-    }
+    return {one: _label(one, policy_runs) + PRIVILEGED * one.is_privileged for one in policy_runs}
 
 
 def _label(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> str:

@@ -64,7 +64,6 @@ class RunTable:
         columns: the instruction options.
         cells: results by scope (a task or `ALL`) and options.
         differences: of the explicit cells from the published rates.
-        privileged: whether the policy uses the simulator's state.
     """
 
     policy_run: PolicyRun
@@ -73,7 +72,6 @@ class RunTable:
     columns: tuple[InstructionOptions, ...]
     cells: dict[tuple[Scope, InstructionOptions], ScopeResults]
     differences: AllDifferences
-    privileged: bool = False
 
 
 def make_run_tables(records: Sequence[AnyResult], planned: Sequence[Job] = ()) -> list[RunTable]:
@@ -85,7 +83,6 @@ def make_run_tables(records: Sequence[AnyResult], planned: Sequence[Job] = ()) -
     """
     found = gather([("", records)], planned)
     policies = list(dict.fromkeys(job.policy for job in (*planned, *records)))
-    privileged = {record.policy for record in records if record.privileged}
     cells = sort_cells(found, policy_order(found, policies))
     results = {one.key: one for one in group_by_scope(cells)}
     return [
@@ -94,9 +91,8 @@ def make_run_tables(records: Sequence[AnyResult], planned: Sequence[Job] = ()) -
             label,
             results,
             _explicit_differences(policy_run, cells),
-            privileged=policy_run.policy in privileged,
         )
-        for policy_run, label in labels(cells, privileged).items()
+        for policy_run, label in labels(cells).items()
     ]
 
 
@@ -157,8 +153,6 @@ def _make_run_table(
     label: str,
     results: dict[ScopeKey, ScopeResults],
     differences: AllDifferences,
-    *,
-    privileged: bool,
 ) -> RunTable:
     cells = {
         (key.scope, key.options): one
@@ -174,7 +168,6 @@ def _make_run_table(
         tuple(sorted(columns, key=options_sort_key)),
         cells,
         differences,
-        privileged,
     )
 
 
@@ -226,7 +219,7 @@ def _legend(tables: Sequence[RunTable]) -> list[str]:
         legend.append(f"{ERROR_MARK} episodes ended in an error and are in no rate")
     if any(cell.missing for cell in cells):
         legend.append(f"{MISSING_MARK} episodes are still to be played")
-    if any(table.privileged for table in tables):
+    if any(table.policy_run.is_privileged for table in tables):
         legend.append("privileged policies use the simulator's state")
     return legend
 

@@ -16,6 +16,7 @@ from typing import Protocol
 
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.evaluation.executors.workers import MAX_FAILED_STARTS, POLL_S, Worker
+from roboirg.evaluation.hosting.host_pool import open_hosts
 from roboirg.evaluation.rollout import PlayJob
 from roboirg.records.record import Job, Record
 
@@ -42,7 +43,8 @@ class InProcess:
 
     def run(self, jobs: Sequence[Job], play: PlayJob) -> Iterator[Record]:
         """Yield one record for each job, in order."""
-        yield from map(play, jobs)
+        with open_hosts(play) as hosted:
+            yield from map(hosted, jobs)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +75,10 @@ class LocalProcesses:
         Raises:
             RoboIRGError: no worker can start, or an error would end every other job too.
         """
+        with open_hosts(play) as hosted:
+            yield from self._run(jobs, hosted)
+
+    def _run(self, jobs: Sequence[Job], play: PlayJob) -> Iterator[Record]:
         waiting, failed_starts = deque(jobs), 0
         # With a process on every core, more threads in Mesa would not help.
         limit_threads = self.workers >= core_count()

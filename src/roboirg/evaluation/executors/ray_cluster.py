@@ -26,6 +26,7 @@ from roboirg.core.errors import InvalidValueError, MissingDependencyError, RoboI
 from roboirg.evaluation.episode_errors import format_cause
 from roboirg.evaluation.executors.executor import NO_TIMEOUT_S
 from roboirg.evaluation.executors.workers import MAX_FAILED_STARTS, WorkerSlot
+from roboirg.evaluation.hosting.host_pool import open_hosts
 from roboirg.evaluation.rollout import PlayJob
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.records.record import Job, Record
@@ -164,7 +165,9 @@ class _RemoteWorker:
         self._folder = Path(tempfile.mkdtemp(prefix="roboirg-"))
         recorder = _video_recorder(play)
         moved = play if recorder is None else cast("PlayJob", recorder.in_folder(self._folder))
-        self._slot = WorkerSlot(moved, episode_timeout_s)
+        # For the life of this actor, which ends with its process.
+        self._hosts = open_hosts(moved)
+        self._slot = WorkerSlot(self._hosts.__enter__(), episode_timeout_s)
 
     def wait_until_started(self) -> None:
         """Return as soon as the actor runs on a machine."""

@@ -18,6 +18,7 @@ from roboirg.core.waiting import Wait, listen
 Phase = Literal[
     "worker startup",
     "environment",
+    "wait for the policy's host",
     "policy's constructor",
     "policy's reset()",
     "policy's hear()",

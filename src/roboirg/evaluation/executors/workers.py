@@ -8,11 +8,9 @@ limit, a timeout error after the worker has been killed.
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import multiprocessing
 import os
 import signal
-import sys
 import threading
 import time
 from dataclasses import dataclass
@@ -27,6 +25,7 @@ from roboirg.evaluation.rollout import EpisodeRunner, PlayJob
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.records.episode_log import log_path, logged_output
 from roboirg.records.record import ErrorKind, Job, Record
+from roboirg.util.child_process import describe_exit, exit_with_parent, was_killed
 
 GRACE_S = 2.0
 """How long a worker may take to exit when it is asked to."""
@@ -37,7 +36,6 @@ MAX_FAILED_STARTS = 3
 POLL_S = 0.25
 """How often a supervisor checks deadlines."""
 
-_PR_SET_PDEATHSIG = 1
 _FATAL_ERRORS = {error.__name__: error for error in (RenderDeviceError, MissingDependencyError)}
 
 
@@ -218,12 +216,8 @@ def _wait_for_record(worker: Worker, episode_timeout_s: float) -> Record:
 
 def _explain_exit(phase: Phase, exit_code: int | None) -> tuple[ErrorKind, str]:
     """Return the kind of error and the message for a process that died."""
-    if exit_code is not None and exit_code < 0:
-        how = f"the process died of signal {-exit_code}"
-    else:
-        how = f"the process ended with exit code {exit_code}"
-    if exit_code == -signal.SIGKILL:
-        # Not the worker's own doing: the machine ran out of memory, or a user killed it.
+    how = describe_exit(exit_code)
+    if was_killed(exit_code):
         return "infrastructure", f"{how} in the {phase}"
     if phase.startswith("policy"):
         return "policy", f"{how} in the {phase}"
@@ -267,12 +261,7 @@ def _logged(play: PlayJob, job: Job) -> contextlib.AbstractContextManager[None]:
 
 def _exit_with_parent(parent: int) -> None:
     """Make sure that this process does not outlive its parent."""
-    if sys.platform == "linux":
-        # Works even if this process hangs in native code. Bound to the parent's thread that
-        # started it, which waits as long as there are workers.
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:
-        os._exit(1)  # the parent died before the line above
+    exit_with_parent(parent)
     parent_process = multiprocessing.parent_process()
     if parent_process is not None:
         sentinel = parent_process.sentinel

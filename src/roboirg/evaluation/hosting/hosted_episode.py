@@ -1,0 +1,157 @@
+"""One episode in the policy's process: its policy, its random numbers, its shared memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from multiprocessing.shared_memory import SharedMemory
+from typing import Any, cast
+
+from numpy.typing import NDArray
+
+from roboirg.core.observations import Observation
+from roboirg.evaluation.hosting.payload import (
+    Message,
+    attach_block,
+    buffer_of,
+    unpack_payload,
+)
+from roboirg.evaluation.policy_calls import check_rows, policy_metadata, policy_usage
+from roboirg.policies.base import close_policy, tell_policy
+from roboirg.policies.loading import is_privileged, make_policy, policy_version
+from roboirg.policies.random_state import RandomState
+from roboirg.policies.requirements import REQUIREMENTS, wanted_actions
+
+Ask = Callable[[Message], Message]
+"""Sends a question to the world of an episode in a call, and returns its answer."""
+
+
+class HostedDemonstration(Mapping[str, NDArray[Any]]):
+    """A demonstration whose pictures are drawn by the world when they are read, and then kept.
+
+    They can be read while a call of the policy is under way.
+
+    Args:
+        fields: names of all fields.
+        arrays: those that are already here.
+        fetch: draws fields and returns them.
+    """
+
+    def __init__(
+        self,
+        fields: Sequence[str],
+        arrays: Mapping[str, NDArray[Any]],
+        fetch: Callable[[Sequence[str]], Mapping[str, NDArray[Any]]],
+    ) -> None:
+        self._fields, self._arrays, self._fetch = tuple(fields), dict(arrays), fetch
+
+    def __getitem__(self, field: str) -> NDArray[Any]:
+        """Return a field for all steps; raises KeyError if it does not exist."""
+        if field not in self._arrays and field in self._fields:
+            self._arrays.update(self._fetch([field]))
+        return self._arrays[field]
+
+    def draw(self) -> None:
+        """Fetch all fields that are not here, drawn together."""
+        missing = [field for field in self._fields if field not in self._arrays]
+        if missing:
+            self._arrays.update(self._fetch(missing))
+
+    @property
+    def length(self) -> int:
+        """Control steps in the video."""
+        return len(self["joint_positions"])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._fields)
+
+    def __len__(self) -> int:
+        """Return the number of fields; `length` is the number of control steps."""
+        return len(self._fields)
+
+    def __reduce__(self) -> tuple[type[dict[str, Any]], tuple[dict[str, Any]]]:
+        self.draw()
+        return dict, (dict(self),)
+
+
+class HostedEpisode:
+    """Carries out the calls of one episode.
+
+    Args:
+        call: ``spec`` and ``seed`` of the policy, ``block``, the name of the shared memory.
+        ask: sends questions to the world.
+        read_fields: names of the demonstration's fields that any episode has read; grows.
+
+    Attributes:
+        policy: the policy of this episode.
+        random: its random numbers.
+    """
+
+    def __init__(self, call: Message, ask: Ask, read_fields: dict[str, None]) -> None:
+        self._ask, self._read_fields = ask, read_fields
+        self._block: SharedMemory = attach_block(call["block"])
+        self.random = RandomState(call["seed"])
+        with self.random:
+            self.policy = make_policy(call["spec"], call["seed"])
+        self._space = wanted_actions(self.policy)
+
+    def describe(self, spec: str) -> Message:
+        """Return what the world must know of the policy."""
+        own = {name: one for name, one in REQUIREMENTS.items() if hasattr(self.policy, name)}
+        return {
+            "needs": {name: read(self.policy) for name, read in own.items() if name != "actions"},
+            "actions": self._space.name,
+            "version": policy_version(spec),
+            "privileged": is_privileged(spec),
+            "together": callable(getattr(self.policy, "act_together", None)),
+            "reads": list(self._read_fields),
+        }
+
+    def reset(self, call: Message) -> Message:
+        """Begin the episode; returns the policy's metadata."""
+        value = self._read(call)
+        demonstration = HostedDemonstration(value["fields"], value["arrays"], self._fetch)
+        self.policy.reset(value["instruction"], demonstration)
+        return {"metadata": policy_metadata(self.policy)}
+
+    def observation(self, call: Message) -> Observation:
+        """Return the observation of a call of `act`."""
+        return cast("Observation", self._read(call))
+
+    def act(self, call: Message) -> Message:
+        """Return the next actions."""
+        return self.actions(self.policy.act(self.observation(call)))
+
+    def actions(self, rows: Any) -> Message:  # noqa: ANN401 - whatever the policy returned
+        """Return a policy's actions, checked, for a message."""
+        chunk = check_rows(rows, self._space)
+        return {"rows": chunk.tobytes(), "size": chunk.shape[1]}
+
+    def hear(self, call: Message) -> Message:
+        """Tell the policy what was said; returns its metadata."""
+        tell_policy(self.policy, call["utterances"])
+        return {"metadata": policy_metadata(self.policy)}
+
+    def usage(self, _call: Message) -> Message:
+        """Return the cost of the episode."""
+        return {"usage": policy_usage(self.policy)}
+
+    def close(self, _call: Message) -> Message:
+        """End the episode."""
+        self._block.close()
+        close_policy(self.policy)
+        return {}
+
+    def _fetch(self, fields: Sequence[str]) -> Mapping[str, NDArray[Any]]:
+        self._read_fields.update(dict.fromkeys(fields))
+        found: Mapping[str, NDArray[Any]] = self._read(self._ask({"want": list(fields)}))
+        return found
+
+    def _read(self, message: Message) -> Any:  # noqa: ANN401 - whatever the world has packed
+        """Return the value of a message; what does not fit into shared memory comes in parts."""
+        data, room = bytearray(message["size"]), self._block.size
+        for start in range(0, len(data), room):
+            if start:
+                self._ask({"want_from": start})
+            stop = min(start + room, len(data))
+            data[start:stop] = buffer_of(self._block)[: stop - start]
+        return unpack_payload(message["tree"], data)

@@ -1,0 +1,82 @@
+"""What a run must know of a policy before it plays, without running its code beside a world."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.evaluation.hosting.host_process import MISSING
+from roboirg.evaluation.hosting.policy_child import ChildLostError, PolicyChild
+from roboirg.policies.loading import (
+    is_foreign,
+    is_privileged,
+    load_policy_class,
+    policy_version,
+)
+from roboirg.util.plain_text import clip_text
+
+_MAX_LENGTH = 2000
+
+
+class PolicyDescription(NamedTuple):
+    """What records say of a policy.
+
+    Attributes:
+        version: distinguishes versions of a policy of the same name.
+        is_privileged: whether it reads the simulator's state.
+    """
+
+    version: str
+    is_privileged: bool
+
+
+_known: dict[str, PolicyDescription] = {}
+"""Descriptions of this run's policies, so that error records need not load them again."""
+
+
+def describe_policy(spec: str, *, again: bool = False) -> PolicyDescription:
+    """Return the description of a policy; foreign code is loaded in a process of its own.
+
+    Args:
+        spec: of the policy.
+        again: whether to look again, because files may have changed.
+
+    Raises:
+        InvalidValueError: there is no such policy, or its module cannot be imported.
+        MissingDependencyError: a library that it needs is not installed.
+    """
+    if again or spec not in _known:
+        _known[spec] = _describe_apart(spec) if is_foreign(spec) else _describe_ours(spec)
+    return _known[spec]
+
+
+def describe_here(spec: str) -> PolicyDescription:
+    """Return the description of a policy of this process; ``unknown`` if it cannot be loaded."""
+    return PolicyDescription(policy_version(spec), is_privileged(spec))
+
+
+def _describe_ours(spec: str) -> PolicyDescription:
+    load_policy_class(spec)
+    return describe_here(spec)
+
+
+def _describe_apart(spec: str) -> PolicyDescription:
+    child = PolicyChild()
+    try:
+        reply = child.exchange({"method": "describe", "calls": [{"spec": spec, "session": 0}]})
+        (result,) = reply["results"]
+        if "error" not in result:
+            return _read(result["value"])
+        kind, message, _ = map(str, result["error"])
+    except (ChildLostError, AttributeError, KeyError, TypeError, ValueError) as error:
+        raise InvalidValueError(f"Policy {spec!r} cannot be loaded: {error}.") from error
+    finally:
+        child.kill()
+        child.stop()
+    message = clip_text(message, _MAX_LENGTH)
+    raise MissingDependencyError(message) if kind == MISSING else InvalidValueError(message)
+
+
+def _read(value: Any) -> PolicyDescription:  # noqa: ANN401 - as a policy's process sent it
+    version = clip_text(str(value["version"]), _MAX_LENGTH)
+    return PolicyDescription(version, value["privileged"] is True)

@@ -1,0 +1,97 @@
+"""Policies that are asked about several episodes at once.
+
+Such a policy is made once per process. It has ``begin(instruction, demonstration) -> state``, one
+object per episode, and ``act_batch(states, observations)``, which returns a chunk for each. If
+``begin`` takes ``seed``, it gets the seed of the episode.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.observations import Demonstration, Observation
+
+
+def takes_batches(policy_class: object) -> bool:
+    """Return whether a policy, or a class of policies, has ``begin`` and ``act_batch``."""
+    return all(callable(getattr(policy_class, name, None)) for name in ("begin", "act_batch"))
+
+
+class BatchedEpisode:
+    """One episode of a policy that takes batches, in the form of a policy.
+
+    Its other attributes are the policy's: ``cameras``, ``version``, ``metadata`` and so on.
+
+    Args:
+        policy: plays many episodes.
+        seed: of the episode's random choices.
+    """
+
+    def __init__(self, policy: Any, seed: int) -> None:  # noqa: ANN401 - any class with two methods
+        self._policy, self._seed = policy, seed
+        self._state: Any = None
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401
+        if name in ("attach", "usage", "close", "follow") or name.startswith("_"):
+            raise AttributeError(name)  # they would mean the policy, not the episode
+        return getattr(self._policy, name)
+
+    def reset(self, instruction: str, demonstration: Demonstration) -> None:
+        """Begin the episode."""
+        begin = self._policy.begin
+        seed = {"seed": self._seed} if "seed" in _parameters(begin) else {}
+        self._state = begin(instruction, demonstration, **seed)
+
+    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
+        """Return the next actions."""
+        return self.act_together([self], [observation])[0]
+
+    def act_together(
+        self, episodes: Sequence[BatchedEpisode], observations: Sequence[Observation]
+    ) -> list[NDArray[np.floating[Any]]]:
+        """Return the next actions of several episodes of the same policy.
+
+        Raises:
+            ValueError: the policy did not return one chunk for each.
+        """
+        states = [one._state for one in episodes]  # noqa: SLF001 - of this class
+        chunks = list(self._policy.act_batch(states, list(observations)))
+        if len(chunks) != len(states):
+            raise ValueError(
+                f"act_batch() returned {len(chunks)} chunks for {len(states)} episodes"
+            )
+        return chunks
+
+    def hear(self, text: str, step: int) -> None:
+        """Pass an utterance on to ``hear(state, text, step)``, if the policy has it."""
+        hear = getattr(self._policy, "hear", None)
+        if callable(hear):
+            hear(self._state, text, step)
+
+
+_made: dict[object, Any] = {}
+
+
+def make_batched(key: object, make: Callable[[], Any], seed: int) -> BatchedEpisode:
+    """Return a new episode of a policy, which is made when the first one begins.
+
+    Args:
+        key: identifies the policy.
+        make: makes it.
+        seed: of the episode's random choices.
+    """
+    if key not in _made:
+        _made[key] = make()
+    return BatchedEpisode(_made[key], seed)
+
+
+def _parameters(function: Callable[..., Any]) -> Sequence[str]:
+    try:
+        return list(inspect.signature(function).parameters)
+    except (TypeError, ValueError):  # written in C, it may have no signature
+        return ()

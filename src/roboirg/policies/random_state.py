@@ -1,0 +1,50 @@
+"""Global random generators, one state for each episode that shares a process with others."""
+
+from __future__ import annotations
+
+import random
+import sys
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+
+class RandomState:
+    """The global random generators of this process, as one episode left them; a context.
+
+    Episodes take turns in a process: without this, one would change the random numbers of others.
+
+    Args:
+        seed: of all generators at the beginning of the episode.
+    """
+
+    def __init__(self, seed: int) -> None:
+        self._seed = seed
+        self._python = random.Random(seed).getstate()
+        self._numpy: Any = np.random.RandomState(seed % 2**32).get_state()
+        self._torch: tuple[Any, ...] | None = None
+
+    def __enter__(self) -> None:
+        random.setstate(self._python)
+        np.random.set_state(self._numpy)  # noqa: NPY002 - what policies may use
+        torch = sys.modules.get("torch")
+        if torch is not None and self._torch is None:
+            torch.manual_seed(self._seed)
+        elif torch is not None and self._torch is not None:
+            processor, *devices = self._torch
+            torch.set_rng_state(processor)
+            if devices:
+                torch.cuda.set_rng_state_all(devices)
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._python, self._numpy = random.getstate(), np.random.get_state()  # noqa: NPY002
+        torch = sys.modules.get("torch")
+        if torch is not None:
+            devices = torch.cuda.get_rng_state_all() if torch.cuda.is_initialized() else ()
+            self._torch = (torch.get_rng_state(), *devices)

@@ -1,0 +1,205 @@
+"""Policies that cheat, or break what they can reach."""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import os
+import signal
+import socket
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+
+NEEDLE = "9035768"
+"""Stands in the world's secret, read backward; this file does not hold it."""
+
+
+class Hostile:
+    cameras = ()
+    version = "1"
+
+    def reset(self, instruction: str, demonstration: Any) -> None:
+        self.metadata: dict[str, Any] = {}
+
+    def act(self, observation: Any) -> Any:
+        return -np.ones((24, 8))
+
+
+class Searcher(Hostile):
+    """Looks for the goal in every frame and every object."""
+
+    def reset(self, instruction: str, demonstration: Any) -> None:
+        types, texts = set(), set()
+        frames: list[Any] = [*sys._current_frames().values()]
+        while frames:
+            frame = frames.pop()
+            types |= {type(one).__name__ for one in frame.f_locals.values()}
+            texts |= {one for one in frame.f_locals.values() if isinstance(one, str)}
+            frames += [frame.f_back] if frame.f_back else []
+        for one in gc.get_objects():
+            types.add(type(one).__name__)
+            if isinstance(one, dict | list | tuple | set):
+                values = one.values() if isinstance(one, dict) else one
+                with contextlib.suppress(RuntimeError):
+                    texts |= {value for value in values if isinstance(value, str)}
+        self.metadata = {
+            "world": "PaperWorld" in types,
+            "job": "Job" in types,
+            "goal": any(NEEDLE[::-1] in text for text in texts),
+        }
+
+
+class Patcher(Hostile):
+    """Makes every episode a success."""
+
+    def act(self, observation: Any) -> Any:
+        from roboirg.evaluation import rollout_result
+        from roboirg.judging import Judge
+
+        patched: Any = rollout_result.RolloutResult
+        patched.record_status = lambda self, *_: setattr(self, "outcome", "success")
+        judge: Any = Judge
+        judge.status = "success"
+        return super().act(observation)
+
+
+class Leaker(Hostile):
+    """Leaves a thread that spoils what comes after it."""
+
+    def act(self, observation: Any) -> Any:
+        def spoil() -> None:
+            while True:
+                time.sleep(0.001)
+                np.random.seed(0)  # noqa: NPY002
+                os.chdir("/")
+                sys.modules.pop("hosting_fakes", None)
+                os.environ["ROBOIRG_CACHE"] = "/nonexistent"
+
+        threading.Thread(target=spoil).start()
+        return super().act(observation)
+
+
+class Wanderer(Hostile):
+    def act(self, observation: Any) -> Any:
+        self.metadata["before"] = os.getcwd()  # noqa: PTH109
+        os.chdir("/")
+        return super().act(observation)
+
+
+class Closer(Hostile):
+    def act(self, observation: Any) -> Any:
+        os.closerange(0, 4096)
+        return super().act(observation)
+
+
+class Babbler(Hostile):
+    """Sends something else than a reply, over every socket that it finds."""
+
+    def act(self, observation: Any) -> Any:
+        for descriptor in range(3, 256):
+            with contextlib.suppress(OSError):
+                socket.socket(fileno=os.dup(descriptor)).send(b"\0\0\0\x08cos\nsyst")
+        return super().act(observation)
+
+
+class Interrupter(Hostile):
+    def act(self, observation: Any) -> NoReturn:
+        raise KeyboardInterrupt
+
+
+class Ender(Hostile):
+    def act(self, observation: Any) -> NoReturn:
+        raise GeneratorExit
+
+
+class Alarmer(Hostile):
+    """An exception arrives from a signal."""
+
+    def act(self, observation: Any) -> Any:
+        signal.signal(signal.SIGALRM, lambda *_: sys.exit("alarm"))
+        signal.setitimer(signal.ITIMER_REAL, 0.05)
+        time.sleep(5)
+        return super().act(observation)
+
+
+class Unspeakable(Hostile):
+    def act(self, observation: Any) -> NoReturn:
+        class BrokenError(Exception):
+            def __str__(self) -> str:
+                raise KeyboardInterrupt
+
+        raise BrokenError
+
+
+class Surrogate(Hostile):
+    def act(self, observation: Any) -> NoReturn:
+        raise ValueError("\ud800" * 3)
+
+
+class SurrogateMetadata(Hostile):
+    def reset(self, instruction: str, demonstration: Any) -> None:
+        self.metadata = {"text": "\ud800"}
+
+
+class SurrogateKey(Hostile):
+    def reset(self, instruction: str, demonstration: Any) -> None:
+        self.metadata = {"\ud800": 1}
+
+
+class SurrogateCost(Hostile):
+    def usage(self) -> dict[str, float]:
+        return {"\ud800": 1.0}
+
+
+class Printer(Hostile):
+    def act(self, observation: Any) -> Any:
+        for _ in range(131):
+            print("x" * 1_000_000)  # noqa: T201
+        return super().act(observation)
+
+
+class Wordy(Hostile):
+    def act(self, observation: Any) -> NoReturn:
+        raise ValueError("x" * 100_000_000)
+
+
+class Missing(Hostile):
+    """Pretends that a package is missing, which would end the run."""
+
+    def act(self, observation: Any) -> NoReturn:
+        from roboirg.core.errors import MissingDependencyError
+
+        raise MissingDependencyError("Install nothing.")
+
+
+class Renderless(Hostile):
+    def act(self, observation: Any) -> NoReturn:
+        from roboirg.core.errors import RenderDeviceError
+
+        raise RenderDeviceError("No device.")
+
+
+SPOILED = {
+    "Closer": "policy: the process",
+    "Babbler": "policy: the ",
+    "Interrupter": "policy: KeyboardInterrupt",
+    "Ender": "policy: GeneratorExit",
+    "Alarmer": "policy: SystemExit: alarm",
+    "Unspeakable": "policy: BrokenError: its text cannot be read",
+    "Surrogate": "policy: ValueError: ???",
+    "SurrogateMetadata": "policy: the policy's metadata hold text with lone surrogates.",
+    "SurrogateKey": "policy: the policy's metadata hold text with lone surrogates.",
+    "Wordy": "policy: ValueError: xxxx",
+    "Missing": "policy: Install nothing.",
+    "Renderless": "policy: No device.",
+}
+"""Those whose episodes end in an error, and how its cause begins."""
+HARMLESS = ("Searcher", "Patcher", "Leaker", "Wanderer", "SurrogateCost", "Printer")
+"""Those that fail like any policy that does not do the task."""
+
+SPEC = f"{Path(__file__).stem}:{{}}".format

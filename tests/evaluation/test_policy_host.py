@@ -1,0 +1,478 @@
+"""Policies in a process of their own: same records, whoever shares the host, whatever dies."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from multiprocessing.shared_memory import SharedMemory
+from pathlib import Path
+from typing import Any
+
+import hosting_fakes
+import numpy as np
+import pytest
+from evaluation_fakes import comparable, is_alive, worker_pids
+from hosting_fakes import PaperRunner, paper_plan, paper_runner
+
+from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError
+from roboirg.evaluation.executors.executor import Executor, InProcess, LocalProcesses
+from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
+from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
+from roboirg.evaluation.hosting.payload import BLOCK_SIZE, pack_payload, unpack_payload
+from roboirg.evaluation.plan import Plan
+from roboirg.evaluation.policy_descriptions import describe_policy
+from roboirg.evaluation.runner import run_plan
+from roboirg.policies.loading import is_foreign, needs_host
+from roboirg.policies.requirements import wanted_cameras, wanted_history
+from roboirg.records.record import Job, Record
+from roboirg.records.store import RECORDS_FILE, read_contents, read_records
+
+KILLS = int(os.environ.get("ROBOIRG_TEST_KILLS", "24"))
+
+
+@pytest.fixture(autouse=True)
+def _fakes_can_be_imported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(Path(hosting_fakes.__file__).parent)
+
+
+@pytest.fixture
+def pool() -> Iterator[HostPool]:
+    with HostPool(HostSettings(policy_timeout_s=60.0)) as opened:
+        yield opened
+
+
+def write_policy(folder: Path, monkeypatch: pytest.MonkeyPatch, name: str, text: str) -> str:
+    (folder / f"{name}.py").write_text("import os, sys, time\nimport numpy as np\n" + text)
+    monkeypatch.syspath_prepend(folder)
+    return f"{name}:It"
+
+
+def play(plan: Plan, folder: Path, executor: Executor) -> dict[Job, dict[str, Any]]:
+    folder.mkdir(exist_ok=True)
+    run_plan(plan, folder, paper_runner(plan, folder), executor)
+    return {record.identity: comparable(record) for record in read_records(folder)}
+
+
+# Arrays
+
+
+def test_arrays_of_every_kind_travel_in_parts() -> None:
+    value = {
+        "history": ({"a": np.arange(6, dtype=np.int16).reshape(2, 3)}, {"a": np.float32(2.5)}),
+        "none": np.zeros((0, 256, 256, 3), np.uint8),
+        "turned": np.arange(12.0).reshape(3, 4).T,
+        "text": "pick",
+    }
+    payload = pack_payload(value)
+    data = bytearray(payload.size)
+    for start in range(0, payload.size, 50):  # parts smaller than an array
+        part = memoryview(bytearray(50))
+        payload.copy_to(part, start)
+        data[start : start + 50] = part[: payload.size - start]
+    found = unpack_payload(payload.tree, data)
+    assert found["text"] == "pick"
+    assert isinstance(found["history"], tuple)
+    assert np.array_equal(found["history"][0]["a"], value["history"][0]["a"])
+    assert found["history"][1]["a"] == np.float32(2.5)
+    assert found["none"].shape == (0, 256, 256, 3)
+    assert np.array_equal(found["turned"], value["turned"])
+    found["turned"][0, 0] = 7.0  # a policy may write into what it gets
+
+
+def test_a_hosted_policy_gets_what_a_policy_gets(
+    pool: HostPool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spec = write_policy(
+        tmp_path,
+        monkeypatch,
+        "curious",
+        """
+class It:
+    observe_every = 4
+    def __init__(self, seed=0):
+        self.metadata = {"seed": seed}
+    def reset(self, instruction, demonstration):
+        self.metadata["instruction"] = instruction
+        self.metadata["fields"] = list(demonstration)
+        self.video = demonstration["front_rgb"]  # many parts
+        self.metadata["sum"] = int(self.video.sum(dtype=np.int64))
+        self.metadata["shape"] = list(self.video.shape)
+    def hear(self, text, step):
+        self.metadata["heard"] = [text, step]
+    def act(self, observation):
+        first, *_ = observation["history"]
+        rows = np.full((2, 8), first["front_rgb"].mean())
+        observation["front_rgb"][:] = 0
+        return rows
+    def usage(self):
+        return {"calls": 2, "cost": float("nan")}
+""",
+    )
+    policy = HostedPolicy(pool.address, spec, 5)
+    assert (wanted_history(policy), wanted_cameras(policy)) == (4, ("front", "wrist"))
+    assert not hasattr(policy, "cameras")  # it has not said which
+    frames = np.random.default_rng(0).integers(0, 255, (30, 256, 256, 3), np.uint8)
+    assert frames.nbytes > 2 * BLOCK_SIZE
+    policy.reset("Pick it.", {"front_rgb": frames, "joint_positions": np.zeros((30, 7))})
+    assert policy.metadata == {
+        "seed": 5,
+        "instruction": "Pick it.",
+        "fields": ["front_rgb", "joint_positions"],
+        "sum": int(frames.sum(dtype=np.int64)),
+        "shape": [30, 256, 256, 3],
+    }
+    picture = np.full((256, 256, 3), 9, np.uint8)
+    observation: Any = {"front_rgb": picture, "history": ({"front_rgb": picture},)}
+    assert np.array_equal(policy.act(observation), np.full((2, 8), 9.0))
+    assert picture.all()  # the world's own is untouched
+    policy.hear("The blue one.", 3)
+    assert policy.metadata["heard"] == ["The blue one.", 3]
+    assert policy.usage() == {"calls": 2.0}
+    policy.close()
+    policy.close()
+    with pytest.raises(FileNotFoundError):
+        SharedMemory(policy._block.name)
+
+
+def test_pictures_of_a_video_are_drawn_when_they_are_read_and_then_sent_at_once(
+    pool: HostPool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spec = write_policy(
+        tmp_path,
+        monkeypatch,
+        "choosy",
+        """
+class It:
+    def reset(self, instruction, demonstration):
+        demonstration["front_rgb"]
+        self.video = demonstration
+        self.metadata = {}
+    def act(self, observation):
+        self.video.draw()
+        return np.zeros((1, 8))
+""",
+    )
+
+    class Video(dict[str, Any]):
+        drawn: list[str]
+
+        def __getitem__(self, field: str) -> Any:
+            self.drawn.append(field)
+            return super().__getitem__(field)
+
+    drawn = []
+    for _ in range(2):
+        video = Video(front_rgb=np.zeros((2, 4, 4, 3), np.uint8), joint_positions=np.zeros((2, 7)))
+        video["wrist_rgb"] = video["wrist_depth"] = np.zeros((2, 4, 4, 3), np.uint8)
+        video.drawn = []
+        policy = HostedPolicy(pool.address, spec, 0)
+        policy.reset("Pick it.", video)
+        drawn.append(list(video.drawn))
+        policy.act({})  # type: ignore[typeddict-item]
+        policy.close()
+        assert sorted(video.drawn) == sorted(video)
+    assert drawn[0] == ["joint_positions", "front_rgb"]
+    # The second episode knows what the first one read.
+    assert sorted(drawn[1]) == sorted(video)
+
+
+# Records
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[Job, dict[str, Any]]]:
+    """Records of worlds that share no host: the policy is in their process."""
+    sys.path.insert(0, str(Path(hosting_fakes.__file__).parent))
+    folder = tmp_path_factory.mktemp("alone")
+    return {
+        policy: play(paper_plan(policy, policy_process="shared"), folder / policy, InProcess())
+        for policy in ("Dice", "BatchedDice")
+    }
+
+
+@pytest.mark.parametrize("policy", ["Dice", "BatchedDice"])
+@pytest.mark.parametrize(("workers", "batch"), [(0, 16), (1, 16), (4, 1), (4, 3), (16, 16)])
+def test_records_do_not_depend_on_workers_or_batches(
+    tmp_path: Path, alone: Any, policy: str, workers: int, batch: int
+) -> None:
+    executor = LocalProcesses(workers) if workers else InProcess()
+    found = play(paper_plan(policy, batch=batch), tmp_path, executor)
+    assert found == alone[policy]
+    assert {record["outcome"] for record in found.values()} == {"success", "failure"}
+
+
+def test_waiting_episodes_are_asked_about_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROBOIRG_TEST_SIZES", str(tmp_path / "sizes"))
+    play(paper_plan("BatchedDice", batch=3), tmp_path / "run", LocalProcesses(4))
+    sizes = [int(line) for line in (tmp_path / "sizes").read_text().split()]
+    assert max(sizes) in (2, 3)
+    assert sum(sizes) == 8 * hosting_fakes.LENGTH / 4
+    # One object, however many worlds there are.
+    assert {record.policy_metadata["made"] for record in read_records(tmp_path / "run")} == {1}
+
+
+def test_a_batch_that_fails_costs_only_the_episode_to_blame(tmp_path: Path) -> None:
+    together = play(paper_plan("Picky"), tmp_path / "together", LocalProcesses(4))
+    single = play(paper_plan("Picky"), tmp_path / "single", LocalProcesses(1))
+    assert together == single
+    causes = [record["cause"] for record in together.values() if record["outcome"] == "error"]
+    assert 0 < len(causes) < len(together)
+    assert set(causes) == {"policy: ValueError: one of them is bad"}
+
+
+def test_a_privileged_policy_stays_beside_the_world(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spec = write_policy(
+        tmp_path,
+        monkeypatch,
+        "insider",
+        """
+class It:
+    cameras = ()
+    def attach(self, env):
+        self.env = env
+    def reset(self, instruction, demonstration):
+        self.metadata = {"secret": self.env.secret, "process": os.getpid() == os.getppid()}
+    def act(self, observation):
+        return np.ones((24, 8))
+""",
+    )
+    plan = paper_plan(spec, 1)
+    play(plan, tmp_path / "run", LocalProcesses(1))
+    (record,) = read_records(tmp_path / "run")
+    assert record.privileged
+    assert "token" in str(record.policy_metadata["secret"])
+
+
+def test_each_device_has_a_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    spec = write_policy(
+        tmp_path,
+        monkeypatch,
+        "located",
+        """
+class It:
+    cameras = ()
+    def reset(self, instruction, demonstration):
+        self.metadata = {"device": os.environ["CUDA_VISIBLE_DEVICES"], "process": os.getpid()}
+    def act(self, observation):
+        time.sleep(0.2)
+        return np.ones((24, 8))
+""",
+    )
+    plan = paper_plan(spec, 6, devices=("0", "3"))
+    play(plan, tmp_path / "run", LocalProcesses(2))
+    found = {
+        (record.policy_metadata["device"], record.policy_metadata["process"])
+        for record in read_records(tmp_path / "run")
+    }
+    assert sorted(device for device, _ in found) == ["0", "3"]
+
+
+# What a policy is
+
+
+def test_which_policies_get_a_process(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text(
+        'name = "mine"\nabout = "Mine."\npolicy = "somewhere:Mine"\n'
+    )
+    foreign = ["somewhere:Mine", f"system:{tmp_path}/mine.toml"]
+    ours = ["oracle", "random", "openpi://localhost:1", "system:GroundSG-QwenVL", "unknown"]
+    assert [is_foreign(one) for one in foreign] == [True, True]
+    assert [needs_host(one) for one in foreign] == [True, True]
+    assert not any(map(needs_host, ours))
+    assert needs_host("lerobot://some/checkpoint")
+    assert not is_foreign("lerobot://some/checkpoint")
+
+
+def test_a_policy_is_described_without_being_imported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spec = write_policy(
+        tmp_path,
+        monkeypatch,
+        "versioned",
+        """
+class It:
+    version = "step-\\ud800" + "7" * 500
+    def reset(self, instruction, demonstration): pass
+    def act(self, observation): pass
+""",
+    )
+    found = describe_policy(spec)
+    assert found.version == "step-?" + "7" * 194
+    assert not found.is_privileged
+    assert "versioned" not in sys.modules
+    assert describe_policy("oracle").is_privileged
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "words"),
+    [
+        ("raise RuntimeError('no')", InvalidValueError, r"cannot be imported \(RuntimeError: no\)"),
+        ("class Other: pass", InvalidValueError, "has no class 'It'"),
+        ("os._exit(3)", InvalidValueError, "ended with exit code 3"),
+        (
+            "from roboirg.core import errors; raise errors.MissingDependencyError('pip it')",
+            MissingDependencyError,
+            "pip it",
+        ),
+    ],
+)
+def test_a_policy_that_cannot_be_loaded_is_reported_before_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, error: type, words: str
+) -> None:
+    spec = write_policy(tmp_path, monkeypatch, "broken", text)
+    with pytest.raises(error, match=words):
+        paper_plan(spec, 1).checked()
+
+
+# Deaths
+
+
+def test_only_the_episode_to_blame_learns_of_a_crash(
+    pool: HostPool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spec = write_policy(
+        tmp_path,
+        monkeypatch,
+        "fragile",
+        """
+class It:
+    def reset(self, instruction, demonstration):
+        self.word = instruction
+    def act(self, observation):
+        if self.word == "die":
+            os._exit(7)
+        return np.zeros((1, 8))
+""",
+    )
+    good, bad = (HostedPolicy(pool.address, spec, 0) for _ in range(2))
+    good.reset("live", {})
+    bad.reset("die", {})
+    assert good.act({}).shape == (1, 8)  # type: ignore[typeddict-item]
+    with pytest.raises(EpisodeError) as guilty:
+        bad.act({})  # type: ignore[typeddict-item]
+    assert guilty.value.kind == "policy"
+    assert str(guilty.value) == "the process ended with exit code 7 in the policy's act()"
+    with pytest.raises(EpisodeLostError):
+        good.act({})  # type: ignore[typeddict-item]
+    for one in (good, bad):
+        one.close()
+    again = HostedPolicy(pool.address, spec, 0)  # in a new process
+    again.reset("live", {})
+    assert again.act({}).shape == (1, 8)  # type: ignore[typeddict-item]
+    again.close()
+
+
+def test_a_world_that_dies_in_a_call_does_not_stop_the_host(pool: HostPool) -> None:
+    spec = f"{Path(hosting_fakes.__file__).stem}:Dice"
+    policy = HostedPolicy(pool.address, spec, 0)
+    policy._connection.send_bytes(b"\x81\xa6method\xa5reset")  # half a message
+    policy._connection.close()
+    after = HostedPolicy(pool.address, spec, 1)
+    after.close()
+
+
+def test_strangers_are_turned_away(pool: HostPool) -> None:
+    stranger = pool.address._replace(key=b"x" * 32)
+    with pytest.raises(EpisodeLostError):
+        HostedPolicy(stranger, "random", 0)
+
+
+def host_pids(supervisor: int) -> list[int]:
+    """Return the processes that a supervisor started for policies."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            status, line = (path / "stat").read_text(), (path / "cmdline").read_bytes()
+        except OSError:
+            continue
+        if int(status.rpartition(")")[2].split()[1]) == supervisor and b"host_process" in line:
+            found.append(int(path.name))
+    return found
+
+
+@pytest.mark.parametrize("policy", ["Dice", "BatchedDice"])
+def test_killed_hosts_worlds_and_supervisors_lose_and_double_nothing(
+    tmp_path: Path, policy: str
+) -> None:
+    folder, undisturbed = tmp_path / "killed", tmp_path / "undisturbed"
+    folder.mkdir()
+    kills = max(3, KILLS // 2)
+    plan = paper_plan(policy, 25, seeds=max(1, kills // 6))
+    expected = play(plan, undisturbed, InProcess())
+    command = [
+        sys.executable,
+        hosting_fakes.__file__,
+        str(folder),
+        "25",
+        policy,
+        str(len(plan.policy_seeds)),
+    ]
+    rng, struck, known = random.Random(policy), 0, 0
+    child = subprocess.Popen(command)
+    for _ in range(kills):
+        time.sleep(rng.uniform(0.1, 1.5))
+        if child.poll() is not None:
+            child = subprocess.Popen(command)
+            continue
+        victims = {
+            "host": host_pids(child.pid),
+            "world": [pid for pid in worker_pids(folder) if is_alive(pid)],
+            "supervisor": [child.pid],
+        }[rng.choice(["host", "world", "supervisor"])]
+        for victim in victims[:1]:
+            struck += 1
+            os.kill(victim, signal.SIGKILL)
+            if victim == child.pid:
+                child.wait()
+        contents = read_contents(folder / RECORDS_FILE)
+        assert len(contents.records) >= known
+        known = len(contents.records)
+    child.wait()
+    for _ in range(5):  # what ended in an error is played again
+        if subprocess.run(command, check=False).returncode == 0 and not _errors(folder):
+            break
+    found = {record.identity: comparable(record) for record in read_records(folder)}
+    assert found == expected
+    assert struck >= kills // 4
+    assert not any(map(is_alive, worker_pids(folder)))
+
+
+def _errors(folder: Path) -> list[Record]:
+    return [record for record in read_records(folder) if record.outcome == "error"]
+
+
+def test_an_episode_that_is_lost_again_and_again_ends_in_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spec = write_policy(
+        tmp_path,
+        monkeypatch,
+        "deserter",
+        """
+import threading
+class It:
+    cameras = ()
+    def reset(self, instruction, demonstration):
+        threading.Timer(0.05, lambda: os._exit(5)).start()  # between two calls
+        self.metadata = {}
+    def act(self, observation):
+        return np.ones((1, 8))
+""",
+    )
+    monkeypatch.setattr("roboirg.evaluation.rollout.MAX_LOSSES", 2)
+    plan = paper_plan(spec, 1)
+    runner: PaperRunner = paper_runner(plan, tmp_path, seconds=0.2)
+    (record,) = InProcess().run(plan.jobs(), runner)
+    assert (record.outcome, record.error) == ("error", "policy")
+    assert "the process ended with exit code 5" in str(record.cause)

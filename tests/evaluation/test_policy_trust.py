@@ -1,0 +1,208 @@
+"""No policy reaches the goal, the next policy or the run; what it breaks is its own."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import hostile_policies
+import hosting_fakes
+import pytest
+from evaluation_fakes import FakePlay, comparable, small_plan
+from hosting_fakes import PaperRunner, PaperWorld, paper_plan, paper_runner
+from pydantic import ValidationError
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
+from roboirg.evaluation.executors.executor import InProcess, LocalProcesses
+from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
+from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
+from roboirg.evaluation.plan import Plan, make_plan
+from roboirg.evaluation.runner import run_plan
+from roboirg.records.record import Job, Record
+from roboirg.records.store import read_records
+
+HONEST = "hosting_fakes:Dice"
+
+
+@pytest.fixture(autouse=True)
+def _fakes_can_be_imported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(Path(hosting_fakes.__file__).parent)
+
+
+def play(folder: Path, names: tuple[str, ...], **options: Any) -> dict[str, list[Record]]:
+    """Play three episodes of each policy, and an honest one between and after them."""
+    specs = [spec for name in names for spec in (hostile_policies.SPEC(name), f"{name}+1={HONEST}")]
+    plan = paper_plan("Dice", 3).model_copy(update={"policies": tuple(specs), **options})
+    folder.mkdir()
+    run_plan(plan, folder, paper_runner(plan, folder), LocalProcesses(2))
+    found: dict[str, list[Record]] = {}
+    for record in read_records(folder):
+        found.setdefault(record.policy, []).append(record)
+    return found
+
+
+def test_what_a_policy_breaks_is_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    names = (*hostile_policies.SPOILED, *hostile_policies.HARMLESS)
+    found = play(tmp_path / "run", names)
+    plan = paper_plan("Dice", 3, policy_process="shared")
+    alone = InProcess().run(plan.jobs(), paper_runner(plan, tmp_path))
+    expected = {record.episode: record.outcome for record in alone}
+    for name in names:
+        records = found[hostile_policies.SPEC(name)]
+        assert len(records) == len(found[f"{name}+1"]) == 3
+        for record in records:
+            if name in hostile_policies.SPOILED:
+                assert record.error == "policy", (name, record.cause)
+                assert str(record.cause).startswith(hostile_policies.SPOILED[name])
+            else:
+                assert (record.outcome, record.error) == ("failure", None), (name, record.cause)
+        for record in found[f"{name}+1"]:
+            assert record.outcome == expected[record.episode]
+    for record in found[hostile_policies.SPEC("Searcher")]:
+        assert record.policy_metadata == {"world": False, "job": False, "goal": False}
+    beside = hostile_policies.Searcher()
+    job, *_ = jobs = plan.jobs()  # alive while it searches
+    world = PaperWorld(job)
+    beside.reset(world.secret, {})
+    assert beside.metadata == {"world": True, "job": True, "goal": True}, jobs
+    assert Path.cwd() == tmp_path
+    shown = capfd.readouterr()
+    assert len(shown.out) + len(shown.err) < 500_000
+    assert "prints more than is shown" in shown.err
+
+
+def test_an_episode_begins_where_the_run_began(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with HostPool(HostSettings()) as pool:
+        for _ in range(2):  # the first one left for elsewhere
+            policy = HostedPolicy(pool.address, hostile_policies.SPEC("Wanderer"), 0)
+            policy.reset("Pick it.", {})
+            policy.act({})  # type: ignore[typeddict-item]
+            policy.hear("The red one.", 1)
+            assert policy.metadata == {"before": str(tmp_path)}
+            policy.close()
+
+
+@pytest.mark.parametrize(("process", "elsewhere"), [("own", False), ("shared", True)])
+def test_a_policy_is_imported_only_in_its_own_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, process: str, elsewhere: bool
+) -> None:
+    (tmp_path / "tattler.py").write_text(
+        "import os, sys\nimport numpy as np\n"
+        "with open('imports', 'a') as file: file.write(f'{sys.orig_argv}\\n')\n"
+        "class It:\n    cameras = ()\n    def reset(self, i, d): pass\n"
+        "    def act(self, o): return np.ones((24, 8))\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    options = {"tasks": "PickXtimes", "settings": "direct", "policy_process": process}
+    sys.path.insert(0, str(tmp_path))
+    try:
+        plan = make_plan(["tattler:It"], **options)  # type: ignore[arg-type]
+        for _ in range(2):  # the second run compares versions
+            run_plan(plan, tmp_path, paper_runner(plan, tmp_path), LocalProcesses(2))
+            plan = make_plan(["tattler:It"], **options, max_steps=9)  # type: ignore[arg-type]
+    finally:
+        sys.modules.pop("tattler", None)
+    imports = (tmp_path / "imports").read_text().splitlines()
+    assert imports
+    assert any("host_process" not in one for one in imports) == elsewhere
+    assert {record.outcome for record in read_records(tmp_path)} == {"success"}
+
+
+def memory_of(pid: int, needle: bytes) -> bool:
+    """Return whether the readable memory of a process holds some bytes."""
+    with Path(f"/proc/{pid}/mem").open("rb", 0) as memory:
+        for line in Path(f"/proc/{pid}/maps").read_text().splitlines():
+            found = re.match(r"([0-9a-f]+)-([0-9a-f]+) r", line)
+            if found is None or "[vvar]" in line or "[vsyscall]" in line:
+                continue
+            start, end = int(found[1], 16), int(found[2], 16)
+            try:
+                memory.seek(start)
+                content = memory.read(end - start)
+            except (OSError, ValueError, OverflowError):
+                continue
+            if needle in content:
+                return True
+    return False
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_the_memory_of_a_host_holds_no_goal_scene_or_seed() -> None:
+    job = paper_plan("Dice", 1).jobs()[0]
+    world = PaperWorld(job)
+    _, info = world.reset()
+    with HostPool(HostSettings()) as pool:
+        policy = HostedPolicy(pool.address, HONEST, 3)
+        policy.reset("Pick the needle in the haystack.", info["demonstration"])
+        policy.act(world.observation())  # type: ignore[arg-type]
+        (pid,) = pool.pids
+        secret = hosting_fakes.WHISPER.format(job.episode).encode()
+        assert memory_of(os.getpid(), secret)  # the search finds what is there
+        assert memory_of(pid, b"Pick the needle in the haystack.")
+        assert not memory_of(pid, secret)
+        policy.close()
+
+
+def test_a_name_with_lone_surrogates_is_refused() -> None:
+    with pytest.raises(InvalidValueError, match="lone surrogates"):
+        make_plan(["x\ud800=random"], tasks="PickXtimes")
+
+
+class Liar(PaperRunner):
+    """Calls a failure a success, as a policy could that patches the judge in its own process."""
+
+    def __call__(self, job: Job) -> Record:
+        record = FakePlay()(job)
+        return record.model_copy(update={"outcome": "success", "cause": "picked the wrong cube"})
+
+
+def test_a_success_with_a_cause_is_refused(tmp_path: Path) -> None:
+    plan: Plan = small_plan(1)
+    run_plan(plan, tmp_path, Liar(tmp_path), InProcess())
+    for record in read_records(tmp_path):
+        assert (record.outcome, record.error) == ("error", "policy")
+        assert record.cause == "policy: a success came with a cause (picked the wrong cube)"
+    (honest, *_) = (FakePlay()(job) for job in plan.jobs())
+    with pytest.raises(ValidationError, match="a success has no cause"):
+        Record(**{**dict(honest), "outcome": "success", "cause": "no"})
+
+
+@pytest.mark.parametrize("error", [GeneratorExit, SystemExit])
+def test_in_the_worlds_process_too_it_is_the_policy(error: type[BaseException]) -> None:
+    with pytest.raises(EpisodeError) as caught, attribute_errors("policy"):
+        raise error
+    assert caught.value.kind == "policy"
+
+
+def test_ctrl_c_is_the_users_where_it_can_be() -> None:
+    with pytest.raises(KeyboardInterrupt), attribute_errors("policy"):
+        raise KeyboardInterrupt
+
+
+def test_in_a_worker_an_interrupt_is_the_policys(tmp_path: Path) -> None:
+    found = play(tmp_path / "run", ("Interrupter", "Ender", "Unspeakable"), policy_process="shared")
+    for name in ("Interrupter", "Ender", "Unspeakable"):
+        for record in found[hostile_policies.SPEC(name)]:
+            assert str(record.cause).startswith(hostile_policies.SPOILED[name])
+        assert {record.error for record in found[f"{name}+1"]} == {None}
+
+
+def test_records_of_honest_policies_are_the_same_beside_any_cheat(tmp_path: Path) -> None:
+    beside = play(tmp_path / "beside", ("Leaker",))["Leaker+1"]
+    plan = paper_plan("Dice", 3)
+    alone = InProcess().run(plan.jobs(), paper_runner(plan, tmp_path))
+    changed = {"policy": "", "policy_version": ""}
+    assert sorted((comparable(one) | changed for one in beside), key=str) == sorted(
+        (comparable(one) | changed for one in alone), key=str
+    )
