@@ -97,8 +97,11 @@ def pair_refusal(request: InstructionRequest, locate: Locate | None = None) -> s
         return "commands from a wording file have no rivals"
     if request.options.distractor != DEFAULT_DISTRACTOR:
         return "next to a rival, a competing distractor would name one value too many"
-    if _pairs(request, locate):
-        return None
+    return None if _pairs(request, locate) else _lack(request, locate)
+
+
+def _lack(request: InstructionRequest, locate: Locate | None) -> str:
+    """Return what a scene lacks for a rival."""
     if len(request.values_of("amount")) > 2:  # noqa: PLR2004 - a color and its count
         return "a goal that counts cubes of several colors leaves no rival"
     if locate is None or not any(pair.slot in COLOR_SLOTS for pair in _possible(request)):
