@@ -58,6 +58,13 @@ def places(rule, text, task, slot):
         ("elimination", "Red, green and blue are nice. Take it once.", COLORS),
         ("surface", "I like the red cube. My door is green. Take it once.", ("red",)),
         ("surface", f"{EXCLUDED} once.", ("green",)),
+        (
+            "surface",
+            "I like the red cube and the blue cube. I mean the latter. Take it.",
+            ("blue",),
+        ),
+        ("surface", "Here are red and blue. Not the former. Take the cube I mean.", ("blue",)),
+        ("surface", "Here are red and blue. Not the former but the latter. Take it.", ("red",)),
         ("first-mention", f"{EXCLUDED} once.", ("red",)),
         ("last-mention", f"{EXCLUDED} once.", ("blue",)),
         ("first-mention", "Have a look at the cube at the far left. Take it once.", COLORS),
@@ -234,7 +241,7 @@ def test_shares_of_every_setting(task, setting):
                 assert all(0 <= share <= 1 for share in (*score.slots, score.goal))
             if not get_setting(setting, get_task(task)).implicit:
                 assert all(score_rule(rule, told).goal == 1 for rule in SURFACE_RULES)
-            elif setting in ("direct", "contextual"):
+            elif setting in ("direct", "contextual") and options.rival == "none":
                 assert score_rule("first-mention", told).goal == 1
                 assert score_rule("surface", told).goal == 1
                 if options.form == "resolved":

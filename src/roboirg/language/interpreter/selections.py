@@ -32,7 +32,7 @@ _REJECTED = re.compile(
     r"(?:\bnot(?: (?:do|mean|want|choose|like|need|prefer))?"
     r"|\b(?:leave|left|rule|ruled) out|\bset|\b(?:forget|never mind|skip|ignore)(?: about)?"
     r"|\b(?:gave|give) up|\b(?:instead of|rather than)|\b(?:swapped|swap|exchanged)"
-    r"|\b(?:prefer(?:red)?|better|more|chose|rather)\b.* (?:to|than|over)"
+    r"|\b(?:prefer(?:red)?|favor|better|more|chose|rather)\b.* (?:to|than|over)"
     r"|\bno (?:means|case|longer|way)|\banything but|\bwithout)$"
 )
 _REJECTED_AFTER = re.compile(r"^(?:[,;] )?no [,;]|^(?:is|are|was) (?:out|not|off)\b")

@@ -85,7 +85,7 @@ def wants_pair(request: InstructionRequest) -> bool:
 
 def hidden_by_pair(instruction: Instruction) -> frozenset[str] | None:
     """Return the slot that an instruction with a rival leaves open; None without a rival."""
-    slot = instruction.metadata["rival_slot"]
+    slot = instruction.metadata.get("rival_slot")
     return None if slot is None else frozenset((str(slot),))
 
 
@@ -93,10 +93,15 @@ def pair_refusal(request: InstructionRequest, locate: Locate | None = None) -> s
     """Return why an episode can have no rival; None if it can, or if none is asked for."""
     if not wants_pair(request):
         return None
+    if request.wordings is not None:
+        return "commands from a wording file have no rivals"
     if request.options.distractor != DEFAULT_DISTRACTOR:
         return "next to a rival, a competing distractor would name one value too many"
-    if _pairs(request, locate):
-        return None
+    return None if _pairs(request, locate) else _lack(request, locate)
+
+
+def _lack(request: InstructionRequest, locate: Locate | None) -> str:
+    """Return what a scene lacks for a rival."""
     if len(request.values_of("amount")) > 2:  # noqa: PLR2004 - a color and its count
         return "a goal that counts cubes of several colors leaves no rival"
     if locate is None or not any(pair.slot in COLOR_SLOTS for pair in _possible(request)):

@@ -5,7 +5,6 @@ Counts stay explicit.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 
 from roboirg.core.episode import Goal
@@ -194,8 +193,9 @@ SETTING = Setting(
     refusal=refusal,
     hidden_slots=_hidden_slots,
     reads=frozenset({"frame", "delivery", "rival"}),
-    variants=tuple(
-        {"frame": frame, "rival": rival} for rival, frame in itertools.product(RIVALS, FRAMES)
+    variants=(
+        *({"frame": frame} for frame in FRAMES),
+        *({"frame": frame, "rival": RIVALS[-1]} for frame in FRAMES),
     ),
     hides_only_color=lambda _instruction: True,
     example=6,

@@ -139,7 +139,7 @@ SET_ASIDE = Pools(
 CHOICES: dict[ReferenceKind, tuple[Pools[str], Pools[str]]] = {
     "preference": (
         Pools(
-            train=("I prefer {yes} to {no}.", "I want {yes} more than {no}."),
+            train=("I prefer {yes} to {no}.", "I favor {yes} over {no}."),
             test=("I like {yes} better than {no}.", "I chose {yes} over {no}."),
         ),
         Pools(

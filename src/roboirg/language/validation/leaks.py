@@ -43,7 +43,7 @@ def find_leaks(instruction: Instruction, goal: Goal) -> frozenset[str]:
 
 def _relation_words(instruction: Instruction) -> frozenset[str]:
     """Return the words of an open relation, which go with every result: *two fewer*, *twice*."""
-    if instruction.metadata["reasoning"] != REASONINGS[-1]:
+    if instruction.metadata.get("reasoning") != REASONINGS[-1]:
         return frozenset()
     return frozenset(re.findall(r"[a-z]+", str(instruction.metadata["relation"])))
 
