@@ -29,7 +29,7 @@ from roboirg.tasks import get_task
 GRID = st.integers(-17, 17).map(lambda step: step / 100)
 PLACES = st.lists(st.tuples(GRID, GRID), min_size=1, max_size=8, unique=True)
 """Centimeter grid: ties, exact margins and collinear rows are common."""
-LONGEST = {"robot": 12, "camera": 13}
+LONGEST = {"robot": 12, "camera": 14}
 """Words of the shortest landmark, which is used where none is short: prompts must stay short."""
 EXTREMES = {
     "farthest to your left",

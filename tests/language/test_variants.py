@@ -34,4 +34,11 @@ def test_every_combination_of_options_is_there():
     for name, task in every_task().items():
         told = list(variants.expressible_options(get_episode(name, "test", 0)))
         assert len(set(told)) == len(told)
-        assert len(told) == 6 + 16 + (4 if "spatial" in settings_of(task) else 0)
+        plain = [one for one in told if (one.rival, one.reasoning) == ("none", "plain")]
+        spatial = 4 if "spatial" in settings_of(task) else 0
+        assert len(plain) == 6 + 16 + spatial
+        # A scene may lack a second value, or what open reasoning needs.
+        others = [one for one in told if one not in plain]
+        assert len({one.setting for one in others} - {"direct", "contextual", "spatial"}) <= 1
+        for setting, most in (("direct", 2), ("reasoning", 2), ("contextual", 8), ("spatial", 4)):
+            assert sum(one.setting == setting for one in others) in (0, most)

@@ -141,7 +141,9 @@ def test_every_split_is_valid_in_the_words_of_either_pool(task, pool):
     for split in ("train", "test"):
         found = validate_batch(Batch(task, split, 0, 12, wordings=pool))
         assert not found.failures
-        assert found.texts[task, "direct"] == 2 * 12
+        assert (
+            2 * 12 <= found.texts[task, "direct"] <= 4 * 12
+        )  # with a rival, too, where there is one
 
 
 @pytest.mark.parametrize("pool", POOLS)
