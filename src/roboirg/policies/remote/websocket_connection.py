@@ -123,12 +123,12 @@ class WebsocketConnection:
         raise PolicyReplyError(f"{self.spec} sent a message without a request.")
 
     def _attempt(self, left: float) -> ClientConnection:
-        spec, options = self.spec, self.spec.options
+        spec, options, headers = self.spec, self.spec.options, self.spec.options.headers
         try:
             return self._closing.enter_context(
                 connect(
                     f"{'wss' if options.tls else 'ws'}://{spec.endpoint}",
-                    additional_headers=options.headers,
+                    additional_headers=headers,
                     compression=None,
                     max_size=options.max_reply,
                     open_timeout=max(left, 0.001),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import weakref
 from collections.abc import Iterator
 from typing import Any
 
@@ -53,6 +54,8 @@ class OpenAIModel:
             default_headers=PLAIN_HEADERS,
             http_client=openai.DefaultHttpxClient(event_hooks={"response": [limit_response]}),
         )
+        # Without a close() the connection ends with this object, as with the library's own client.
+        weakref.finalize(self, self._client.close)
 
     def answer(self, query: ModelQuery) -> ModelReply:
         """Send a query; see `Model`."""
