@@ -42,7 +42,8 @@ def test_a_verdict_beats_an_error_and_the_first_verdict_a_later_one(tmp_path: Pa
     one, two, *_ = some()
     error = one.model_copy(update={"outcome": "error", "error": "connection"})
     other = {"success": "failure", "failure": "success"}[two.outcome]
-    disputed = two.model_copy(update={"outcome": other})
+    cause = None if other == "success" else "it fell"
+    disputed = two.model_copy(update={"outcome": other, "cause": cause})
     merged = merge_runs(
         [fill(tmp_path / "a", error, two), fill(tmp_path / "b", one, disputed)], tmp_path / "out"
     )

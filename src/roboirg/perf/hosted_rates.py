@@ -58,18 +58,18 @@ def hosted() -> float:
 
 def episodes_per_hour(workers: int) -> float:
     """Return the pace at which a number of workers plays one slow policy, without their start."""
-    count = 4 * workers + 4
+    count = 12 * workers
     plan = make_plan(
         [f"{__name__}:{SlowPolicy.__name__}"],
         tasks="PickXtimes",
         settings="explicit",
         episodes="4",
-        policy_seeds=f"0-{count // 4}",
+        policy_seeds=f"0-{count // 4 - 1}",
         max_steps=MAX_STEPS,
     )
     with tempfile.TemporaryDirectory() as folder:
         runner = EpisodeRunner(Path(folder), hosting=plan.hosting)
         times = [time.perf_counter() for _ in LocalProcesses(workers).run(plan.jobs(), runner)]
-    # From when all workers have played an episode until the first one has none left to play.
-    first, last = workers, len(times) - workers
+    # Without the beginning, when some workers still start, and the end, when some have no more.
+    first, last = 4 * workers, len(times) - workers
     return _HOUR_S * (last - first) / (times[last] - times[first])
