@@ -124,7 +124,7 @@ def test_a_record_says_what_was_cut() -> None:
 
 
 def test_records_without_a_limit_and_old_ones_are_unknown() -> None:
-    record = make_record(job(), RolloutResult("success"), started_at="now")
+    record = make_record(job(), RolloutResult("success", cause=None), started_at="now")
     assert (record.prompt, record.prompt_verdict) == (None, "unknown")
     old = record.model_dump(mode="json", exclude={"prompt", "prompt_verdict"})
     assert Record.model_validate(old) == record
