@@ -96,6 +96,12 @@ Devices = Annotated[
     str | None,
     typer.Option(help="GPUs, such as 0,1; each policy has a process on each.  (one, on any)"),
 ]
+LongPrompts = Annotated[
+    str | None,
+    typer.Option(
+        help="Episodes whose prompt is longer than what the policy reads: send or refuse.  (send)"
+    ),
+]
 PolicyTimeout = Annotated[
     float | None, typer.Option(help="Time limit of one policy call, seconds.  (600)")
 ]

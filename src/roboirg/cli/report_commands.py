@@ -129,6 +129,9 @@ def tables(
         bool, typer.Option(help="Add that of the forgetful and the shortcut listeners.")
     ] = False,
     by: By = None,
+    heard: Annotated[
+        bool, typer.Option(help="Instead: how many prompts were cut, and rates over the others.")
+    ] = False,
     out: Annotated[
         Path | None, typer.Option(help="Folder for a file of each table; prints without it.")
     ] = None,
@@ -137,7 +140,11 @@ def tables(
     from roboirg.analysis.tables.rendering import get_format
 
     output = get_format(format)
-    if by is None:
+    if heard:
+        if published or chance or floors or which != _ALL or by is not None:
+            raise InvalidValueError("--heard has a table of its own; give no other but --format.")
+        found = [_heard_table(runs or [])]
+    elif by is None:
         cells = _cells(runs or [])
         found = _tables(which, cells, published=published, chance=chance, floors=floors)
     elif published or chance or floors or which != _ALL:
@@ -224,6 +231,22 @@ def _breakdown_tables(runs: list[str], by: str) -> list[Table]:
             f"The runs have no instruction to break down by {by}; they need an implicit setting."
         )
     return [table for table in found if table.rows]
+
+
+def _heard_table(runs: list[str]) -> Table:
+    from roboirg.analysis.stats.cells import gather, labels, policy_order, sort_cells
+    from roboirg.analysis.stats.heard_rates import count_heard
+    from roboirg.analysis.tables.heard_table import make_heard_table
+
+    results, planned = _runs(runs)
+    cells = gather(results, planned)
+    names = labels(sort_cells(cells, policy_order(cells, ())))
+    found = count_heard(results, names)
+    if not found:
+        raise InvalidValueError(
+            "No policy of the runs declares how many tokens it reads; prompt_tokens=N does."
+        )
+    return make_heard_table(found, names)
 
 
 def _breakdowns(by: str | None) -> tuple[Breakdown, ...]:

@@ -17,6 +17,8 @@ from roboirg.core.printable import printable
 from roboirg.util.plurals import counted
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from roboirg.evaluation.executors.executor import Executor
     from roboirg.evaluation.plan import Plan
     from roboirg.evaluation.runner import RunSummary
@@ -76,6 +78,7 @@ def run(
     policy_process: options.PolicyProcessOption = None,
     batch: options.Batch = None,
     devices: options.Devices = None,
+    long_prompts: options.LongPrompts = None,
     policy_timeout_s: options.PolicyTimeout = None,
     episode_timeout_s: options.EpisodeTimeout = None,
     tries: options.Tries = None,
@@ -114,6 +117,7 @@ def run(
         policy_process=policy_process,
         batch=batch,
         devices=devices,
+        long_prompts=long_prompts,
         policy_timeout_s=policy_timeout_s,
         episode_timeout_s=episode_timeout_s,
         tries=tries,
@@ -125,6 +129,7 @@ def run(
     if dry_run:
         _print_estimate(made, folder, workers)
         return
+    _warn_of_cut_prompts(made)
     summary = play(made, folder, _executor(made, executor, address, workers), retry=retry_errors)
     print_tables_of(folder, planned_jobs(folder))
     report_problems(summary, folder)
@@ -196,6 +201,7 @@ def play(plan: Plan, out: Path, executor: Executor, *, retry: bool) -> RunSummar
         policy_timeout_s=plan.policy_timeout_s,
         plan=plan.fingerprint,
         hosting=plan.hosting,
+        refuse_long=plan.long_prompts == "refuse",
     )
     try:
         with ConsoleReporter(Console()) as reporter:
@@ -283,6 +289,13 @@ def _plan(name: str | None, typed: dict[str, Any]) -> Plan:
     return make_plan(policies, **chosen)
 
 
+def _warn_of_cut_prompts(plan: Plan) -> None:
+    from roboirg.evaluation.prompt_shares import prompt_shares, warning_lines
+
+    for line in warning_lines(prompt_shares(plan.jobs())):
+        typer.echo(line, err=True)
+
+
 def _executor(plan: Plan, name: str, address: str | None, workers: int | None) -> Executor:
     if name not in EXECUTORS:
         raise UnknownNameError("executor", name, EXECUTORS)
@@ -321,8 +334,38 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
         table.add_row(policy, task, *counts)
     table.caption = "episodes: implicit" + (" + resolved" if "resolved" in plan.forms else "")
     console.print(table)
+    _print_prompt_shares(jobs, settings, console)
     played = read_index(folder)
     todo = [job for job in jobs if identity_key(job) not in played]
     count = core_count() if workers is None else max(workers, 1)
     for line in estimate_text(estimate(todo, played.values(), count), len(jobs), count):
         console.print(line, highlight=False)
+
+
+def _print_prompt_shares(
+    jobs: tuple[Job, ...], settings: tuple[str, ...], console: Console
+) -> None:
+    """Print how many instructions the policies that declare a limit do not read whole."""
+    from rich.table import Table
+
+    from roboirg.evaluation.prompt_shares import prompt_shares, share_text
+    from roboirg.policies.policy_classes import BUILTIN
+
+    shares = prompt_shares(jobs)
+    table = Table(title="instructions that are cut", title_justify="left")
+    for name in ("policy", "reads", *settings):
+        table.add_column(name, justify="left" if name == "policy" else "right")
+    for one in shares:
+        if one.limit is not None:
+            counts = (one.settings.get(setting) for setting in settings)
+            row = ("–" if count is None else share_text(count) for count in counts)
+            table.add_row(one.policy, f"{one.limit.tokens} tokens", *row)
+    if table.row_count:
+        console.print(table)
+    undeclared = [one.policy for one in shares if one.limit is None and one.policy not in BUILTIN]
+    if undeclared:
+        console.print(
+            f"Not declared, so unknown (prompt_tokens=N): {', '.join(undeclared)}.",
+            highlight=False,
+            markup=False,
+        )

@@ -1,14 +1,17 @@
-"""Deliveries: when each utterance of an instruction is said and heard."""
+"""Deliveries: when each utterance of an instruction is said, and whether it is heard."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from roboirg.core.instruction_options import DEFAULT_DELIVERY
 
 TURNS = "turns"
 DELIVERIES = (DEFAULT_DELIVERY, TURNS)
+
+PromptVerdict = Literal["heard", "cut", "unknown"]
+"""Whether all that was said reached a policy's language model, or its prompt was cut."""
 
 SPACING = 20
 """Control steps between two utterances: one second."""

@@ -63,6 +63,9 @@ VIDEO_MODES: tuple[VideoMode, ...] = get_args(VideoMode)
 PolicyProcessMode = Literal["own", "shared"]
 POLICY_PROCESSES: tuple[PolicyProcessMode, ...] = get_args(PolicyProcessMode)
 
+LongPrompts = Literal["send", "refuse"]
+LONG_PROMPTS: tuple[LongPrompts, ...] = get_args(LongPrompts)
+
 MESHES = ("faithful", "light")
 
 RETRYABLE: tuple[ErrorKind, ...] = ("connection", "environment", "infrastructure")
@@ -101,6 +104,8 @@ class Plan(BaseModel):
             its own; ``shared``: it runs in the world's, for debuggers.
         batch: most episodes that a policy is asked about together.
         devices: values of ``CUDA_VISIBLE_DEVICES``; each policy has a process on each of them.
+        long_prompts: whether an episode is played (``send``) or not (``refuse``) if its prompt is
+            longer than what the policy declares that its model reads.
         policy_timeout_s: seconds that one call of a policy may take.
         episode_timeout_s: seconds that an episode may take.
         tries: how often an episode is played if it ends in an error of a kind in `retry_on`.
@@ -134,6 +139,7 @@ class Plan(BaseModel):
     policy_process: PolicyProcessMode = "own"
     batch: int = DEFAULT_BATCH
     devices: tuple[str, ...] = ()
+    long_prompts: LongPrompts = "send"
     policy_timeout_s: float = 600.0
     episode_timeout_s: float = 7200.0
     tries: int = 2
@@ -376,6 +382,9 @@ def make_plan(
         )
     if video not in VIDEO_MODES:
         raise UnknownNameError("video mode", video, VIDEO_MODES)
+    long_prompts = options.get("long_prompts", "send")
+    if long_prompts not in LONG_PROMPTS:
+        raise UnknownNameError("way with long prompts", long_prompts, LONG_PROMPTS)
     try:
         plan = Plan(
             policies=parse_policies(policies),

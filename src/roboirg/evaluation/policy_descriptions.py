@@ -13,6 +13,11 @@ from roboirg.policies.loading import (
     load_policy_class,
     policy_version,
 )
+from roboirg.policies.prompt_length.declared_limit import (
+    PromptNeeds,
+    prompt_needs,
+    prompt_needs_of,
+)
 from roboirg.util.plain_text import clip_text
 
 _MAX_LENGTH = 2000
@@ -24,10 +29,12 @@ class PolicyDescription(NamedTuple):
     Attributes:
         version: distinguishes versions of a policy of the same name.
         is_privileged: whether it reads the simulator's state.
+        prompt: what it declares about its prompt.
     """
 
     version: str
     is_privileged: bool
+    prompt: PromptNeeds = PromptNeeds()
 
 
 _known: dict[str, PolicyDescription] = {}
@@ -52,7 +59,11 @@ def describe_policy(spec: str, *, again: bool = False) -> PolicyDescription:
 
 def describe_here(spec: str) -> PolicyDescription:
     """Return the description of a policy of this process; ``unknown`` if it cannot be loaded."""
-    return PolicyDescription(policy_version(spec), is_privileged(spec))
+    try:
+        prompt = prompt_needs_of(spec)
+    except InvalidValueError:
+        prompt = PromptNeeds()
+    return PolicyDescription(policy_version(spec), is_privileged(spec), prompt)
 
 
 def _describe_ours(spec: str) -> PolicyDescription:
@@ -79,4 +90,5 @@ def _describe_apart(spec: str) -> PolicyDescription:
 
 def _read(value: Any) -> PolicyDescription:  # noqa: ANN401 - as a policy's process sent it
     version = clip_text(str(value["version"]), _MAX_LENGTH)
-    return PolicyDescription(version, value["privileged"] is True)
+    prompt = prompt_needs(PromptNeeds(**value["prompt"]))
+    return PolicyDescription(version, value["privileged"] is True, prompt)

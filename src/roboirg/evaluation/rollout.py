@@ -7,6 +7,7 @@
 | the policy's action cannot be executed | error | invalid_action |
 | the policy's server answers too late or not at all | error | timeout, connection |
 | the environment or the demonstration raises | error | environment |
+| the instruction is too long for the policy, and such episodes are refused | error | prompt |
 | no Vulkan device, a missing dependency | none: the run stops | |
 | a video cannot be written, a policy cannot report its costs | unchanged | |
 """
@@ -42,11 +43,13 @@ from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.plan import VideoMode
 from roboirg.evaluation.policy_calls import next_actions, policy_metadata, policy_usage
 from roboirg.evaluation.policy_descriptions import PolicyDescription, describe_here
+from roboirg.evaluation.prompt_shares import audit_job, too_long_text
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.video_writer import VideoOptions, VideoWriter
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.policies.base import Policy, PrivilegedPolicy, close_policy, tell_policy
 from roboirg.policies.loading import needs_host
+from roboirg.policies.prompt_length.declared_limit import prompt_limit
 from roboirg.policies.requirements import (
     wanted_actions,
     wanted_calibration,
@@ -84,6 +87,8 @@ class EpisodeRunner:
         plan: fingerprint of the plan, for the records.
         hosting: how policies get processes of their own; None for policies in the world's process.
         hosts: where to ask for them; an executor sets it.
+        refuse_long: whether an episode is not played if its prompt is longer than what the policy's
+            model reads.
     """
 
     folder: Path
@@ -93,6 +98,7 @@ class EpisodeRunner:
     plan: str | None = None
     hosting: HostSettings | None = None
     hosts: HostAddress | None = None
+    refuse_long: bool = False
 
     def in_folder(self, folder: Path) -> EpisodeRunner:
         """Return a copy that writes its videos to another folder."""
@@ -132,7 +138,12 @@ class EpisodeRunner:
                 writer = VideoWriter(self.folder / VIDEO_FOLDER / f"{job.slug}.mp4", self.options)
             try:
                 return writer, play_episode(
-                    job, writer, self.policy_timeout_s, self.hosts, alone=alone
+                    job,
+                    writer,
+                    self.policy_timeout_s,
+                    self.hosts,
+                    alone=alone,
+                    refuse_long=self.refuse_long,
                 )
             except EpisodeLostError as error:
                 alone = alone or error.alone
@@ -231,6 +242,7 @@ def play_episode(
     hosts: HostAddress | None = None,
     *,
     alone: bool = False,
+    refuse_long: bool = False,
 ) -> RolloutResult:
     """Play one job; errors of the policy or the environment end up in the result.
 
@@ -240,6 +252,7 @@ def play_episode(
         policy_timeout_s: seconds that one call of the policy may take, if a supervisor watches.
         hosts: where policies have processes of their own; None to run them in this process.
         alone: whether a hosted policy must not be asked about this episode together with others.
+        refuse_long: whether not to play an episode whose prompt will be cut.
 
     Raises:
         EpisodeLostError: the policy's process was lost; the episode can be played again.
@@ -264,6 +277,9 @@ def play_episode(
                 policy = load_policy(job)
         with guard.policy("policy's constructor", "policy_load"):
             needs = env_requirements(policy, job)
+            result.prompt_limit = prompt_limit(policy)
+        if refuse_long:
+            _refuse_long_prompt(job, result)
         with guard.environment("env_reset"):
             env = make_env(job, needs)
         _play_to_end(env, policy, needs.actions, job, writer, result, guard)
@@ -275,6 +291,14 @@ def play_episode(
         if env is not None:
             env.close()
     return result
+
+
+def _refuse_long_prompt(job: Job, result: RolloutResult) -> None:
+    """Raise an `EpisodeError` if the instruction is longer than what the policy's model reads."""
+    if result.prompt_limit is None:
+        return
+    if message := too_long_text(*audit_job(job, result.prompt_limit)):
+        raise EpisodeError("prompt", message, "")
 
 
 def env_requirements(policy: Policy, job: Job) -> EnvRequirements:

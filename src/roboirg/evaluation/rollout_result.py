@@ -14,7 +14,7 @@ from pydantic import JsonValue
 
 from roboirg import language
 from roboirg.core.conditions import Fact
-from roboirg.core.delivery import TURNS
+from roboirg.core.delivery import TURNS, PromptVerdict
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.observations import DemonstrationSource
@@ -22,9 +22,11 @@ from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.code_fingerprint import code_fingerprint
 from roboirg.evaluation.plan import instruct_job
 from roboirg.evaluation.policy_descriptions import PolicyDescription, describe_policy
+from roboirg.evaluation.prompt_shares import audit_job, audit_prompt
 from roboirg.judging import Event, attribute_failure
 from roboirg.language.settings import EXPLICIT
 from roboirg.policies.loading import server_version
+from roboirg.policies.prompt_length.prompt_audit import PromptLimit
 from roboirg.records.record import (
     Attribution,
     ErrorKind,
@@ -35,6 +37,9 @@ from roboirg.records.record import (
     Record,
     UtteranceRecord,
 )
+
+UNDECLARED: PromptVerdict = "unknown"
+"""Verdict on the prompts of a policy that declares no limit."""
 
 
 @dataclass
@@ -57,6 +62,7 @@ class RolloutResult:
         render_device: the driver's name; None if nothing was rendered.
         details: traceback of an error.
         policy: its version and whether it is privileged; None if it was never loaded.
+        prompt_limit: what the policy declares about its prompt; None if it declares nothing.
         policy_metadata: what the policy reports about itself.
         usage: what the policy reports that the episode cost.
         timings: seconds spent in the policy and in the environment, by phase.
@@ -77,6 +83,7 @@ class RolloutResult:
     render_device: str | None = None
     details: str | None = None
     policy: PolicyDescription | None = None
+    prompt_limit: PromptLimit | None = None
     policy_metadata: dict[str, JsonValue] = field(default_factory=dict)
     usage: dict[str, float] = field(default_factory=dict)
     timings: dict[str, float] = field(default_factory=dict)
@@ -146,6 +153,14 @@ def make_record(
     instruction = result.instruction or instruct_job(job)
     explicit = instruct_job(job.model_copy(update={"setting": EXPLICIT}))
     policy = result.policy or _describe(job)
+    utterances = _utterances(job, instruction, result)
+    prompt, verdict = None, UNDECLARED
+    if result.prompt_limit is not None:
+        steps = [one.step for one in utterances]
+        if steps == [None] * len(steps):  # it ended before anything was said
+            prompt, verdict = audit_job(job, result.prompt_limit, instruction)
+        else:
+            prompt, verdict = audit_prompt(instruction, steps, result.prompt_limit)
     return Record(
         **dict(job),
         seed=episode.seed,
@@ -157,7 +172,9 @@ def make_record(
         steps=result.steps,
         demonstration_steps=result.demonstration_steps,
         demonstration_source=result.demonstration_source,
-        instruction=_utterances(job, instruction, result),
+        instruction=utterances,
+        prompt=prompt,
+        prompt_verdict=verdict,
         mentions=tuple(MentionSpan(**asdict(one)) for one in instruction.mentions),
         command=explicit.text,
         goal=dict(episode.goal.as_mapping()),

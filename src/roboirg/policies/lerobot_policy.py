@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import functools
 import inspect
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -28,6 +30,7 @@ _MAX_BRIGHTNESS = 255.0
 _BATCH = 8
 _NOISELESS = frozenset({"act"})
 """Types of checkpoints that draw no noise when they act."""
+_CONFIG = "config.json"
 
 
 class LeRobotPolicyOptions(UrlOptions):
@@ -38,12 +41,18 @@ class LeRobotPolicyOptions(UrlOptions):
         batch: episodes that the checkpoint is asked about at once; None for 1 on the CPU, else 8.
         execute: actions of a chunk that are executed; None for all.
         version: of the checkpoint, for the records.
+        prompt_tokens: that the model reads of a prompt; None for what the checkpoint says.
+        prompt_added: most tokens of a state that share this budget.
+        tokenizer: file of the model's tokenizer.
     """
 
     device: str = Field("cpu", min_length=1)
     batch: int | None = Field(None, ge=1)
     execute: int | None = Field(None, ge=1)
     version: str | None = Field(None, min_length=1)
+    prompt_tokens: int | None = Field(None, ge=1)
+    prompt_added: int = Field(0, ge=0)
+    tokenizer: str | None = Field(None, min_length=1)
 
 
 class LoadedCheckpoint(NamedTuple):
@@ -107,6 +116,8 @@ class LeRobotPolicy:
         parts = split_url(url)
         self.options = read_options(parts, LeRobotPolicyOptions)
         self.place = parts.place
+        self.prompt_tokens = self.options.prompt_tokens or read_prompt_tokens(parts.place)
+        self.prompt_added, self.tokenizer = self.options.prompt_added, self.options.tokenizer
 
     @property
     def version(self) -> str:
@@ -231,6 +242,27 @@ def load(place: str, device: str) -> LoadedCheckpoint:
     return LoadedCheckpoint(
         model.to(device).eval(), before, after, noise, config.type in _NOISELESS
     )
+
+
+def read_prompt_tokens(place: str) -> int | None:
+    """Return the limit in a checkpoint's configuration.
+
+    None if it has none, or if it is not on this computer: nothing is downloaded.
+    """
+    path: Path | str | None = Path(place) / _CONFIG
+    if not Path(place).is_dir():
+        try:
+            from huggingface_hub import try_to_load_from_cache
+
+            path = try_to_load_from_cache(place, _CONFIG)
+        except (ImportError, ValueError):  # not installed, or no name of a repository
+            return None
+    try:
+        config = json.loads(Path(path).read_text(encoding="utf-8"))  # type: ignore[arg-type]
+        limit = config.get("tokenizer_max_length")
+    except (OSError, ValueError, TypeError, AttributeError):  # loading it says more
+        return None
+    return limit if isinstance(limit, int) and limit > 0 else None
 
 
 def _check_features(place: str, features: dict[str, Any]) -> None:

@@ -82,6 +82,50 @@ def wanted_calibration(policy: object) -> bool:
     return _beside_pictures(policy, "calibration")
 
 
+def wanted_prompt_tokens(policy: object) -> int | None:
+    """Return the tokens that a policy's model reads of a prompt; None if it does not say.
+
+    Raises:
+        InvalidValueError: ``prompt_tokens`` is neither None nor a number from 1.
+    """
+    return _whole_number(policy, "prompt_tokens", None, least=1)
+
+
+def wanted_prompt_added(policy: object) -> int:
+    """Return the most tokens of a state or subgoal that share the prompt's budget.
+
+    Raises:
+        InvalidValueError: ``prompt_added`` is not a number from 0.
+    """
+    return _whole_number(policy, "prompt_added", 0, least=0) or 0
+
+
+def wanted_tokenizer(policy: object) -> str | None:
+    """Return the file of the tokenizer of a policy's model; None if it does not say.
+
+    Raises:
+        InvalidValueError: ``tokenizer`` is neither None nor a path.
+    """
+    path = getattr(policy, "tokenizer", None)
+    if path is not None and not (isinstance(path, str) and path):
+        raise InvalidValueError(f"tokenizer is {path!r}; it must be the path of a file, or None.")
+    return path
+
+
+def wanted_lower_case(policy: object) -> bool:
+    """Return whether a policy's client sends prompts in lower case."""
+    return bool(getattr(policy, "lowers_prompt", False))
+
+
+def _whole_number(policy: object, attribute: str, default: int | None, *, least: int) -> int | None:
+    value = getattr(policy, attribute, default)
+    if value == default and not isinstance(value, bool):
+        return default
+    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        raise InvalidValueError(f"{attribute} is {value!r}; it must be a number from {least}.")
+    return value
+
+
 def _beside_pictures(policy: object, attribute: str) -> bool:
     wanted = getattr(policy, attribute, False)
     if not isinstance(wanted, bool):
@@ -99,5 +143,9 @@ REQUIREMENTS: Mapping[str, Callable[[object], object]] = {
     "history_cameras": wanted_history_cameras,
     "depth": wanted_depth,
     "calibration": wanted_calibration,
+    "prompt_tokens": wanted_prompt_tokens,
+    "prompt_added": wanted_prompt_added,
+    "tokenizer": wanted_tokenizer,
+    "lowers_prompt": wanted_lower_case,
 }
 """The function that reads each attribute of a policy and checks it."""

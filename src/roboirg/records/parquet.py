@@ -39,6 +39,7 @@ _TEXT_COLUMNS = [
     "cause",
     "policy_version",
     "server_version",
+    "prompt_verdict",
     "language_version",
     "package_version",
     "code",
@@ -85,8 +86,8 @@ def check_parquet_support() -> None:
 def write_parquet(records: Iterable[Record], path: Path) -> int:
     """Write records to a Parquet file, which appears complete or not at all.
 
-    The columns are the fields of a record. ``instruction``, ``mentions``, ``events`` and
-    ``attribution`` are nested; ``goal``, ``metadata``, ``policy_metadata``, ``usage`` and
+    The columns are the fields of a record. ``instruction``, ``mentions``, ``prompt``, ``events``
+    and ``attribution`` are nested; ``goal``, ``metadata``, ``policy_metadata``, ``usage`` and
     ``timings`` are JSON texts.
 
     Returns:
@@ -133,6 +134,13 @@ def _schema() -> Schema:
         "privileged": truth,
         "duration_s": pa.float64(),
         "stages": pa.list_(number),
+        "prompt": pa.struct(
+            {
+                "limit": number,
+                **dict.fromkeys(("needed", "reached", "lost"), pa.list_(number)),
+                "tokenizer": text,
+            }
+        ),
         "attribution": pa.struct(
             {"kind": text, "failure": text, "subject": text, "step": number, "sentence": text}
         ),

@@ -14,6 +14,7 @@ from typing import Literal, Self, get_args
 
 from pydantic import BaseModel, ConfigDict, JsonValue, model_validator
 
+from roboirg.core.delivery import PromptVerdict
 from roboirg.core.instruction_options import (
     ALL_STAGES,
     DEFAULT_DELIVERY,
@@ -31,10 +32,12 @@ SCHEMA_VERSION: Literal[3] = 3
 Outcome = Literal["success", "failure", "error"]
 
 ErrorKind = Literal[
-    "policy", "invalid_action", "timeout", "connection", "environment", "infrastructure"
+    "policy", "invalid_action", "timeout", "connection", "environment", "infrastructure", "prompt"
 ]
 """What an error is due to: the policy raised; its action cannot be executed; a time limit was
-exceeded; a server could not be reached; the environment raised; a process or machine was lost."""
+exceeded; a server could not be reached; the environment raised; a process or machine was lost; the
+instruction is longer than what the policy's model reads, and such episodes were not to be played.
+"""
 
 ERROR_KINDS: tuple[ErrorKind, ...] = get_args(ErrorKind)
 
@@ -237,6 +240,30 @@ class Attribution(_RecordModel):
     sentence: str
 
 
+class PromptAudit(_RecordModel):
+    """What of the instruction reached the policy's language model, by the limit it declares.
+
+    Attributes:
+        limit: tokens that the model reads of a message.
+        needed: tokens that the longest message needs, at least and at most.
+        tokenizer: name of the file of the tokenizer that counted; None for bounds without one.
+        reached: for each utterance, the characters from its beginning that can have arrived; an
+            utterance that was not said yet is not counted here.
+        lost: indices of the mentions that certainly did not arrive whole.
+    """
+
+    limit: int
+    needed: tuple[int, int]
+    tokenizer: str | None = None
+    reached: tuple[int, ...]
+    lost: tuple[int, ...] = ()
+
+    @property
+    def sent(self) -> tuple[int, int]:
+        """Tokens of the longest message that the model reads, at least and at most."""
+        return min(self.needed[0], self.limit), min(self.needed[1], self.limit)
+
+
 class Result(Job):
     """Verdict on a job, without instruction and events: everything that rates are computed from.
 
@@ -263,6 +290,7 @@ class Result(Job):
         code: fingerprint of the package's files.
         plan: fingerprint of the plan.
         attempt: number of the attempt, from 1.
+        prompt_verdict: whether all that was said reached the policy's language model.
     """
 
     seed: int
@@ -283,6 +311,7 @@ class Result(Job):
     code: str = "unknown"
     plan: str | None = None
     attempt: int = 1
+    prompt_verdict: PromptVerdict = "unknown"
 
     @model_validator(mode="after")
     def _refuse_success_with_cause(self) -> Self:
@@ -303,6 +332,7 @@ class Record(Result):
         schema_version: version of this list of fields.
         instruction: the utterances that the policy was given.
         mentions: the referring expressions in them.
+        prompt: what of them reached its language model; None if the policy declares no limit.
         command: the same task in the explicit setting.
         goal: what the instruction conveys, a value for each slot.
         metadata: of the instruction: reasoning pattern, relation, stages, landmarks, template
@@ -324,6 +354,7 @@ class Record(Result):
     schema_version: Literal[3] = SCHEMA_VERSION
     instruction: tuple[UtteranceRecord, ...]
     mentions: tuple[MentionSpan, ...] = ()
+    prompt: PromptAudit | None = None
     command: str
     goal: dict[str, str | int | tuple[str, ...] | tuple[int, ...]]
     metadata: dict[str, JsonValue]

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import msgspec
 from pydantic import ValidationError
 
+from roboirg.core.delivery import PromptVerdict
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.instruction_options import (
     ALL_STAGES,
@@ -136,6 +137,7 @@ class EpisodeSummary(RecordIndexEntry, frozen=True, kw_only=True):
     spec: str | None = None
     wordings_file: str | None = None
     demonstration_frames: DemonstrationFrames | None = None
+    prompt_verdict: PromptVerdict = "unknown"
     started_at: str
     render_device: str | None = None
     video: str | None = None

@@ -12,6 +12,7 @@ from roboirg.analysis.stats.option_labels import words_label
 from roboirg.core.fact_traits import fact_traits
 from roboirg.language.settings import EXPLICIT
 from roboirg.records.record import EventRecord, Record
+from roboirg.util.plurals import counted
 
 EMBEDDED = "#"
 """Stands for a video that is part of the page."""
@@ -66,6 +67,8 @@ def details_of(
     index, optional_index = strings.index, strings.optional_index
     found: Details = {
         "turns": [[index(turn.stage), index(turn.text)] for turn in record.instruction],
+        "reached": _reached(record),
+        "prompt": optional_index(_prompt(record)),
         "mentions": _mentions(record, strings),
         "command": None if record.setting == EXPLICIT else index(record.command),
         "resolved": optional_index(resolved),
@@ -101,6 +104,30 @@ def _mentions(record: Record, strings: Strings) -> list[list[int]]:
          index(one.expression or ""), index(one.slot), index(str(one.value))]
         for one in record.mentions
     ]  # fmt: skip
+
+
+def _reached(record: Record) -> list[int] | None:
+    """Return the characters of each utterance that arrive, if some do not."""
+    audit = record.prompt
+    if audit is None or record.prompt_verdict != "cut":
+        return None
+    return list(audit.reached)
+
+
+def _prompt(record: Record) -> str | None:
+    """Return how many tokens the model reads, unless it read everything."""
+    audit = record.prompt
+    if audit is None or record.prompt_verdict == "heard":
+        return None
+    low, high = audit.needed
+    needed = f"{low}" if low == high else f"{low} to {high}"
+    counted_by = f"counted with {audit.tokenizer}" if audit.tokenizer else "bounds, no tokenizer"
+    lost = sum(record.mentions[place].role == "anaphor" for place in audit.lost)
+    tail = ""
+    if audit.lost:
+        tail = f"; {counted(len(audit.lost), 'mention')} lost, {lost} of them referring back"
+    verdict = "cut" if record.prompt_verdict == "cut" else "may be cut"
+    return f"{verdict}: needs {needed} tokens, the model reads {audit.limit} ({counted_by}){tail}"
 
 
 def _shown_events(record: Record) -> Iterator[EventRecord]:

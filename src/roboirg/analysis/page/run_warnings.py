@@ -13,6 +13,7 @@ from roboirg.analysis.page.entries import EpisodeEntries, Run
 from roboirg.analysis.stats.cells import FAIRNESS, EvalConditions, PolicyRun, Versions
 from roboirg.analysis.stats.comparison import compare
 from roboirg.analysis.stats.comparison_text import sentences
+from roboirg.analysis.stats.heard_rates import count_heard, heard_notes
 from roboirg.analysis.stats.intervals import SEED
 from roboirg.core.errors import InvalidValueError
 from roboirg.language.settings import EXPLICIT
@@ -34,6 +35,7 @@ def run_warnings(entries: EpisodeEntries) -> list[RunWarning]:
     return [
         *(RunWarning("warning", text) for text in _incomplete(entries)),
         *(RunWarning("warning", text) for text in _mixed(entries)),
+        *(RunWarning("warning", text) for text in _cut(entries)),
         *(RunWarning("note", text) for text in _without_reference(entries)),
     ]
 
@@ -134,6 +136,12 @@ def _mixed(entries: EpisodeEntries) -> Iterable[str]:
     codes = {entry.record.code for entry in entries.all}
     if len(codes) > 1:
         yield f"Played with {len(codes)} different states of the package’s code."
+
+
+def _cut(entries: EpisodeEntries) -> Iterable[str]:
+    runs = {entry.run.name: entry.run for entry in entries.all}
+    counts = count_heard([(name, run.records) for name, run in runs.items()], entries.names)
+    return heard_notes(counts, entries.names)
 
 
 def _mixed_policy(policy: str, policy_runs: Sequence[PolicyRun]) -> Iterable[str]:

@@ -23,6 +23,7 @@ from roboirg.analysis.stats.cells import (
     policy_order,
     sort_cells,
 )
+from roboirg.analysis.stats.heard_rates import count_heard, heard_notes
 from roboirg.analysis.stats.option_labels import REFERENCE, options_label, options_sort_key
 from roboirg.analysis.stats.paired_tests import Overlap
 from roboirg.analysis.stats.rates import points, whole_percent
@@ -64,6 +65,7 @@ class RunTable:
         columns: the instruction options.
         cells: results by scope (a task or `ALL`) and options.
         differences: of the explicit cells from the published rates.
+        heard: a sentence if some of its prompts were cut, or may have been.
     """
 
     policy_run: PolicyRun
@@ -72,6 +74,7 @@ class RunTable:
     columns: tuple[InstructionOptions, ...]
     cells: dict[tuple[Scope, InstructionOptions], ScopeResults]
     differences: AllDifferences
+    heard: tuple[str, ...] = ()
 
 
 def make_run_tables(records: Sequence[AnyResult], planned: Sequence[Job] = ()) -> list[RunTable]:
@@ -85,12 +88,14 @@ def make_run_tables(records: Sequence[AnyResult], planned: Sequence[Job] = ()) -
     policies = list(dict.fromkeys(job.policy for job in (*planned, *records)))
     cells = sort_cells(found, policy_order(found, policies))
     results = {one.key: one for one in group_by_scope(cells)}
+    heard = count_heard([("", records)])
     return [
         _make_run_table(
             policy_run,
             label,
             results,
             _explicit_differences(policy_run, cells),
+            heard=tuple(heard_notes(heard, {policy_run: label})),
         )
         for policy_run, label in labels(cells).items()
     ]
@@ -153,6 +158,8 @@ def _make_run_table(
     label: str,
     results: dict[ScopeKey, ScopeResults],
     differences: AllDifferences,
+    *,
+    heard: tuple[str, ...],
 ) -> RunTable:
     cells = {
         (key.scope, key.options): one
@@ -168,6 +175,7 @@ def _make_run_table(
         tuple(sorted(columns, key=options_sort_key)),
         cells,
         differences,
+        heard,
     )
 
 
@@ -227,7 +235,7 @@ def _legend(tables: Sequence[RunTable]) -> list[str]:
 def _caption(table: RunTable) -> str:
     first = f"{where_played([table.policy_run.conditions])} {_sizes(table)}"
     notes = comparison_notes(table.differences, {table.policy_run: table.label})
-    return "\n".join([first, *notes])
+    return "\n".join([first, *notes, *table.heard])
 
 
 def _explicit_signs(table: RunTable) -> dict[str, str]:

@@ -23,6 +23,7 @@ from roboirg.evaluation.episode_errors import describe_error, one_line
 from roboirg.evaluation.hosting.hosted_episode import HostedEpisode
 from roboirg.evaluation.hosting.payload import Message, decode, encode
 from roboirg.policies.loading import is_privileged, load_policy_class, policy_version
+from roboirg.policies.prompt_length.declared_limit import prompt_needs_of
 from roboirg.util.child_process import exit_with_parent
 
 MISSING = "missing"
@@ -74,6 +75,7 @@ class HostProcess:
             return {
                 "version": policy_version(call["spec"]),
                 "privileged": is_privileged(call["spec"]),
+                "prompt": prompt_needs_of(call["spec"])._asdict(),
             }
         if method == "open":
             if is_privileged(call["spec"]):

@@ -27,6 +27,10 @@ from roboirg.policies.requirements import (
     wanted_depth,
     wanted_history,
     wanted_history_cameras,
+    wanted_lower_case,
+    wanted_prompt_added,
+    wanted_prompt_tokens,
+    wanted_tokenizer,
 )
 
 if TYPE_CHECKING:
@@ -71,6 +75,12 @@ class HierarchicalPolicy:
             self.observe_every = 1
         self.depth = wanted_depth(policy) or wanted_depth(planner)
         self.calibration = wanted_calibration(policy) or wanted_calibration(planner)
+        # The planner's model has a context of its own, which no instruction fills.
+        self.prompt_tokens, self.prompt_added = (
+            wanted_prompt_tokens(policy),
+            wanted_prompt_added(policy),
+        )
+        self.tokenizer, self.lowers_prompt = wanted_tokenizer(policy), wanted_lower_case(policy)
         self.grounded = any(getattr(one, "grounded", False) for one in (planner, policy))
         self._observed = self._step = self._rows = 0
 

@@ -27,6 +27,10 @@ from roboirg.policies.requirements import (
     wanted_depth,
     wanted_history,
     wanted_history_cameras,
+    wanted_lower_case,
+    wanted_prompt_added,
+    wanted_prompt_tokens,
+    wanted_tokenizer,
 )
 
 if TYPE_CHECKING:
@@ -57,6 +61,10 @@ class PolicyFactory:
         self.history_cameras = wanted_history_cameras(sample)
         self.depth = wanted_depth(sample)
         self.calibration = wanted_calibration(sample)
+        self.prompt_tokens = wanted_prompt_tokens(sample)
+        self.prompt_added = wanted_prompt_added(sample)
+        self.tokenizer = wanted_tokenizer(sample)
+        self.lowers_prompt = wanted_lower_case(sample)
         self.grounded = bool(getattr(sample, "grounded", False))
         self.version = str(getattr(sample, "version", "unknown"))
 

@@ -70,6 +70,7 @@ class MmeVlaPolicy(RemotePolicy):
 
     options_type: ClassVar[type[RemoteOptions]] = MmeVlaOptions
     options: MmeVlaOptions
+    lowers_prompt: ClassVar[bool] = True
 
     def __init__(self, url: str, seed: int = 0) -> None:
         super().__init__(url, seed)

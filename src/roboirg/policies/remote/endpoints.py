@@ -49,6 +49,9 @@ class RemoteOptions(UrlOptions):
         api_key_env: environment variable that holds the server's key.
         max_reply_mib: size limit of a reply, MiB.
         version: of the checkpoint, for the records.
+        prompt_tokens: that the model reads of a prompt.
+        prompt_added: most tokens of a state or subgoal that share this budget.
+        tokenizer: file of the model's tokenizer.
     """
 
     timeout: float = Field(60.0, gt=0)
@@ -59,6 +62,9 @@ class RemoteOptions(UrlOptions):
     api_key_env: str | None = Field(None, min_length=1)
     max_reply_mib: float = Field(16.0, gt=0)
     version: str | None = Field(None, min_length=1)
+    prompt_tokens: int | None = Field(None, ge=1)
+    prompt_added: int = Field(0, ge=0)
+    tokenizer: str | None = Field(None, min_length=1)
 
     @property
     def headers(self) -> dict[str, str]:

@@ -57,6 +57,9 @@ class RemotePolicy(ABC):
         del seed
         parts = split_url(url)
         self.options = read_options(parts, self.options_type)
+        self.prompt_tokens = self.options.prompt_tokens
+        self.prompt_added = self.options.prompt_added
+        self.tokenizer = self.options.tokenizer
         self.metadata: dict[str, Any] = {}
         self._space = find_action_space(getattr(self.options, "actions", self.actions))
         self.actions = self._space.name

@@ -30,6 +30,7 @@ const factsOf = (row, details) => {
   const facts = [];
   if (details.command !== undefined) facts.push(entry("explicit", strings[details.command]));
   if (details.resolved !== undefined) facts.push(entry("resolved", strings[details.resolved]));
+  if (details.prompt !== undefined) facts.push(entry("prompt", strings[details.prompt]));
   facts.push(entry("meant", (details.goal ?? [])
     .map(([slot, value]) => `${strings[slot]}: ${strings[value]}`).join(" · ")));
   if (details.attribution) {

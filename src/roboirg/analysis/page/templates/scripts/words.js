@@ -34,7 +34,7 @@ const spansOf = (details, utterance) => {
   return spans;
 };
 
-const markOf = (span, text, known) => {
+const markOf = (span, text, shown, known) => {
   const own = span.keys.map((key) => known.get(key));
   const role = span.isAnaphor ? `refers back (${span.kind})` : "first named";
   const hint = `${role}: ${own.map((one) => one.words).join(", ")}`;
@@ -44,22 +44,29 @@ const markOf = (span, text, known) => {
     "aria-description": hint,
     "data-keys": span.keys.join(" "),
     "data-number": own.map((one) => one.number).join(","),
-  }, text), [text, hint]);
+  }, shown), [text, hint]);
 };
 
 const turnsOf = (details) => {
   const known = referents(details);
   const list = h("ol", { class: "turns" }, (details.turns ?? []).map(([stage, text], utterance) => {
     const letters = [...strings[text]];
-    const cut = (start, end) => letters.slice(start, end).join("");
+    const reached = details.reached?.[utterance] ?? letters.length;
+    const lost = (part) => (part ? [h("del", { title: "cut off: the model does not read this" }, part)] : []);
+    /** What the policy's model reads of a piece of the text, and what is cut off. */
+    const cut = (start, end = letters.length) => {
+      const middle = Math.min(Math.max(reached, start), end);
+      return [letters.slice(start, middle).join(""), ...lost(letters.slice(middle, end).join(""))];
+    };
     const parts = [];
     let position = 0;
     for (const span of spansOf(details, utterance)) {
-      parts.push(cut(position, span.start), markOf(span, cut(span.start, span.end), known));
+      const said = letters.slice(span.start, span.end).join("");
+      parts.push(...cut(position, span.start), markOf(span, said, cut(span.start, span.end), known));
       position = span.end;
     }
     return h("li", { class: strings[stage] }, h("span", { class: "stage" }, strings[stage]),
-      h("q", {}, parts, cut(position)));
+      h("q", {}, parts, ...cut(position)));
   }));
   for (const [event, on] of [["mouseover", true], ["focusin", true], ["mouseout", false], ["focusout", false]]) {
     list.addEventListener(event, ({ target }) => light(list, target.closest("mark"), on));

@@ -1,0 +1,88 @@
+"""Tokenizers from files: SentencePiece models and the JSON of the library `tokenizers`."""
+
+from __future__ import annotations
+
+import functools
+import os
+from pathlib import Path
+from typing import Any
+
+from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.policies.prompt_length.prompt_audit import LINE_BREAK_TOKENS, Tokenize, Tokens
+
+JSON = ".json"
+
+
+def read_tokenizer(path: str) -> Tokenize:
+    """Return the tokenizer of a file, read once per process.
+
+    Args:
+        path: ``.json`` for the library `tokenizers`, anything else for SentencePiece.
+
+    Raises:
+        InvalidValueError: there is no such file, or it holds no tokenizer.
+        MissingDependencyError: the library that reads it is not installed.
+    """
+    return _read(os.path.abspath(path))  # noqa: PTH100 - links stay: the suffix tells the kind
+
+
+@functools.cache
+def _read(path: str) -> Tokenize:
+    if not Path(path).is_file():
+        raise InvalidValueError(
+            f"The tokenizer {path!r} is not a file; give a SentencePiece model or a tokenizer.json."
+        )
+    return _read_json(path) if path.endswith(JSON) else _read_sentencepiece(path)
+
+
+def _read_sentencepiece(path: str) -> Tokenize:
+    try:
+        import sentencepiece
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"The tokenizer {path!r} needs sentencepiece; install roboirgbench[tokens]."
+        ) from error
+    try:
+        model: Any = sentencepiece.SentencePieceProcessor(model_file=path)
+    except (OSError, RuntimeError, ValueError) as error:
+        raise _unreadable(path, "a SentencePiece model") from error
+
+    # The name depends on the version; so does whether places count characters or bytes.
+    encode = getattr(model, "encode_as_immutable_proto", None) or model.encode_as_proto
+
+    def tokenize(text: str) -> Tokens:
+        ends = tuple(one.end for one in encode(text).pieces)
+        content = text.encode()
+        if ends and ends[-1] == len(content) != len(text):
+            ends = tuple(len(content[:end].decode(errors="ignore")) for end in ends)
+        # The beginning of the text is a token too.
+        return Tokens(1, ends, LINE_BREAK_TOKENS)
+
+    return tokenize
+
+
+def _read_json(path: str) -> Tokenize:
+    try:
+        import tokenizers
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"The tokenizer {path!r} needs tokenizers; install roboirgbench[tokens]."
+        ) from error
+    try:
+        model: Any = tokenizers.Tokenizer.from_file(path)
+    except Exception as error:  # the library raises nothing narrower
+        raise _unreadable(path, "a tokenizer of the library tokenizers") from error
+    model.no_truncation()
+    model.no_padding()
+    # The library keeps these when it cuts a text.
+    kept = int(model.num_special_tokens_to_add(is_pair=False))
+
+    def tokenize(text: str) -> Tokens:
+        found = model.encode(text, add_special_tokens=False).offsets
+        return Tokens(kept, tuple(end for _, end in found), LINE_BREAK_TOKENS)
+
+    return tokenize
+
+
+def _unreadable(path: str, kind: str) -> InvalidValueError:
+    return InvalidValueError(f"The tokenizer {path!r} is not {kind}.")

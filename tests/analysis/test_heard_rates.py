@@ -1,0 +1,164 @@
+"""Cut prompts in tables and on the page."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.console import Console
+from typer.testing import CliRunner
+
+from roboirg.analysis.page.details import Strings, details_of
+from roboirg.analysis.page.entries import Run, make_entries
+from roboirg.analysis.page.run_warnings import run_warnings
+from roboirg.analysis.stats.heard_rates import add_up, count_heard, cut_text, heard_notes
+from roboirg.analysis.tables.heard_table import make_heard_table
+from roboirg.analysis.tables.rendering import get_format
+from roboirg.analysis.tables.run_tables import make_run_tables, print_run_tables
+from roboirg.cli import app
+from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.policies.prompt_length.prompt_audit import PromptLimit, most_tokens
+from roboirg.records.record import Job, Record, Result
+from roboirg.records.store import RecordStore
+
+VERDICTS = st.sampled_from(["heard", "cut", "unknown"])
+OUTCOMES = st.sampled_from(["success", "failure", "error"])
+
+
+MakeResult = Callable[..., Result]
+
+
+def results(make: MakeResult, *rows: tuple[str, str], **fields: object) -> list[Result]:
+    return [
+        make(outcome, number, prompt_verdict=verdict, **fields)
+        for number, (outcome, verdict) in enumerate(rows)
+    ]
+
+
+@given(st.lists(st.tuples(OUTCOMES, VERDICTS), min_size=1))
+def test_counts_add_up(result: MakeResult, rows: list[tuple[str, str]]) -> None:
+    found = count_heard([("", results(result, *rows))])
+    if all(verdict == "unknown" for _, verdict in rows):
+        assert not found
+        return
+    (one,) = found.values()
+    assert one.episodes == len(rows)
+    assert one.cut == sum(verdict == "cut" for _, verdict in rows)
+    assert one.heard == rows.count(("success", "heard")) + rows.count(("failure", "heard"))
+    assert one.heard_successes == rows.count(("success", "heard")) <= one.successes <= one.trials
+
+
+def sample(result: MakeResult) -> list[Result]:
+    contextual = {"setting": "contextual"}
+    return [
+        *results(result, ("success", "heard"), ("failure", "heard")),
+        *results(
+            result, ("failure", "cut"), ("failure", "cut"), ("success", "heard"), ("error", "cut"),
+            **contextual,
+        ),
+        *results(
+            result, ("failure", "unknown"), ("success", "heard"), task="BinFill", **contextual
+        ),
+        *results(result, ("success", "unknown"), policy="other"),
+    ]  # fmt: skip
+
+
+def test_notes_tell_rates_over_what_was_heard_beside_rates_over_all(result: MakeResult) -> None:
+    found = count_heard([("", sample(result))])
+    (policy_run,) = {key.policy_run for key in found}
+    (note,) = heard_notes(found, {policy_run: "listener"})
+    assert "contextual 50–67 % cut, success 40 % of 5, 100 % of the 2 heard whole" in note
+    assert "explicit" not in note
+    total = {options.setting: one for (_, options), one in add_up(found).items()}
+    assert cut_text(total["explicit"]) == "0"
+    console = Console(file=io.StringIO(), width=300)
+    print_run_tables(make_run_tables(sample(result)), console)
+    printed = console.file.getvalue()  # type: ignore[attr-defined]
+    assert printed.count(note) == 1
+
+
+def test_the_table_has_a_row_for_each_cell_and_for_all_tasks(result: MakeResult) -> None:
+    found = count_heard([("", sample(result))])
+    (policy_run,) = {key.policy_run for key in found}
+    table = make_heard_table(found, {policy_run: "listener"})
+    rows = {(row.group, row.name): [entry.text for entry in row.entries] for row in table.rows}
+    assert rows == {
+        ("listener, explicit", "PickXtimes"): ["2", "0", "50.00", "2", "50.00"],
+        ("listener, contextual", "PickXtimes"): ["4", "75", "33.33", "1", "100.00"],
+        ("listener, contextual", "BinFill"): ["2", "0–50", "50.00", "1", "100.00"],
+        ("listener, contextual", "all tasks"): ["6", "50–67", "40.00", "2", "100.00"],
+    }
+    for form in (get_format(name) for name in ("markdown", "latex", "csv")):
+        assert "50–67" in form.draw(table).replace("--", "–")
+
+
+def long_record(policy: str, tokens: int | None, **fields: object) -> Record:
+    job = Job(
+        policy=policy, task="PickXtimes", split="test", episode=0, setting="contextual",
+        distractors=16, **fields,
+    )  # fmt: skip
+    limit = None if tokens is None else PromptLimit(tokens, 0, most_tokens, "some.model")
+    result = RolloutResult("failure", cause="because", prompt_limit=limit)
+    return make_record(job, result, started_at="2026-01-02T03:04:05+00:00")
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    with RecordStore(tmp_path) as store:
+        for policy, tokens in (("cutting", 64), ("whole", 1000), ("silent", None)):
+            store.append(long_record(policy, tokens))
+    return tmp_path
+
+
+def test_the_command_prints_it_on_request(run: Path) -> None:
+    said = CliRunner().invoke(app.app, ["tables", str(run), "--heard", "--format", "csv"])
+    assert said.exit_code == 0, said.output
+    assert "cutting" in said.output
+    assert "whole" in said.output
+    assert "silent" not in said.output
+    refused = CliRunner().invoke(app.app, ["tables", str(run), "--heard", "--chance"])
+    assert "--heard has a table of its own" in str(refused.exception or refused.output)
+
+
+def test_the_page_says_what_was_cut() -> None:
+    cut, whole = long_record("cutting", 64), long_record("whole", 1000)
+    entries = make_entries([Run("run", [cut, whole])])
+    (warning,) = [one for one in run_warnings(entries) if "limited" in one.text]
+    assert warning.kind == "warning"
+    assert warning.text.startswith("cutting did not read every instruction to its end")
+    strings = Strings()
+    details = details_of(cut, strings, None, None, embeds=False)
+    assert details["reached"] == list(cut.prompt.reached)  # type: ignore[union-attr]
+    assert strings.texts[details["prompt"]].startswith("cut: needs ")
+    assert "the model reads 64 (counted with some.model)" in strings.texts[details["prompt"]]
+    assert "mentions lost" in strings.texts[details["prompt"]]
+    for record in (whole, long_record("silent", None)):
+        shown = details_of(record, strings, None, None, embeds=False)
+        assert not {"reached", "prompt"} & set(shown)
+
+
+@pytest.mark.browser
+def test_the_page_strikes_out_what_was_cut(open_page: Any, run: Path) -> None:
+    said = CliRunner().invoke(app.app, ["report", str(run)])
+    assert said.exit_code == 0, said.output
+    with open_page((run / "report.html").as_uri()) as page:
+        page.select_option("#filters [name=policy]", "cutting")
+        row = page.locator("#rows > li").first
+        row.locator("h3 button").click()
+        struck = " ".join(row.locator(".turns del").all_inner_texts())
+        record = long_record("cutting", 64)
+        assert record.prompt is not None
+        texts = [turn.text for turn in record.instruction]
+        lost = "".join(text[end:] for text, end in zip(texts, record.prompt.reached, strict=True))
+        assert struck.replace(" ", "") == lost.replace(" ", "")
+        shown = row.locator(".turns q").all_inner_texts()
+        assert len(shown) == len(texts)
+        page.select_option("#filters [name=policy]", "whole")
+        row = page.locator("#rows > li").first
+        row.locator("h3 button").click()
+        assert row.locator(".turns del").count() == 0

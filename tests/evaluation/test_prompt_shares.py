@@ -1,0 +1,258 @@
+"""Cut prompts in plans, dry runs, records and reports."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+from typer.testing import CliRunner
+
+from roboirg.analysis.stats.heard_rates import count_heard
+from roboirg.analysis.tables.run_tables import make_run_tables, print_run_tables
+from roboirg.cli import app
+from roboirg.core.errors import UnknownNameError
+from roboirg.evaluation.plan import instruct_job, make_plan
+from roboirg.evaluation.plan_file import read_plan_file
+from roboirg.evaluation.prompt_shares import (
+    audit_job,
+    prompt_shares,
+    sent_messages,
+    share_text,
+    too_long_text,
+    warning_lines,
+)
+from roboirg.evaluation.rollout import EpisodeRunner
+from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.policies.planning.systems import all_systems
+from roboirg.policies.prompt_length.prompt_audit import PromptLimit, most_tokens
+from roboirg.records.record import IDENTITY, Job, Record
+from roboirg.records.store import read_records
+
+SYSTEMS = [f"system:{name}" for name in all_systems()]
+EXACT = PromptLimit(64, 0, most_tokens, "some.model")
+LONG = {"setting": "contextual", "distractors": 16}
+
+
+def job(**fields: object) -> Job:
+    usual = {"policy": "p", "task": "PickXtimes", "split": "test", "episode": 0}
+    return Job(**{**usual, "setting": "direct", **fields})  # type: ignore[arg-type]
+
+
+def test_no_system_of_the_paper_cuts_an_instruction_of_the_papers_plan() -> None:
+    options = {**read_plan_file("paper"), "policy_seeds": "0", "episodes": "0,9,19,29,39,49"}
+    options.pop("policies", None)
+    plan = make_plan(SYSTEMS, **options)
+    shares = prompt_shares(plan.jobs())
+    assert [one.policy for one in shares] == SYSTEMS
+    for one in shares:
+        assert one.limit is not None
+        assert one.limit.tokens >= 64
+        assert set(one.settings) == {"explicit", "direct", "reasoning", "contextual", "spatial"}
+        assert {share_text(verdicts) for verdicts in one.settings.values()} == {"0 %"}
+    assert not list(warning_lines(shares))
+
+
+def test_options_that_add_words_are_cut() -> None:
+    plan = make_plan(
+        ["a=system:pi0.5", "b=openpi://localhost:1?prompt_tokens=1000", "random"],
+        settings="explicit,contextual",
+        tasks="PickXtimes",
+        distractors=16,
+    )
+    cut, whole, silent = prompt_shares(plan.jobs())
+    assert share_text(cut.settings["contextual"]) == "100 %"
+    assert share_text(cut.settings["explicit"]) == "0 %"
+    assert share_text(whole.settings["contextual"]) == "0 %"
+    assert silent.limit is None
+    (line,) = warning_lines([cut, whole, silent])
+    assert line.startswith("a reads 64 tokens of a prompt")
+    assert line.endswith("contextual 100 %.")
+
+
+@pytest.mark.parametrize(
+    ("counts", "text"),
+    [
+        ({"heard": 4}, "0 %"),
+        ({"cut": 1, "heard": 3}, "25 %"),
+        ({"cut": 1, "unknown": 1, "heard": 2}, "25–50 %"),
+        ({"unknown": 1, "heard": 999}, "0–<1 %"),
+    ],
+)
+def test_shares_are_between_bounds(counts: dict[str, int], text: str) -> None:
+    assert share_text(Counter(counts)) == text  # type: ignore[arg-type]
+
+
+def test_messages_are_what_is_heard_at_once() -> None:
+    assert sent_messages("abc", (0, 0, 0)) == (("a", "b", "c"),)
+    assert sent_messages("abcd", (0, 16, 16, None)) == (("a",), ("b", "c"))
+
+
+def test_in_turns_each_message_has_the_whole_budget() -> None:
+    at_once, in_turns = job(**LONG), job(**LONG, delivery="turns")
+    assert audit_job(at_once, EXACT)[1] == "cut"
+    audit, verdict = audit_job(in_turns, EXACT)
+    assert verdict == "heard"
+    assert audit.needed[1] < 64
+    assert [len(turn) for turn in instruct_job(in_turns).turns] == list(audit.reached)
+
+
+def test_a_record_says_what_was_cut() -> None:
+    result = RolloutResult("failure", cause="because", prompt_limit=EXACT)
+    record = make_record(job(**LONG), result, started_at="now")
+    audit = record.prompt
+    assert audit is not None
+    assert record.prompt_verdict == "cut"
+    assert audit.needed[0] == audit.needed[1] > 64
+    assert audit.sent == (64, 64)
+    assert audit.tokenizer == "some.model"
+    # The command stands at the end.
+    assert audit.reached[-1] == 0 < audit.reached[0] == len(record.instruction[0].text)
+    in_command = {
+        index
+        for index, one in enumerate(record.mentions)
+        if one.utterance == len(record.instruction) - 1
+    }
+    assert in_command
+    assert in_command <= set(audit.lost)
+    assert Record.model_validate_json(record.model_dump_json()) == record
+    assert not {"prompt", "prompt_verdict"} & set(IDENTITY)
+
+
+def test_records_without_a_limit_and_old_ones_are_unknown() -> None:
+    record = make_record(job(), RolloutResult("success", cause=None), started_at="now")
+    assert (record.prompt, record.prompt_verdict) == (None, "unknown")
+    old = record.model_dump(mode="json", exclude={"prompt", "prompt_verdict"})
+    assert Record.model_validate(old) == record
+
+
+def test_what_was_not_said_yet_is_neither_heard_nor_lost() -> None:
+    played = job(setting="contextual", delivery="turns")
+    result = RolloutResult("failure", cause="because", prompt_limit=EXACT._replace(tokens=3))
+    result.heard = [{"text": "", "step": 0}]
+    record = make_record(played, result, started_at="now")
+    assert record.prompt is not None
+    assert len(record.prompt.reached) == 1 < len(record.instruction)
+    assert all(record.mentions[index].utterance == 0 for index in record.prompt.lost)
+    result.heard = []
+    planned = make_record(played, result, started_at="now").prompt
+    assert planned is not None
+    assert len(planned.reached) == len(record.instruction)
+
+
+def test_a_long_prompt_is_refused_before_it_is_played(tmp_path: Path) -> None:
+    spec = "openpi://localhost:1?prompt_tokens=64&connect=1"  # nobody listens there
+    for delivery in ("prompt", "turns"):
+        record = EpisodeRunner(tmp_path, refuse_long=True)(
+            job(**LONG, spec=spec, delivery=delivery)
+        )
+        if delivery == "prompt":
+            assert (record.outcome, record.error, record.steps) == ("error", "prompt", 0)
+            assert record.cause is not None
+            assert record.cause.startswith("prompt: the instruction needs ")
+            assert record.attribution is None
+            assert record.prompt_verdict == "cut"
+            assert "env_reset" not in record.timings
+        else:
+            assert record.error != "prompt"
+
+
+def test_only_what_is_certainly_cut_is_refused() -> None:
+    for verdict in ("heard", "unknown"):
+        assert too_long_text(audit_job(job(), EXACT)[0], verdict) is None
+    with pytest.raises(UnknownNameError, match="known: send, refuse"):
+        make_plan(["random"], long_prompts="cut")
+
+
+def test_the_dry_run_prints_the_shares(tmp_path: Path) -> None:
+    words = ["run", "--dry-run", "--out", str(tmp_path), "--tasks", "PickXtimes"]
+    words += ["--policy", "system:pi0.5", "--policy", "far=openpi://localhost:1"]
+    said = CliRunner().invoke(app.app, [*words, "--distractors", "16"])
+    assert said.exit_code == 0, said.output
+    row = next(line for line in said.output.splitlines() if "64 tokens" in line)
+    assert "system:pi0.5" in row
+    assert "100 %" in row
+    assert "Not declared, so unknown (prompt_tokens=N): far." in said.output
+
+
+SERVED = '''
+import json, sys
+import numpy as np
+
+class Served:
+    """Writes down what its model reads: the first words, as many as the server's tokens."""
+
+    limit = None
+
+    def reset(self, instruction, demonstration):
+        self.read = " ".join(instruction.split()[: self.limit])
+
+    def act(self, observation):
+        with open(f"read-{self.limit}.txt", "a") as file:
+            file.write(self.read + "\\n")
+        return np.append(observation["joint_positions"], 1.0)[None]
+
+class Cutting(Served):
+    limit = 64
+'''
+
+
+@pytest.mark.sim
+def test_a_server_that_cuts_is_told_from_one_that_hears_everything_and_fails(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "served.py").write_text(SERVED)
+    servers, specs = [], []
+    try:
+        for name, limit in (("Served", 1000), ("Cutting", 64)):
+            words = ("serve", f"served:{name}", "--protocol", "openpi", "--port", "0")
+            server = subprocess.Popen(
+                [sys.executable, "-u", "-m", "roboirg", *words],
+                cwd=tmp_path,
+                stdout=subprocess.PIPE,
+                text=True,
+            )
+            servers.append(server)
+            assert server.stdout is not None
+            address = server.stdout.readline().split(" at ")[1].split(";")[0]
+            specs += ["--policy", f"{name}={address}?prompt_tokens={limit}"]
+        words = ("--tasks", "PickXtimes", "--settings", "explicit,contextual", "--episodes", "1")
+        said = subprocess.run(
+            [sys.executable, "-m", "roboirg", "run", *specs, *words, "--distractors", "16",
+             "--max-steps", "2", "--workers", "1", "--out", "out"],
+            cwd=tmp_path, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+    finally:
+        for server in servers:
+            server.terminate()
+            server.wait()
+    assert said.returncode == 0, said.stderr
+    assert "Cutting reads 64 tokens of a prompt" in said.stderr
+    assert "Served reads" not in said.stderr
+    records = {(one.policy, one.setting): one for one in read_records(tmp_path / "out")}
+    # The verdicts of the judge are the same; what was heard is not.
+    assert {one.outcome for one in records.values()} == {"failure"}
+    assert {key: one.prompt_verdict for key, one in records.items()} == {
+        ("Served", "explicit"): "heard",
+        ("Served", "contextual"): "heard",
+        ("Cutting", "explicit"): "heard",
+        ("Cutting", "contextual"): "cut",
+    }
+    instruction = " ".join(one.text for one in records["Cutting", "contextual"].instruction)
+    assert instruction in (tmp_path / "read-None.txt").read_text()
+    assert instruction not in (tmp_path / "read-64.txt").read_text()
+    console = Console(file=io.StringIO(), width=200)
+    tables = make_run_tables(list(records.values()))
+    print_run_tables(tables, console)
+    printed = console.file.getvalue()  # type: ignore[attr-defined]
+    assert "Cutting did not read every instruction to its end" in printed
+    assert "100 % cut, success 0 % of 1, none heard whole" in printed
+    assert "Served did not" not in printed
+    counts = count_heard([("", list(records.values()))])
+    assert {key.policy_run.policy: one.cut for key, one in counts.items() if one.cut} == {
+        "Cutting": 1
+    }

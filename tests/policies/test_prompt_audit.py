@@ -1,0 +1,251 @@
+"""What of an instruction reaches a model that reads a limited number of tokens."""
+
+import json
+import subprocess
+import sys
+from importlib import resources
+from itertools import accumulate
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
+from roboirg.language.token_counts import count_tokens
+from roboirg.policies.lerobot_policy import LeRobotPolicy
+from roboirg.policies.planning.systems import all_systems
+from roboirg.policies.prompt_length.declared_limit import prompt_limit, prompt_needs_of
+from roboirg.policies.prompt_length.prompt_audit import (
+    PromptLimit,
+    Tokens,
+    audit_instruction,
+    audit_message,
+    clean_prompt,
+    fewest_tokens,
+    most_tokens,
+)
+from roboirg.policies.prompt_length.tokenizer_file import read_tokenizer
+
+WORDS = ["Put", "the", "red", "cube", "into", "bin.", "Remember:", "green_one", "Zürich", "quokka"]
+TEXTS = st.lists(st.sampled_from(WORDS), min_size=1, max_size=30).map(" ".join)
+ANY_TEXTS = st.text(st.characters(exclude_categories=("Cs",)), max_size=60)
+LIMITS = st.integers(1, 80)
+ORDER = ("cut", "unknown", "heard")
+
+
+def prompt_limit_of(spec):
+    return prompt_limit(prompt_needs_of(spec))
+
+
+def halves(text):
+    """A tokenizer that splits every word in two."""
+    ends, place = [], 0
+    for word in text.split(" "):
+        ends += [place + (len(word) + 1) // 2, place + len(word)] if len(word) > 1 else []
+        ends += [place + 1] if len(word) == 1 else []
+        place += len(word) + 1
+    return Tokens(1, tuple(ends), 1)
+
+
+TOKENIZERS = st.sampled_from([None, halves, most_tokens, fewest_tokens])
+
+
+@given(TEXTS, LIMITS, st.integers(0, 30), TOKENIZERS)
+def test_bounds_are_in_order_and_verdicts_follow_from_them(text, tokens, added, tokenize):
+    found = audit_message(text, PromptLimit(tokens, added, tokenize))
+    assert 0 < found.least <= found.most
+    assert 0 <= found.sure <= found.reached <= len(text)
+    assert (found.verdict == "heard") == (found.most <= tokens)
+    assert (found.verdict == "cut") == (found.least > tokens)
+    if found.verdict == "heard":
+        assert found.sure == found.reached == len(text)
+
+
+@given(TEXTS, LIMITS)
+def test_with_a_tokenizer_heard_means_that_nothing_is_lost(text, tokens):
+    found = audit_message(text, PromptLimit(tokens, 0, halves))
+    assert found.least == found.most == halves(clean_prompt(text)).total
+    assert found.verdict in ("heard", "cut")
+    # The line break behind the words may be all that is lost.
+    words_fit = 1 + len(halves(clean_prompt(text)).ends) <= tokens
+    assert (found.reached == len(text)) == words_fit
+    if found.verdict == "heard":
+        assert words_fit
+
+
+@given(TEXTS, LIMITS)
+def test_what_is_read_is_the_prefix_that_its_tokens_spell(text, tokens):
+    found = audit_message(text, PromptLimit(tokens, 0, halves))
+    read = halves(clean_prompt(text)).ends[: max(tokens - 1, 0)]
+    assert found.reached == (len(text) if found.verdict == "heard" else max(read, default=0))
+
+
+@given(TEXTS, LIMITS, LIMITS, TOKENIZERS)
+def test_a_larger_limit_never_hears_less(text, one, other, tokenize):
+    low, high = sorted((one, other))
+    less, more = (audit_message(text, PromptLimit(n, 0, tokenize)) for n in (low, high))
+    assert ORDER.index(less.verdict) <= ORDER.index(more.verdict)
+    assert less.reached <= more.reached
+    assert less.sure <= more.sure
+
+
+@given(ANY_TEXTS, LIMITS, TOKENIZERS, st.booleans())
+def test_any_text_is_counted(text, tokens, tokenize, lowers):
+    found = audit_message(text, PromptLimit(tokens, 0, tokenize, None, lowers))
+    assert 0 <= found.sure <= found.reached <= len(text)
+    assert len(clean_prompt(text, lowers=lowers)) == len(clean_prompt(text))
+
+
+@given(st.lists(st.lists(TEXTS, min_size=1, max_size=4), max_size=4), LIMITS, TOKENIZERS)
+def test_every_message_is_read_from_its_own_beginning(messages, tokens, tokenize):
+    limit = PromptLimit(tokens, 0, tokenize)
+    found = audit_instruction(messages, limit)
+    alone = [audit_message(" ".join(turns), limit) for turns in messages]
+    assert len(found.reached) == sum(map(len, messages))
+    assert found.most == max((one.most for one in alone), default=0)
+    assert (found.verdict == "heard") == all(one.verdict == "heard" for one in alone)
+    assert (found.verdict == "cut") == any(one.verdict == "cut" for one in alone)
+    place = 0
+    for turns, audit in zip(messages, alone, strict=True):
+        starts = accumulate((len(turn) + 1 for turn in turns[:-1]), initial=0)
+        for start, turn in zip(starts, turns, strict=True):
+            assert (found.reached[place] == len(turn)) == (audit.reached >= start + len(turn))
+            place += 1
+
+
+def test_mentions_beyond_the_cut_are_lost_and_others_not():
+    turns = ("Look at the red cube.", "Put it into the bin.")
+    limit = PromptLimit(1 + 2 * 6, 0, halves)  # the beginning, five words and "Put"
+    found = audit_instruction([turns], limit)
+    assert found.reached == (21, 3)
+    spans = [(0, 20), (1, 3), (1, 6), (1, 19)]
+    assert found.lost(spans) == (2, 3)
+    assert audit_instruction([turns], limit._replace(tokens=99)).lost(spans) == ()
+    # The second is not said yet: it is not lost.
+    assert audit_instruction([turns[:1]], limit).lost(spans) == ()
+
+
+def test_prompts_are_stripped_and_underscores_and_line_breaks_are_blanks():
+    assert clean_prompt("  Put_the\ncube.\n") == "Put the cube."
+    assert clean_prompt("Put İt", lowers=True) == "put İt"
+    indented = audit_message("   red cube", PromptLimit(3, 0, halves))
+    assert indented.reached == 3 + len("red")
+
+
+def test_a_state_behind_the_words_shares_their_budget():
+    fits = audit_message("red cube", PromptLimit(6, 0, halves))
+    crowded = audit_message("red cube", PromptLimit(6, 10, halves))
+    assert (fits.verdict, crowded.verdict) == ("heard", "unknown")
+    assert crowded.reached == len("red cube")
+    assert (crowded.least, crowded.most) == (6, 16)
+
+
+@given(TEXTS)
+def test_the_upper_bound_is_the_count_of_the_language(text):
+    ascii_text = clean_prompt(text.replace("ü", "u"))
+    assert most_tokens(ascii_text).total == count_tokens(ascii_text)
+    assert fewest_tokens(ascii_text).total <= count_tokens(ascii_text)
+
+
+@pytest.fixture(scope="module")
+def sentencepiece_file():
+    package = pytest.importorskip("mistral_common")
+    return str(resources.files(package) / "data" / "tokenizer.model.v1")
+
+
+@given(ANY_TEXTS)
+def test_a_sentencepiece_model_says_where_its_pieces_end(sentencepiece_file, text):
+    cleaned = clean_prompt(text)
+    tokens = read_tokenizer(sentencepiece_file)(cleaned)
+    assert list(tokens.ends) == sorted(tokens.ends)
+    if tokens.ends:
+        assert tokens.ends[-1] <= len(cleaned)
+
+
+@given(st.lists(st.sampled_from([*WORDS[:6], "cubes,", "third"]), min_size=1).map(" ".join))
+def test_a_sentencepiece_model_lies_between_the_bounds(sentencepiece_file, text):
+    tokens = read_tokenizer(sentencepiece_file)(text)
+    assert fewest_tokens(text).total <= tokens.total <= most_tokens(text).total
+    assert tokens.ends[-1] == len(text)
+
+
+def test_a_json_tokenizer_is_read(tmp_path):
+    tokenizers = pytest.importorskip("tokenizers")
+    words = {word: number for number, word in enumerate(["[B]", "put", "the", "cube", ".", "[U]"])}
+    model = tokenizers.Tokenizer(tokenizers.models.WordLevel(words, unk_token="[U]"))  # noqa: S106
+    model.pre_tokenizer = tokenizers.pre_tokenizers.Whitespace()
+    model.post_processor = tokenizers.processors.TemplateProcessing("[B] $A", None, [("[B]", 0)])
+    model.enable_truncation(3)
+    path = tmp_path / "tokenizer.json"
+    model.save(str(path))
+    assert read_tokenizer(str(path))("put the cube.") == Tokens(1, (3, 7, 12, 13), 1)
+
+
+def test_tokenizers_that_cannot_be_read(tmp_path, monkeypatch):
+    with pytest.raises(InvalidValueError, match="is not a file"):
+        read_tokenizer(str(tmp_path / "none.model"))
+    (tmp_path / "bad.model").write_text("no model")
+    with pytest.raises(InvalidValueError, match="not a SentencePiece model"):
+        read_tokenizer(str(tmp_path / "bad.model"))
+    for name, library in (("other.model", "sentencepiece"), ("a.json", "tokenizers")):
+        (tmp_path / name).write_text("{}")
+        monkeypatch.setitem(sys.modules, library, None)
+        with pytest.raises(MissingDependencyError, match=rf"needs {library}; install .*tokens"):
+            read_tokenizer(str(tmp_path / name))
+
+
+def test_limits_are_parameters_of_remote_policies(sentencepiece_file):
+    url = f"openpi://localhost:1?prompt_tokens=48&prompt_added=7&tokenizer={sentencepiece_file}"
+    limit = prompt_limit_of(url)
+    assert limit[:2] == (48, 7)
+    assert limit.tokenizer == "tokenizer.model.v1"
+    assert not limit.lowers
+    assert prompt_limit_of("mme-vla://localhost:1?prompt_tokens=64").lowers
+    assert prompt_limit_of("openpi://localhost:1") is None
+    assert prompt_limit_of("oracle") is None
+    with pytest.raises(InvalidValueError, match="option prompt_tokens is '0'"):
+        prompt_limit_of("openpi://localhost:1?prompt_tokens=0")
+    with pytest.raises(UnknownNameError, match="prompt_token'"):
+        prompt_limit_of("openpi://localhost:1?prompt_token=3")
+
+
+def test_limits_are_attributes_of_own_policies():
+    class Mine:
+        prompt_tokens, prompt_added = 64, 3
+
+    assert prompt_limit(Mine) == PromptLimit(64, 3)
+    for attribute, value in (("prompt_tokens", "64"), ("prompt_tokens", True), ("tokenizer", 3)):
+        wrong = type("Wrong", (Mine,), {attribute: value})
+        with pytest.raises(InvalidValueError, match=f"{attribute} is {value!r}"):
+            prompt_limit(wrong)
+
+
+def test_the_systems_of_the_paper_have_limits():
+    limits = {name: prompt_limit_of(f"system:{name}") for name in all_systems()}
+    assert len(limits) == 7
+    symbolic = {name for name in limits if name.startswith("GroundSG") or name == "MemER"}
+    assert {name: limit.tokens for name, limit in limits.items()} == {
+        name: 128 if name in symbolic else 64 for name in limits
+    }
+    assert all((limits[name].added > 0) == (name in symbolic) for name in limits)
+    assert all(limit.lowers for limit in limits.values())
+    assert prompt_limit_of("system:pi0.5?policy.prompt_tokens=48").tokens == 48
+
+
+def test_a_lerobot_checkpoint_says_its_limit_itself(tmp_path):
+    (tmp_path / "config.json").write_text(json.dumps({"tokenizer_max_length": 48}))
+    assert LeRobotPolicy(f"lerobot://{tmp_path}").prompt_tokens == 48
+    assert prompt_limit_of(f"lerobot://{tmp_path}?prompt_tokens=9").tokens == 9
+    assert prompt_limit_of("lerobot://nobody/nothing") is None
+    for content in ("{", "[]", "{}", '{"tokenizer_max_length": "many"}'):
+        (tmp_path / "config.json").write_text(content)
+        assert LeRobotPolicy(f"lerobot://{tmp_path}").prompt_tokens is None
+
+
+def test_optional_libraries_are_imported_when_they_are_used():
+    code = (
+        "import sys; import roboirg.policies.prompt_length.declared_limit as d;"
+        "d.prompt_needs_of('openpi://localhost:1?prompt_tokens=64');"
+        "sys.exit(bool({'sentencepiece', 'tokenizers'} & set(sys.modules)))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
