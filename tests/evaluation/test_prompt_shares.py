@@ -256,3 +256,34 @@ def test_a_server_that_cuts_is_told_from_one_that_hears_everything_and_fails(
     assert {key.policy_run.policy: one.cut for key, one in counts.items() if one.cut} == {
         "Cutting": 1
     }
+
+
+def test_a_policy_of_ones_own_declares_its_limit_from_a_process_of_its_own(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(
+        "import os\n"
+        "print('imported by', os.getpid())\n"
+        "class Mine:\n"
+        "    prompt_tokens = 64\n"
+        "    def reset(self, instruction, demonstration): raise AssertionError('played')\n"
+        "    def act(self, observation): raise AssertionError('played')\n"
+    )
+    words = ["--policy", "mine:Mine", "--tasks", "PickXtimes", "--settings", "contextual"]
+    words += ["--episodes", "1", "--distractors", "16", "--long-prompts", "refuse"]
+
+    def run(*more: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-m", "roboirg", "run", *words, "--out", "out", *more],
+            cwd=tmp_path, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+
+    said = run("--dry-run")
+    assert said.returncode == 0, said.stderr
+    assert any("64 tokens" in line and "100 %" in line for line in said.stdout.splitlines())
+    assert "imported by" not in said.stdout
+    said = run("--workers", "1")
+    assert said.returncode == 2
+    assert "mine:Mine reads 64 tokens of a prompt" in said.stderr
+    (record,) = read_records(tmp_path / "out")
+    assert (record.outcome, record.error, record.prompt_verdict) == ("error", "prompt", "cut")
+    assert record.prompt is not None
+    assert record.prompt.limit == 64
