@@ -355,7 +355,7 @@ class It:
         return np.zeros((1, 8))
 """,
     )
-    good, bad = (HostedPolicy(pool.address, spec, 0) for _ in range(2))
+    good, bad, over, late = (HostedPolicy(pool.address, spec, 0) for _ in range(4))
     good.reset("live", {})
     bad.reset("die", {})
     assert good.act({}).shape == (1, 8)  # type: ignore[typeddict-item]
@@ -365,7 +365,9 @@ class It:
     assert str(guilty.value) == "the process ended with exit code 7 in the policy's act()"
     with pytest.raises(EpisodeLostError):
         good.act({})  # type: ignore[typeddict-item]
-    for one in (good, bad):
+    with pytest.raises(EpisodeLostError):
+        over.usage()  # what it has cost is lost
+    for one in (good, bad, over, late):
         one.close()
     again = HostedPolicy(pool.address, spec, 0)  # in a new process
     again.reset("live", {})

@@ -43,7 +43,13 @@ def fill(folder: Path, records: tuple[Record, ...]) -> bytes:
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=40)
 records = st.builds(
     lambda cause, steps, events, goal: some_records()[0].model_copy(
-        update={"cause": cause, "steps": steps, "events": tuple(events), "goal": goal}
+        update={
+            "outcome": "failure",
+            "cause": cause,
+            "steps": steps,
+            "events": tuple(events),
+            "goal": goal,
+        }
     ),
     st.none() | texts,
     st.integers(0, 2000),

@@ -286,10 +286,12 @@ def play_episode(
     except EpisodeError as error:
         result.record_error(error.kind, error.cause, error.details)
     finally:
-        if policy is not None:
-            _close_policy(policy, result, guard)
-        if env is not None:
-            env.close()
+        try:
+            if policy is not None:
+                _close_policy(policy, result, guard)
+        finally:
+            if env is not None:
+                env.close()
     return result
 
 
@@ -436,7 +438,11 @@ def _tell(
 
 
 def _close_policy(policy: Policy, result: RolloutResult, guard: _CallGuard) -> None:
-    """Read the policy's costs and close it; errors there do not change the outcome."""
+    """Read the policy's costs and close it; errors there do not change the outcome.
+
+    Raises:
+        EpisodeLostError: the policy's process was lost before it told the costs.
+    """
     try:
         with guard.policy("policy's close()", "policy_close"):
             try:
@@ -445,7 +451,5 @@ def _close_policy(policy: Policy, result: RolloutResult, guard: _CallGuard) -> N
                 close_policy(policy)
     except EpisodeError as error:
         result.details = result.details or error.details
-    except EpisodeLostError:
-        pass  # nothing is lost: the episode is over
     if isinstance(policy, HostedPolicy):
         result.timings["policy_wait"] = round(policy.waited_s, 6)
