@@ -326,7 +326,7 @@ def test_a_record_has_the_words_that_were_spoken() -> None:
 def test_a_record_tells_a_mirrored_pick_where_the_words_name_a_side(
     setting: str, frame: str, failure: str
 ) -> None:
-    job = Job(policy="p", task="PickXtimes", split="test", episode=2, setting=setting, frame=frame)
+    job = Job(policy="p", task="PickXtimes", split="test", episode=18, setting=setting, frame=frame)
     events = [EventRecord(step=9, kind="picked", subject="cube_red")]
     result = RolloutResult(
         "failure", None, "picked up the red cube", elapsed_steps=9, events=events

@@ -76,7 +76,7 @@ GOLDEN: dict[tuple[str, str], str] = {
 
 
 def digest(task, setting):
-    """A hash of all instructions of the first 24 training episodes and the first 24 of the tests."""
+    """A hash of all instructions of the first 24 episodes of train and of test."""
     sha = hashlib.sha256()
     for episode in (one for split in ("train", "test") for one in first_episodes(task, split, 24)):
         for options in expressible_options(episode):

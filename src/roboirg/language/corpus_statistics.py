@@ -73,7 +73,7 @@ class TokenCounts(NamedTuple):
     """Tokens per instruction (`roboirg.language.token_counts`).
 
     Attributes:
-        median: half of the instructions need at most so many.
+        median: half of the instructions need at most this number.
         longest: the most.
         over_short: share over the shortest limit of the field, 0 to 1.
         over_usual: share over the usual limit.
