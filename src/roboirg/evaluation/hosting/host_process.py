@@ -60,7 +60,11 @@ class HostProcess:
         one = len(calls) == 1
         results = [self._result(calls[0], method)] if one else self._act_together(calls)
         self._asking = set()
-        return {"results": results, "seconds": time.perf_counter() - start}
+        seconds = time.perf_counter() - start
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(Exception):  # a policy may have closed or replaced it
+                stream.flush()
+        return {"results": results, "seconds": seconds}
 
     def _result(self, call: Message, method: str) -> Message:
         try:

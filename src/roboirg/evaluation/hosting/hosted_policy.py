@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
+import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from multiprocessing.connection import Client, Connection
@@ -157,6 +159,7 @@ class HostedPolicy:
         except EpisodeError:
             self._is_open = False  # the host waits for an answer
             raise
+        _print(reply.get("output"))
         found = self._result(reply)
         self.waited_s += max(time.perf_counter() - start - self._seconds, 0.0)
         return found
@@ -218,6 +221,14 @@ class HostedPolicy:
 
     def _copy(self, start: int) -> None:
         self._sent.copy_to(buffer_of(self._block), start)
+
+
+def _print(output: object) -> None:
+    """Print what the policy printed, so that it is in the log of its episode."""
+    if output and isinstance(output, bytes):
+        with contextlib.suppress(OSError):
+            sys.stderr.flush()
+            os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, output)
 
 
 def _connect(hosts: HostAddress) -> Connection:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import array
+import fcntl
 import json
 import os
+import select
 import socket
 import subprocess
 import sys
+import termios
 import threading
 from collections.abc import Mapping
 from multiprocessing.connection import Connection
@@ -18,8 +22,10 @@ from roboirg.util.child_process import describe_exit, was_killed
 
 GRACE_S = 2.0
 """How long a process may take to exit when it is asked to."""
-MAX_OUTPUT = 64 * 2**10
-"""Bytes that a policy process may print; the rest is read and dropped."""
+MAX_OUTPUT = 256 * 2**10
+"""Bytes that are kept of what a policy process prints in one call; the rest is read and dropped."""
+DRAIN_S = 1.0
+"""How long to wait for the end of what was printed; a thread of the policy may print for ever."""
 
 # The first thing the process gets is the import path: nothing of the command is on its command
 # line, and the script that started the run is not imported again.
@@ -62,7 +68,7 @@ class PolicyChild:
                 env={**os.environ, **(variables or {})},
             )
         self._connection = Connection(ours.detach())
-        threading.Thread(target=_pass_on, args=(self._process.stdout,), daemon=True).start()
+        self._output = _Output(self._process.stdout)
 
     @property
     def pid(self) -> int:
@@ -83,6 +89,10 @@ class PolicyChild:
         except ValueError as error:
             self.kill()
             raise ChildLostError("policy", f"the process sent {error}") from error
+
+    def take_output(self) -> bytes:
+        """Return what the process has printed since the last time, clipped."""
+        return self._output.take()
 
     def loss(self) -> ChildLostError | None:
         """Return how the process died; None while it is alive."""
@@ -117,12 +127,47 @@ def _explain(code: int) -> ChildLostError:
     return ChildLostError("infrastructure" if was_killed(code) else "policy", describe_exit(code))
 
 
-def _pass_on(output: IO[bytes] | None) -> None:
-    """Pass what a process prints on to stderr, up to a limit, until its end."""
-    left = MAX_OUTPUT
-    while output is not None and (data := os.read(output.fileno(), 65_536)):
-        if left > 0:
-            sys.stderr.write(data[:left].decode(errors="replace"))
-            left -= len(data)
-            if left <= 0:
-                sys.stderr.write("\nThe policy's process prints more than is shown.\n")
+class _Output:
+    """Reads what a process prints, so that it never waits, and keeps a part of it.
+
+    Args:
+        stream: the read end of the pipe that is its stdout and stderr.
+    """
+
+    def __init__(self, stream: IO[bytes] | None) -> None:
+        self._stream = stream
+        self._changed = threading.Condition()
+        self._kept, self._dropped = bytearray(), 0
+        self._is_reading = False
+        threading.Thread(target=self._read, name="policy output", daemon=True).start()
+
+    def take(self) -> bytes:
+        """Return what is kept, and forget it. Called when the process waits or has ended."""
+        with self._changed:
+            self._changed.wait_for(self._is_drained, DRAIN_S)
+            output, dropped = bytes(self._kept), self._dropped
+            self._kept.clear()
+            self._dropped = 0
+        note = f"\n[roboirg: {dropped:,} bytes of this call are left out]\n"
+        return output + (note.encode() if dropped else b"")
+
+    def _is_drained(self) -> bool:
+        if self._stream is None or self._stream.closed:
+            return True
+        waiting = array.array("i", [0])
+        fcntl.ioctl(self._stream.fileno(), termios.FIONREAD, waiting)
+        return not (waiting[0] or self._is_reading)
+
+    def _read(self) -> None:
+        while self._stream is not None and select.select([self._stream], [], []):
+            with self._changed:
+                self._is_reading = True
+            data = os.read(self._stream.fileno(), 65_536)
+            with self._changed:
+                room = max(MAX_OUTPUT - len(self._kept), 0)
+                self._kept += data[:room]
+                self._dropped += len(data[room:])
+                self._is_reading = False
+                self._changed.notify_all()
+            if not data:
+                return

@@ -217,8 +217,10 @@ class PolicyHost:
                 self._child, self._starts = PolicyChild(self._variables), self._starts + 1
             reply = self._exchange(calls)
             results = reply["results"]
+            # What a call for several episodes prints is of all of them.
+            printed = self._child.take_output()
             replies = [
-                {**result, "seconds": reply["seconds"]}
+                {**result, "seconds": reply["seconds"], "output": printed}
                 for _, result in zip(calls, results, strict=True)
             ]
         except ChildLostError as loss:
@@ -271,17 +273,21 @@ class PolicyHost:
 
     def _attribute(self, calls: Sequence[_Call], loss: ChildLostError) -> None:
         """Attribute the loss of the process to the call that was under way."""
+        printed = b""
         if self._child is not None:
             self._child.kill()
+            printed = self._child.take_output()
         self._forget_child(loss)
         for call in calls:
             phase = PHASES[call.message["method"]]
             if len(calls) > 1:
                 self._reply_lost(call, loss, alone=True)
             elif self._overdue:
-                call.replies.put({"error": ["timeout", f"the {phase} did not return in time", ""]})
+                error = ["timeout", f"the {phase} did not return in time", ""]
+                call.replies.put({"error": error, "output": printed})
             else:
-                call.replies.put({"error": [loss.kind, f"{loss} in the {phase}", ""]})
+                error = [loss.kind, f"{loss} in the {phase}", ""]
+                call.replies.put({"error": error, "output": printed})
 
     def _reply_lost(
         self, call: _Call, loss: ChildLostError | None = None, *, alone: bool = False
