@@ -22,6 +22,7 @@ from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.plan import Plan, make_plan
 from roboirg.evaluation.runner import run_plan
+from roboirg.records.episode_log import MAX_LOG_BYTES, log_path, logged_slugs
 from roboirg.records.record import Job, Record
 from roboirg.records.store import read_records
 
@@ -74,8 +75,15 @@ def test_what_a_policy_breaks_is_its_own(
     assert beside.metadata == {"world": True, "job": True, "goal": True}, jobs
     assert Path.cwd() == tmp_path
     shown = capfd.readouterr()
-    assert len(shown.out) + len(shown.err) < 500_000
-    assert "prints more than is shown" in shown.err
+    assert shown.out + shown.err == ""
+    printer = {record.slug for record in found[hostile_policies.SPEC("Printer")]}
+    assert printer == {slug for slug in logged_slugs(tmp_path / "run") if slug in printer}
+    for slug in printer:
+        log = log_path(tmp_path / "run", slug).read_text(encoding="utf-8")
+        assert "are left out" in log
+        assert len(log) <= MAX_LOG_BYTES + 1000
+    honest = {record.slug for name in names for record in found[f"{name}+1"]}
+    assert honest.isdisjoint(logged_slugs(tmp_path / "run"))
 
 
 def test_an_episode_begins_where_the_run_began(
