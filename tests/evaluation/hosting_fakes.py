@@ -77,8 +77,12 @@ class PaperRunner(EpisodeRunner):
     def __call__(self, job: Job) -> Record:
         if self.notes is not None:
             (self.notes / f"worker-{os.getpid()}").touch()
+        kept = rollout.make_env
         rollout.make_env = lambda job, _needs: PaperWorld(job, self.seconds)
-        return EpisodeRunner.__call__(self, job)
+        try:
+            return EpisodeRunner.__call__(self, job)
+        finally:
+            rollout.make_env = kept  # this may be the process of all tests
 
 
 class Dice:

@@ -37,7 +37,12 @@ each_case = pytest.mark.parametrize(
 def played(task: str, one: Case) -> list[Staged]:
     """The case in every episode of the sample that offers what it needs."""
     stages = [Staged(get_episode(task, *where)) for where in SAMPLE]
-    return [staged for staged in stages if one.play(staged) is not False]
+    found = [staged for staged in stages if one.play(staged) is not False]
+    if found:
+        return found
+    # Words that name a side in a certain way are rare.
+    more = (Staged(get_episode(task, "train", index)) for index in range(4, 100))
+    return [next(staged for staged in more if one.play(staged) is not False)]
 
 
 @each_case

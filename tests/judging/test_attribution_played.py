@@ -67,7 +67,7 @@ def test_hands_that_do_another_task_well_fail_by_grounding(task: str) -> None:
     ("task", "episode", "failure", "subject"),
     [
         ("VideoUnmask", 0, "wrong_object", "container"),
-        ("PickXtimes", 7, "wrong_count", "button"),
+        ("PickXtimes", 0, "wrong_count", "cube"),
         ("VideoPlaceOrder", 0, "wrong_place", "cube"),
     ],
 )

@@ -294,16 +294,19 @@ def test_a_trial_that_goes_wrong_does_not_end_the_study(tmp_path):
 
 
 def test_two_versions_of_a_policy_are_not_mixed(tmp_path, monkeypatch):
-    import faulty_policies
-
+    module = tmp_path / "of_two_versions.py"
+    monkeypatch.syspath_prepend(tmp_path)
+    words = "from faulty_policies import Still\n\n\nclass Versioned(Still):\n    version = "
+    module.write_text(f'{words}"one"\n', encoding="utf-8")
+    folder = tmp_path / "study"
+    folder.mkdir()
     plan = make_study(
-        ("faulty_policies:Still",), tasks=("PutInBox",), settings=("explicit", "direct"), trials=1,
-        demonstrations=0, max_steps=5,
+        ("of_two_versions:Versioned",), tasks=("PutInBox",), settings=("explicit", "direct"),
+        trials=1, demonstrations=0, max_steps=5,
     )  # fmt: skip
-    monkeypatch.setattr(faulty_policies.Still, "version", "one", raising=False)
-    study = Study(plan, tmp_path, Watched(), scorer="judge")
+    study = Study(plan, folder, Watched(), scorer="judge")
     assert len(study.run()) == 2
-    monkeypatch.setattr(faulty_policies.Still, "version", "two", raising=False)
+    module.write_text(f'{words}"two"\n', encoding="utf-8")
     with pytest.raises(InvalidValueError, match="the policy in version one, which is two now"):
         study.run()
 

@@ -283,7 +283,7 @@ class PolicyHost:
             if len(calls) > 1:
                 self._reply_lost(call, loss, alone=True)
             elif self._overdue:
-                error = ["timeout", f"the {phase} did not return in time", ""]
+                error = ["timeout", f"the {phase} did not return within {self._timeout_s:g} s", ""]
                 call.replies.put({"error": error, "output": printed})
             else:
                 error = [loss.kind, f"{loss} in the {phase}", ""]

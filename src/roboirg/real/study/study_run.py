@@ -19,9 +19,10 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import DEFAULT_DELIVERY
 from roboirg.evaluation.plan import instruct_job
 from roboirg.evaluation.plan_parsing import name_and_spec
+from roboirg.evaluation.policy_descriptions import describe_policy
 from roboirg.evaluation.rollout_result import make_record, utc_now
 from roboirg.language import LANGUAGE_VERSION
-from roboirg.policies.loading import is_privileged, load_policy_class, policy_version
+from roboirg.policies.loading import is_privileged, load_policy_class
 from roboirg.policies.requirements import wanted_actions, wanted_cameras, wanted_history
 from roboirg.real.control.control_loop import ControlLoop
 from roboirg.real.control.limits import Limits
@@ -217,7 +218,9 @@ def policy_seed(trial: PlannedTrial) -> int:
 
 def _check_versions(trial_log: TrialLog, policies: Mapping[str, str | None]) -> None:
     """Refuse to mix two versions of a policy, the language or the environment."""
-    now = {name: policy_version(spec or name) for name, spec in policies.items()}
+    now = {
+        name: describe_policy(spec or name, again=True).version for name, spec in policies.items()
+    }
     for trial in trial_log.plan.trials:
         record = trial_log.newest(trial.name)
         if record is None or record.policy not in now:
