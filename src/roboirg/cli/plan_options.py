@@ -60,7 +60,7 @@ Reasoning = Annotated[
 ]
 Wordings = Annotated[
     str | None,
-    typer.Option(help="Wording file: use its commands (docs/language.md).  (our own words)"),
+    typer.Option(help="Our words for train or test, or a file with commands.  (ours of the split)"),
 ]
 MaxSteps = Annotated[
     int | None, typer.Option(help="Limit in control steps, 20 per second.  (1300)")

@@ -286,8 +286,7 @@ def _chains(
         if rank and rank >= len(others) - 1:
             continue
         nearest = f"{ORDINALS[rank]} nearest" if rank else "nearest"
-        noun = "cube" if thing == "hidden_cube" else thing
-        phrase = f"{nearest} to the {noun} {selector.landmark.phrase}"
+        phrase = f"{nearest} to the {thing.removeprefix('hidden_')} {selector.landmark.phrase}"
         landmark = Landmark(phrase, level, selector.landmark.sided)
         yield Selector(landmark, (_nearness(anchor.position),), others, rank)
 

@@ -129,17 +129,7 @@ class Job(_RecordModel):
 
         Wordings tell runs apart, as a step limit does: the columns of tables are the same in all.
         """
-        return InstructionOptions(
-            self.setting,
-            self.form,
-            self.stages,
-            self.distractor,
-            self.distractors,
-            self.frame,
-            delivery=self.delivery,
-            rival=self.rival,
-            reasoning=self.reasoning,
-        )
+        return options_of(self)
 
     @property
     def policy_spec(self) -> str:
@@ -155,6 +145,12 @@ class Job(_RecordModel):
 
 IDENTITY = tuple(name for name in Job.model_fields if name not in {"spec", "wordings_file"})
 """The fields that identify a job."""
+
+
+def options_of(record: object) -> InstructionOptions:
+    """Return the instruction options among a record's attributes, without `wordings`."""
+    names = (name for name in InstructionOptions._fields if name != "wordings")
+    return InstructionOptions(**{name: getattr(record, name) for name in names})
 
 
 def slug_of(identity: Mapping[str, object]) -> str:

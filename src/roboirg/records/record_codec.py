@@ -33,6 +33,7 @@ from roboirg.records.record import (
     Outcome,
     Record,
     Result,
+    options_of,
     slug_of,
 )
 
@@ -87,17 +88,7 @@ class RecordIndexEntry(msgspec.Struct, frozen=True, gc=False):
     @property
     def options(self) -> InstructionOptions:
         """The instruction options, as of its `Job`."""
-        return InstructionOptions(
-            self.setting,
-            self.form,
-            self.stages,
-            self.distractor,
-            self.distractors,
-            self.frame,
-            delivery=self.delivery,
-            rival=self.rival,
-            reasoning=self.reasoning,
-        )
+        return options_of(self)
 
     @property
     def identity(self) -> Job:
