@@ -14,6 +14,7 @@ from typing import NamedTuple, Protocol, Self, TypeVar, runtime_checkable
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.hosting.payload import decode, encode
+from roboirg.evaluation.hosting.policy_child import ChildLostError, PolicyChild
 from roboirg.evaluation.hosting.policy_host import HostSession, PolicyHost, host_variables
 
 POLL_S = 0.25
@@ -107,9 +108,15 @@ class HostPool:
     @property
     def pids(self) -> list[int]:
         """The process ids of the policies' processes."""
+        return [child.pid for child in self._children()]
+
+    def loss(self) -> ChildLostError | None:
+        """Return how a policy's process died that nobody has called since; None without one."""
+        return next(filter(None, (child.loss() for child in self._children())), None)
+
+    def _children(self) -> list[PolicyChild]:
         with self._lock:
-            pids = [host.pid for host in self._hosts.values()]
-        return [pid for pid in pids if pid is not None]
+            return [host.child for host in self._hosts.values() if host.child is not None]
 
     def close(self) -> None:
         """End all hosts."""

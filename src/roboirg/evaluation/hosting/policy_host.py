@@ -80,6 +80,7 @@ class PolicyHost:
 
     Attributes:
         sessions: the episodes it serves.
+        child: the policy's process; None if there is none.
     """
 
     def __init__(self, variables: Mapping[str, str], batch: int, timeout_s: float | None) -> None:
@@ -88,19 +89,13 @@ class PolicyHost:
         self._waiting: deque[_Call] = deque()
         self._changed = threading.Condition()
         self._stopped = False
-        self._child: PolicyChild | None = None
+        self.child: PolicyChild | None = None
         self._starts = 0
         self._deadline: float | None = None
         self._overdue = False
         self._loss = ChildLostError("infrastructure", "the run is ending")
         self._thread = threading.Thread(target=self._run, name="policy host", daemon=True)
         self._thread.start()
-
-    @property
-    def pid(self) -> int | None:
-        """The process id of the policy's process; None if there is none."""
-        child = self._child
-        return None if child is None else child.pid
 
     def call(self, session: HostSession, message: Message) -> Message:
         """Carry out a call of a world and return the reply; called by the session's thread.
@@ -142,34 +137,34 @@ class PolicyHost:
     def join(self) -> None:
         """Stop now, and wait for it."""
         self.stop()
-        if self.sessions and (child := self._child) is not None:
+        if self.sessions and (child := self.child) is not None:
             child.kill()
         self._thread.join()
 
     def kill_if_overdue(self) -> None:
         """Kill the process if the call that is under way has exceeded the time limit."""
-        deadline, child = self._deadline, self._child
+        deadline, child = self._deadline, self.child
         if deadline is not None and child is not None and time.monotonic() > deadline:
             self._overdue = True
             child.kill()
 
     def _run(self) -> None:
         while calls := self._gather():
-            if self._child is not None and (loss := self._child.loss()) is not None:
+            if self.child is not None and (loss := self.child.loss()) is not None:
                 self._forget_child(loss)
             ready = [call for call in calls if self._is_current(call)]
             if ready:
                 self._carry_out(ready)
         for call in self._waiting:
             self._reply_lost(call)
-        if self._child is not None:
-            self._child.stop()
+        if self.child is not None:
+            self.child.close()
 
     def _forget_child(self, loss: ChildLostError) -> None:
         """Give up a process that is dead; the episodes that it served are played again."""
-        if self._child is not None:
-            self._child.stop()
-        self._child, self._starts, self._loss = None, self._starts + 1, loss
+        if self.child is not None:
+            self.child.close()
+        self.child, self._starts, self._loss = None, self._starts + 1, loss
 
     def _gather(self) -> list[_Call]:
         """Wait for a call and for others to go with it; empty when the host is stopped."""
@@ -213,12 +208,12 @@ class PolicyHost:
 
     def _carry_out(self, calls: Sequence[_Call]) -> None:
         try:
-            if self._child is None:
-                self._child, self._starts = PolicyChild(self._variables), self._starts + 1
+            if self.child is None:
+                self.child, self._starts = PolicyChild.start(self._variables), self._starts + 1
             reply = self._exchange(calls)
             results = reply["results"]
             # What a call for several episodes prints is of all of them.
-            printed = self._child.take_output()
+            printed = self.child.printed.take()
             replies = [
                 {**result, "seconds": reply["seconds"], "output": printed}
                 for _, result in zip(calls, results, strict=True)
@@ -245,7 +240,7 @@ class PolicyHost:
 
     def _exchange(self, calls: Sequence[_Call]) -> Message:
         """Send calls to the process, pass on its questions, and return its reply."""
-        child = self._child
+        child = self.child
         if child is None:
             raise AssertionError("the process has been started")
         message: Message = {
@@ -274,9 +269,9 @@ class PolicyHost:
     def _attribute(self, calls: Sequence[_Call], loss: ChildLostError) -> None:
         """Attribute the loss of the process to the call that was under way."""
         printed = b""
-        if self._child is not None:
-            self._child.kill()
-            printed = self._child.take_output()
+        if self.child is not None:
+            self.child.kill()
+            printed = self.child.printed.take()
         self._forget_child(loss)
         for call in calls:
             phase = PHASES[call.message["method"]]

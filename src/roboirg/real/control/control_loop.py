@@ -7,6 +7,7 @@ which it is detected, before anything else happens.
 | fault | kind of error |
 | --- | --- |
 | the policy raises, or its process dies | policy |
+| its process is killed from outside | infrastructure |
 | the policy exceeds its time limit | timeout |
 | its command is malformed or outside the limits | invalid_action |
 | a camera has no new picture, the robot raises | environment |
@@ -31,7 +32,7 @@ from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
 from roboirg.evaluation.rollout_result import RolloutResult
 from roboirg.real.control.limits import Limits
 from roboirg.real.control.loop_watchdog import LoopWatchdog
-from roboirg.real.control.policy_workers import PolicyReply, PolicyWorker
+from roboirg.real.control.policy_workers import PolicyReply, PolicyThread
 from roboirg.real.control.robot import HORIZON, Command, JudgingRobot, Robot, SensorReading
 from roboirg.records.record import Job
 
@@ -66,7 +67,7 @@ class ControlLoop:
     """
 
     robot: Robot
-    worker: PolicyWorker
+    worker: PolicyThread
     limits: Limits
     cameras: Sequence[str] = ()
     stop_requested: Callable[[], bool] = _never
@@ -173,9 +174,9 @@ class ControlLoop:
         with attribute_errors("environment"):
             reading = self.robot.observe()
         self._check_cameras(reading)
-        exit_reason = self.worker.exit_reason()
-        if exit_reason is not None:
-            raise EpisodeError("policy", exit_reason, "")
+        loss = self.worker.loss()
+        if loss is not None:
+            raise EpisodeError(loss.kind, str(loss), "")
         self._update_actions(reading, period)
         if not self._actions:
             with attribute_errors("environment"):
