@@ -111,7 +111,7 @@ class HostPool:
         return [child.pid for child in self._children()]
 
     def loss(self) -> ChildLostError | None:
-        """Return how a policy's process died that nobody has called since; None without one."""
+        """Return how a policy's process died since the last call; None if all are alive."""
         return next(filter(None, (child.loss() for child in self._children())), None)
 
     def _children(self) -> list[PolicyChild]:
