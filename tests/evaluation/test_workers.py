@@ -17,12 +17,13 @@ from evaluation_fakes import FakePlay, WaitingPlay, comparable, small_plan
 
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.waiting import Wait, waiting
+from roboirg.evaluation.call_guard import CallGuard
 from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
 from roboirg.evaluation.executors import watchdog
 from roboirg.evaluation.executors.executor import LocalProcesses
 from roboirg.evaluation.executors.workers import Worker
 from roboirg.evaluation.plan import Plan
-from roboirg.evaluation.rollout import EpisodeRunner, _CallGuard, load_policy
+from roboirg.evaluation.rollout import EpisodeRunner, load_policy
 from roboirg.evaluation.rollout_result import RolloutResult
 from roboirg.evaluation.runner import UNREACHABLE_AFTER, RunSummary, run_plan
 from roboirg.records.record import Job, Record
@@ -218,7 +219,7 @@ def test_long_words_for_what_is_waited_for_are_cut() -> None:
 
 def test_time_in_a_queue_has_a_timing_of_its_own() -> None:
     result = RolloutResult()
-    guard = _CallGuard(result, None)
+    guard = CallGuard(result, None)
     start = time.perf_counter()
     with guard.policy("policy's reset()", "policy_reset"), waiting("a server", is_queue=True):
         time.sleep(0.3)

@@ -17,7 +17,7 @@ from roboirg.core.observations import FRONT, Demonstration, Observation
 from roboirg.evaluation.executors.executor import LocalProcesses
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
-from roboirg.evaluation.plan import make_plan
+from roboirg.evaluation.plan_maker import make_plan
 from roboirg.evaluation.rollout import EpisodeRunner
 from roboirg.perf.remote_rates import CHUNK, WavingPolicy, steps_per_second
 

@@ -153,6 +153,10 @@ def _video_recorder(play: object) -> VideoRecorder | None:
     return play if isinstance(play, VideoRecorder) else None
 
 
+def _hosting(play: object) -> HostSettings | None:
+    return play.hosting if isinstance(play, HostUser) else None
+
+
 def _check_reachable(address: str | None) -> None:
     """Check that the address accepts connections; Ray would wait minutes and then exit."""
     host, _, port = (address or "").removeprefix("ray://").rpartition(":")
@@ -218,14 +222,14 @@ class _WorkerPool:
         self._ray, self._play, self._episode_timeout_s = ray, play, episode_timeout_s
         variables = {
             "PYTHONPATH": os.pathsep.join(_user_paths()),
-            # Or Ray would hide the GPUs from actors that do not reserve them.
+            # Or older versions of Ray hide the GPUs from actors that reserve none.
             "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
         }
         self._remote = functools.partial(ray.remote, runtime_env={"env_vars": variables})
         self._actor = self._remote(num_cpus=1, max_restarts=0, scheduling_strategy="SPREAD")(
             _RemoteWorker
         )
-        self._hosting = play.hosting if isinstance(play, HostUser) else None
+        self._hosting = _hosting(play)
         # By id of a machine: the actor that holds its policy hosts.
         self._hosts: dict[str, Any] = {}
         # By pending call: its worker, its machine and its job; both None while the worker starts.
