@@ -17,6 +17,7 @@ from queue import SimpleQueue
 
 from roboirg.evaluation.hosting.payload import Message, decode, encode
 from roboirg.evaluation.hosting.policy_child import ChildLostError, PolicyChild
+from roboirg.util.deadline_watch import DeadlineWatch
 
 GATHER_S = 0.003
 """How long a call waits for others that could be carried out together with it."""
@@ -91,8 +92,7 @@ class PolicyHost:
         self._stopped = False
         self.child: PolicyChild | None = None
         self._starts = 0
-        self._deadline: float | None = None
-        self._overdue = False
+        self._limit = DeadlineWatch(self._kill)
         self._loss = ChildLostError("infrastructure", "the run is ending")
         self._thread = threading.Thread(target=self._run, name="policy host", daemon=True)
         self._thread.start()
@@ -137,28 +137,29 @@ class PolicyHost:
     def join(self) -> None:
         """Stop now, and wait for it."""
         self.stop()
-        if self.sessions and (child := self.child) is not None:
-            child.kill()
+        if self.sessions:
+            self._kill()
         self._thread.join()
 
-    def kill_if_overdue(self) -> None:
-        """Kill the process if the call that is under way has exceeded the time limit."""
-        deadline, child = self._deadline, self.child
-        if deadline is not None and child is not None and time.monotonic() > deadline:
-            self._overdue = True
+    def _kill(self) -> None:
+        if (child := self.child) is not None:
             child.kill()
 
     def _run(self) -> None:
+        with self._limit:
+            self._carry_out_all()
+        for call in self._waiting:
+            self._reply_lost(call)
+        if self.child is not None:
+            self.child.close()
+
+    def _carry_out_all(self) -> None:
         while calls := self._gather():
             if self.child is not None and (loss := self.child.loss()) is not None:
                 self._forget_child(loss)
             ready = [call for call in calls if self._is_current(call)]
             if ready:
                 self._carry_out(ready)
-        for call in self._waiting:
-            self._reply_lost(call)
-        if self.child is not None:
-            self.child.close()
 
     def _forget_child(self, loss: ChildLostError) -> None:
         """Give up a process that is dead; the episodes that it served are played again."""
@@ -248,14 +249,14 @@ class PolicyHost:
             "calls": [{**call.message, "session": call.session.number} for call in calls],
         }
         by_number = {call.session.number: call for call in calls}
-        left_s, self._overdue = self._timeout_s, False
+        left_s, self._limit.acted_after = self._timeout_s, None
         while True:
             start = time.monotonic()
-            self._deadline = None if left_s is None else start + left_s
+            self._limit.begin(left_s)
             try:
                 reply = child.exchange(message)
             finally:
-                self._deadline = None
+                self._limit.begin(None)
             if "results" in reply:
                 return reply
             if left_s is not None:  # what the world takes to draw is not the policy's time
@@ -277,7 +278,7 @@ class PolicyHost:
             phase = PHASES[call.message["method"]]
             if len(calls) > 1:
                 self._reply_lost(call, loss, alone=True)
-            elif self._overdue:
+            elif self._limit.acted_after is not None:
                 error = ["timeout", f"the {phase} did not return within {self._timeout_s:g} s", ""]
                 call.replies.put({"error": error, "output": printed})
             else:
