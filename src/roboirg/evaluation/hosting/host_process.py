@@ -55,8 +55,10 @@ class HostProcess:
             os.chdir(self._home)  # an earlier episode may have changed it
         self._asking = {call["session"] for call in calls}
         start = time.perf_counter()
-        one = len(calls) == 1
-        results = [self._result(calls[0], method)] if one else self._act_together(calls)
+        if method == "act" and len(calls) > 1:
+            results = self._act_together(calls)
+        else:
+            results = [self._result(call, method) for call in calls]
         self._asking = set()
         seconds = time.perf_counter() - start
         for stream in (sys.stdout, sys.stderr):

@@ -208,9 +208,12 @@ class PolicyHost:
         return False
 
     def _carry_out(self, calls: Sequence[_Call]) -> None:
+        self._limit.acted_after = None
         try:
             if self.child is None:
                 self.child, self._starts = PolicyChild.start(self._variables), self._starts + 1
+                # The start of the interpreter is not the policy's time.
+                self.child.exchange({"method": "start", "calls": []})
             reply = self._exchange(calls)
             results = reply["results"]
             # What a call for several episodes prints is of all of them.
@@ -249,7 +252,7 @@ class PolicyHost:
             "calls": [{**call.message, "session": call.session.number} for call in calls],
         }
         by_number = {call.session.number: call for call in calls}
-        left_s, self._limit.acted_after = self._timeout_s, None
+        left_s = self._timeout_s
         while True:
             start = time.monotonic()
             self._limit.begin(left_s)
