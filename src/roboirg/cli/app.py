@@ -18,6 +18,7 @@ from roboirg.cli import (
     policy_commands,
     report_commands,
     run_commands,
+    verification_commands,
     wording_commands,
 )
 from roboirg.cli.bench_commands import bench
@@ -90,6 +91,8 @@ def _options(*, version: _Version = False) -> None:
 
 app.command()(run_commands.run)
 app.command()(run_commands.merge)
+app.command()(verification_commands.verify)
+app.command()(verification_commands.pack)
 app.command()(report_commands.report)
 app.command()(report_commands.view)
 app.command()(report_commands.tables)

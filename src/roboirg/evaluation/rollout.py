@@ -59,6 +59,7 @@ from roboirg.policies.requirements import (
     wanted_history,
     wanted_history_cameras,
 )
+from roboirg.records.action_log import write_actions
 from roboirg.records.record import Job, Record
 
 if TYPE_CHECKING:
@@ -119,6 +120,7 @@ class EpisodeRunner:
         writer, result = self._play(job)
         video = self._finish_video(writer, result)
         error = None if writer is None else writer.error
+        log = result.action_log
         return make_record(
             job,
             result,
@@ -127,6 +129,7 @@ class EpisodeRunner:
             started_at=started_at,
             duration_s=round(time.monotonic() - start, 3),
             plan=self.plan,
+            action_log=None if log is None else write_actions(log, self.folder),
         )
 
     def _play(self, job: Job) -> tuple[VideoWriter | None, RolloutResult]:
@@ -190,7 +193,7 @@ class EnvRequirements(NamedTuple):
     calibration: bool = False
 
 
-class _CallGuard:
+class CallGuard:
     """Attributes errors of policy and environment calls, watches their time and measures it.
 
     Args:
@@ -208,6 +211,7 @@ class _CallGuard:
 
     @contextlib.contextmanager
     def policy(self, phase: Phase, name: str) -> Iterator[None]:
+        """Guard a call of the policy; its time is added to `name`."""
         # Whatever ends this process while it waits for a host, it is not the policy.
         hosted: Phase = "wait for the policy's host"
         watching = watched(hosted) if self._is_hosted else watched(phase, self._limit_s)
@@ -216,6 +220,7 @@ class _CallGuard:
 
     @contextlib.contextmanager
     def environment(self, name: str) -> Iterator[None]:
+        """Guard a call of the environment; its time is added to `name`."""
         with attribute_errors("environment"), watched("environment"), self._timed(name):
             yield
 
@@ -263,15 +268,14 @@ def play_episode(
     if job.wordings is not None:
         open_wordings(job.wordings_file, job.wordings)
     result = RolloutResult()
-    guard = _CallGuard(result, policy_timeout_s, is_hosted=hosts is not None)
+    guard = CallGuard(result, policy_timeout_s, is_hosted=hosts is not None)
     policy: Policy | None = None
-    env = None
     try:
         if hosts is not None and needs_host(job.policy_spec):
             with guard.policy("policy's constructor", "policy_load"):
                 policy = _load_hosted(job, hosts, result, alone=alone)
         if policy is None:
-            guard = _CallGuard(result, policy_timeout_s)
+            guard = CallGuard(result, policy_timeout_s)
             result.policy = describe_here(job.policy_spec)
             with guard.policy("policy's constructor", "policy_load"):
                 policy = load_policy(job)
@@ -280,19 +284,49 @@ def play_episode(
             result.prompt_limit = prompt_limit(policy)
         if refuse_long:
             _refuse_long_prompt(job, result)
+        play_with(policy, job, needs, result, guard, writer)
+    except EpisodeError as error:
+        result.record_error(error.kind, error.cause, error.details)
+    finally:
+        if policy is not None:
+            _close_policy(policy, result, guard)
+    return result
+
+
+def play_with(
+    policy: Policy,
+    job: Job,
+    needs: EnvRequirements,
+    result: RolloutResult,
+    guard: CallGuard,
+    writer: VideoWriter | None = None,
+) -> None:
+    """Play one job with a loaded policy, which is not closed.
+
+    Args:
+        policy: answers the observations.
+        job: what to play.
+        needs: what the environment offers.
+        result: is filled in.
+        guard: attributes errors and measures calls.
+        writer: gets the frames of a video.
+
+    Raises:
+        EpisodeError: the environment raised, or the policy, or an action cannot be executed.
+    """
+    env, broke = None, False
+    try:
         with guard.environment("env_reset"):
             env = make_env(job, needs)
         _play_to_end(env, policy, needs.actions, job, writer, result, guard)
     except EpisodeError as error:
-        result.record_error(error.kind, error.cause, error.details)
+        broke = error.kind == "environment"
+        raise
     finally:
-        try:
-            if policy is not None:
-                _close_policy(policy, result, guard)
-        finally:
-            if env is not None:
-                env.close()
-    return result
+        if env is not None:
+            if result.action_space is not None and not broke:
+                result.end_state = env.session.state_numbers(), env.session.state_hash()
+            env.close()
 
 
 def _refuse_long_prompt(job: Job, result: RolloutResult) -> None:
@@ -382,7 +416,7 @@ def _play_to_end(
     job: Job,
     writer: VideoWriter | None,
     result: RolloutResult,
-    guard: _CallGuard,
+    guard: CallGuard,
 ) -> None:
     """Play the environment's episode with the policy to its end."""
     with guard.environment("env_reset"):
@@ -406,12 +440,15 @@ def _play_to_end(
             policy.attach(env)
         policy.reset(first, info["demonstration"])
         result.policy_metadata = policy_metadata(policy)
+    result.action_space = actions.name
     status, cause = "ongoing", None
     while status == "ongoing":
         with guard.policy("policy's act()", "policy_act"):
             rows = next_actions(policy, observation, actions)
         with guard.environment("env_step"):
+            done = env.executed_actions
             observation, *_, info = env.step_chunk(rows)
+            result.answers.append(rows[: env.executed_actions - done])
         result.steps = int(info["steps"])
         result.add_events(info)
         if info.get("heard"):
@@ -426,7 +463,7 @@ def _tell(
     utterances: Sequence[Mapping[str, Any]],
     writer: VideoWriter | None,
     result: RolloutResult,
-    guard: _CallGuard,
+    guard: CallGuard,
 ) -> None:
     """Tell the policy what has just been said, and write it under the video."""
     result.heard += utterances
@@ -437,7 +474,7 @@ def _tell(
         result.policy_metadata = policy_metadata(policy)
 
 
-def _close_policy(policy: Policy, result: RolloutResult, guard: _CallGuard) -> None:
+def _close_policy(policy: Policy, result: RolloutResult, guard: CallGuard) -> None:
     """Read the policy's costs and close it; errors there do not change the outcome.
 
     Raises:

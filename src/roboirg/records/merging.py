@@ -12,6 +12,7 @@ from typing import NamedTuple
 import msgspec
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.records.action_log import action_path
 from roboirg.records.episode_log import log_path, logged_slugs
 from roboirg.records.record_codec import (
     RecordIndexEntry,
@@ -37,9 +38,10 @@ class MergeSummary(NamedTuple):
 
 
 class _MergeEntry(RecordIndexEntry, frozen=True):
-    """An index entry with the path of the video."""
+    """An index entry with the path of the video and the digest of the actions."""
 
     video: str | None = None
+    action_log: str | None = None
 
 
 _decoder = msgspec.json.Decoder(_MergeEntry)
@@ -124,7 +126,7 @@ def _server_version(record: RecordIndexEntry) -> Iterator[tuple[tuple[object, ..
 def _lines(
     run: StoredRun[_MergeEntry], wanted: Sequence[_MergeEntry], source: Path, target: Path
 ) -> Iterator[bytes]:
-    """Yield the lines of records and copy their videos and logs.
+    """Yield the lines of records and copy their videos, logs and actions.
 
     A video whose file is missing is removed from its line.
     """
@@ -132,6 +134,8 @@ def _lines(
     for one, line in zip(wanted, run.lines(wanted), strict=True):
         if logs and (slug := one.slug) in logs:
             _copy_log(log_path(source, slug), log_path(target, slug))
+        if one.action_log is not None:
+            _copy_actions(one.action_log, source, target)
         if one.video is None or _copy_video(one.video, source, target):
             yield line
         else:
@@ -150,6 +154,13 @@ def _copy_video(name: str, source: Path, target: Path) -> bool:
         with contextlib.suppress(FileNotFoundError):
             _copy_file(video.with_suffix(".jpg"), copy.with_suffix(".jpg"))
     return True
+
+
+def _copy_actions(digest: str, source: Path, target: Path) -> None:
+    actions, copy = action_path(source, digest), action_path(target, digest)
+    if actions.is_file() and not copy.exists():
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        _copy_file(actions, copy)
 
 
 def _copy_log(log: Path, copy: Path) -> None:
