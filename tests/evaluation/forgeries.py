@@ -8,8 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from roboirg.evaluation.plan import PLAN_FILE
 from roboirg.records.action_log import ActionLog, action_path, read_actions, write_actions
+from roboirg.records.plan_files import PLAN_FILE
 from roboirg.records.store import RECORDS_FILE
 
 Lines = list[dict[str, Any]]

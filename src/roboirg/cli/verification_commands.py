@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from roboirg.cli.import_path import add_working_directory
 from roboirg.cli.options import Workers
 from roboirg.cli.progress_bar import progress_bar
-from roboirg.cli.run_commands import USAGE_ERROR, Folder, folder_of
+from roboirg.cli.run_commands import USAGE_ERROR, Folder, folder_of, report_problems
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.printable import printable
 from roboirg.util.plurals import counted
 
 if TYPE_CHECKING:
+    from roboirg.analysis.stats.flips import RepeatedEpisode
     from roboirg.evaluation.verification.run_verification import Verification
 
 _MOST_SHOWN = 20
@@ -111,3 +113,57 @@ def _print_some(what: str, slugs: tuple[str, ...]) -> None:
         typer.echo(f"{what}: {printable(slug)}")
     if len(slugs) > _MOST_SHOWN:
         typer.echo(f"… and {len(slugs) - _MOST_SHOWN:,} more.")
+
+
+def repeat(
+    run: Folder,
+    out: Annotated[str, typer.Option(help="Folder of the repetition; the same again to resume.")],
+    workers: Workers = None,
+) -> None:
+    """Play a run's plan again with its policies, and print which verdicts changed."""
+    from roboirg.analysis.stats.flips import repeated_episodes
+    from roboirg.cli.run_commands import play
+    from roboirg.evaluation.executors.executor import choose_executor
+    from roboirg.evaluation.plan import read_plan
+
+    folder, target = folder_of(run), folder_of(out)
+    if folder.resolve() == target.resolve():
+        raise InvalidValueError(f"{out} is the run itself; choose another --out.")
+    plan = read_plan(folder)
+    if plan is None:
+        raise InvalidValueError(
+            f"{run} has no plan.json that can be read, so it cannot be repeated."
+        )
+    add_working_directory()
+    summary = play(
+        plan.checked(), target, choose_executor(workers, plan.episode_timeout_s), retry=True
+    )
+    _print_flips(repeated_episodes(folder, target))
+    report_problems(summary, target)
+
+
+def _print_flips(episodes: tuple[RepeatedEpisode, ...]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from roboirg.analysis.stats.flips import count_flips, flips_by_cell
+    from roboirg.analysis.stats.option_labels import options_label
+
+    table = Table(title="verdicts, first and second time", title_justify="left")
+    for name in ("policy", "setting"):
+        table.add_column(name)
+    for name in ("✓✓", "✗✗", "✓✗", "✗✓", "other actions", "errors"):
+        table.add_column(name, justify="right")
+    for (policy, options), one in flips_by_cell(episodes).items():
+        counts = (one.both, one.neither, one.lost, one.gained, one.acted_differently, one.errors)
+        table.add_row(policy, options_label(options), *map(str, counts))
+    Console().print(table)
+    for changed in [one for one in episodes if one.is_flip][:_MOST_SHOWN]:
+        where = (
+            ""
+            if changed.differs_at is None
+            else f"; actions differ from number {changed.differs_at} on"
+        )
+        typer.echo(f"{changed.slug}: {' then '.join(changed.outcomes)}{where}")
+    found = count_flips(episodes)
+    typer.echo(f"{found.flips:,} of {counted(found.verdicts, 'verdict')} changed.")

@@ -47,12 +47,10 @@ from roboirg.language.generator import find_refusal
 from roboirg.language.instruction import FORMS, Instruction
 from roboirg.language.settings import all_settings
 from roboirg.language.wordings.wording_store import open_wordings
+from roboirg.records.plan_files import PLAN_FILE, earlier_plans, store_plan
 from roboirg.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, ERROR_KINDS, ErrorKind, Job
-from roboirg.util.atomic_write import write_atomically
 from roboirg.util.plain_text import is_encodable
 from roboirg.util.short_hash import short_hash
-
-PLAN_FILE = "plan.json"
 
 REQUIRED = "required"
 """Instead of a wording file in a plan: one must be given when the plan is run."""
@@ -409,14 +407,24 @@ def make_plan(
 
 
 def write_plan(plan: Plan, folder: Path) -> None:
-    """Write the newest plan of a folder beside its records."""
-    write_atomically(folder / PLAN_FILE, plan.model_dump_json(indent=2) + "\n")
+    """Write the newest plan of a folder beside its records; earlier ones stay in ``plans/``."""
+    store_plan((plan.model_dump_json(indent=2) + "\n").encode(), folder)
 
 
 def read_plan(folder: Path) -> Plan | None:
     """Return the newest plan of a folder; None if it is missing or of an unknown version."""
+    return _read_plan_at(folder / PLAN_FILE)
+
+
+def read_earlier_plans(folder: Path) -> tuple[Plan, ...]:
+    """Return the plans of earlier commands, or of merged runs, that can be read."""
+    found = (_read_plan_at(path) for path in earlier_plans(folder))
+    return tuple(plan for plan in found if plan is not None)
+
+
+def _read_plan_at(path: Path) -> Plan | None:
     try:
-        return Plan.model_validate_json((folder / PLAN_FILE).read_bytes())
+        return Plan.model_validate_json(path.read_bytes())
     except (OSError, ValidationError):
         return None
 

@@ -14,6 +14,7 @@ import msgspec
 from roboirg.core.errors import InvalidValueError
 from roboirg.records.action_log import action_path
 from roboirg.records.episode_log import log_path, logged_slugs
+from roboirg.records.plan_files import PLAN_FILE, earlier_plans, keep_earlier_plan
 from roboirg.records.record_codec import (
     RecordIndexEntry,
     StoreError,
@@ -69,6 +70,7 @@ def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
     added, duplicates = 0, 0
     conflicts: list[RecordIndexEntry] = []
     with RecordStore(out) as store:
+        _keep_plans(folders, out)
         kept = dict(store.stored)
         _check_versions([(out, kept.values()), *entries])
         for folder, run in runs:
@@ -88,6 +90,14 @@ def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
                 added += before is None
             store.extend(_lines(run, wanted, folder, out))
     return MergeSummary(added, duplicates, tuple(conflicts))
+
+
+def _keep_plans(folders: Sequence[Path], out: Path) -> None:
+    """Keep the plans of all runs, so that it can be told which episodes are missing."""
+    for folder in folders:
+        for path in (folder / PLAN_FILE, *earlier_plans(folder)):
+            if path.is_file():
+                keep_earlier_plan(path.read_bytes(), out)
 
 
 def _read_entry(line: bytes, path: Path, number: int) -> _MergeEntry:

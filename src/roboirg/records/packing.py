@@ -20,6 +20,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.version import __version__
 from roboirg.records.action_log import ACTION_FOLDER
 from roboirg.records.episode_log import LOG_FOLDER
+from roboirg.records.plan_files import EARLIER_PLANS, PLAN_FILE, earlier_plans
 from roboirg.records.record_codec import StoreError, read_index_entry
 from roboirg.records.store import RECORDS_FILE, StoredRun
 from roboirg.util.atomic_write import replacing
@@ -68,7 +69,8 @@ def pack_run(folder: Path, out: Path, *, videos: bool = False, logs: bool = Fals
     """
     entries = StoredRun(folder, read_index_entry).newest
     wanted = {"actions", *(["videos"] if videos else []), *(["logs"] if logs else [])}
-    names = [name for name in (RECORDS_FILE, "plan.json") if (folder / name).is_file()]
+    names = [name for name in (RECORDS_FILE, PLAN_FILE) if (folder / name).is_file()]
+    names += [path.relative_to(folder).as_posix() for path in earlier_plans(folder)]
     for name in sorted(wanted):
         found = (folder / _PACKED_FOLDERS[name]).rglob("*")
         names += sorted(path.relative_to(folder).as_posix() for path in found if path.is_file())
@@ -158,7 +160,8 @@ def _safe(name: str, path: Path) -> str:
     """
     parts = PurePosixPath(name).parts
     top = parts[0] if parts else ""
-    is_known = name in (RECORDS_FILE, "plan.json") or top in _PACKED_FOLDERS.values()
+    folders = {EARLIER_PLANS, *_PACKED_FOLDERS.values()}
+    is_known = name in (RECORDS_FILE, PLAN_FILE) or top in folders
     if not is_known or ".." in parts or "\\" in name or name.startswith("/"):
         raise StoreError(f"{path} holds {name!r}, which is no file of a run.")
     return name

@@ -107,7 +107,7 @@ class EpisodeSession:
         Units: rad, m and s. An object has its position and orientation (w, x, y, z), its linear and
         angular velocity if it can move, and a button the position and velocity of its joint.
         """
-        return np.concatenate([np.ravel(one) for one in self._state()]).astype(np.float64)
+        return np.concatenate([np.asarray(one, np.float64).ravel() for one in self._state()])
 
     def _state(self) -> list[NDArray[Any]]:
         robot = self.world.robot.articulation

@@ -12,7 +12,7 @@ from pathlib import Path
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.plan import read_plan
+from roboirg.evaluation.plan import read_earlier_plans, read_plan
 from roboirg.evaluation.verification.record_check import (
     LineToCheck,
     RecordCheck,
@@ -20,8 +20,8 @@ from roboirg.evaluation.verification.record_check import (
     check_line,
 )
 from roboirg.language.generator import find_refusal
-from roboirg.records.record_codec import RecordIndexEntry, identity_key, read_index_entry
-from roboirg.records.store import StoredRun
+from roboirg.records.record_codec import EpisodeSummary, identity_key
+from roboirg.records.store import StoredRun, read_summaries
 from roboirg.util.parallel_map import parallel_map
 from roboirg.util.plurals import counted
 
@@ -82,7 +82,7 @@ def verify_run(
     """
     if not 0.0 <= sample <= 1.0:
         raise InvalidValueError(f"sample is {sample}; it must be between 0 % and 100 %.")
-    run = StoredRun(folder, read_index_entry)
+    run = read_summaries(folder)
     checks: list[RecordCheck] = []
     verdicts: Counter[ReplayVerdict] = Counter()
     deviation = 0.0
@@ -110,7 +110,7 @@ def verify_run(
 
 
 def _lines(
-    run: StoredRun[RecordIndexEntry], sample: float, seed: int | None
+    run: StoredRun[EpisodeSummary], sample: float, seed: int | None
 ) -> Sequence[LineToCheck]:
     """Return the newest lines, with a share of them to play."""
     count = round(sample * len(run.newest))
@@ -124,23 +124,26 @@ def _lines(
 
 
 def _completeness(
-    folder: Path, entries: Sequence[RecordIndexEntry]
+    folder: Path, entries: Sequence[EpisodeSummary]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return which episodes are missing, and notes about the plan."""
-    plan = read_plan(folder)
-    holes = set(_holes(entries))
-    if plan is None:
-        return tuple(sorted(holes)), ("There is no plan; only holes between records were sought.",)
+    newest, earlier = read_plan(folder), read_earlier_plans(folder)
+    missing = set(_holes(entries))
+    made_by = {one.plan for one in entries if one.plan is not None}
+    known = {plan.fingerprint for plan in (newest, *earlier) if plan is not None}
+    missing |= {f"the plan {one}, by which episodes were played" for one in made_by - known}
+    # A merged run has the plans of its parts, all of them to be played.
+    plans = earlier if newest is None else (newest,)
+    jobs = {identity_key(job): job.slug for plan in plans for job in plan.jobs()}
     there = {identity_key(one) for one in entries}
-    jobs = {identity_key(job): job.slug for job in plan.jobs()}
+    missing |= {slug for key, slug in jobs.items() if key not in there}
     notes = []
     if outside := len(there - jobs.keys()):
         notes.append(f"{counted(outside, 'record')} are not in the newest plan of the folder.")
-    missing = {slug for key, slug in jobs.items() if key not in there}
-    return tuple(sorted(missing | holes)), tuple(notes)
+    return tuple(sorted(missing)), tuple(notes)
 
 
-def _holes(entries: Iterable[RecordIndexEntry]) -> Iterator[str]:
+def _holes(entries: Iterable[EpisodeSummary]) -> Iterator[str]:
     """Yield episodes that a policy played in one setting or seed of a task, but not in another."""
     episodes: dict[tuple[str, ...], set[int]] = defaultdict(set)
     seeds: dict[str, set[int]] = defaultdict(set)
