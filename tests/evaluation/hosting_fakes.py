@@ -97,6 +97,24 @@ class PaperRunner(EpisodeRunner):
             rollout.make_env = kept  # this may be the process of all tests
 
 
+@dataclass(frozen=True)
+class PatientRunner(PaperRunner):
+    """Plays when as many worlds as wanted have come.
+
+    Attributes:
+        wanted: number of processes with a world.
+    """
+
+    wanted: int = 1
+
+    def __call__(self, job: Job) -> Record:
+        assert self.notes is not None
+        (self.notes / f"worker-{os.getpid()}").touch()
+        while len(list(self.notes.glob("worker-*"))) < self.wanted:
+            time.sleep(0.05)
+        return super().__call__(job)
+
+
 class Dice:
     """Draws from the global generators, which belong to one episode at a time."""
 
@@ -121,6 +139,13 @@ class Dice:
 
     def usage(self) -> dict[str, float]:
         return {"calls": self.calls}
+
+
+class Resident(Dice):
+    """Tells in which process it is."""
+
+    def usage(self) -> dict[str, float]:
+        return {"process": os.getpid()}
 
 
 class BatchedDice:

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from roboirg.cli.app import app
 from roboirg.evaluation.executors.executor import InProcess
-from roboirg.evaluation.plan import make_plan
+from roboirg.evaluation.plan_maker import make_plan
 from roboirg.evaluation.rollout import EpisodeRunner
 from roboirg.evaluation.runner import run_plan
 from roboirg.evaluation.verification.record_check import ReplayVerdict

@@ -117,7 +117,7 @@ def demo(
     """Play three built-in policies on every task and setting, record videos, write a report."""
     from roboirg.analysis.page.report import check_report_support
     from roboirg.evaluation.executors.executor import choose_executor
-    from roboirg.evaluation.plan import make_plan
+    from roboirg.evaluation.plan_maker import make_plan
 
     folder = run_commands.folder_of(out)
     plan = make_plan(DEMO_POLICIES, episodes=episodes, video=video)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from roboirg import language, policies, tasks
 from roboirg.core.actions import find_action_space
 from roboirg.core.delivery import DELIVERIES
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import (
     ALL_STAGES,
     DEFAULT_DELIVERY,
@@ -32,23 +32,14 @@ from roboirg.core.observations import (
 from roboirg.core.word_pools import POOLS
 from roboirg.episodes import splits
 from roboirg.evaluation.hosting.host_pool import DEFAULT_BATCH, HostSettings
-from roboirg.evaluation.plan_parsing import (
-    ALL,
-    means_all,
-    name_and_spec,
-    parse_episodes,
-    parse_names,
-    parse_numbers,
-    parse_policies,
-    parse_stage_sets,
-)
+from roboirg.evaluation.plan_parsing import check_names, name_and_spec
 from roboirg.evaluation.policy_descriptions import describe_policy
 from roboirg.language.generator import find_refusal
 from roboirg.language.instruction import FORMS, Instruction
 from roboirg.language.settings import all_settings
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.records.plan_files import PLAN_FILE, earlier_plans, store_plan
-from roboirg.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, ERROR_KINDS, ErrorKind, Job
+from roboirg.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, ErrorKind, Job
 from roboirg.util.plain_text import is_encodable
 from roboirg.util.short_hash import short_hash
 
@@ -309,11 +300,11 @@ class Plan(BaseModel):
                 yield from self._jobs_of(("", ""), task, episode, settings, seeds=(0,))
 
     def _check_options(self) -> None:
-        _check_names("form", self.forms, FORMS)
-        _check_names("delivery", (self.delivery,), DELIVERIES)
-        _check_names("rival", (self.rival,), RIVALS)
-        _check_names("reasoning", (self.reasoning,), REASONINGS)
-        _check_names("kind of meshes", (self.meshes,), MESHES)
+        check_names("form", self.forms, FORMS)
+        check_names("delivery", (self.delivery,), DELIVERIES)
+        check_names("rival", (self.rival,), RIVALS)
+        check_names("reasoning", (self.reasoning,), REASONINGS)
+        check_names("kind of meshes", (self.meshes,), MESHES)
         for name, least in (("max_steps", 1), ("tries", 1), ("batch", 1)):
             if getattr(self, name) < least:
                 raise InvalidValueError(
@@ -333,77 +324,11 @@ class Plan(BaseModel):
     def _check_settings(self, task: str) -> None:
         has = language.settings_of(tasks.get_task(task))
         for setting in () if self.settings == "all" else self.settings:
-            _check_names("setting", (setting,), language.setting_names())
+            check_names("setting", (setting,), language.setting_names())
             if setting not in has:
                 raise InvalidValueError(
                     f"{task} has no {setting} setting; its settings are {', '.join(has)}."
                 )
-
-
-def make_plan(
-    policies: Iterable[str],
-    *,
-    tasks: str = ALL,
-    settings: str = ALL,
-    forms: str = "implicit",
-    episodes: str = "4",
-    policy_seeds: str = "0",
-    stages: str = "1-5",
-    retry_on: str = ",".join(RETRYABLE),
-    devices: str = "",
-    **options: object,
-) -> Plan:
-    """Return a checked plan from options as typed on the command line.
-
-    Args:
-        policies: names or addresses; names may be separated by commas.
-        tasks: names separated by commas; ``all`` anywhere selects all.
-        settings: names separated by commas; ``all`` anywhere selects all.
-        forms: names separated by commas.
-        episodes: ``4`` for the first four, or a list such as ``0,3,5-9``.
-        policy_seeds: a list of numbers.
-        stages: a list of numbers, or several lists separated by semicolons.
-        retry_on: kinds of errors separated by commas, or ``none``.
-        devices: names separated by commas; none for one process on any device.
-        **options: other fields of `Plan`.
-
-    Raises:
-        UnknownNameError: a name does not exist; the message suggests the nearest.
-        InvalidValueError: a number or combination is out of range.
-    """
-    video, split = options.get("video", "off"), str(options.get("split", "test"))
-    if options.get("wordings") == REQUIRED:
-        raise InvalidValueError(
-            "This plan needs words from outside: make a wording file with `roboirg wordings "
-            "import-robomme PATH --out robomme.toml`, where PATH is a clone of RoboMME's "
-            "repository, and give it with --wordings robomme.toml."
-        )
-    if video not in VIDEO_MODES:
-        raise UnknownNameError("video mode", video, VIDEO_MODES)
-    long_prompts = options.get("long_prompts", "send")
-    if long_prompts not in LONG_PROMPTS:
-        raise UnknownNameError("way with long prompts", long_prompts, LONG_PROMPTS)
-    try:
-        plan = Plan(
-            policies=parse_policies(policies),
-            tasks=_task_names(tasks),
-            settings="all" if means_all(settings) else parse_names("setting", settings),
-            forms=parse_names("form", forms),
-            episodes=parse_episodes(episodes, split),
-            policy_seeds=parse_numbers("policy seed", policy_seeds),
-            stages=parse_stage_sets(stages),
-            retry_on=_error_kinds(retry_on),
-            devices=parse_names("device", devices) if devices else (),
-            **options,  # type: ignore[arg-type]
-        )
-    except ValidationError as error:
-        first = error.errors()[0]
-        cause = first.get("ctx", {}).get("error")
-        if isinstance(cause, InvalidValueError):
-            raise cause from None
-        name = ".".join(str(part) for part in first["loc"])
-        raise InvalidValueError(f"{name} is {first['input']!r}: {first['msg']}.") from error
-    return plan.checked()
 
 
 def write_plan(plan: Plan, folder: Path) -> None:
@@ -440,21 +365,3 @@ def instruct_job(job: Job) -> Instruction:
     if job.wordings is not None:
         open_wordings(job.wordings_file, job.wordings)
     return language.instruct_with(episode, job.options._replace(wordings=job.wordings))
-
-
-def _task_names(text: str) -> tuple[str, ...]:
-    return tasks.find_tasks(parse_names("task", text))
-
-
-def _error_kinds(text: str) -> tuple[ErrorKind, ...]:
-    if text.strip().lower() == "none":
-        return ()
-    names = parse_names("kind of error", text)
-    _check_names("kind of error", names, ERROR_KINDS)
-    return tuple(kind for kind in ERROR_KINDS if kind in names)
-
-
-def _check_names(kind: str, names: Sequence[str], known: Iterable[str]) -> None:
-    for name in names:
-        if name not in known:
-            raise UnknownNameError(kind, name, known)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import importlib.metadata
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import zip_longest
 from typing import Any
@@ -38,6 +38,7 @@ from roboirg.records.record import (
     Job,
     MentionSpan,
     Outcome,
+    PromptAudit,
     Record,
     UtteranceRecord,
 )
@@ -176,13 +177,7 @@ def make_record(
     explicit = instruct_job(job.model_copy(update={"setting": EXPLICIT}))
     policy = result.policy or _describe(job)
     utterances = _utterances(job, instruction, result)
-    prompt, verdict = None, UNDECLARED
-    if result.prompt_limit is not None:
-        steps = [one.step for one in utterances]
-        if steps == [None] * len(steps):  # it ended before anything was said
-            prompt, verdict = audit_job(job, result.prompt_limit, instruction)
-        else:
-            prompt, verdict = audit_prompt(instruction, steps, result.prompt_limit)
+    prompt, verdict = _audit(job, instruction, utterances, result)
     return Record(
         **dict(job),
         seed=episode.seed,
@@ -213,16 +208,38 @@ def make_record(
         video_error=video_error,
         details=result.details,
         render_device=result.render_device,
-        language_version=str(language.LANGUAGE_VERSION),
-        environment_version=ENVIRONMENT_VERSION,
-        package_version=importlib.metadata.version("roboirgbench"),
-        code=code_fingerprint(),
+        **_versions(),
         plan=plan,
         usage=result.usage,
         timings=result.timings,
         started_at=started_at,
         duration_s=duration_s,
     )
+
+
+def _audit(
+    job: Job,
+    instruction: language.Instruction,
+    utterances: Sequence[UtteranceRecord],
+    result: RolloutResult,
+) -> tuple[PromptAudit | None, PromptVerdict]:
+    """Return what of the instruction reached the policy's model, and the verdict."""
+    if result.prompt_limit is None:
+        return None, UNDECLARED
+    steps = [one.step for one in utterances]
+    if steps == [None] * len(steps):  # it ended before anything was said
+        return audit_job(job, result.prompt_limit, instruction)
+    return audit_prompt(instruction, steps, result.prompt_limit)
+
+
+def _versions() -> dict[str, Any]:
+    """Return the versions of what made a record, by its fields."""
+    return {
+        "language_version": str(language.LANGUAGE_VERSION),
+        "environment_version": ENVIRONMENT_VERSION,
+        "package_version": importlib.metadata.version("roboirgbench"),
+        "code": code_fingerprint(),
+    }
 
 
 def _describe(job: Job) -> PolicyDescription:

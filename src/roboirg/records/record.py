@@ -8,6 +8,7 @@ for the fields in `NON_DETERMINISTIC_FIELDS`.
 from __future__ import annotations
 
 import hashlib
+import operator
 import re
 from collections.abc import Mapping
 from typing import Literal, Self, get_args
@@ -147,10 +148,13 @@ IDENTITY = tuple(name for name in Job.model_fields if name not in {"spec", "word
 """The fields that identify a job."""
 
 
+_OPTIONS = tuple(name for name in InstructionOptions._fields if name != "wordings")
+_read_options = operator.attrgetter(*_OPTIONS)
+
+
 def options_of(record: object) -> InstructionOptions:
     """Return the instruction options among a record's attributes, without `wordings`."""
-    names = (name for name in InstructionOptions._fields if name != "wordings")
-    return InstructionOptions(**{name: getattr(record, name) for name in names})
+    return InstructionOptions(**dict(zip(_OPTIONS, _read_options(record), strict=True)))
 
 
 def slug_of(identity: Mapping[str, object]) -> str:

@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from roboirg.core.actions import find_action_space
 from roboirg.core.observations import Observation
+from roboirg.evaluation.call_guard import CallGuard
 from roboirg.evaluation.episode_errors import EpisodeError
 from roboirg.evaluation.policy_descriptions import PolicyDescription
-from roboirg.evaluation.rollout import CallGuard, EnvRequirements, play_with
+from roboirg.evaluation.policy_environment import EnvRequirements
+from roboirg.evaluation.rollout import play_with
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.records.action_log import ActionLog
 from roboirg.records.record import IDENTITY, Job, Record
