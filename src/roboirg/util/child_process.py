@@ -18,7 +18,7 @@ import sys
 from collections.abc import Callable, Mapping
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
-from typing import IO, Any, NamedTuple, Self
+from typing import IO, Any, NamedTuple, Self, cast
 
 GRACE_S = 2.0
 """How long a child may take to exit once its channel is closed."""
@@ -117,7 +117,7 @@ class ChildProcess:
     @property
     def pid(self) -> int:
         """Its process id."""
-        return self._process.pid or 0
+        return cast("int", self._process.pid)  # it has been started
 
     @property
     def exit(self) -> ChildExit | None:

@@ -115,7 +115,8 @@ class HostPool:
 
     def _children(self) -> list[PolicyChild]:
         with self._lock:
-            return [host.child for host in self._hosts.values() if host.child is not None]
+            children = [host.child for host in self._hosts.values()]
+        return [child for child in children if child is not None]
 
     def close(self) -> None:
         """End all hosts."""
