@@ -6,10 +6,10 @@ import itertools
 import numpy as np
 import pytest
 
+from roboirg.core.episode import ROBOT_BASE
 from roboirg.core.errors import RenderDeviceError
-from roboirg.policies.builtin.random_policy import RandomPolicy
 from roboirg.policies.checks.check_result import FAIL, NOTE, PASS, WARN
-from roboirg.policies.checks.expert_episode import MAX_ROWS, record_expert
+from roboirg.policies.checks.expert_episode import MAX_ROWS, ExpertEpisode, record_expert
 from roboirg.policies.policy_check import check_policy
 
 pytestmark = pytest.mark.sim
@@ -100,20 +100,67 @@ def test_conventions_are_told_apart_in_real_pictures(kind, expected):
     assert found == expected
 
 
-class Posing(RandomPolicy):
+class Posing:
+    """Does what the expert did where the tool is; reads no pictures."""
+
     actions = "ee_pose"
-    frame = np.zeros(3)
+    cameras = ()
+
+    def reset(self, instruction, demonstration):
+        self.words = len(instruction)
 
     def act(self, observation):
-        pose = observation["end_effector"] + 1e-3 * self._rng.standard_normal(6)
-        return np.append(pose - [*self.frame, 0, 0, 0], 1.0)[None].repeat(8, axis=0)
+        here = observation["end_effector"]
+        nearest = min(recorded_poses(), key=lambda one: np.abs(one.still - here).sum())
+        rows = nearest.actions + 1e-6 * self.words
+        rows[:, :6] += here - nearest.still
+        return self.write(rows, here)
+
+    def write(self, rows, here):
+        return rows
+
+
+class FromBase(Posing):
+    def write(self, rows, here):
+        return rows - [*ROBOT_BASE, 0, 0, 0, 0]
+
+
+class Millimeters(Posing):
+    def write(self, rows, here):
+        return rows * [1000, 1000, 1000, 1, 1, 1, 1]
+
+
+class Changing(Posing):
+    def write(self, rows, here):
+        return rows - [*here, 0]
+
+
+@functools.cache
+def recorded_poses():
+    return record_expert(Posing(), 8).moments
 
 
 def test_poses_of_the_expert_are_those_after_each_step():
-    moments = record_expert(Posing(), 8).moments
-    for one, after in itertools.pairwise(moments):
+    for one, after in itertools.pairwise(recorded_poses()):
         assert one.actions.shape[1] == 7
         assert np.allclose(one.actions[-1, :6], after.still)
+
+
+@pytest.mark.parametrize(
+    ("kind", "check", "words"),
+    [
+        (Posing, None, ""),
+        (FromBase, "tool frame", "robot's base"),
+        (Millimeters, "tool position", "in millimeters"),
+        (Changing, "tool position", "changes of the pose"),
+    ],
+)
+def test_conventions_of_poses_are_told_apart(kind, check, words):
+    episode = ExpertEpisode("Go on.", {}, recorded_poses())
+    results = check_policy(kind(), record_expert=lambda *_: episode)
+    found = {one.check: one.message for one in results if one.verdict in (WARN, FAIL)}
+    assert set(found) == ({check} if check else set())
+    assert words in "".join(found.values())
 
 
 def test_without_a_renderer_nothing_is_compared(monkeypatch):

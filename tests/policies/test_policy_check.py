@@ -10,8 +10,9 @@ from typer.testing import CliRunner
 
 from roboirg.cli.policy_commands import check_policy as command
 from roboirg.core.observations import CAMERAS
+from roboirg.policies.checks.check_result import FAIL, NOTE, PASS, WARN
 from roboirg.policies.checks.synthetic_episodes import SyntheticEpisodes
-from roboirg.policies.policy_check import FAIL, NOTE, PASS, WARN, check_policy
+from roboirg.policies.policy_check import check_policy
 
 
 class Sound:

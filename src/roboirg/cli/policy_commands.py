@@ -110,9 +110,10 @@ def check_policy(
     """Check a policy on synthetic episodes, and beside the scripted expert."""
     from rich.console import Console
 
+    from roboirg.policies.checks.check_result import FAIL
     from roboirg.policies.checks.expert_episode import record_expert
-    from roboirg.policies.policy_check import FAIL, print_check_results
     from roboirg.policies.policy_check import check_policy as check
+    from roboirg.policies.policy_check import print_check_results
 
     add_working_directory()
     results = check(policy, seed=seed, record_expert=record_expert if expert else None)

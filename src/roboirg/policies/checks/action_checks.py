@@ -53,4 +53,5 @@ def _joint_targets(player: PolicyPlayer) -> NDArray[np.float64]:
     if player.space is not JOINT_ANGLE or player.constant:
         return np.empty((0, ARM_JOINTS))
     chunks = [*player.first_rollout.chunks, *player.expected.chunks]
-    return np.concatenate(chunks)[:, :ARM_JOINTS]
+    joints: NDArray[np.float64] = np.concatenate(chunks)[:, :ARM_JOINTS]
+    return joints

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,7 +90,7 @@ def check_expert(player: PolicyPlayer, record: RecordExpert | None) -> Iterator[
 def _ask(
     player: PolicyPlayer,
     episode: ExpertEpisode,
-    change: Callable[[dict[str, object]], dict[str, object]] = dict,
+    change: Callable[[dict[str, Any]], dict[str, Any]] = dict,
 ) -> Chunks:
     observations = [change_observation(one.observation, change) for one in episode.moments]
     return player.ask(episode.instruction, change(dict(episode.demonstration)), observations)
