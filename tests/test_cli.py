@@ -367,6 +367,85 @@ def test_a_dry_run_counts_and_plays_nothing(roboirg, tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--workers", "-2"), "workers is -2; it must be at least 1"),
+        (("--executor", "slurm"), "There is no executor 'slurm'"),
+        (("--address", "auto"), "--address 'auto' needs --executor ray"),
+        (("--out", "{file}"), "Cannot write to {file}: {file} is not a folder"),
+        (("--out", "{file}/deep/er"), "{file} is not a folder"),
+        (("--out", "{other}"), "language version 1.1"),
+    ],
+)
+def test_a_dry_run_checks_what_a_run_checks(
+    roboirg, tmp_path: Path, words: tuple[str, ...], sentence: str
+) -> None:
+    file, other = tmp_path / "file", tmp_path / "other"
+    file.write_text("x")
+    job = Job(policy="random", task="PickXtimes", split="test", episode=0, setting="direct")
+    with RecordStore(other) as store:
+        result = RolloutResult("success", cause=None, steps=7)
+        store.append(
+            make_record(job, result, started_at="now").model_copy(
+                update={"language_version": "1.1"}
+            )
+        )
+    places = {"file": file, "other": other}
+    given = [word.format(**places) for word in words]
+    before = sorted(tmp_path.rglob("*"))
+    # Twice: without --dry-run, too.
+    for last in (["--dry-run"], []):
+        said = roboirg(*RUN, "--out", tmp_path / "out", *given, *last)
+        assert said.code == 2, said
+        assert sentence.format(**places) in said.err
+        assert len(said.err.splitlines()) == 1
+        if last:
+            assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_run_s_own_plan_can_be_played_again(
+    roboirg, tmp_path: Path, canned: type[CannedPlayer]
+) -> None:
+    del canned
+    words = "--settings contextual,direct --stages 1,5;1-5 --episodes 3, --retry-on none"
+    words += " --wordings train --forms implicit,resolved --workers 0 --out"
+    first = roboirg(*RUN, *words.split(), tmp_path / "a")
+    assert first.code == 0, first.err
+    plan = tmp_path / "a" / "plan.json"
+    again = roboirg("run", "--plan", plan, "--workers", "0", "--out", tmp_path / "b")
+    assert again.code == 0, again.err
+    assert read_plan(tmp_path / "b") == read_plan(tmp_path / "a")
+
+
+def test_a_key_twice_in_a_plan_is_refused(roboirg, tmp_path: Path) -> None:
+    (tmp_path / "my.yaml").write_text("policies: [random]\ntasks: PickXtimes\ntasks: BinFill\n")
+    said = roboirg("run", "--plan", tmp_path / "my.yaml", "--out", tmp_path / "out")
+    assert said.code == 2
+    assert "line 3 has the key 'tasks' again" in said.err
+
+
+def test_a_name_that_is_no_name_is_told(roboirg, tmp_path: Path) -> None:
+    said = roboirg("run", "--policy", "../../x=random", "--out", tmp_path / "out")
+    assert said.code == 2
+    assert "The name of a policy is '../../x' (in '../../x=random')" in said.err
+
+
+@pytest.mark.parametrize("word", ["my_policy", "my_policy.py", "folder/other", "folder.other"])
+def test_a_module_without_a_class_gets_a_hint(
+    roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, word: str
+) -> None:
+    (tmp_path / "folder").mkdir()
+    for path in (tmp_path / "my_policy.py", tmp_path / "folder" / "other.py"):
+        path.write_text("raise SystemExit('not imported')\nclass Mine:\n    pass\nclass _X: pass\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    said = roboirg("run", "--policy", word, "--out", tmp_path / "out")
+    assert said.code == 2
+    name = word.removesuffix(".py").replace("/", ".")
+    assert said.err.endswith(f"Policy {word!r} is a module; name its class, {name}:Mine.\n")
+
+
 def test_runs_are_merged_and_exported(roboirg, tmp_path: Path, canned: type[CannedPlayer]) -> None:
     del canned
     for name, episodes in (("a", "0-2"), ("b", "2-4")):

@@ -22,6 +22,7 @@ from roboirg.cli import (
     wording_commands,
 )
 from roboirg.cli.bench_commands import bench
+from roboirg.cli.missing_extras import describe_missing
 from roboirg.cli.options import (
     Distractor,
     Frame,
@@ -198,6 +199,7 @@ def show(
     """Print an episode's scene and instructions, and draw how the oracle plays it."""
     from rich.console import Console
 
+    from roboirg.envs.factory import check_simulator
     from roboirg.episodes.splits import get_episode
     from roboirg.visualization.episode_text import print_episode
     from roboirg.visualization.playthrough import draw_sheet
@@ -206,6 +208,7 @@ def show(
     path = Path(f"{task}-{split}-{episode}.png" if out is None else out)
     if path.suffix.lower() != ".png" or path.is_dir():
         raise InvalidValueError(f"{str(path)!r} is not a valid picture file; it must end in .png.")
+    check_simulator()
     console = Console()
     print_episode(found, console)
     verdict = draw_sheet(found, path)
@@ -266,6 +269,12 @@ def main() -> None:
         code = app(prog_name="roboirg", standalone_mode=False)
     except RoboIRGError as error:
         typer.echo(f"roboirg: {printable(str(error))}", err=True)
+        sys.exit(USAGE_ERROR)
+    except ModuleNotFoundError as error:
+        message = describe_missing(error)
+        if message is None:
+            raise
+        typer.echo(f"roboirg: {message}", err=True)
         sys.exit(USAGE_ERROR)
     except _WrongUsage as error:
         sys.exit(_print_usage_error(error))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict, Unpack
@@ -84,11 +85,22 @@ def make(task: str | Episode, **options: Unpack[EnvOptions]) -> RoboIRGEnv:
         InvalidValueError: the split has no such episode, or the combination is not defined; or
             the wording file cannot be read or lacks a command for the episode.
     """
+    check_simulator()
+    from roboirg.envs.environment import RoboIRGEnv
+
+    return RoboIRGEnv(task, **options)
+
+
+def check_simulator() -> None:
+    """Check that what playing episodes needs is installed.
+
+    Raises:
+        MissingDependencyError: it is not.
+    """
     try:
-        from roboirg.envs.environment import RoboIRGEnv
+        importlib.import_module("roboirg.envs.environment")
     except ModuleNotFoundError as error:
         raise MissingDependencyError(
             f"Playing episodes needs the package {error.name!r}; "
             "run: pip install 'roboirgbench[sim]' (in a checkout: make setup)"
         ) from error
-    return RoboIRGEnv(task, **options)

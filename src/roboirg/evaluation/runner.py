@@ -23,7 +23,13 @@ from roboirg.evaluation.rollout import PlayJob
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.records.record import Job, Record
 from roboirg.records.record_codec import RecordIndexEntry, identity_key
-from roboirg.records.store import TORN_FILE, RecordStore, StoreError
+from roboirg.records.store import (
+    TORN_FILE,
+    RecordStore,
+    StoreError,
+    check_writable,
+    read_index,
+)
 from roboirg.util.plurals import counted
 
 UNREACHABLE_AFTER = 20
@@ -110,6 +116,19 @@ def run_plan(
             video_errors=tuple(loop.video_errors),
             unreachable=tuple(loop.unreachable),
         )
+
+
+def check_run(plan: Plan, folder: Path) -> None:
+    """Check what `run_plan` checks before it plays, and write nothing.
+
+    Raises:
+        StoreError: the folder cannot be written, or its records belong to another version of
+            language, environment, scene or policy.
+    """
+    check_writable(folder)
+    records = read_index(folder).values()
+    _check_versions(records, folder)
+    _check_policies(plan, records, folder)
 
 
 class _RunLoop:
