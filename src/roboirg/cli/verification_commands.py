@@ -66,6 +66,36 @@ def pack(
     typer.echo(f"{counted(manifest.records, 'record')}, {size:.1f} MB: {out}")
 
 
+def board(
+    folder: Annotated[str, typer.Argument(help="Folder of packed runs.", metavar="DIR")],
+    out: Annotated[Path | None, typer.Option(help="Page to write.  (DIR/board.html)")] = None,
+    verify_share: Annotated[
+        str | None,
+        typer.Option(
+            "--verify", help="Share of the episodes to play again where not done yet, such as 5%."
+        ),
+    ] = None,
+    workers: Workers = None,
+) -> None:
+    """Make a leaderboard page of packed runs: verified, privileged, comparable or not."""
+    from roboirg.analysis.board.board_page import BOARD_FILE, read_packs, write_board
+    from roboirg.analysis.page.report import check_report_support
+    from roboirg.evaluation.executors.executor import core_count
+
+    check_report_support()
+    path = folder_of(folder)
+    with progress_bar("packed runs") as show:
+        packs = read_packs(
+            path,
+            sample=None if verify_share is None else _share(verify_share),
+            workers=core_count() if workers is None else workers,
+            progress=show,
+        )
+    page = out or path / BOARD_FILE
+    write_board(packs, page)
+    typer.echo(f"{counted(len(packs), 'packed run')}: {page}")
+
+
 def _share(text: str) -> float:
     """Return a share such as 5% or 0.05.
 

@@ -341,6 +341,15 @@ def read_plan(folder: Path) -> Plan | None:
     return _read_plan_at(folder / PLAN_FILE)
 
 
+def read_plans(folder: Path) -> tuple[Plan, ...]:
+    """Return the plans whose episodes a folder should hold.
+
+    That is the newest, or in a merged run those of its parts.
+    """
+    newest = read_plan(folder)
+    return read_earlier_plans(folder) if newest is None else (newest,)
+
+
 def read_earlier_plans(folder: Path) -> tuple[Plan, ...]:
     """Return the plans of earlier commands, or of merged runs, that can be read."""
     found = (_read_plan_at(path) for path in earlier_plans(folder))

@@ -12,7 +12,7 @@ from pathlib import Path
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.plan import read_earlier_plans, read_plan
+from roboirg.evaluation.plan import read_earlier_plans, read_plans
 from roboirg.evaluation.verification.record_check import (
     LineToCheck,
     RecordCheck,
@@ -127,13 +127,11 @@ def _completeness(
     folder: Path, entries: Sequence[EpisodeSummary]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return which episodes are missing, and notes about the plan."""
-    newest, earlier = read_plan(folder), read_earlier_plans(folder)
+    plans = read_plans(folder)
     missing = set(_holes(entries))
     made_by = {one.plan for one in entries if one.plan is not None}
-    known = {plan.fingerprint for plan in (newest, *earlier) if plan is not None}
+    known = {plan.fingerprint for plan in (*plans, *read_earlier_plans(folder))}
     missing |= {f"the plan {one}, by which episodes were played" for one in made_by - known}
-    # A merged run has the plans of its parts, all of them to be played.
-    plans = earlier if newest is None else (newest,)
     jobs = {identity_key(job): job.slug for plan in plans for job in plan.jobs()}
     there = {identity_key(one) for one in entries}
     missing |= {slug for key, slug in jobs.items() if key not in there}
