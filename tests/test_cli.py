@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -416,6 +417,43 @@ def test_a_run_s_own_plan_can_be_played_again(
     again = roboirg("run", "--plan", plan, "--workers", "0", "--out", tmp_path / "b")
     assert again.code == 0, again.err
     assert read_plan(tmp_path / "b") == read_plan(tmp_path / "a")
+
+
+class Wanderer(CannedPlayer):
+    """Changes the working directory, as a policy in the command's own process may."""
+
+    away = Path()
+
+    def __call__(self, job: Job):
+        os.chdir(self.away)
+        return super().__call__(job)
+
+
+def test_a_relative_folder_stays_where_it_is(
+    roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    home, away = tmp_path / "home", tmp_path / "away"
+    home.mkdir()
+    away.mkdir()
+    monkeypatch.chdir(home)
+    monkeypatch.setattr("roboirg.evaluation.rollout.EpisodeRunner", Wanderer)
+    monkeypatch.setattr(Wanderer, "away", away)
+    said = roboirg(*RUN, "--episodes", "2", "--workers", "0", "--out", "mine")
+    assert said.code == 0, said.err
+    assert (home / "mine" / "records.jsonl").exists()
+    assert list(away.iterdir()) == []
+
+
+def test_unfinished_videos_of_a_run_that_died_are_deleted(
+    roboirg, tmp_path: Path, canned: type[CannedPlayer]
+) -> None:
+    videos = tmp_path / "videos"
+    videos.mkdir()
+    for name in (".a.mp4.part", "b.mp4", ".c.mp4.part.keep"):
+        (videos / name).write_bytes(b"x")
+    (videos / ".d.mp4.part").mkdir()  # not ours
+    assert roboirg(*RUN, "--workers", "0", "--out", tmp_path).code == 0
+    assert {one.name for one in videos.iterdir()} == {"b.mp4", ".c.mp4.part.keep", ".d.mp4.part"}
 
 
 def test_a_key_twice_in_a_plan_is_refused(roboirg, tmp_path: Path) -> None:

@@ -124,7 +124,8 @@ def run(
         tries=tries,
         retry_on=retry_on,
     )
-    folder = folder_of(out)
+    # Absolute: a policy in this process may change the working directory.
+    folder = folder_of(out).absolute()
     add_working_directory()
     made = _plan(plan, typed)
     chosen = _executor(made, executor, address, workers)
