@@ -9,6 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+import typer.main
 
 from roboirg.cli import app as cli
 from roboirg.evaluation.plan import read_plan
@@ -495,3 +496,51 @@ def test_runs_are_merged_and_exported(roboirg, tmp_path: Path, canned: type[Cann
     assert "1 already there" in said.out
     said = roboirg("export", "records", tmp_path / "c", "--out", tmp_path / "c.parquet")
     assert said.out.startswith("5 records:")
+
+
+def commands(command, words=()):
+    """Yield every command and group with its words."""
+    yield command, words
+    for word, inner in getattr(command, "commands", {}).items():
+        yield from commands(inner, (*words, word))
+
+
+@pytest.mark.parametrize("width", [80, 132])
+def test_help_cuts_no_word_and_is_no_wider_than_the_terminal(
+    roboirg, monkeypatch: pytest.MonkeyPatch, width: int
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    for command, words in commands(typer.main.get_command(cli.app)):
+        said = roboirg(*words, "--help")
+        assert said.code == 0
+        assert max(map(len, said.out.splitlines())) <= width
+        # Addresses are written scheme://….
+        assert not [word for word in said.out.split() if "…" in word and "://…" not in word], words
+        names = [
+            name for one in command.params for name in (*one.opts, *one.secondary_opts)
+            if name.startswith("-")
+        ]  # fmt: skip
+        assert set(names) <= set(said.out.split()), words
+
+
+def test_long_lists_of_options_have_panels(roboirg, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    out = roboirg("run", "--help").out
+    panels = re.split(r"╭─ (.+?) ─+╮", out)[1:]
+    sizes = {
+        name: len(re.findall(r"(?m)^│ [ *] {0,3}--|^│ --", body))
+        for name, body in zip(panels[::2], panels[1::2], strict=True)
+    }
+    assert len(sizes) == 6
+    assert all(1 < size <= 9 for size in sizes.values()), sizes
+
+
+def test_colors_are_left_out_where_they_are_not_wanted() -> None:
+    words = [sys.executable, "-m", "roboirg", "run", "--help"]
+    piped = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    assert "\x1b" not in piped
+    forced = subprocess.run(
+        words, capture_output=True, text=True, check=True,
+        env={**os.environ, "FORCE_COLOR": "1", "NO_COLOR": "1"},
+    ).stdout  # fmt: skip
+    assert not re.search(r"\x1b\[[0-9;]*3[0-7]m", forced)
