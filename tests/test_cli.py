@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -8,6 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+import typer.main
 
 from roboirg.cli import app as cli
 from roboirg.evaluation.plan import read_plan
@@ -418,6 +420,43 @@ def test_a_run_s_own_plan_can_be_played_again(
     assert read_plan(tmp_path / "b") == read_plan(tmp_path / "a")
 
 
+class Wanderer(CannedPlayer):
+    """Changes the working directory, as a policy in the command's own process may."""
+
+    away = Path()
+
+    def __call__(self, job: Job):
+        os.chdir(self.away)
+        return super().__call__(job)
+
+
+def test_a_relative_folder_stays_where_it_is(
+    roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    home, away = tmp_path / "home", tmp_path / "away"
+    home.mkdir()
+    away.mkdir()
+    monkeypatch.chdir(home)
+    monkeypatch.setattr("roboirg.evaluation.rollout.EpisodeRunner", Wanderer)
+    monkeypatch.setattr(Wanderer, "away", away)
+    said = roboirg(*RUN, "--episodes", "2", "--workers", "0", "--out", "mine")
+    assert said.code == 0, said.err
+    assert (home / "mine" / "records.jsonl").exists()
+    assert list(away.iterdir()) == []
+
+
+def test_unfinished_videos_of_a_run_that_died_are_deleted(
+    roboirg, tmp_path: Path, canned: type[CannedPlayer]
+) -> None:
+    videos = tmp_path / "videos"
+    videos.mkdir()
+    for name in (".a.mp4.part", "b.mp4", ".c.mp4.part.keep"):
+        (videos / name).write_bytes(b"x")
+    (videos / ".d.mp4.part").mkdir()  # not ours
+    assert roboirg(*RUN, "--workers", "0", "--out", tmp_path).code == 0
+    assert {one.name for one in videos.iterdir()} == {"b.mp4", ".c.mp4.part.keep", ".d.mp4.part"}
+
+
 def test_a_key_twice_in_a_plan_is_refused(roboirg, tmp_path: Path) -> None:
     (tmp_path / "my.yaml").write_text("policies: [random]\ntasks: PickXtimes\ntasks: BinFill\n")
     said = roboirg("run", "--plan", tmp_path / "my.yaml", "--out", tmp_path / "out")
@@ -457,3 +496,51 @@ def test_runs_are_merged_and_exported(roboirg, tmp_path: Path, canned: type[Cann
     assert "1 already there" in said.out
     said = roboirg("export", "records", tmp_path / "c", "--out", tmp_path / "c.parquet")
     assert said.out.startswith("5 records:")
+
+
+def commands(command, words=()):
+    """Yield every command and group with its words."""
+    yield command, words
+    for word, inner in getattr(command, "commands", {}).items():
+        yield from commands(inner, (*words, word))
+
+
+@pytest.mark.parametrize("width", [80, 132])
+def test_help_cuts_no_word_and_is_no_wider_than_the_terminal(
+    roboirg, monkeypatch: pytest.MonkeyPatch, width: int
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    for command, words in commands(typer.main.get_command(cli.app)):
+        said = roboirg(*words, "--help")
+        assert said.code == 0
+        assert max(map(len, said.out.splitlines())) <= width
+        # Addresses are written scheme://….
+        assert not [word for word in said.out.split() if "…" in word and "://…" not in word], words
+        names = [
+            name for one in command.params for name in (*one.opts, *one.secondary_opts)
+            if name.startswith("-")
+        ]  # fmt: skip
+        assert set(names) <= set(said.out.split()), words
+
+
+def test_long_lists_of_options_have_panels(roboirg, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    out = roboirg("run", "--help").out
+    panels = re.split(r"╭─ (.+?) ─+╮", out)[1:]
+    sizes = {
+        name: len(re.findall(r"(?m)^│ [ *] {0,3}--|^│ --", body))
+        for name, body in zip(panels[::2], panels[1::2], strict=True)
+    }
+    assert len(sizes) == 6
+    assert all(1 < size <= 9 for size in sizes.values()), sizes
+
+
+def test_colors_are_left_out_where_they_are_not_wanted() -> None:
+    words = [sys.executable, "-m", "roboirg", "run", "--help"]
+    piped = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    assert "\x1b" not in piped
+    forced = subprocess.run(
+        words, capture_output=True, text=True, check=True,
+        env={**os.environ, "FORCE_COLOR": "1", "NO_COLOR": "1"},
+    ).stdout  # fmt: skip
+    assert not re.search(r"\x1b\[[0-9;]*3[0-7]m", forced)

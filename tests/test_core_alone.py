@@ -7,13 +7,9 @@ import tomllib
 from pathlib import Path
 
 import pytest
-import typer.main
+from all_commands import all_commands, make_run, words_of
 
-from roboirg.cli.app import app
 from roboirg.cli.missing_extras import _MODULES, describe_missing
-from roboirg.evaluation.rollout_result import RolloutResult, make_record
-from roboirg.records.record import Job
-from roboirg.records.store import RecordStore
 
 WALK = """
 import io, json, sys, traceback
@@ -53,68 +49,11 @@ NEEDS = {
 """The extra of each command that cannot do its work without one; all others work."""
 
 
-def words_of(folder, run):
-    """Return words for each command with which it does its work where all is installed."""
-    return {
-        "bench": ["--rounds", "1"],
-        "run": ["--policy", "random", "--tasks", "PickXtimes", "--episodes", "1", "--workers", "0",
-                "--settings", "explicit", "--out", f"{folder}/out"],
-        "merge": [run, "--out", f"{folder}/merged"],
-        "report": [run],
-        "view": [run],
-        "tables": [run],
-        "figures": [run, "--out", f"{folder}/figures"],
-        "compare": [f"{run}:random", f"{run}:oracle"],
-        "serve": ["random"],
-        "check-policy": ["random"],
-        "demo": ["--out", f"{folder}/demo"],
-        "doctor": [],
-        "tasks": [],
-        "build-splits": ["--tasks", "PickXtimes", "--split", "val", "--workers", "0"],
-        "show": ["PickXtimes", "0", "--out", f"{folder}/sheet.png"],
-        "instruct": ["PickXtimes", "0"],
-        "language stats": ["--tasks", "PickXtimes", "--split", "val"],
-        "language validate": ["--tasks", "PickXtimes", "--split", "val", "--workers", "0"],
-        "language card": ["--help"],
-        "language shortcuts": ["--tasks", "PickXtimes", "--split", "val", "--learned"],
-        "export instructions": ["--tasks", "PickXtimes", "--split", "val",
-                                "--out", f"{folder}/words.jsonl"],
-        "export episodes": ["--tasks", "PickXtimes", "--split", "val",
-                            "--out", f"{folder}/episodes.jsonl"],
-        "export records": [run, "--out", f"{folder}/records.parquet"],
-        "real plan": ["--policy", "random", "--tasks", "PutInBox", "--trials", "1", "--no-sheet",
-                      "--demonstrations", "1", "--out", f"{folder}/study"],
-        "real run": [f"{folder}/study"],
-        "real score": [f"{folder}/study"],
-        "real figure": [run, "--out", f"{folder}/figures"],
-        "wordings import-robomme": ["--help"],
-    }  # fmt: skip
-
-
-def all_commands():
-    def walk(command, name):
-        for word, inner in getattr(command, "commands", {}).items():
-            yield from walk(inner, [*name, word])
-        if not hasattr(command, "commands"):
-            yield " ".join(name)
-
-    return set(walk(typer.main.get_command(app), []))
-
-
 @pytest.fixture(scope="module")
 def walked(tmp_path_factory):
     folder = tmp_path_factory.mktemp("core")
-    with RecordStore(folder / "run") as store:
-        for number in range(6):
-            job = Job(policy="random", task="PickXtimes", split="test", episode=number // 2,
-                      setting="direct")  # fmt: skip
-            result = RolloutResult("failure", cause="timeout", steps=7)
-            if number % 2:
-                job = job.model_copy(update={"policy": "oracle"})
-                result = RolloutResult("success", cause=None, steps=7)
-            store.append(make_record(job, result, started_at="now"))
-    words = words_of(str(folder), str(folder / "run"))
-    assert set(words) == all_commands()
+    words = words_of(str(folder), str(make_run(folder / "run")))
+    assert set(words) == set(all_commands())
     refused = sorted({module for modules in _MODULES.values() for module in modules})
     done = subprocess.run(
         [sys.executable, "-c", WALK, json.dumps(refused), json.dumps(words)],

@@ -35,6 +35,7 @@ Policies = Annotated[
     typer.Option(
         "--policy",
         help="Built-in name, package.module:Class or address, or NAME=one of these; repeatable.",
+        rich_help_panel=options.POLICIES,
     ),
 ]
 PlanName = Annotated[
@@ -43,12 +44,17 @@ PlanName = Annotated[
         "--plan",
         help="YAML file or a run's plan.json; or challenge, paper, paper-context, paper-planners, "
         "robomme or quick.",
+        rich_help_panel=options.EPISODES,
     ),
 ]
 Out = Annotated[str, typer.Option(help="Output folder; give the same folder again to resume.")]
 Folder = Annotated[str, typer.Argument(help="Output folder of a run.")]
 RetryErrors = Annotated[
-    bool, typer.Option(help="Play episodes again if their newest record is an error.")
+    bool,
+    typer.Option(
+        help="Play episodes again if their newest record is an error.",
+        rich_help_panel=options.ERRORS,
+    ),
 ]
 
 
@@ -89,7 +95,8 @@ def run(
     address: Annotated[str | None, typer.Option(help="Address of the Ray cluster.")] = None,
     retry_errors: RetryErrors = True,
     dry_run: Annotated[
-        bool, typer.Option(help="Only count the episodes and estimate the time.")
+        bool,
+        typer.Option("--dry-run", help="Only check, count the episodes and estimate the time."),
     ] = False,
 ) -> None:
     """Play episodes and store a record of each in OUT/records.jsonl; resumes where it stopped."""
@@ -124,7 +131,8 @@ def run(
         tries=tries,
         retry_on=retry_on,
     )
-    folder = folder_of(out)
+    # Absolute: a policy in this process may change the working directory.
+    folder = folder_of(out).absolute()
     add_working_directory()
     made = _plan(plan, typed)
     chosen = _executor(made, executor, address, workers)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, ValidationError, field_validator, model_validator
 
 from roboirg import language, policies, tasks
 from roboirg.core.actions import find_action_space
-from roboirg.core.delivery import DELIVERIES
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import (
     ALL_STAGES,
@@ -20,8 +20,6 @@ from roboirg.core.instruction_options import (
     DEFAULT_FRAME,
     DEFAULT_REASONING,
     DEFAULT_RIVAL,
-    REASONINGS,
-    RIVALS,
     InstructionOptions,
 )
 from roboirg.core.observations import (
@@ -34,9 +32,9 @@ from roboirg.episodes import splits
 from roboirg.evaluation.hosting.host_pool import DEFAULT_BATCH, HostSettings
 from roboirg.evaluation.plan_parsing import check_names, name_and_spec
 from roboirg.evaluation.policy_descriptions import describe_policy
-from roboirg.language.generator import find_refusal
-from roboirg.language.instruction import FORMS, Instruction
-from roboirg.language.settings import all_settings
+from roboirg.language.generator import check_options, find_refusal
+from roboirg.language.instruction import Instruction
+from roboirg.language.settings import EXPLICIT, all_settings
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.records.plan_files import PLAN_FILE, earlier_plans, store_plan
 from roboirg.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, ErrorKind, Job
@@ -145,6 +143,11 @@ class Plan(BaseModel):
             return {**fields, "wordings_identity": fields["wordings"]}
         path = Path(str(fields["wordings"])).resolve()
         return {**fields, "wordings": str(path), "wordings_identity": open_wordings(path)}
+
+    @field_validator("demonstration_frames", mode="before")
+    @classmethod
+    def _check_frames(cls, value: object) -> object:
+        return None if value is None else check_demonstration_frames(value)
 
     @property
     def specs(self) -> dict[str, str]:
@@ -300,10 +303,20 @@ class Plan(BaseModel):
                 yield from self._jobs_of(("", ""), task, episode, settings, seeds=(0,))
 
     def _check_options(self) -> None:
-        check_names("form", self.forms, FORMS)
-        check_names("delivery", (self.delivery,), DELIVERIES)
-        check_names("rival", (self.rival,), RIVALS)
-        check_names("reasoning", (self.reasoning,), REASONINGS)
+        for form, stages in itertools.product(self.forms, self.stages):
+            check_options(
+                InstructionOptions(
+                    EXPLICIT,
+                    form=form,
+                    stages=stages,
+                    distractor=self.distractor,
+                    distractors=self.distractors,
+                    frame=self.frame,
+                    delivery=self.delivery,
+                    rival=self.rival,
+                    reasoning=self.reasoning,
+                )
+            )
         check_names("kind of meshes", (self.meshes,), MESHES)
         for name, least in (("max_steps", 1), ("tries", 1), ("batch", 1)):
             if getattr(self, name) < least:

@@ -19,7 +19,8 @@ from roboirg.evaluation.executors.executor import Executor
 from roboirg.evaluation.plan import Plan, write_plan
 from roboirg.evaluation.policy_descriptions import describe_policy
 from roboirg.evaluation.progress import Reporter, SilentReporter
-from roboirg.evaluation.rollout import PlayJob
+from roboirg.evaluation.rollout import VIDEO_FOLDER, PlayJob
+from roboirg.evaluation.video_writer import without_unfinished_videos
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.records.record import Job, Record
 from roboirg.records.record_codec import RecordIndexEntry, identity_key
@@ -92,7 +93,8 @@ def run_plan(
     """
     reporter = reporter or SilentReporter()
     jobs = plan.jobs()
-    with _sigterm_interrupts(), RecordStore(folder) as store:
+    films = without_unfinished_videos(folder / VIDEO_FOLDER)
+    with _sigterm_interrupts(), RecordStore(folder) as store, films:
         _report_damage(store, reporter)
         _check_versions(store.stored.values(), folder)
         _check_policies(plan, store.stored.values(), folder)
