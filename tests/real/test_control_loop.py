@@ -252,6 +252,22 @@ def test_in_real_time_too_a_killed_policy_stops_the_arm_within_a_period():
     assert np.diff(moments).min() > 0.5 * PERIOD
 
 
+def test_after_a_late_command_comes_a_whole_period():
+    class Stalling(Watched):
+        def observe(self):
+            if len(self.log) == 15:
+                time.sleep(5 * PERIOD)
+            return super().observe()
+
+    robot = Stalling(RealClock())
+    result, _, loop = play("Still", robot, limits=Limits(watchdog_timeout_s=2.0))
+    assert result.error is None
+    assert loop.overruns >= 1
+    moments = [when for when, kind, _ in robot.log if kind == "command"]
+    late = next(n for n, when in enumerate(moments) if when >= robot.log[14][0] + 5 * PERIOD)
+    assert moments[late + 1] - moments[late] > 0.5 * PERIOD
+
+
 def test_a_hanging_loop_is_stopped_by_the_watchdog():
     class Stuck(Watched):
         def observe(self):

@@ -148,6 +148,21 @@ class RolloutResult:
             )
 
 
+_COPIED = (
+    "outcome",
+    "cause",
+    "steps",
+    "demonstration_steps",
+    "demonstration_source",
+    "policy_metadata",
+    "details",
+    "render_device",
+    "usage",
+    "timings",
+)
+"""Fields that a record has from the result as they are."""
+
+
 def make_record(
     job: Job,
     result: RolloutResult,
@@ -180,15 +195,11 @@ def make_record(
     prompt, verdict = _audit(job, instruction, utterances, result)
     return Record(
         **dict(job),
+        **{name: getattr(result, name) for name in _COPIED},
         seed=episode.seed,
         difficulty=episode.difficulty,
-        outcome=result.outcome,
         error=result.error if result.outcome == "error" else None,
-        cause=result.cause,
         attribution=_attribution(episode, result, instruction),
-        steps=result.steps,
-        demonstration_steps=result.demonstration_steps,
-        demonstration_source=result.demonstration_source,
         instruction=utterances,
         prompt=prompt,
         prompt_verdict=verdict,
@@ -200,18 +211,13 @@ def make_record(
         privileged=policy.is_privileged,
         policy_version=policy.version,
         server_version=server_version(result.policy_metadata),
-        policy_metadata=result.policy_metadata,
         action_log=action_log,
         end_state=None if result.end_state is None else result.end_state[1],
         events=tuple(result.events),
         video=video,
         video_error=video_error,
-        details=result.details,
-        render_device=result.render_device,
         **_versions(),
         plan=plan,
-        usage=result.usage,
-        timings=result.timings,
         started_at=started_at,
         duration_s=duration_s,
     )

@@ -79,6 +79,7 @@ class ControlLoop:
     _reply: PolicyReply | None = None
     _instruction: str = ""
     _is_prepared: bool = False
+    _sent_at: float = float("-inf")
     _last: NDArray[np.float64] = field(default_factory=lambda: np.zeros(ARM_JOINTS))
 
     def play(self, job: Job, spec: str, seed: int, instruction: str) -> RolloutResult:
@@ -159,9 +160,9 @@ class ControlLoop:
             result.steps = step + 1
             deadline += period
             if clock.now() > deadline:
-                # A late command delays the next ones: two commands are always a period apart.
+                # A late command delays the next ones: after it comes a whole period.
                 self.overruns += 1
-                deadline = clock.now()
+                deadline = max(clock.now(), self._sent_at + period)
             clock.wait_until(deadline)
             if isinstance(self.robot, JudgingRobot) and self.robot.is_over():
                 return
@@ -188,6 +189,7 @@ class ControlLoop:
         with attribute_errors("policy"):
             self.limits.check(command, self._last, reading.joints, period)
         with attribute_errors("environment"):
+            self._sent_at = self.robot.clock.now()
             self.robot.command(command)
         self._last = command[:ARM_JOINTS]
 
