@@ -40,6 +40,7 @@ FORBIDDEN_IDENTIFIERS = {
 
 SPOKEN = (
     "src/roboirg/language/templates/",
+    "src/roboirg/policies/planning/prompts/grounding_questions.toml",
     "src/roboirg/policies/planning/prompts/listener.toml",
 )
 """Words that are said to robots and models are data: changing them would change results."""

@@ -14,6 +14,7 @@ import typer
 
 from roboirg.cli import (
     episode_commands,
+    grounding_commands,
     language_commands,
     policy_commands,
     report_commands,
@@ -97,6 +98,7 @@ app.command()(report_commands.figures)
 app.command()(report_commands.compare)
 app.command(cls=policy_commands.ProtocolHelpCommand)(policy_commands.serve)
 app.command("check-policy", cls=policy_commands.ProtocolHelpCommand)(policy_commands.check_policy)
+language_commands.export_app.command("grounding")(grounding_commands.export_grounding)
 language_commands.export_app.command("episodes")(episode_commands.export_episodes)
 language_commands.export_app.command("records")(run_commands.export_records)
 
