@@ -64,6 +64,7 @@ app = typer.Typer(
 
 app.add_typer(language_commands.language_app, name="language")
 app.add_typer(language_commands.export_app, name="export")
+app.add_typer(grounding_commands.score_app, name="score")
 app.add_typer(real_app, name="real")
 app.add_typer(wording_commands.wordings_app, name="wordings")
 app.command()(bench)

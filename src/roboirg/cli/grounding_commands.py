@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,9 +21,24 @@ from roboirg.cli.options import (
     Wordings,
     Workers,
 )
+from roboirg.core.errors import InvalidValueError
 from roboirg.util.plurals import counted
 
+if TYPE_CHECKING:
+    from roboirg.analysis.grounding_scores.answer_scores import GroundingScore
+
 # Heavy modules are imported inside the commands, so that --help is fast.
+
+MINIMUM_WIDTH = 150
+"""Columns of output that is not a terminal."""
+
+score_app = typer.Typer(no_args_is_help=True, help="Score answers of models.")
+
+
+@score_app.callback()
+def _score() -> None:
+    # With a callback, a single command keeps its name.
+    pass
 
 
 def export_grounding(
@@ -111,3 +127,93 @@ def export_grounding(
         f"{counted(facts.videos, 'video')}, {facts.size / 2**20:.1f} MiB: {out}\n"
         f"sha256 {facts.sha256}"
     )
+
+
+@score_app.command("grounding")
+def score_grounding(
+    data: Annotated[Path, typer.Option(help="Folder of the dataset.")],
+    answers: Annotated[
+        list[Path] | None,
+        typer.Argument(help="Files of answers; the model's name is the file's.", metavar="ANSWERS"),
+    ] = None,
+    floor: Annotated[
+        str | None,
+        typer.Option(
+            help="Add floors, separated by commas: oracle, chance, command, first-mention, "
+            "last-mention, elimination, surface, words-explicit, words-setting, or all."
+        ),
+    ] = None,
+    write_floors: Annotated[
+        Path | None, typer.Option(help="Folder to write the floors' answers to.")
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option(help="File for a report in Markdown, with confusions.")
+    ] = None,
+) -> None:
+    """Score answers to the grounding dataset; two files are also compared."""
+    from rich.console import Console
+
+    from roboirg.analysis.grounding_scores.answer_scores import score_answers
+    from roboirg.analysis.grounding_scores.score_report import report_text
+    from roboirg.analysis.grounding_scores.score_tables import score_table
+    from roboirg.analysis.tables.rendering.terminal import renderable
+    from roboirg.evaluation.grounding_set.answer_file import read_answers, write_answers
+    from roboirg.evaluation.grounding_set.answer_floors import floor_answers
+    from roboirg.evaluation.grounding_set.grounding_item import read_items
+    from roboirg.util.atomic_write import write_atomically
+
+    names = _floors(floor)
+    if not answers and not names:
+        raise InvalidValueError("There is nothing to score: give files of answers, or --floor.")
+    items = read_items(data)
+    scores = [
+        one
+        for path in answers or ()
+        for one in score_answers(items, read_answers(path, items), path.stem)
+    ]
+    compared = _comparisons(scores) if len(answers or ()) == 2 else []  # noqa: PLR2004
+    for name in names:
+        found = list(floor_answers(name, items))
+        if write_floors is not None:
+            write_floors.mkdir(parents=True, exist_ok=True)
+            write_answers(write_floors / f"{name}.jsonl", found)
+        scores += score_answers(items, found, name)
+    console = Console()
+    if not console.is_terminal:
+        console.width = max(console.width, MINIMUM_WIDTH)
+    console.print(renderable(score_table(scores), console))
+    for sentence in compared:
+        console.print(sentence, highlight=False, markup=False)
+    if report is not None:
+        write_atomically(report, report_text(scores, data, report))
+        typer.echo(report)
+
+
+def _floors(text: str | None) -> tuple[str, ...]:
+    from roboirg.cli.language_commands import known_name
+    from roboirg.evaluation.grounding_set.answer_floors import FLOORS
+    from roboirg.evaluation.plan_parsing import means_all, parse_names
+
+    if text is None:
+        return ()
+    if means_all(text):
+        return FLOORS
+    return tuple(known_name("floor", one, FLOORS) for one in parse_names("floor", text))
+
+
+def _comparisons(scores: Sequence[GroundingScore]) -> list[str]:
+    """Return the paired comparison of two models in each kind of question that both answered."""
+    import numpy as np
+
+    from roboirg.analysis.stats.comparison import compare
+    from roboirg.analysis.stats.comparison_text import sentences
+    from roboirg.analysis.stats.intervals import SEED
+
+    found: list[str] = []
+    for place, first in enumerate(scores):
+        for second in scores[place + 1 :]:
+            if first.kind == second.kind:
+                names = f"{first.name} ({first.kind})", f"{second.name} ({second.kind})"
+                result = compare(first.cells, second.cells, np.random.default_rng(SEED))
+                found += ["", *sentences(result, *names)]
+    return found
