@@ -150,15 +150,14 @@ def _read_points(reply: str) -> list[Pixel] | None:
 def _read_point(value: object) -> Pixel | None:
     if not isinstance(value, dict):
         return None
-    x, y = value.get("x"), value.get("y")
-    if not _is_number(x) or not _is_number(y):
+    x, y = _number(value.get("x")), _number(value.get("y"))
+    return None if x is None or y is None else (x, y)
+
+
+def _number(value: Any) -> float | None:  # noqa: ANN401 - whatever JSON holds
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         return None
-    return float(x), float(y)
-
-
-def _is_number(value: Any) -> bool:  # noqa: ANN401 - whatever JSON holds
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return is_number and math.isfinite(value)
+    return float(value)
 
 
 def _hits(target: PointTarget, point: Pixel) -> bool:
