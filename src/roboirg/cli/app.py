@@ -14,6 +14,7 @@ import typer
 
 from roboirg.cli import (
     episode_commands,
+    grounding_commands,
     language_commands,
     policy_commands,
     report_commands,
@@ -65,6 +66,7 @@ app = typer.Typer(
 
 app.add_typer(language_commands.language_app, name="language")
 app.add_typer(language_commands.export_app, name="export")
+app.add_typer(grounding_commands.score_app, name="score")
 app.add_typer(real_app, name="real")
 app.add_typer(wording_commands.wordings_app, name="wordings")
 app.command()(bench)
@@ -103,6 +105,7 @@ app.command()(report_commands.figures)
 app.command()(report_commands.compare)
 app.command(cls=policy_commands.ProtocolHelpCommand)(policy_commands.serve)
 app.command("check-policy", cls=policy_commands.ProtocolHelpCommand)(policy_commands.check_policy)
+language_commands.export_app.command("grounding")(grounding_commands.export_grounding)
 language_commands.export_app.command("episodes")(episode_commands.export_episodes)
 language_commands.export_app.command("records")(run_commands.export_records)
 
