@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from roboirg.cli import (
+    demonstration_commands,
     episode_commands,
     language_commands,
     policy_commands,
@@ -90,6 +91,7 @@ def _options(*, version: _Version = False) -> None:
 
 app.command()(run_commands.run)
 app.command()(run_commands.merge)
+app.command()(demonstration_commands.replay)
 app.command()(report_commands.report)
 app.command()(report_commands.view)
 app.command()(report_commands.tables)
@@ -99,6 +101,7 @@ app.command(cls=policy_commands.ProtocolHelpCommand)(policy_commands.serve)
 app.command("check-policy", cls=policy_commands.ProtocolHelpCommand)(policy_commands.check_policy)
 language_commands.export_app.command("episodes")(episode_commands.export_episodes)
 language_commands.export_app.command("records")(run_commands.export_records)
+language_commands.export_app.command("demonstrations")(demonstration_commands.export_demonstrations)
 
 
 @app.command()

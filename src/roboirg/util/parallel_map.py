@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
+import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -11,9 +12,17 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import TypeVar
 
 from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.util.child_process import exit_with_parent
 
 Item = TypeVar("Item")
 Outcome = TypeVar("Outcome")
+
+
+def _start_worker(parent: int) -> None:
+    """Prepare a worker: it ends when the parent is killed."""
+    exit_with_parent(parent)
+    # Ctrl-C reaches the whole process group; only the parent handles it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def parallel_map(
@@ -39,9 +48,8 @@ def parallel_map(
         workers,
         # Spawn, because threads of the simulator do not survive a fork.
         mp_context=multiprocessing.get_context("spawn"),
-        initializer=signal.signal,
-        # Ctrl-C reaches the whole process group; only the parent handles it.
-        initargs=(signal.SIGINT, signal.SIG_IGN),
+        initializer=_start_worker,
+        initargs=(os.getpid(),),
     )
     with contextlib.ExitStack() as stack:
         stack.callback(pool.shutdown, cancel_futures=True)
