@@ -55,7 +55,7 @@ def export_demonstrations(
         str, typer.Option(help="prompt, or turns: in language columns and the table of episodes.")
     ] = "prompt",
     pictures: Annotated[
-        str, typer.Option(help="png or lossless-video, both without loss, or lossy-video.")
+        str, typer.Option(help="png or lossless-video, both without loss; lossy-video; or none.")
     ] = "png",
     video: Annotated[
         str | None,

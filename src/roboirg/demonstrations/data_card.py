@@ -124,7 +124,9 @@ def _content_lines(plan: ExportPlan, facts: Sequence[TrajectoryFacts]) -> Iterat
         yield "Frames of the videos are in the data set `demonstration_videos` beside this one."
     else:
         yield "Frames of the videos are left out."
-    if plan.pictures == "png":
+    if plan.pictures == "none":
+        yield "There are no pictures."
+    elif plan.pictures == "png":
         yield "Pictures are stored without loss, as PNG."
     elif plan.pictures == "lossless-video":
         yield "Pictures are stored without loss, as H.264 in RGB; every one was compared."

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from roboirg.demonstrations.export_plan import ExportPlan, TaskText
+from roboirg.demonstrations.export_plan import ORACLE, ExportPlan, TaskText
 from roboirg.demonstrations.frame_columns import FrameColumns, PlacedText
-from roboirg.demonstrations.trajectory import Trajectory, load_facts, load_trajectory
+from roboirg.demonstrations.trajectory import (
+    Trajectory,
+    TrajectoryFacts,
+    load_facts,
+    load_trajectory,
+)
 
 CHUNK_SIZE = 1000
 """Files in a folder."""
@@ -124,7 +129,7 @@ def episode_row(trajectory: Trajectory, placed: PlacedText, length: int) -> dict
         "cause": facts.cause,
         "policy": facts.policy,
         "variation": facts.variation,
-        "trajectory": f"{facts.task}/{facts.split}/{facts.episode}/{facts.variation}",
+        "trajectory": _trajectory_name(facts, options),
         "final_state": [
             *trajectory.joint_positions[-1].tolist(),
             *trajectory.gripper[-1].tolist(),
@@ -134,6 +139,12 @@ def episode_row(trajectory: Trajectory, placed: PlacedText, length: int) -> dict
         **{key: value for key, value in options.items() if key in _OPTIONS},
         **words.facts,
     }
+
+
+def _trajectory_name(facts: TrajectoryFacts, options: Mapping[str, Any]) -> str:
+    """Return a name that all instructions of a trajectory share; only the oracle's has several."""
+    name = f"{facts.task}/{facts.split}/{facts.episode}/{facts.variation}"
+    return name if facts.policy == ORACLE else f"{name}/{options['setting']}-{options['form']}"
 
 
 _OPTIONS = ("delivery",)

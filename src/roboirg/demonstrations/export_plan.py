@@ -20,6 +20,7 @@ from roboirg.language.export import row
 from roboirg.language.generator import instruct_with
 from roboirg.language.settings import all_settings
 from roboirg.language.variants import instructions
+from roboirg.util.short_hash import short_hash
 
 FormatName = Literal["lerobot-v3", "lerobot-v2.1", "robomme-hdf5"]
 VideoMode = Literal["none", "prefix", "sidecar"]
@@ -179,7 +180,9 @@ class RecordingJob(NamedTuple):
     @property
     def file_name(self) -> str:
         """Name of the trajectory's file, which tells all that it depends on."""
-        said = "" if self.options is None else f"-{self.options.setting}-{self.options.form}"
+        said = ""
+        if self.options is not None:
+            said = f"-{short_hash(self.policy)}-{self.options.setting}-{self.options.form}"
         spec: list[str] = [self.spec.coding]
         spec += ["video"] * self.spec.video + ["apart"] * self.spec.is_video_apart
         spec += ["depth"] * self.spec.depth

@@ -74,7 +74,12 @@ class FrameColumns:
     @property
     def has_videos(self) -> bool:
         """Whether pictures are in videos, not in the table."""
-        return self.plan.pictures != "png"
+        return self.plan.pictures not in ("png", "none")
+
+    @property
+    def cameras(self) -> tuple[str, ...]:
+        """Cameras whose pictures are stored."""
+        return () if self.plan.pictures == "none" else CAMERAS
 
     def rows(self, facts: TrajectoryFacts) -> range:
         """Return the rows of a trajectory that are frames; the next row has a frame's action."""
@@ -91,7 +96,7 @@ class FrameColumns:
 
     def features(self) -> dict[str, dict[str, Any]]:
         """Return what ``info.json`` says of each column."""
-        found = {self.keys[camera]: self._picture_feature() for camera in CAMERAS}
+        found = {self.keys[camera]: self._picture_feature() for camera in self.cameras}
         found[self.keys["state"]] = _feature("float32", [*JOINTS, "gripper"])
         found[self.keys["action"]] = _feature("float32", [*JOINTS, "gripper"])
         if "delta" in self.plan.extra_actions:
@@ -176,7 +181,8 @@ class FrameColumns:
         with zipfile.ZipFile(trajectory.path) as archive:
             file = PictureFile(archive)
             return {
-                self.keys[camera]: [file.encoded(camera, row) for row in rows] for camera in CAMERAS
+                self.keys[camera]: [file.encoded(camera, row) for row in rows]
+                for camera in self.cameras
             }
 
     def picture_counts(self, trajectory: Trajectory) -> dict[str, NDArray[np.int64]]:
@@ -187,7 +193,7 @@ class FrameColumns:
             parts = slice(0, 2) if self.plan.video == "prefix" else slice(1, 2)
         return {
             self.keys[camera]: trajectory.histograms[camera][parts].sum(axis=0)
-            for camera in CAMERAS
+            for camera in self.cameras
         }
 
     def stats(

@@ -57,7 +57,7 @@ def write_part(part: DatasetPart) -> None:
     trajectory = load_trajectory(episode.path)
     shared = frame_columns(columns, trajectory)
     length = len(columns.rows(trajectory.facts))
-    pictures = [] if columns.has_videos else [columns.keys[camera] for camera in CAMERAS]
+    pictures = [] if columns.has_videos else [columns.keys[one] for one in columns.cameras]
     for placed in episode.texts:
         if columns.has_videos:
             _write_videos(part, placed.episode_index)
@@ -117,7 +117,7 @@ def modality(columns: FrameColumns) -> dict[str, Any]:
             name: {**span, "original_key": columns.keys["action"], "absolute": True}
             for name, span in (("arm", arm), ("gripper", gripper))
         },
-        "video": {camera: {"original_key": columns.keys[camera]} for camera in CAMERAS},
+        "video": {camera: {"original_key": columns.keys[camera]} for camera in columns.cameras},
         "annotation": {"human.task_description": {"original_key": "task_index"}},
     }
 

@@ -70,7 +70,7 @@ def write_part(part: DatasetPart) -> None:
     shared = frame_columns(columns, trajectory)
     length = len(columns.rows(trajectory.facts))
     own = [own_columns(columns, trajectory, placed, length) for placed in episode.texts]
-    pictures = [] if columns.has_videos else [columns.keys[camera] for camera in CAMERAS]
+    pictures = [] if columns.has_videos else [columns.keys[one] for one in columns.cameras]
     order = [name for name in info_features(columns) if name in shared or name in own[0]]
     path = part.root / _DATA.format(chunk_index=chunk, file_index=file)
     write_frames(path, order, shared, own, pictures)

@@ -22,7 +22,7 @@ _LENGTHS: Mapping[str, tuple[int, int]] = {
 }
 """Control steps of the oracle and of the video: means of twelve training episodes of each task."""
 _OTHER_TASK = (314, 212)
-_FRAME_BYTES = {"png": 205_000, "lossless-video": 67_000, "lossy-video": 8_800}
+_FRAME_BYTES = {"png": 205_000, "lossless-video": 67_000, "lossy-video": 8_800, "none": 0}
 """Bytes of both pictures of a frame."""
 _HDF5_FRAME_BYTES = 257_000
 """Bytes of a time step with pictures and depth, both compressed."""

@@ -26,7 +26,7 @@ TRAJECTORY_VERSION = 1
 """Increases with any change of what a file holds."""
 SUFFIX = ".zip"
 
-PictureCoding = Literal["png", "lossless-video", "lossy-video"]
+PictureCoding = Literal["png", "lossless-video", "lossy-video", "none"]
 
 _FACTS = "facts.json"
 _ARRAY = ".npy"
@@ -50,7 +50,7 @@ class TrajectoryFacts:
         steps: control steps of the policy.
         demonstration_source: who moved the robot in the video: recorded, planned or none.
         environment_version: of scenes, rules and physics.
-        coding: how the pictures are stored; None if there are none.
+        coding: how the pictures are stored.
         depth: whether depth and calibration are stored.
         picture_error: of a lossy video, for each camera the mean absolute error, the largest error
             (both of 255) and the PSNR (dB), over all of its frames; empty if lossless.
@@ -70,7 +70,7 @@ class TrajectoryFacts:
     steps: int
     demonstration_source: str
     environment_version: int
-    coding: PictureCoding | None
+    coding: PictureCoding
     depth: bool
     picture_error: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     version: int = TRAJECTORY_VERSION

@@ -46,7 +46,7 @@ class RecordingSpec(NamedTuple):
     """What a trajectory holds.
 
     Attributes:
-        coding: how pictures are stored.
+        coding: how pictures are stored; with ``none`` nothing is drawn, and no subgoal has a pixel.
         video: whether the pictures of the video are stored.
         is_video_apart: whether a stored MP4 holds the video and the policy's part in two files.
         depth: whether depth and calibration are stored.
@@ -80,6 +80,8 @@ class _PictureTracks:
 
     def add(self, pictures: Mapping[str, Any], *, is_video: bool) -> None:
         """Add the pictures of a row: ``front_rgb`` and so on."""
+        if self._spec.coding == "none":
+            return
         self._count_last()
         self._uncounted = pictures, int(not is_video)
         part = _VIDEO_PARTS[not is_video] if self._spec.is_video_apart else ""
@@ -154,14 +156,14 @@ def record_trajectory(
             f"Policy {policy_name!r} acts in {wanted_actions(policy).name!r}; demonstrations hold "
             "joint angles, so it must act in 'joint_angle'."
         )
-    said = options or InstructionOptions()
+    said, is_drawn = options or InstructionOptions(), spec.coding != "none"
     env = make(
         episode,
         **said._asdict(),
-        cameras=CAMERAS,
+        cameras=CAMERAS if is_drawn or policy_name != "oracle" else (),
         depth=spec.depth,
         calibration=spec.depth,
-        grounded=True,
+        grounded=is_drawn,
         demonstration_frames="none" if policy_name == "oracle" else "all",
     )
     try:
@@ -195,7 +197,7 @@ class _Recorder:
 
     def record(self, policy_name: str, variation: int) -> TrajectoryFacts:
         """Play the episode and store what happens."""
-        if self._spec.video:
+        if self._spec.video and self._spec.coding != "none":
             self._env.set_frame_hook(self._see_video)
         observation, info = self._env.reset()
         self._start(observation, info)
@@ -228,7 +230,7 @@ class _Recorder:
         if isinstance(self._policy, PrivilegedPolicy):
             self._policy.attach(self._env)
         self._policy.reset(observation["instruction"], info["demonstration"])
-        self._add_row(HOME_ACTION, observation, info["grounded_subgoal"], info["grounded_subgoal"])
+        self._add_row(HOME_ACTION, observation, self._env.subgoal, self._env.subgoal)
 
     def _play(self, observation: Any, info: dict[str, Any]) -> str:  # noqa: ANN401
         """Play to the end. Returns the cause of a failure."""
@@ -242,7 +244,7 @@ class _Recorder:
                 action = exact.astype(np.float32).astype(np.float64)
                 observation, *_, info = self._env.step(action)
                 heard += info["heard"]
-                online = info["grounded_subgoal"]
+                online = self._env.subgoal
                 stage = getattr(self._policy, "stage", None)
                 doing = online if stage is None else stage.subgoal
                 self._add_row(action, observation, doing, online)
