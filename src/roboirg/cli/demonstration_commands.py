@@ -93,55 +93,35 @@ def export_demonstrations(
     from roboirg.demonstrations.export_plan import ExportPlan
     from roboirg.demonstrations.export_run import run_export
     from roboirg.demonstrations.size_estimate import size_text
-    from roboirg.episodes.splits import SIZES, check_split
     from roboirg.evaluation.executors.executor import core_count
-    from roboirg.evaluation.plan_parsing import (
-        means_all,
-        parse_episodes,
-        parse_names,
-        parse_stages,
-    )
-    from roboirg.language import FORMS, open_wordings, setting_names
+    from roboirg.evaluation.plan_parsing import means_all, parse_names, parse_stages
+    from roboirg.language import FORMS, open_wordings
     from roboirg.policies import load_policy_class
     from roboirg.tasks import find_tasks
 
-    check_split(split)
-    if means_all(episodes) and split == "random":
-        raise InvalidValueError(
-            f"The split 'random' has {SIZES['random']:,} episodes; say how many with --episodes."
-        )
-    indices = (
-        tuple(range(SIZES[check_split(split)]))
-        if means_all(episodes)
-        else parse_episodes(episodes, split)
-    )
-    wanted = setting_names() if means_all(settings) else parse_names("setting", settings)
-    for name in wanted:
-        if name not in setting_names():
-            raise UnknownNameError("setting", name, setting_names())
     load_policy_class(policy)
-    extra = () if actions == "none" else parse_names("description of actions", actions)
+    options = InstructionOptions(
+        stages=parse_stages(stages),
+        distractor=distractor,
+        frame=frame,
+        wordings=open_wordings(wordings),
+        delivery=delivery,
+        rival=rival,
+        reasoning=reasoning,
+    )
     # `validated` checks the names that are cast.
     plan = ExportPlan(
         tasks=tuple(find_tasks(parse_names("task", tasks))),
         split=split,
-        episodes=indices,
-        settings=tuple(wanted),
+        episodes=_episodes(split, episodes),
+        settings=_settings(settings),
         forms=FORMS if means_all(forms) else parse_names("form", forms),
-        options=InstructionOptions(
-            stages=parse_stages(stages),
-            distractor=distractor,
-            frame=frame,
-            wordings=open_wordings(wordings),
-            delivery=delivery,
-            rival=rival,
-            reasoning=reasoning,
-        ),
+        options=options,
         format=cast("Any", format),
         pictures=cast("Any", pictures),
         video=cast("Any", video or _default_video(format)),
         names=cast("Any", names or _default_names(format, pictures)),
-        extra_actions=cast("Any", extra),
+        extra_actions=cast("Any", () if actions == "none" else parse_names("action", actions)),
         variations=variations,
         policy=policy,
         outcomes=cast("Any", outcomes),
@@ -158,6 +138,33 @@ def export_demonstrations(
         f"{counted(summary.episodes, 'episode')}, {size_text(summary.size)}: {out} "
         f"(trajectories: {ends})"
     )
+
+
+def _episodes(split: str, text: str) -> tuple[int, ...]:
+    """Return the positions of episodes in a split."""
+    from roboirg.episodes.splits import SIZES, check_split
+    from roboirg.evaluation.plan_parsing import means_all, parse_episodes
+
+    size = SIZES[check_split(split)]
+    if not means_all(text):
+        return parse_episodes(text, split)
+    if split == "random":
+        raise InvalidValueError(
+            f"The split 'random' has {size:,} episodes; say how many with --episodes."
+        )
+    return tuple(range(size))
+
+
+def _settings(text: str) -> tuple[str, ...]:
+    """Return the names of settings."""
+    from roboirg.evaluation.plan_parsing import means_all, parse_names
+    from roboirg.language import setting_names
+
+    names = setting_names() if means_all(text) else parse_names("setting", text)
+    for name in names:
+        if name not in setting_names():
+            raise UnknownNameError("setting", name, setting_names())
+    return names
 
 
 def _default_video(format_name: str) -> str:
