@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from roboirg.cli import (
+    demonstration_commands,
     episode_commands,
     grounding_commands,
     language_commands,
@@ -98,6 +99,7 @@ app.command()(verification_commands.verify)
 app.command()(verification_commands.pack)
 app.command()(verification_commands.board)
 app.command()(verification_commands.repeat)
+app.command()(demonstration_commands.replay)
 app.command()(report_commands.report)
 app.command()(report_commands.view)
 app.command()(report_commands.tables)
@@ -108,6 +110,7 @@ app.command("check-policy", cls=policy_commands.ProtocolHelpCommand)(policy_comm
 language_commands.export_app.command("grounding")(grounding_commands.export_grounding)
 language_commands.export_app.command("episodes")(episode_commands.export_episodes)
 language_commands.export_app.command("records")(run_commands.export_records)
+language_commands.export_app.command("demonstrations")(demonstration_commands.export_demonstrations)
 
 
 @app.command()
