@@ -14,6 +14,7 @@ import typer
 
 from roboirg.cli import (
     episode_commands,
+    import_commands,
     language_commands,
     policy_commands,
     report_commands,
@@ -95,6 +96,7 @@ app.command()(report_commands.view)
 app.command()(report_commands.tables)
 app.command()(report_commands.figures)
 app.command()(report_commands.compare)
+app.command()(import_commands.import_results)
 app.command(cls=policy_commands.ProtocolHelpCommand)(policy_commands.serve)
 app.command("check-policy", cls=policy_commands.ProtocolHelpCommand)(policy_commands.check_policy)
 language_commands.export_app.command("episodes")(episode_commands.export_episodes)

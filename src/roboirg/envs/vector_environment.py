@@ -11,6 +11,7 @@ from typing import Any, Unpack, cast
 
 import gymnasium
 import numpy as np
+from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
@@ -45,6 +46,8 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
 
     The arguments are those of `roboirg.make_vec`, which documents them and the errors.
     """
+
+    single_observation_space: spaces.Dict
 
     def __init__(
         self,
@@ -119,7 +122,8 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
             index: ("reset", (self._choose(index, seeds[index], episodes[index]),))
             for index in np.flatnonzero(mask).tolist()
         }
-        return self._observe(self._ask(requests))[::4]
+        observations, *_, infos = self._observe(self._ask(requests))
+        return observations, infos
 
     def step(self, actions: ArrayLike) -> StepResult:
         """Execute one action in each sub-environment.
@@ -210,7 +214,7 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
         self._moment += 1
         return self._processes.ask(requests)
 
-    def _observe(self, answers: Mapping[int, Transition]) -> Any:  # noqa: ANN401 - as `step` returns
+    def _observe(self, answers: Mapping[int, Transition]) -> StepResult:
         """Return what `step` does, given the answers of those who were asked."""
         count, mode = self.num_envs, self._mode
         rewards = np.zeros(count)
@@ -222,7 +226,7 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
             ends[:, index] = answer.terminated, answer.truncated
             infos[index] = self._complete(index, answer)
             self._over[index] = ends[:, index].any() and mode is not AutoresetMode.SAME_STEP
-        return self._batch(), rewards, *ends, stack_infos(infos)
+        return self._batch(), rewards, ends[0], ends[1], stack_infos(infos)
 
     def _complete(self, index: int, answer: Transition) -> dict[str, Any]:
         """Return an info with the video, and the end of the episode before if there was one."""
@@ -238,7 +242,7 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
     def _batch(self) -> Batch:
         """Return the observations."""
         batch: dict[str, Any] = {}
-        for field in self.single_observation_space.keys():  # noqa: SIM118 - it is no dictionary
+        for field in self.single_observation_space:
             if field not in self._arrays:
                 batch[field] = tuple(texts.get(field) for texts in self._texts)
             elif not self._lazy or field not in self._pictures:
