@@ -16,10 +16,12 @@ from inspect_ai.model import ModelOutput, get_model
 
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.rollout import play_episode
+from roboirg.integrations.result_import import ImportOptions, import_results
 from roboirg.policies.planning.goal_schema import goal_schema
 from roboirg.policies.planning.models import ModelOptions, ModelReply
 from roboirg.policies.planning.vlm_listener import ListenerOptions, VLMListener
 from roboirg.records.record import Job, Record
+from roboirg.records.store import read_records
 
 pytestmark = pytest.mark.sim
 
@@ -79,6 +81,15 @@ def test_outcomes_are_those_of_our_runner(tmp_path, monkeypatch):
     assert [one.outcome for one in records] == [one.outcome for one in ours]
     assert [one.steps for one in records] == [one.steps for one in ours]
     assert [one.value for one in scores] == [one.outcome == "success" for one in ours]
+    convert = [
+        str(Path(sys.executable).with_name("inspect")), "log", "convert", str(tmp_path),
+        "--to", "json", "--output-dir", str(tmp_path / "json"),
+    ]  # fmt: skip
+    subprocess.run(convert, check=True, capture_output=True)
+    (path,) = (tmp_path / "json").glob("*.json")
+    assert import_results("inspect", path, tmp_path / "run", ImportOptions("gpt")) == EPISODES
+    imported = read_records(tmp_path / "run")
+    assert [one.model_copy(update={"policy": records[0].policy}) for one in imported] == records
     metrics = {one.name: one.metrics for one in log.results.scores}
     assert any("accuracy" in one for one in metrics.values())
     for sample, record in zip(log.samples, records, strict=True):

@@ -32,7 +32,9 @@ from replay_table import MAX_STEPS, MESHES, SETTING, TASK, record_table
 
 import roboirg
 from roboirg.evaluation.rollout import play_episode
+from roboirg.integrations.result_import import ImportOptions, import_results
 from roboirg.records.record import Job
+from roboirg.records.store import read_records
 
 pytestmark = pytest.mark.sim
 
@@ -105,6 +107,10 @@ def test_outcomes_are_those_of_our_runner(checkpoint, ours, tmp_path, batch, use
     (task,) = info["per_task"]
     assert task["task_group"] == f"{TASK}-{SETTING}-test"
     assert task["metrics"]["successes"] == ours
+    path = tmp_path / "out" / "eval_info.json"
+    import_results("lerobot", path, tmp_path / "run", ImportOptions("replay"))
+    imported = [(one.episode, one.outcome == "success") for one in read_records(tmp_path / "run")]
+    assert imported == list(enumerate(ours))
 
 
 def make_batch(n_envs, **options):

@@ -18,8 +18,10 @@ import yaml
 from replay_table import MAX_STEPS, MESHES, SETTING, TASK, Replay, record_table
 
 from roboirg.evaluation.rollout import play_episode
+from roboirg.integrations.result_import import ImportOptions, import_results
 from roboirg.integrations.vla_eval.step_benchmark import RoboIRGBenchmark
 from roboirg.records.record import Job
+from roboirg.records.store import read_records
 
 pytestmark = pytest.mark.sim
 
@@ -114,6 +116,10 @@ def test_a_run_has_the_outcomes_of_our_runner_and_tells_nothing(table, tmp_path,
         (TASK, "success" if one.outcome == "success" else "fail", one.steps) for one in ours
     ]
     assert rows == expected
+    recording = out / "recording-first.sqlite"
+    import_results("vla-eval", recording, tmp_path / "run", ImportOptions("replay"))
+    imported = [(one.episode, one.outcome, one.setting) for one in read_records(tmp_path / "run")]
+    assert imported == [(index, one.outcome, SETTING) for index, one in enumerate(ours)]
     told = [json.loads(line) for line in log.read_text().splitlines()]
     starts = [content for kind, content in told if kind == "start"]
     assert len(starts) == EPISODES
