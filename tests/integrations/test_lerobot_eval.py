@@ -83,7 +83,7 @@ def ours(checkpoint):
 def evaluate(checkpoint, out, *more):
     command = [
         str(Path(sys.executable).with_name("lerobot-eval")),
-        f"--policy.path={checkpoint}", "--policy.discover_packages_path=replay_policy",
+        f"--policy.path={checkpoint}", "--env.discover_packages_path=replay_policy",
         "--policy.device=cpu", "--env.type=roboirg", f"--env.task={TASK}",
         f"--env.setting={SETTING}", f"--env.meshes={MESHES}", "--env.cameras=front",
         f"--env.episode_length={MAX_STEPS}", f"--output_dir={out}", *more,

@@ -46,7 +46,7 @@ VIA = "http://inspect"
 """Address of the model in records: it is Inspect that knows the real one."""
 
 
-@task
+@task  # type: ignore[untyped-decorator] # Inspect is not installed where this is checked
 def listener(
     setting: str = "contextual",
     tasks: str = "all",
@@ -104,7 +104,7 @@ def _sample(job: Job) -> Sample:
     )
 
 
-@solver
+@solver  # type: ignore[untyped-decorator]
 def play_with_model(frames: int = 16, think: bool = False, structured: bool = True) -> Solver:
     """Play the sample's episode in a process of its own and ask the evaluated model there.
 
@@ -199,7 +199,9 @@ def _contents(pieces: list[dict[str, Any]]) -> Iterator[Content]:
             yield ContentImage(image=piece["image_url"]["url"])
 
 
-@scorer(metrics=[accuracy(), stderr(), grouped(accuracy(), "task"), grouped(accuracy(), "setting")])
+@scorer(  # type: ignore[untyped-decorator]
+    metrics=[accuracy(), stderr(), grouped(accuracy(), "task"), grouped(accuracy(), "setting")]
+)
 def grounds_reference() -> Scorer:
     """Score 1 if the episode succeeded, else 0; the explanation says why it failed."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Literal, Unpack
 
 import gymnasium
@@ -47,7 +47,6 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
             `video_frames` frames of the first camera, evenly spaced, and `demonstration_steps`
             their number, 0 without a video.
         video_frames: frames in the key.
-        cameras: names of the cameras.
         **options: the other keyword arguments of `roboirg.make`.
 
     Raises:
@@ -60,6 +59,7 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
         "render_fps": 20,
     }
     render_mode = "rgb_array"
+    observation_space: spaces.Dict
 
     def __init__(
         self,
@@ -67,18 +67,21 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
         *,
         video: str = "none",
         video_frames: int = 16,
-        cameras: Sequence[str] = CAMERAS,
         **options: Unpack[EnvOptions],
     ) -> None:
         if video not in VIDEO_MODES:
             raise UnknownNameError("way with the video", video, VIDEO_MODES)
         if not isinstance(video_frames, int) or video_frames < 1:
             raise InvalidValueError(f"video_frames is {video_frames!r}; it must be 1 or more.")
-        if not cameras:
+        if not options.get("cameras", CAMERAS):
             raise InvalidValueError("cameras is empty; LeRobot needs at least one picture.")
         self._video, self._frames = video, video_frames
-        chosen: EnvOptions = {"demonstration_frames": "none" if video == "none" else "all"}
-        self._env = make(task, **{**chosen, "episode": None, "cameras": cameras, **options})
+        usual: EnvOptions = {
+            "demonstration_frames": "none" if video == "none" else "all",
+            "episode": None,
+        }
+        chosen: EnvOptions = {**usual, **options}
+        self._env = make(task, **chosen)
         self.observation_space = self._make_space()
         low, high = self._env.action_space.low, self._env.action_space.high  # type: ignore[attr-defined]
         self.action_space = spaces.Box(low.astype(np.float32), high.astype(np.float32))
@@ -140,7 +143,7 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
             self._last = observation, 0.0, terminated, truncated, after
         return observation, reward, terminated, truncated, after
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """Return the first camera's picture in the last observation."""
         return self._picture
 
@@ -176,7 +179,7 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
 
     def _sample(self, demonstration: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
         """Return evenly spaced frames of the video, the first and the last included."""
-        shape = self.observation_space["demonstration"].shape or ()  # type: ignore[index]
+        shape = self.observation_space["demonstration"].shape or ()
         frames = np.zeros(shape, np.uint8)
         if self._length:
             picked = np.linspace(0, self._length - 1, self._frames).round().astype(int)
