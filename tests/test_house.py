@@ -15,8 +15,8 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "roboirg"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 
-MAX_ROOMS = 20
-MAX_ARROWS = 100
+MAX_ROOMS = 21
+MAX_ARROWS = 110
 MAX_FILES = 20
 
 FORBIDDEN_MODULES = {
@@ -38,7 +38,10 @@ FORBIDDEN_IDENTIFIERS = {
 }  # fmt: skip
 """A leading underscore makes no difference."""
 
-LENT = {"src/roboirg/integrations/inspect_grounding.py": {"Sample"}}
+LENT = {
+    "src/roboirg/integrations/inspect_grounding.py": {"Sample"},
+    "src/roboirg/integrations/inspect/listener_task.py": {"Sample"},
+}
 """Names of other packages' classes."""
 
 SPOKEN = (

@@ -16,6 +16,7 @@ from roboirg.cli import (
     demonstration_commands,
     episode_commands,
     grounding_commands,
+    import_commands,
     language_commands,
     policy_commands,
     report_commands,
@@ -105,6 +106,7 @@ app.command()(report_commands.view)
 app.command()(report_commands.tables)
 app.command()(report_commands.figures)
 app.command()(report_commands.compare)
+app.command()(import_commands.import_results)
 app.command(cls=policy_commands.ProtocolHelpCommand)(policy_commands.serve)
 app.command("check-policy", cls=policy_commands.ProtocolHelpCommand)(policy_commands.check_policy)
 language_commands.export_app.command("grounding")(grounding_commands.export_grounding)

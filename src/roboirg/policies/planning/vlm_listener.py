@@ -7,6 +7,7 @@ the goal.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ConfigDict
@@ -19,7 +20,7 @@ from roboirg.policies.planning.config_fingerprint import config_version
 from roboirg.policies.planning.goal_schema import GoalSchema, goal_schema
 from roboirg.policies.planning.listener_query import PROMPTS, question_texts
 from roboirg.policies.planning.model_content import ChatTurn, Clip, Picture, summary_clip
-from roboirg.policies.planning.models import ModelOptions, ModelQuery
+from roboirg.policies.planning.models import Model, ModelOptions, ModelQuery, make_model
 from roboirg.policies.planning.prompts import load_prompts
 from roboirg.policies.planning.vlm_query import VLMQuery
 from roboirg.tasks import get_task
@@ -61,19 +62,29 @@ class VLMListener(ScriptedPolicy):
     not have, the robot holds still until time is up: a failure that cannot succeed by luck.
     `usage` counts both cases (``unparsed``, ``impossible``).
 
+    Args:
+        options: of the listener and its model.
+        seed: unused.
+        connect: connects the model.
+
     Raises:
         InvalidValueError: the prompts cannot be read.
     """
 
     cameras = (CAMERA,)
 
-    def __init__(self, options: ListenerOptions, seed: int = 0) -> None:
+    def __init__(
+        self,
+        options: ListenerOptions,
+        seed: int = 0,
+        connect: Callable[[ModelOptions], Model] = make_model,
+    ) -> None:
         super().__init__(seed)
         self.options = options
         self.demonstration_frames = options.frames_every
         self.prompts = load_prompts(PROMPTS, options.prompts)
         self.understood: Goal | None = None
-        self._vlm = VLMQuery(options.model, self.prompts["again"])
+        self._vlm = VLMQuery(options.model, self.prompts["again"], connect)
         self._demonstration: Demonstration = {}
         self._impossible = 0
 
