@@ -3,7 +3,7 @@
 PYTHON := .venv/bin/python
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test lint demo card clean
+.PHONY: help setup test integrations lint demo card clean
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
@@ -19,6 +19,9 @@ lint: setup ## ruff and mypy
 # Two workers: every one that renders takes a core and 0.5 GiB.
 test: lint ## lint, then every test
 	$(PYTHON) -m pytest -n 2
+
+integrations: ## the plug-ins in the real LeRobot, vla-eval and Inspect, in environments of their own
+	@scripts/test-integrations
 
 demo: setup ## the main job: three policies, every task and setting; ends with a table and a page
 	.venv/bin/roboirg demo --out runs/demo

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -8,6 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+import typer.main
 
 from roboirg.cli import app as cli
 from roboirg.evaluation.plan import read_plan
@@ -367,6 +369,122 @@ def test_a_dry_run_counts_and_plays_nothing(roboirg, tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--workers", "-2"), "workers is -2; it must be at least 1"),
+        (("--executor", "slurm"), "There is no executor 'slurm'"),
+        (("--address", "auto"), "--address 'auto' needs --executor ray"),
+        (("--out", "{file}"), "Cannot write to {file}: {file} is not a folder"),
+        (("--out", "{file}/deep/er"), "{file} is not a folder"),
+        (("--out", "{other}"), "language version 1.1"),
+    ],
+)
+def test_a_dry_run_checks_what_a_run_checks(
+    roboirg, tmp_path: Path, words: tuple[str, ...], sentence: str
+) -> None:
+    file, other = tmp_path / "file", tmp_path / "other"
+    file.write_text("x")
+    job = Job(policy="random", task="PickXtimes", split="test", episode=0, setting="direct")
+    with RecordStore(other) as store:
+        result = RolloutResult("success", cause=None, steps=7)
+        store.append(
+            make_record(job, result, started_at="now").model_copy(
+                update={"language_version": "1.1"}
+            )
+        )
+    places = {"file": file, "other": other}
+    given = [word.format(**places) for word in words]
+    before = sorted(tmp_path.rglob("*"))
+    # Twice: without --dry-run, too.
+    for last in (["--dry-run"], []):
+        said = roboirg(*RUN, "--out", tmp_path / "out", *given, *last)
+        assert said.code == 2, said
+        assert sentence.format(**places) in said.err
+        assert len(said.err.splitlines()) == 1
+        if last:
+            assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_run_s_own_plan_can_be_played_again(
+    roboirg, tmp_path: Path, canned: type[CannedPlayer]
+) -> None:
+    del canned
+    words = "--settings contextual,direct --stages 1,5;1-5 --episodes 3, --retry-on none"
+    words += " --wordings train --forms implicit,resolved --workers 0 --out"
+    first = roboirg(*RUN, *words.split(), tmp_path / "a")
+    assert first.code == 0, first.err
+    plan = tmp_path / "a" / "plan.json"
+    again = roboirg("run", "--plan", plan, "--workers", "0", "--out", tmp_path / "b")
+    assert again.code == 0, again.err
+    assert read_plan(tmp_path / "b") == read_plan(tmp_path / "a")
+
+
+class Wanderer(CannedPlayer):
+    """Changes the working directory, as a policy in the command's own process may."""
+
+    away = Path()
+
+    def __call__(self, job: Job):
+        os.chdir(self.away)
+        return super().__call__(job)
+
+
+def test_a_relative_folder_stays_where_it_is(
+    roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    home, away = tmp_path / "home", tmp_path / "away"
+    home.mkdir()
+    away.mkdir()
+    monkeypatch.chdir(home)
+    monkeypatch.setattr("roboirg.evaluation.rollout.EpisodeRunner", Wanderer)
+    monkeypatch.setattr(Wanderer, "away", away)
+    said = roboirg(*RUN, "--episodes", "2", "--workers", "0", "--out", "mine")
+    assert said.code == 0, said.err
+    assert (home / "mine" / "records.jsonl").exists()
+    assert list(away.iterdir()) == []
+
+
+def test_unfinished_videos_of_a_run_that_died_are_deleted(
+    roboirg, tmp_path: Path, canned: type[CannedPlayer]
+) -> None:
+    videos = tmp_path / "videos"
+    videos.mkdir()
+    for name in (".a.mp4.part", "b.mp4", ".c.mp4.part.keep"):
+        (videos / name).write_bytes(b"x")
+    (videos / ".d.mp4.part").mkdir()  # not ours
+    assert roboirg(*RUN, "--workers", "0", "--out", tmp_path).code == 0
+    assert {one.name for one in videos.iterdir()} == {"b.mp4", ".c.mp4.part.keep", ".d.mp4.part"}
+
+
+def test_a_key_twice_in_a_plan_is_refused(roboirg, tmp_path: Path) -> None:
+    (tmp_path / "my.yaml").write_text("policies: [random]\ntasks: PickXtimes\ntasks: BinFill\n")
+    said = roboirg("run", "--plan", tmp_path / "my.yaml", "--out", tmp_path / "out")
+    assert said.code == 2
+    assert "line 3 has the key 'tasks' again" in said.err
+
+
+def test_a_name_that_is_no_name_is_told(roboirg, tmp_path: Path) -> None:
+    said = roboirg("run", "--policy", "../../x=random", "--out", tmp_path / "out")
+    assert said.code == 2
+    assert "The name of a policy is '../../x' (in '../../x=random')" in said.err
+
+
+@pytest.mark.parametrize("word", ["my_policy", "my_policy.py", "folder/other", "folder.other"])
+def test_a_module_without_a_class_gets_a_hint(
+    roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, word: str
+) -> None:
+    (tmp_path / "folder").mkdir()
+    for path in (tmp_path / "my_policy.py", tmp_path / "folder" / "other.py"):
+        path.write_text("raise SystemExit('not imported')\nclass Mine:\n    pass\nclass _X: pass\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    said = roboirg("run", "--policy", word, "--out", tmp_path / "out")
+    assert said.code == 2
+    name = word.removesuffix(".py").replace("/", ".")
+    assert said.err.endswith(f"Policy {word!r} is a module; name its class, {name}:Mine.\n")
+
+
 def test_runs_are_merged_and_exported(roboirg, tmp_path: Path, canned: type[CannedPlayer]) -> None:
     del canned
     for name, episodes in (("a", "0-2"), ("b", "2-4")):
@@ -378,3 +496,51 @@ def test_runs_are_merged_and_exported(roboirg, tmp_path: Path, canned: type[Cann
     assert "1 already there" in said.out
     said = roboirg("export", "records", tmp_path / "c", "--out", tmp_path / "c.parquet")
     assert said.out.startswith("5 records:")
+
+
+def commands(command, words=()):
+    """Yield every command and group with its words."""
+    yield command, words
+    for word, inner in getattr(command, "commands", {}).items():
+        yield from commands(inner, (*words, word))
+
+
+@pytest.mark.parametrize("width", [80, 132])
+def test_help_cuts_no_word_and_is_no_wider_than_the_terminal(
+    roboirg, monkeypatch: pytest.MonkeyPatch, width: int
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    for command, words in commands(typer.main.get_command(cli.app)):
+        said = roboirg(*words, "--help")
+        assert said.code == 0
+        assert max(map(len, said.out.splitlines())) <= width
+        # Addresses are written scheme://….
+        assert not [word for word in said.out.split() if "…" in word and "://…" not in word], words
+        names = [
+            name for one in command.params for name in (*one.opts, *one.secondary_opts)
+            if name.startswith("-")
+        ]  # fmt: skip
+        assert set(names) <= set(said.out.split()), words
+
+
+def test_long_lists_of_options_have_panels(roboirg, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    out = roboirg("run", "--help").out
+    panels = re.split(r"╭─ (.+?) ─+╮", out)[1:]
+    sizes = {
+        name: len(re.findall(r"(?m)^│ [ *] {0,3}--|^│ --", body))
+        for name, body in zip(panels[::2], panels[1::2], strict=True)
+    }
+    assert len(sizes) == 6
+    assert all(1 < size <= 9 for size in sizes.values()), sizes
+
+
+def test_colors_are_left_out_where_they_are_not_wanted() -> None:
+    words = [sys.executable, "-m", "roboirg", "run", "--help"]
+    piped = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    assert "\x1b" not in piped
+    forced = subprocess.run(
+        words, capture_output=True, text=True, check=True,
+        env={**os.environ, "FORCE_COLOR": "1", "NO_COLOR": "1"},
+    ).stdout  # fmt: skip
+    assert not re.search(r"\x1b\[[0-9;]*3[0-7]m", forced)

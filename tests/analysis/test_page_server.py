@@ -44,6 +44,7 @@ def run(tmp_path: Path) -> Path:
     (tmp_path / "secret").write_text("secret")
     (folder / "link").symlink_to(tmp_path / "secret")
     (folder / "empty.mp4").write_bytes(b"")
+    (folder / "videos" / ".b.mp4.part").write_bytes(b"secret")
     with RecordStore(folder) as store:
         store.append(record(0))
     return folder
@@ -129,6 +130,7 @@ def test_no_header_leads_outside_of_the_file(size: int, header: str | None) -> N
     [
         "/../secret", "/%2e%2e/secret", "/videos/../../secret", "/videos/%2e%2e/%2e%2e/secret",
         "//etc/passwd", "/link", "/..%2fsecret", "/videos", "/nothing", "/%00", "/" + "a" * 5000,
+        "/.lock", "/videos/../.lock", "/videos/.b.mp4.part",
     ],
 )  # fmt: skip
 def test_nothing_outside_of_the_run_is_served(server: PageServer, path: str) -> None:

@@ -25,6 +25,16 @@ LENGTH = 24
 WHISPER = "the goal is the cube with the token {} of seed 8675309"
 
 
+class PaperSession:
+    """State of a world of paper."""
+
+    def state_numbers(self) -> np.ndarray:
+        return np.zeros(3)
+
+    def state_hash(self) -> str:
+        return "paper"
+
+
 class PaperWorld:
     """Ends after `LENGTH` steps; its events tell the policy's actions, and the verdict too."""
 
@@ -34,6 +44,7 @@ class PaperWorld:
         self.instruction = instruct_job(job)
         self.secret = WHISPER.format(job.episode)
         self.seconds, self.steps, self.total = seconds, 0, 0.0
+        self.executed_actions, self.session = 0, PaperSession()
 
     def reset(self) -> tuple[dict[str, Any], dict[str, Any]]:
         video = np.arange(5 * 4 * 4 * 3, dtype=np.uint8).reshape(5, 4, 4, 3)
@@ -52,6 +63,7 @@ class PaperWorld:
         time.sleep(self.seconds)
         self.steps = min(self.steps + len(rows), LENGTH)
         self.total += float(np.sum(rows))
+        self.executed_actions += len(rows)
         event = {"step": self.steps, "kind": "picked", "subject": f"{self.total:.9f}"}
         over = self.steps == LENGTH
         status = ("success" if self.total > 0 else "failure") if over else "ongoing"

@@ -1,6 +1,7 @@
 """Clients that idle, stall, drip, flood or come from foreign pages: other clients are served on."""
 
 import contextlib
+import struct
 import threading
 import time
 from types import SimpleNamespace
@@ -24,6 +25,7 @@ from roboirg.cli.app import app
 from roboirg.core.errors import PolicyConnectionError
 from roboirg.policies import make_policy
 from roboirg.policies.protocols import protocols_by_scheme
+from roboirg.policies.remote.message_codec import pack
 from roboirg.policies.serving import policy_server
 from roboirg.policies.serving.policy_server import PolicyServer, open_server
 from roboirg.policies.serving.server_options import ServerOptions
@@ -297,3 +299,32 @@ def test_the_table_ends_those_who_wait_and_spares_those_who_play():
 
 def test_a_key_is_not_shown():
     assert "sesame" not in repr(ServerOptions(key="sesame"))
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_message_is_as_large_as_a_video_needs_and_no_larger(scheme):
+    service = protocols_by_scheme()[scheme].service
+    if scheme == "openpi":  # shows no video
+        assert service.max_request_bytes == 64 << 20
+    else:
+        # All of the longest video with the fields that the protocol can carry, as its client packs.
+        step = moment(0, size=256, sensors="challenge" in scheme)
+        if scheme == "mme-vla":
+            step = {name: step[name] for name in ("front_rgb", "joint_positions", "gripper")}
+        lists = {name: [value] * 10 for name, value in step.items() if name != "instruction"}
+        longest = 1187 * len(pack(lists)) / 10
+        assert longest < service.max_request_bytes < 1.3 * longest
+    with serving(scheme) as server:
+        before, size = server.peak_mib(), service.max_request_bytes + 1
+        if "http" in scheme:
+            head = f"POST /infer HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: {size}\r\n\r\n"
+            with server.connect(head.encode()) as raw:
+                assert read_all(raw).startswith(b"HTTP/1.1 413 ")
+        else:
+            header = struct.pack("!BBQ", 0x82, 0xFF, size) + b"\0\0\0\0"
+            with server.connect(opening(scheme)) as raw:
+                assert raw.recv(65536).startswith(b"HTTP/1.1 101 ")
+                raw.sendall(header)
+                assert struct.pack("!H", 1009) in read_all(raw)
+        assert server.peak_mib() - before <= MAX_MIB
+        assert server.is_healthy()

@@ -10,8 +10,9 @@ from typer.testing import CliRunner
 
 from roboirg.cli.policy_commands import check_policy as command
 from roboirg.core.observations import CAMERAS
-from roboirg.policies.policy_check import FAIL, NOTE, PASS, check_policy
-from roboirg.policies.synthetic_episodes import SyntheticEpisodes
+from roboirg.policies.checks.check_result import FAIL, NOTE, PASS, WARN
+from roboirg.policies.checks.synthetic_episodes import SyntheticEpisodes
+from roboirg.policies.policy_check import check_policy
 
 
 class Sound:
@@ -154,6 +155,11 @@ def test_a_sound_policy_passes_everything():
         "deterministic",
         "reset forgets",
         "turns",
+        "language",
+        "prompt end",
+        "pictures",
+        "state",
+        "video",
         "broken sensors",
     ]
     assert all(result.message.endswith(".") for result in results)
@@ -240,9 +246,11 @@ def test_the_command_prints_a_table_and_an_exit_code(name, code, tmp_path, monke
     monkeypatch.setenv("COLUMNS", "200")
     app = typer.Typer()
     app.command()(command)
-    result = CliRunner().invoke(app, [f"my_policy:{name}"])
+    result = CliRunner().invoke(app, [f"my_policy:{name}", "--no-expert"])
     assert result.exit_code == code, result.output
-    assert ("12 checks, none failed." if code == 0 else "1 of 3 checks failed.") in result.output
+    assert (
+        "13 checks, none failed, 1 warning." if code == 0 else "1 of 3 checks failed."
+    ) in result.output
     assert "Actions joint_angle" in result.output
 
 
@@ -316,3 +324,22 @@ def test_a_policy_that_hears_is_checked_for_it():
     assert (last.check, last.verdict) == ("hears", FAIL)
     assert "hear()" in last.message
     assert "hears" not in {one.check for one in check_policy(Sound())}
+
+
+class Tokenizing(Sound):
+    """Rounds its answers, as models with action tokens do."""
+
+    def reset(self, instruction, demonstration):
+        self.words = instruction.split()
+
+    def act(self, observation):
+        lights = [observation[f"{name}_rgb"].mean() // 40 for name in ("front", "wrist")]
+        last = sum(map(len, self.words[-8:])) // 4 + len(self.words[0])
+        values = [*lights, last, observation["joint_positions"].sum() // 2, 0.0, 0.0, 0.0]
+        return np.tile(np.append(np.array(values) / 10 - [0, 0, 0, 2, 0, 0, 0], 1.0), (4, 1))
+
+
+def test_a_policy_that_rounds_its_answers_is_not_suspected():
+    results = {one.check: one.verdict for one in check_policy(Tokenizing())}
+    assert WARN not in results.values(), results
+    assert results["pictures"] == results["language"] == PASS

@@ -13,14 +13,19 @@ from typing import Annotated
 import typer
 
 from roboirg.cli import (
+    demonstration_commands,
     episode_commands,
+    grounding_commands,
+    import_commands,
     language_commands,
     policy_commands,
     report_commands,
     run_commands,
+    verification_commands,
     wording_commands,
 )
 from roboirg.cli.bench_commands import bench
+from roboirg.cli.missing_extras import describe_missing
 from roboirg.cli.options import (
     Distractor,
     Frame,
@@ -63,6 +68,7 @@ app = typer.Typer(
 
 app.add_typer(language_commands.language_app, name="language")
 app.add_typer(language_commands.export_app, name="export")
+app.add_typer(grounding_commands.score_app, name="score")
 app.add_typer(real_app, name="real")
 app.add_typer(wording_commands.wordings_app, name="wordings")
 app.command()(bench)
@@ -90,15 +96,23 @@ def _options(*, version: _Version = False) -> None:
 
 app.command()(run_commands.run)
 app.command()(run_commands.merge)
+app.command()(verification_commands.verify)
+app.command()(verification_commands.pack)
+app.command()(verification_commands.board)
+app.command()(verification_commands.repeat)
+app.command()(demonstration_commands.replay)
 app.command()(report_commands.report)
 app.command()(report_commands.view)
 app.command()(report_commands.tables)
 app.command()(report_commands.figures)
 app.command()(report_commands.compare)
+app.command()(import_commands.import_results)
 app.command(cls=policy_commands.ProtocolHelpCommand)(policy_commands.serve)
 app.command("check-policy", cls=policy_commands.ProtocolHelpCommand)(policy_commands.check_policy)
+language_commands.export_app.command("grounding")(grounding_commands.export_grounding)
 language_commands.export_app.command("episodes")(episode_commands.export_episodes)
 language_commands.export_app.command("records")(run_commands.export_records)
+language_commands.export_app.command("demonstrations")(demonstration_commands.export_demonstrations)
 
 
 @app.command()
@@ -194,6 +208,7 @@ def show(
     """Print an episode's scene and instructions, and draw how the oracle plays it."""
     from rich.console import Console
 
+    from roboirg.envs.factory import check_simulator
     from roboirg.episodes.splits import get_episode
     from roboirg.visualization.episode_text import print_episode
     from roboirg.visualization.playthrough import draw_sheet
@@ -202,6 +217,7 @@ def show(
     path = Path(f"{task}-{split}-{episode}.png" if out is None else out)
     if path.suffix.lower() != ".png" or path.is_dir():
         raise InvalidValueError(f"{str(path)!r} is not a valid picture file; it must end in .png.")
+    check_simulator()
     console = Console()
     print_episode(found, console)
     verdict = draw_sheet(found, path)
@@ -262,6 +278,12 @@ def main() -> None:
         code = app(prog_name="roboirg", standalone_mode=False)
     except RoboIRGError as error:
         typer.echo(f"roboirg: {printable(str(error))}", err=True)
+        sys.exit(USAGE_ERROR)
+    except ModuleNotFoundError as error:
+        message = describe_missing(error)
+        if message is None:
+            raise
+        typer.echo(f"roboirg: {message}", err=True)
         sys.exit(USAGE_ERROR)
     except _WrongUsage as error:
         sys.exit(_print_usage_error(error))

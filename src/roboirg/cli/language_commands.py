@@ -74,13 +74,13 @@ def export_instructions(
     from roboirg.language.variants import instructions
     from roboirg.language.wordings.wording_store import open_wordings
 
-    kind = _known("format", format, EXPORT_FORMATS)
+    kind = known_name("format", format, EXPORT_FORMATS)
     check_export_support(kind)
     if out.is_dir() or not out.parent.is_dir():
         raise InvalidValueError(f"{str(out)!r} is not a file in an existing folder.")
     identity = open_wordings(wordings)
-    names, chosen = _tasks(tasks, identity), _settings(settings)
-    spoken = [_known("form", one, FORMS) for one in parse_names("form", forms)]
+    names, chosen = known_tasks(tasks, identity), known_settings(settings)
+    spoken = [known_name("form", one, FORMS) for one in parse_names("form", forms)]
     episodes = list(split_episodes(names, parse_splits(split)))
     said = instructions(
         episodes,
@@ -124,10 +124,10 @@ def stats(
 
     if out is not None:
         check_figure_support()
-    names, wanted = _tasks(tasks), parse_splits(split)
+    names, wanted = known_tasks(tasks), parse_splits(split)
     episodes = split_episodes(names, wanted)
     options = InstructionOptions(rival=rival, reasoning=reasoning)
-    said = [one for _, one in instructions(episodes, _settings("all"), ("implicit",), options)]
+    said = [one for _, one in instructions(episodes, known_settings("all"), ("implicit",), options)]
     console = _console()
     for table in overview_tables(said):
         console.print(table)
@@ -156,7 +156,7 @@ def validate_instructions(
     from roboirg.language.validation.validation_tables import validation_tables
     from roboirg.language.wordings.wording_store import open_wordings
 
-    names = _tasks(tasks, open_wordings(wordings))
+    names = known_tasks(tasks, open_wordings(wordings))
     wanted = () if split.strip().lower() == "none" else parse_splits(split)
     work = batches(names, wanted, seeds, wordings)
     count = core_count() if workers is None else workers
@@ -224,7 +224,7 @@ def score_shortcuts(
     from roboirg.language.wordings.wording_store import open_wordings
 
     splits = () if split.strip().lower() == "none" else parse_splits(split)
-    grouping = None if by is None else _known("row", by, GROUPINGS)
+    grouping = None if by is None else known_name("row", by, GROUPINGS)
     if learned:
         check_learning_support()
         if TRAINING_SPLIT in splits:
@@ -234,7 +234,7 @@ def score_shortcuts(
             )
     identity = open_wordings(wordings)
     options = InstructionOptions(
-        form=_known("form", form, FORMS),
+        form=known_name("form", form, FORMS),
         stages=parse_stages(stages),
         distractor=distractor,
         distractors=distractors,
@@ -243,7 +243,7 @@ def score_shortcuts(
         rival=rival,
         reasoning=reasoning,
     )
-    names, chosen = _tasks(tasks, identity), _settings(settings)
+    names, chosen = known_tasks(tasks, identity), known_settings(settings)
     rows = shortcut_rows(names, splits, chosen, options, seeds=seeds, by=grouping, learned=learned)
     if not rows:
         raise InvalidValueError(
@@ -280,8 +280,12 @@ def _console() -> Console:
     return console
 
 
-def _tasks(text: str, wordings: str | None = None) -> tuple[str, ...]:
-    """Return the tasks that were typed; of all, those that open wordings have commands of."""
+def known_tasks(text: str, wordings: str | None = None) -> tuple[str, ...]:
+    """Return the tasks that were typed; of all, those that open wordings have commands of.
+
+    Raises:
+        UnknownNameError: one of them does not exist.
+    """
     from roboirg.core.word_pools import POOLS
     from roboirg.evaluation.plan_parsing import means_all, parse_names
     from roboirg.language.wordings.wording_store import find_wordings
@@ -293,16 +297,28 @@ def _tasks(text: str, wordings: str | None = None) -> tuple[str, ...]:
     return tuple(name for name in names if name in find_wordings(wordings).tasks)
 
 
-def _settings(text: str) -> tuple[str, ...]:
+def known_settings(text: str) -> tuple[str, ...]:
+    """Return the settings that were typed.
+
+    Raises:
+        UnknownNameError: one of them does not exist.
+    """
     from roboirg.evaluation.plan_parsing import means_all, parse_names
     from roboirg.language import setting_names
 
     if means_all(text):
         return setting_names()
-    return tuple(_known("setting", name, setting_names()) for name in parse_names("setting", text))
+    return tuple(
+        known_name("setting", name, setting_names()) for name in parse_names("setting", text)
+    )
 
 
-def _known(kind: str, name: str, known: Sequence[Name]) -> Name:
+def known_name(kind: str, name: str, known: Sequence[Name]) -> Name:
+    """Return a name if it is known.
+
+    Raises:
+        UnknownNameError: it is not.
+    """
     for one in known:
         if name == one:
             return one

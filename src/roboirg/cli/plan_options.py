@@ -5,116 +5,117 @@ Help texts give the default in parentheses.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
 import typer
 
+EPISODES, WORDS, SENSES, POLICIES, ERRORS = (
+    "Which episodes", "Which words", "Actions, observations, videos", "Policies",
+    "Time limits and errors",
+)  # fmt: skip
+"""Panels of the help; narrow terminals have room for every name in them."""
+
+_episodes = partial(typer.Option, rich_help_panel=EPISODES)
+_words = partial(typer.Option, rich_help_panel=WORDS)
+_senses = partial(typer.Option, rich_help_panel=SENSES)
+_policies = partial(typer.Option, rich_help_panel=POLICIES)
+_errors = partial(typer.Option, rich_help_panel=ERRORS)
+
 Tasks = Annotated[
     str | None,
-    typer.Option(help="Tasks or suites, separated by commas; all for the whole benchmark.  (all)"),
+    _episodes(help="Tasks or suites, separated by commas; all for the whole benchmark.  (all)"),
 ]
 Settings = Annotated[
     str | None,
-    typer.Option(help="Settings, separated by commas; all for every setting of each task.  (all)"),
+    _episodes(help="Settings, separated by commas; all for every setting of each task.  (all)"),
 ]
 Forms = Annotated[
-    str | None, typer.Option(help="implicit, resolved, or both separated by a comma.  (implicit)")
+    str | None, _episodes(help="implicit, resolved, or both separated by a comma.  (implicit)")
 ]
-Split = Annotated[str | None, typer.Option(help="train, val, test or random.  (test)")]
+Split = Annotated[str | None, _episodes(help="train, val, test or random.  (test)")]
 Episodes = Annotated[
-    str | None, typer.Option(help="4 for the first four, or a list such as 0,3,5-9.  (4)")
+    str | None, _episodes(help="4 for the first four, or a list such as 0,3,5-9.  (4)")
 ]
 PolicySeeds = Annotated[
     str | None,
-    typer.Option(help="Seeds, separated by commas; every seed plays every episode.  (0)"),
+    _episodes(help="Seeds, separated by commas; every seed plays every episode.  (0)"),
 ]
 Stages = Annotated[
     str | None,
-    typer.Option(
-        help="Stages of the contextual setting; several sets with semicolons: 1,5;1-5.  (1-5)"
-    ),
+    _words(help="Stages of the contextual setting; several sets with semicolons: 1,5;1-5.  (1-5)"),
 ]
 Distractor = Annotated[
     str | None,
-    typer.Option(help="Distractors of the contextual setting: neutral or competing.  (neutral)"),
+    _words(help="Distractors of the contextual setting: neutral or competing.  (neutral)"),
 ]
 Distractors = Annotated[
-    int | None, typer.Option(help="Number of distractors in the contextual setting.  (1)")
+    int | None, _words(help="Number of distractors in the contextual setting.  (1)")
 ]
 Frame = Annotated[
     str | None,
-    typer.Option(help="Frame of reference of the spatial setting: robot or camera.  (robot)"),
+    _words(help="Frame of reference of the spatial setting: robot or camera.  (robot)"),
 ]
 Delivery = Annotated[
     str | None,
-    typer.Option(
+    _words(
         help="prompt: the whole instruction at once; turns: one utterance after another.  (prompt)"
     ),
 ]
 Rival = Annotated[
     str | None,
-    typer.Option(help="A second value in direct, contextual, spatial: none or drawn.  (none)"),
+    _words(help="A second value in direct, contextual, spatial: none or drawn.  (none)"),
 ]
 Reasoning = Annotated[
-    str | None, typer.Option(help="Patterns of the reasoning setting: plain or open.  (plain)")
+    str | None, _words(help="Patterns of the reasoning setting: plain or open.  (plain)")
 ]
 Wordings = Annotated[
     str | None,
-    typer.Option(help="Our words for train or test, or a file with commands.  (ours of the split)"),
+    _words(help="Our words for train or test, or a file with commands.  (ours of the split)"),
 ]
-MaxSteps = Annotated[
-    int | None, typer.Option(help="Limit in control steps, 20 per second.  (1300)")
-]
-Actions = Annotated[str | None, typer.Option(help="Required action space.  (the policy's own)")]
+MaxSteps = Annotated[int | None, _episodes(help="Limit in control steps, 20 per second.  (1300)")]
+Actions = Annotated[str | None, _senses(help="Required action space.  (the policy's own)")]
 DemonstrationFrames = Annotated[
     str | None,
-    typer.Option(
-        help="Frames of the demonstration: all, none, or a number.  (the policy's choice)"
-    ),
+    _senses(help="Frames of the demonstration: all, none, or a number.  (the policy's choice)"),
 ]
 ObserveEvery = Annotated[
     int | None,
-    typer.Option(help="Record an observation every N control steps.  (the policy's choice)"),
+    _senses(help="Record an observation every N control steps.  (the policy's choice)"),
 ]
-Meshes = Annotated[
-    str | None, typer.Option(help="Meshes for rendering: faithful or light.  (faithful)")
-]
+Meshes = Annotated[str | None, _senses(help="Meshes for rendering: faithful or light.  (faithful)")]
 Video = Annotated[
-    str | None, typer.Option(help="Record videos of episodes: off, failures or all.  (off)")
+    str | None, _senses(help="Record videos of episodes: off, failures or all.  (off)")
 ]
 PolicyProcessOption = Annotated[
     str | None,
-    typer.Option(
+    _policies(
         "--policy-process",
         help="own: policies have processes of their own; shared: the world's, to debug.  (own)",
     ),
 ]
 Batch = Annotated[
-    int | None, typer.Option(help="Most episodes that a policy is asked about at once.  (16)")
+    int | None, _policies(help="Most episodes that a policy is asked about at once.  (16)")
 ]
 Devices = Annotated[
     str | None,
-    typer.Option(help="GPUs, such as 0,1; each policy has a process on each.  (one, on any)"),
+    _policies(help="GPUs, such as 0,1; each policy has a process on each.  (one, on any)"),
 ]
 LongPrompts = Annotated[
     str | None,
-    typer.Option(
+    _policies(
         help="Episodes whose prompt is longer than what the policy reads: send or refuse.  (send)"
     ),
 ]
 PolicyTimeout = Annotated[
-    float | None, typer.Option(help="Time limit of one policy call, seconds.  (600)")
+    float | None, _errors(help="Time limit of one policy call, seconds.  (600)")
 ]
-EpisodeTimeout = Annotated[
-    float | None, typer.Option(help="Time limit of an episode, seconds.  (7200)")
-]
+EpisodeTimeout = Annotated[float | None, _errors(help="Time limit of an episode, seconds.  (7200)")]
 Tries = Annotated[
     int | None,
-    typer.Option(help="Attempts per episode if it ends in an error listed in --retry-on.  (2)"),
+    _errors(help="Attempts per episode if it ends in an error listed in --retry-on.  (2)"),
 ]
 RetryOn = Annotated[
     str | None,
-    typer.Option(
-        help="Kinds of errors to retry, or none.  (connection,environment,infrastructure)"
-    ),
+    _errors(help="Kinds of errors to retry, or none.  (connection, environment, infrastructure)"),
 ]

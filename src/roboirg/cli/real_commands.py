@@ -108,7 +108,7 @@ def run(
         ),
     ] = None,
     robot: Annotated[
-        str, typer.Option(help="Robot: twin, or lerobot:package.module:function?options.")
+        str, typer.Option(help="Robot: twin, or lerobot:MODULE:FUNCTION and options.")
     ] = "twin",
     real_time: Annotated[bool, typer.Option(help="Run the twin in real time.")] = False,
     limits: Annotated[

@@ -48,7 +48,6 @@ def report(
     path, other = run_commands.folder_of(folder), None if against is None else Path(against)
     check_report_support()
     planned = run_commands.planned_jobs(path)
-    run_commands.print_tables_of(path, planned)
     with progress_bar("episodes of the page") as progress:
         page = write_report(
             path,
@@ -58,6 +57,7 @@ def report(
             planned_against=() if other is None else run_commands.planned_jobs(other),
             progress=progress,
         )
+    run_commands.print_tables_of(path, planned)
     typer.echo(page)
 
 

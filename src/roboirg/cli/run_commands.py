@@ -35,19 +35,26 @@ Policies = Annotated[
     typer.Option(
         "--policy",
         help="Built-in name, package.module:Class or address, or NAME=one of these; repeatable.",
+        rich_help_panel=options.POLICIES,
     ),
 ]
 PlanName = Annotated[
     str | None,
     typer.Option(
         "--plan",
-        help="YAML file, or challenge, paper, paper-context, paper-planners, robomme or quick.",
+        help="YAML file or a run's plan.json; or challenge, paper, paper-context, paper-planners, "
+        "robomme or quick.",
+        rich_help_panel=options.EPISODES,
     ),
 ]
 Out = Annotated[str, typer.Option(help="Output folder; give the same folder again to resume.")]
 Folder = Annotated[str, typer.Argument(help="Output folder of a run.")]
 RetryErrors = Annotated[
-    bool, typer.Option(help="Play episodes again if their newest record is an error.")
+    bool,
+    typer.Option(
+        help="Play episodes again if their newest record is an error.",
+        rich_help_panel=options.ERRORS,
+    ),
 ]
 
 
@@ -88,7 +95,8 @@ def run(
     address: Annotated[str | None, typer.Option(help="Address of the Ray cluster.")] = None,
     retry_errors: RetryErrors = True,
     dry_run: Annotated[
-        bool, typer.Option(help="Only count the episodes and estimate the time.")
+        bool,
+        typer.Option("--dry-run", help="Only check, count the episodes and estimate the time."),
     ] = False,
 ) -> None:
     """Play episodes and store a record of each in OUT/records.jsonl; resumes where it stopped."""
@@ -123,14 +131,17 @@ def run(
         tries=tries,
         retry_on=retry_on,
     )
-    folder = folder_of(out)
+    # Absolute: a policy in this process may change the working directory.
+    folder = folder_of(out).absolute()
     add_working_directory()
     made = _plan(plan, typed)
+    chosen = _executor(made, executor, address, workers)
+    _check_run(made, folder)
     if dry_run:
         _print_estimate(made, folder, workers)
         return
     _warn_of_cut_prompts(made)
-    summary = play(made, folder, _executor(made, executor, address, workers), retry=retry_errors)
+    summary = play(made, folder, chosen, retry=retry_errors)
     print_tables_of(folder, planned_jobs(folder))
     report_problems(summary, folder)
 
@@ -289,6 +300,16 @@ def _plan(name: str | None, typed: dict[str, Any]) -> Plan:
     return make_plan(policies, **chosen)
 
 
+def _check_run(plan: Plan, folder: Path) -> None:
+    """Check what a run checks before its first episode; nothing is written."""
+    from roboirg.evaluation.runner import check_run
+    from roboirg.evaluation.video_writer import check_video_support
+
+    if plan.video != "off":
+        check_video_support()
+    check_run(plan, folder)
+
+
 def _warn_of_cut_prompts(plan: Plan) -> None:
     from roboirg.evaluation.prompt_shares import prompt_shares, warning_lines
 
@@ -337,7 +358,7 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
     _print_prompt_shares(jobs, settings, console)
     played = read_index(folder)
     todo = [job for job in jobs if identity_key(job) not in played]
-    count = core_count() if workers is None else max(workers, 1)
+    count = core_count() if workers is None else max(workers, 1)  # 0 is this process
     for line in estimate_text(estimate(todo, played.values(), count), len(jobs), count):
         console.print(line, highlight=False)
 

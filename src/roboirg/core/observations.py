@@ -110,3 +110,19 @@ Demonstration = Mapping[str, NDArray[Any]]
 T is 0 in tasks without a video. The first observation follows the last frame. Images are rendered
 when they are first read, and then kept; images that are not read cost no time.
 """
+
+
+def proprioception(joints: NDArray[Any], gripper: NDArray[Any]) -> NDArray[np.float32]:
+    """Return the state as openpi, MME-VLA and our LeRobot data sets define it.
+
+    Args:
+        joints: (..., 7) rad.
+        gripper: (..., 2) finger positions, m.
+
+    Returns:
+        (..., 8): the joints and the first finger.
+    """
+    state: NDArray[np.float32] = np.concatenate(
+        [joints, gripper[..., :1]], axis=-1, dtype=np.float32
+    )
+    return state

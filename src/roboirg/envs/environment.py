@@ -3,51 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
-from roboirg.core.actions import JOINT_ANGLE, check_action, check_chunk, find_action_space
+from roboirg.core.actions import check_action, check_chunk, find_action_space
 from roboirg.core.delivery import SpokenInstruction
 from roboirg.core.episode import Episode, Stage
-from roboirg.core.errors import InvalidValueError, MotionPlanningError, UnknownNameError
-from roboirg.core.instruction_options import (
-    ALL_STAGES,
-    DEFAULT_DELIVERY,
-    DEFAULT_REASONING,
-    DEFAULT_RIVAL,
-    InstructionOptions,
-)
-from roboirg.core.observations import CAMERAS, DemonstrationFrames
+from roboirg.core.errors import InvalidValueError, MotionPlanningError
+from roboirg.core.observations import CAMERAS
+from roboirg.envs.env_settings import RENDER_MODES, EnvSettings, choose_index
+from roboirg.envs.factory import EnvOptions
+from roboirg.envs.observation_spaces import make_observation_space
 from roboirg.episodes.recordings import is_recorded, recorded_actions
-from roboirg.episodes.splits import get_episode
 from roboirg.judging import Event, Status, plain_subgoal
 from roboirg.language import instruct_with
-from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.simulation.controllers import make_controller
 from roboirg.simulation.demonstration.demonstration_cache import replay_or_plan
 from roboirg.simulation.demonstration.demonstration_video import make_video
 from roboirg.simulation.demonstration.recording import Recording
 from roboirg.simulation.episode_session import EpisodeSession
 from roboirg.simulation.episode_state import EpisodeState
-from roboirg.simulation.observation_builder import (
-    ObservationBuilder,
-    ObservationSpec,
-    history_space,
-    observation_space,
-)
+from roboirg.simulation.observation_builder import ObservationBuilder
 from roboirg.simulation.rendering.pixel_grounding import PixelGrounding
 from roboirg.simulation.rendering.render_device import describe_device, find_render_device
-from roboirg.simulation.rendering.render_settings import find_render_settings
 
-MAX_STEPS = 1300
-"""Control steps a policy has, as in RoboMME's published experiments."""
-MAX_INSTRUCTION_LENGTH = 100_000
-PRINTABLE = "".join(chr(code) for code in range(32, 127))
 COMPLETED = "All tasks completed"
 """The subgoal after the last stage."""
 
@@ -55,7 +38,7 @@ FrameHook = Callable[["RoboIRGEnv", bool], None]
 
 
 class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
-    """One episode of one task, with an instruction in one setting.
+    """Episodes of one task, with an instruction in one setting.
 
     Observation: `front_rgb` and `wrist_rgb` uint8 (256, 256, 3) for the requested cameras;
     `joint_positions` float32 (7,) rad; `gripper` float32 (2,) m; `end_effector` float64 (6,)
@@ -76,15 +59,20 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
 
     Episode end: terminated on success or failure, truncated after `max_steps`.
 
-    Info: `status` (ongoing, success, failure, timeout), `cause`, `steps` of the policy,
-    `elapsed_steps` since the start of the world, `events` since the last call, utterances `heard`
-    since the last call (`text` and `step`), `subgoal` in words,
-    and `grounded_subgoal` with `grounded`. At reset also `demonstration`, arrays as in the
-    observation with a leading axis T (pictures are drawn when they are read), and
-    `demonstration_subgoals`, T texts, and `demonstration_source`: ``recorded`` (RoboMME's
-    actions), ``planned`` by the oracle, or ``none``.
+    Info: `status` (ongoing, success, failure, timeout), `is_success`, `cause`, `steps` of the
+    policy, `elapsed_steps` since the start of the world, `events` since the last call, utterances
+    `heard` since the last call (`text` and `step`), `subgoal` in words, and `grounded_subgoal` with
+    `grounded`. At reset also `demonstration`, arrays as in the observation with a leading axis T
+    (pictures are drawn when they are read), and `demonstration_subgoals`, T texts, and
+    `demonstration_source`: ``recorded`` (RoboMME's actions), ``planned`` by the oracle, or
+    ``none``.
 
     The arguments are those of `roboirg.make`, which documents them.
+
+    Attributes:
+        episode: the episode that is played, or will be.
+        instruction: its instruction.
+        draws: whether observations hold pictures; `read_pictures` reads them at any time.
 
     Raises:
         UnknownNameError: a task, setting, split, form, action space or camera does not exist.
@@ -92,77 +80,27 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium declares it this way
-        "render_modes": ["rgb_array"],
+        "render_modes": list(RENDER_MODES),
         "render_fps": 20,
     }
     observation_space: spaces.Dict
 
-    def __init__(
-        self,
-        task: str | Episode,
-        setting: str = "explicit",
-        form: str = "implicit",
-        split: str = "test",
-        episode: int = 0,
-        *,
-        stages: Sequence[int] = ALL_STAGES,
-        distractor: str = "neutral",
-        distractors: int = 1,
-        frame: str = "robot",
-        wordings: str | Path | None = None,
-        delivery: str = DEFAULT_DELIVERY,
-        rival: str = DEFAULT_RIVAL,
-        reasoning: str = DEFAULT_REASONING,
-        actions: str = JOINT_ANGLE.name,
-        cameras: Sequence[str] = CAMERAS,
-        depth: bool = False,
-        calibration: bool = False,
-        grounded: bool = False,
-        demonstration_frames: DemonstrationFrames = "all",
-        observe_every: int | None = None,
-        history_cameras: Sequence[str] | None = None,
-        meshes: str = "faithful",
-        max_steps: int = MAX_STEPS,
-        render_mode: str | None = None,
-    ) -> None:
-        self.episode = task if isinstance(task, Episode) else get_episode(task, split, episode)
-        options = InstructionOptions(
-            setting,
-            form,
-            tuple(stages),
-            distractor,
-            distractors,
-            frame,
-            open_wordings(wordings),
-            delivery,
-            rival,
-            reasoning,
-        )
-        self.instruction, self.delivery = instruct_with(self.episode, options), delivery
-        self._space = find_action_space(actions)
-        self.actions = self._space.name
-        self._spec = ObservationSpec(
-            cameras,
-            depth,
-            calibration,
-            demonstration_frames,
-            observe_every,
-            history_cameras,
-            find_render_settings(meshes),
-        ).validated()
-        self.cameras = tuple(self._spec.cameras)
-        self.depth, self.calibration = depth, calibration
-        self.demonstration_frames, self.observe_every = demonstration_frames, observe_every
+    def __init__(self, task: str | Episode, **options: Unpack[EnvOptions]) -> None:
+        self._task, self._settings = task, EnvSettings(**options)
+        self._last_index: int | None = None
+        self._select_episode(self._settings, choose_index(self._settings, None, None))
+        self._space = find_action_space(self._settings.actions)
+        self._spec = self._settings.observation_spec()
+        self.actions, self.cameras = self._space.name, tuple(self._spec.cameras)
+        self.depth, self.calibration = self._spec.depth, self._spec.calibration
+        self.demonstration_frames = self._spec.demonstration_frames
+        self.observe_every = self._spec.observe_every
         self.history_cameras = tuple(self._spec.for_history.cameras)
-        if not isinstance(max_steps, int) or max_steps < 1:
-            raise InvalidValueError(f"max_steps is {max_steps!r}; it must be an integer >= 1.")
-        if render_mode not in (None, "rgb_array"):
-            raise UnknownNameError("render mode", render_mode, ["rgb_array"])
-        self.max_steps = max_steps
-        self.render_mode = render_mode
-        self.observation_space = self._make_observation_space()
+        self.grounded = self._settings.grounded
+        self.max_steps, self.render_mode = self._settings.max_steps, self._settings.render_mode
+        self.draws = True
+        self.observation_space = make_observation_space(self._spec)
         self.action_space = spaces.Box(self._space.low, self._space.high, dtype=np.float64)
-        self.grounded = grounded
         self._state: EpisodeState | None = None
         self._frame_hook: FrameHook | None = None
         self._hook_period = 1
@@ -185,6 +123,12 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         return str(status)
 
     @property
+    def cause(self) -> str | None:
+        """Why the episode ended without success, in words; None if it did not."""
+        late = f"not done after {self.max_steps} steps" if self.status == "timeout" else None
+        return self.session.judge.cause or late
+
+    @property
     def subgoal(self) -> str:
         """The current subgoal in words; with `grounded`, with the pixel of its object."""
         state, stage = self._current, self.session.judge.published
@@ -202,6 +146,15 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         return self._current.spoken.unheard
 
     @property
+    def executed_actions(self) -> int:
+        """Number of actions executed since reset; the last perhaps in part.
+
+        Raises:
+            ResetNeeded: `reset` has not been called.
+        """
+        return self._current.executed_actions
+
+    @property
     def events(self) -> Sequence[Event]:
         """All events since reset, including those of the demonstration."""
         return tuple(self.session.events)
@@ -214,8 +167,21 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Start the episode again. The episode is the same for every seed."""
+        """Start an episode.
+
+        Args:
+            seed: chooses the episode if the environment was made with ``episode=None``: number
+                ``seed % n`` of the n in the split. Without a seed it is then the one after the
+                last played. It has no other effect: scene, words and physics do not depend on it.
+            options: for this reset alone: ``split``, ``episode``, ``setting`` and the other
+                options of the instruction, as in `roboirg.make`.
+
+        Raises:
+            UnknownNameError: there is no such option, or one of its values does not exist.
+            InvalidValueError: the split has no such episode, or the combination is not defined.
+        """
         super().reset(seed=seed, options=options)
+        self._choose_episode(seed, options or {})
         recording = replay_or_plan(
             self.episode,
             self._play_demonstration,
@@ -286,6 +252,10 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         """
         return self.session.world.picture(camera)
 
+    def read_pictures(self, fields: Sequence[str]) -> dict[str, NDArray[Any]]:
+        """Return fields of the current observation that are drawn, for example ``front_rgb``."""
+        return self._current.observation_builder.read_pictures(fields)
+
     def set_frame_hook(self, hook: FrameHook, every: int = 1) -> None:
         """Call ``hook(env, is_demonstration)`` after every n-th control step and at the end.
 
@@ -308,13 +278,20 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
             raise gymnasium.error.ResetNeeded("Call reset() first.")
         return self._state
 
-    def _make_observation_space(self) -> spaces.Dict:
-        instruction = spaces.Text(MAX_INSTRUCTION_LENGTH, charset=PRINTABLE)
-        fields = {**observation_space(self._spec), "instruction": instruction}
-        if self.observe_every is not None:
-            entry = spaces.Dict({**history_space(self._spec), "instruction": instruction})
-            fields["history"] = spaces.Sequence(entry)
-        return spaces.Dict(fields)
+    def _choose_episode(self, seed: int | None, options: dict[str, Any]) -> None:
+        """Choose the episode and the instruction of a reset."""
+        if isinstance(self._task, Episode) and (fixed := {"split", "episode"} & set(options)):
+            raise InvalidValueError(
+                f"This environment was made of one episode; reset takes no {min(fixed)!r}."
+            )
+        settings = self._settings.with_reset_options(options)
+        self._select_episode(settings, choose_index(settings, seed, self._last_index))
+        self._last_index = self.episode.index
+
+    def _select_episode(self, settings: EnvSettings, index: int) -> None:
+        self.episode = settings.find_episode(self._task, index)
+        self.instruction = instruct_with(self.episode, settings.instruction_options())
+        self.delivery = settings.delivery
 
     def _play_demonstration(self, recording: Recording | None) -> Recording:
         """Start the episode and play its demonstration."""
@@ -342,6 +319,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
 
     def _execute(self, action: NDArray[np.float64]) -> None:
         """Execute one validated action, stopping if the episode ends."""
+        self._current.executed_actions += 1
         try:
             for trajectory in self._current.controller.trajectories(action):
                 for row in trajectory:
@@ -381,7 +359,9 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         spoken = self._current.spoken
         if self.status == "ongoing":  # afterwards no policy hears anything
             spoken.hear(self._current.steps)
-        observation = {**self._current.observation_builder.read(), "instruction": spoken.prompt}
+        builder = self._current.observation_builder
+        seen = builder.read() if self.draws else builder.read_proprioception()
+        observation = {**seen, "instruction": spoken.prompt}
         if self.observe_every is not None:
             observation["history"] = tuple(self._current.history)
             self._current.history.clear()
@@ -391,7 +371,8 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         state, judge = self._current, self.session.judge
         info = {
             "status": self.status,
-            "cause": judge.cause,
+            "is_success": self.status == Status.SUCCESS,
+            "cause": self.cause,
             "steps": state.steps,
             "elapsed_steps": self.session.world.elapsed,
             "events": [event.as_dict() for event in state.take_new_events()],

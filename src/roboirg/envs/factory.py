@@ -1,8 +1,10 @@
-"""`make`, which creates the environment of one episode, and its options."""
+"""`make` and `make_vec`, which create environments, and their options."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+import importlib
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict, Unpack
 
@@ -10,18 +12,21 @@ from roboirg.core.errors import MissingDependencyError
 
 if TYPE_CHECKING:
     # Not at run time: these load NumPy and SAPIEN, which `import roboirg` must not.
+    from gymnasium.vector import AutoresetMode
+
     from roboirg.core.episode import Episode
     from roboirg.core.observations import DemonstrationFrames
     from roboirg.envs.environment import RoboIRGEnv
+    from roboirg.envs.vector_environment import RoboIRGVectorEnv
 
 
 class EnvOptions(TypedDict, total=False):
-    """Keyword arguments of `make`, which documents them; `RoboIRGEnv` has their defaults."""
+    """Keyword arguments of `make`, which documents them; `EnvSettings` has their defaults."""
 
     setting: str
     form: str
     split: str
-    episode: int
+    episode: int | None
     stages: Sequence[int]
     distractor: str
     distractors: int
@@ -44,18 +49,19 @@ class EnvOptions(TypedDict, total=False):
 
 
 def make(task: str | Episode, **options: Unpack[EnvOptions]) -> RoboIRGEnv:
-    """Create the Gymnasium environment of one episode.
+    """Create a Gymnasium environment; without further options it plays one episode.
 
     Args:
         task: name of the task, for example ``"PickXtimes"``, or a custom episode (`split` and
             `episode` are then ignored).
-        **options: the keyword arguments below; `RoboIRGEnv` has their defaults.
+        **options: the keyword arguments below; `EnvSettings` has their defaults.
 
     Keyword Args:
         setting: explicit, direct, reasoning, contextual or spatial.
         form: implicit, or resolved for the paired explicit counterpart.
         split: train, val, test or random.
-        episode: index of the episode in the split, from 0.
+        episode: index of the episode in the split, from 0; None if the seed of each reset
+            chooses it.
         stages: stages, of five, that a contextual instruction includes.
         distractor: neutral or competing, for contextual instructions.
         distractors: number of distractors in a contextual instruction.
@@ -84,11 +90,60 @@ def make(task: str | Episode, **options: Unpack[EnvOptions]) -> RoboIRGEnv:
         InvalidValueError: the split has no such episode, or the combination is not defined; or
             the wording file cannot be read or lacks a command for the episode.
     """
-    try:
+    with _simulator_needed():
         from roboirg.envs.environment import RoboIRGEnv
+    return RoboIRGEnv(task, **options)
+
+
+def make_vec(
+    task: str | Episode,
+    num_envs: int = 1,
+    *,
+    autoreset_mode: str | AutoresetMode = "NextStep",
+    workers: int | None = None,
+    lazy: bool = False,
+    **options: Unpack[EnvOptions],
+) -> RoboIRGVectorEnv:
+    """Create a Gymnasium vector environment whose sub-environments run in worker processes.
+
+    Args:
+        task: as in `make`.
+        num_envs: number of sub-environments.
+        autoreset_mode: ``NextStep``, ``SameStep`` or ``Disabled``, as Gymnasium defines them.
+        workers: number of worker processes; None for one per core, at most `num_envs`.
+        lazy: whether pictures are drawn only when they are read from an observation; they must
+            then be read before the next step.
+        **options: as in `make`, but `episode` is None by default: seeds choose episodes.
+
+    Raises:
+        MissingDependencyError: the simulator is not installed.
+        UnknownNameError: a task, an option's value or the autoreset mode does not exist.
+        InvalidValueError: a number is out of range, or the combination is not defined.
+    """
+    with _simulator_needed():
+        from roboirg.envs.vector_environment import RoboIRGVectorEnv
+    return RoboIRGVectorEnv(
+        task, num_envs, autoreset_mode=autoreset_mode, workers=workers, lazy=lazy, **options
+    )
+
+
+def check_simulator() -> None:
+    """Check that what playing episodes needs is installed.
+
+    Raises:
+        MissingDependencyError: it is not.
+    """
+    with _simulator_needed():
+        importlib.import_module("roboirg.envs.environment")
+
+
+@contextlib.contextmanager
+def _simulator_needed() -> Iterator[None]:
+    """Tell how to install a package that is missing."""
+    try:
+        yield
     except ModuleNotFoundError as error:
         raise MissingDependencyError(
             f"Playing episodes needs the package {error.name!r}; "
             "run: pip install 'roboirgbench[sim]' (in a checkout: make setup)"
         ) from error
-    return RoboIRGEnv(task, **options)

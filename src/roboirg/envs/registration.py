@@ -6,7 +6,7 @@ this module.
 
 from __future__ import annotations
 
-import gymnasium
+from gymnasium.envs.registration import register
 
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.tasks import every_task
@@ -19,9 +19,15 @@ def environment_id(task: str) -> str:
     return f"{NAMESPACE}/{task}-v{ENVIRONMENT_VERSION}"
 
 
-for _task in every_task():
-    gymnasium.register(
-        id=environment_id(_task),
-        entry_point="roboirg.envs.environment:RoboIRGEnv",
-        kwargs={"task": _task},
-    )
+def register_environments() -> None:
+    """Register the environments of all tasks, those of other packages included."""
+    for task in every_task():
+        register(
+            id=environment_id(task),
+            entry_point="roboirg.envs.environment:RoboIRGEnv",
+            vector_entry_point="roboirg.envs.vector_environment:RoboIRGVectorEnv",
+            kwargs={"task": task},
+        )
+
+
+register_environments()

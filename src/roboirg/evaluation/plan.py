@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, ValidationError, field_validator, model_validator
 
 from roboirg import language, policies, tasks
 from roboirg.core.actions import find_action_space
-from roboirg.core.delivery import DELIVERIES
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import (
     ALL_STAGES,
@@ -20,8 +20,6 @@ from roboirg.core.instruction_options import (
     DEFAULT_FRAME,
     DEFAULT_REASONING,
     DEFAULT_RIVAL,
-    REASONINGS,
-    RIVALS,
     InstructionOptions,
 )
 from roboirg.core.observations import (
@@ -34,16 +32,14 @@ from roboirg.episodes import splits
 from roboirg.evaluation.hosting.host_pool import DEFAULT_BATCH, HostSettings
 from roboirg.evaluation.plan_parsing import check_names, name_and_spec
 from roboirg.evaluation.policy_descriptions import describe_policy
-from roboirg.language.generator import find_refusal
-from roboirg.language.instruction import FORMS, Instruction
-from roboirg.language.settings import all_settings
+from roboirg.language.generator import check_options, find_refusal
+from roboirg.language.instruction import Instruction
+from roboirg.language.settings import EXPLICIT, all_settings
 from roboirg.language.wordings.wording_store import open_wordings
+from roboirg.records.plan_files import PLAN_FILE, earlier_plans, store_plan
 from roboirg.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, ErrorKind, Job
-from roboirg.util.atomic_write import write_atomically
 from roboirg.util.plain_text import is_encodable
 from roboirg.util.short_hash import short_hash
-
-PLAN_FILE = "plan.json"
 
 REQUIRED = "required"
 """Instead of a wording file in a plan: one must be given when the plan is run."""
@@ -147,6 +143,11 @@ class Plan(BaseModel):
             return {**fields, "wordings_identity": fields["wordings"]}
         path = Path(str(fields["wordings"])).resolve()
         return {**fields, "wordings": str(path), "wordings_identity": open_wordings(path)}
+
+    @field_validator("demonstration_frames", mode="before")
+    @classmethod
+    def _check_frames(cls, value: object) -> object:
+        return None if value is None else check_demonstration_frames(value)
 
     @property
     def specs(self) -> dict[str, str]:
@@ -302,10 +303,20 @@ class Plan(BaseModel):
                 yield from self._jobs_of(("", ""), task, episode, settings, seeds=(0,))
 
     def _check_options(self) -> None:
-        check_names("form", self.forms, FORMS)
-        check_names("delivery", (self.delivery,), DELIVERIES)
-        check_names("rival", (self.rival,), RIVALS)
-        check_names("reasoning", (self.reasoning,), REASONINGS)
+        for form, stages in itertools.product(self.forms, self.stages):
+            check_options(
+                InstructionOptions(
+                    EXPLICIT,
+                    form=form,
+                    stages=stages,
+                    distractor=self.distractor,
+                    distractors=self.distractors,
+                    frame=self.frame,
+                    delivery=self.delivery,
+                    rival=self.rival,
+                    reasoning=self.reasoning,
+                )
+            )
         check_names("kind of meshes", (self.meshes,), MESHES)
         for name, least in (("max_steps", 1), ("tries", 1), ("batch", 1)):
             if getattr(self, name) < least:
@@ -334,14 +345,33 @@ class Plan(BaseModel):
 
 
 def write_plan(plan: Plan, folder: Path) -> None:
-    """Write the newest plan of a folder beside its records."""
-    write_atomically(folder / PLAN_FILE, plan.model_dump_json(indent=2) + "\n")
+    """Write the newest plan of a folder beside its records; earlier ones stay in ``plans/``."""
+    store_plan((plan.model_dump_json(indent=2) + "\n").encode(), folder)
 
 
 def read_plan(folder: Path) -> Plan | None:
     """Return the newest plan of a folder; None if it is missing or of an unknown version."""
+    return _read_plan_at(folder / PLAN_FILE)
+
+
+def read_plans(folder: Path) -> tuple[Plan, ...]:
+    """Return the plans whose episodes a folder should hold.
+
+    That is the newest, or in a merged run those of its parts.
+    """
+    newest = read_plan(folder)
+    return read_earlier_plans(folder) if newest is None else (newest,)
+
+
+def read_earlier_plans(folder: Path) -> tuple[Plan, ...]:
+    """Return the plans of earlier commands, or of merged runs, that can be read."""
+    found = (_read_plan_at(path) for path in earlier_plans(folder))
+    return tuple(plan for plan in found if plan is not None)
+
+
+def _read_plan_at(path: Path) -> Plan | None:
     try:
-        return Plan.model_validate_json((folder / PLAN_FILE).read_bytes())
+        return Plan.model_validate_json(path.read_bytes())
     except (OSError, ValidationError):
         return None
 

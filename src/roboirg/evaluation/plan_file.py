@@ -1,4 +1,4 @@
-"""Read plans from YAML files and from the package."""
+"""Read plans from YAML files, from the folders of runs (plan.json) and from the package."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from roboirg.evaluation.plan import Plan
 
 _PACKAGE = "roboirg.evaluation"
 _FOLDER = "plans"
-_SUFFIXES = (".yaml", ".yml")
+_SUFFIXES = (".yaml", ".yml", ".json")
+"""JSON is YAML, too: a run's plan.json can be played again."""
 _LISTS = frozenset(
     {
         "policies",
@@ -45,11 +46,12 @@ def read_plan_file(name: str) -> dict[str, Any]:
     ``[[1, 5], [1, 2, 5]]`` becomes ``"1,5;1,2,5"``.
 
     Args:
-        name: name of a plan that comes with the package, or path of a YAML file.
+        name: name of a plan that comes with the package, or path of a YAML file, or of the
+            plan.json that a run wrote.
 
     Raises:
         UnknownNameError: there is no such plan, or it has an unknown key.
-        InvalidValueError: the file cannot be read or is not a mapping.
+        InvalidValueError: the file cannot be read, is not a mapping or has a key twice.
     """
     data = _load(name)
     if not isinstance(data, Mapping):
@@ -63,9 +65,22 @@ def read_plan_file(name: str) -> dict[str, Any]:
     return {key: _as_typed(key, value) for key, value in data.items() if value is not None}
 
 
+class _UniqueKeyLoader(yaml.SafeLoader):
+    """Refuses a mapping with a key twice, of which YAML would take the last."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        keys = [self.construct_object(key, deep=True) for key, _ in node.value]
+        for number, key in enumerate(keys):
+            if key in keys[:number]:
+                line = node.value[number][0].start_mark.line + 1
+                raise yaml.YAMLError(f"line {line} has the key {key!r} again")
+        return super().construct_mapping(node, deep=deep)
+
+
 def _load(name: str) -> object:
     try:
-        return yaml.safe_load(_find(name).read_text(encoding="utf-8"))
+        # A safe loader, with one more check.
+        return yaml.load(_find(name).read_text(encoding="utf-8"), _UniqueKeyLoader)  # noqa: S506
     except (OSError, UnicodeDecodeError) as error:
         raise InvalidValueError(f"The plan {name!r} cannot be read: {error}.") from error
     except yaml.YAMLError as error:
@@ -97,6 +112,6 @@ def _as_typed(key: str, value: object) -> object:
         return [str(one) for one in value]
     if key == "stages" and any(isinstance(one, list) for one in value):
         return ";".join(str(_as_typed(key, one)) for one in value)
-    typed = ",".join(map(str, value))
+    typed = ",".join(map(str, value)) or ("none" if key == "retry_on" else "")
     # A single number without a comma would mean the first n episodes.
     return f"{typed}," if key == "episodes" and len(value) == 1 else typed

@@ -13,6 +13,8 @@ from roboirg.episodes import splits
 ALL = "all"
 """The name that selects everything."""
 
+_NAME = r"[\w.+ -]+"
+"""Of a policy: it becomes part of names of files."""
 _MAX_NUMBERS = 10_000
 _MAX_DIGITS = 18
 _MAX_QUOTED_LENGTH = 40
@@ -39,7 +41,7 @@ def parse_policies(specs: Iterable[str]) -> tuple[str, ...]:
     """Parse policies; one text may hold several names separated by commas.
 
     Raises:
-        InvalidValueError: there is none.
+        InvalidValueError: there is none, or ``NAME=SPEC`` has a name that is not allowed.
     """
     # Addresses and their options may contain commas.
     parts = (
@@ -49,12 +51,20 @@ def parse_policies(specs: Iterable[str]) -> tuple[str, ...]:
     policies = tuple(dict.fromkeys(name for names in parts for name in names))
     if not policies:
         raise InvalidValueError("No policy was given.")
+    for policy in policies:
+        name, equals, _ = policy.partition("=")
+        # Addresses have ":" or "?" before the first "=".
+        if equals and not re.search("[:?]", name) and not re.fullmatch(_NAME, name):
+            raise InvalidValueError(
+                f"The name of a policy is {name!r} (in {policy!r}); a name has letters, digits, "
+                "blanks and any of . _ + - only."
+            )
     return policies
 
 
 def name_and_spec(policy: str) -> tuple[str, str]:
     """Split ``NAME=SPEC`` into name and spec; without a name, the spec is the name."""
-    found = re.fullmatch(r"([\w.+ -]+)=(.+)", policy)
+    found = re.fullmatch(rf"({_NAME})=(.+)", policy)
     return (policy, policy) if found is None else (found[1].strip(), found[2].strip())
 
 

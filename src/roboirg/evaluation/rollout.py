@@ -38,7 +38,7 @@ from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.plan import VideoMode
 from roboirg.evaluation.policy_calls import next_actions, policy_metadata, policy_usage
 from roboirg.evaluation.policy_descriptions import PolicyDescription, describe_here
-from roboirg.evaluation.policy_environment import env_requirements, make_env
+from roboirg.evaluation.policy_environment import EnvRequirements, env_requirements, make_env
 from roboirg.evaluation.prompt_shares import audit_job, too_long_text
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.video_writer import VideoOptions, VideoWriter
@@ -46,6 +46,7 @@ from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.policies.base import Policy, PrivilegedPolicy, close_policy, tell_policy
 from roboirg.policies.loading import needs_host
 from roboirg.policies.prompt_length.declared_limit import prompt_limit
+from roboirg.records.action_log import write_actions
 from roboirg.records.record import Job, Record
 
 if TYPE_CHECKING:
@@ -106,6 +107,7 @@ class EpisodeRunner:
         writer, result = self._play(job)
         video = self._finish_video(writer, result)
         error = None if writer is None else writer.error
+        log = result.action_log
         return make_record(
             job,
             result,
@@ -114,6 +116,7 @@ class EpisodeRunner:
             started_at=started_at,
             duration_s=round(time.monotonic() - start, 3),
             plan=self.plan,
+            action_log=None if log is None else write_actions(log, self.folder),
         )
 
     def _play(self, job: Job) -> tuple[VideoWriter | None, RolloutResult]:
@@ -183,7 +186,6 @@ def play_episode(
     result = RolloutResult()
     guard = CallGuard(result, policy_timeout_s, is_hosted=hosts is not None)
     policy: Policy | None = None
-    env = None
     try:
         if hosts is not None and needs_host(job.policy_spec):
             with guard.policy("policy's constructor", "policy_load"):
@@ -198,19 +200,49 @@ def play_episode(
             result.prompt_limit = prompt_limit(policy)
         if refuse_long:
             _refuse_long_prompt(job, result)
+        play_with(policy, job, needs, result, guard, writer)
+    except EpisodeError as error:
+        result.record_error(error.kind, error.cause, error.details)
+    finally:
+        if policy is not None:
+            _close_policy(policy, result, guard)
+    return result
+
+
+def play_with(
+    policy: Policy,
+    job: Job,
+    needs: EnvRequirements,
+    result: RolloutResult,
+    guard: CallGuard,
+    writer: VideoWriter | None = None,
+) -> None:
+    """Play one job with a loaded policy, which is not closed.
+
+    Args:
+        policy: answers the observations.
+        job: what to play.
+        needs: what the environment offers.
+        result: is filled in.
+        guard: attributes errors and measures calls.
+        writer: gets the frames of a video.
+
+    Raises:
+        EpisodeError: the environment raised, or the policy, or an action cannot be executed.
+    """
+    env, broke = None, False
+    try:
         with guard.environment("env_reset"):
             env = make_env(job, needs)
         _play_to_end(env, policy, needs.actions, job, writer, result, guard)
     except EpisodeError as error:
-        result.record_error(error.kind, error.cause, error.details)
+        broke = error.kind == "environment"
+        raise
     finally:
-        try:
-            if policy is not None:
-                _close_policy(policy, result, guard)
-        finally:
-            if env is not None:
-                env.close()
-    return result
+        if env is not None:
+            if result.action_space is not None and not broke:
+                result.end_state = env.session.state_numbers(), env.session.state_hash()
+            env.close()
 
 
 def _refuse_long_prompt(job: Job, result: RolloutResult) -> None:
@@ -278,12 +310,15 @@ def _play_to_end(
             policy.attach(env)
         policy.reset(first, info["demonstration"])
         result.policy_metadata = policy_metadata(policy)
+    result.action_space = actions.name
     status, cause = "ongoing", None
     while status == "ongoing":
         with guard.policy("policy's act()", "policy_act"):
             rows = next_actions(policy, observation, actions)
         with guard.environment("env_step"):
+            done = env.executed_actions
             observation, *_, info = env.step_chunk(rows)
+            result.answers.append(rows[: env.executed_actions - done])
         result.steps = int(info["steps"])
         result.add_events(info)
         if info.get("heard"):

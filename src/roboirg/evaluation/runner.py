@@ -19,11 +19,18 @@ from roboirg.evaluation.executors.executor import Executor
 from roboirg.evaluation.plan import Plan, write_plan
 from roboirg.evaluation.policy_descriptions import describe_policy
 from roboirg.evaluation.progress import Reporter, SilentReporter
-from roboirg.evaluation.rollout import PlayJob
+from roboirg.evaluation.rollout import VIDEO_FOLDER, PlayJob
+from roboirg.evaluation.video_writer import without_unfinished_videos
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.records.record import Job, Record
 from roboirg.records.record_codec import RecordIndexEntry, identity_key
-from roboirg.records.store import TORN_FILE, RecordStore, StoreError
+from roboirg.records.store import (
+    TORN_FILE,
+    RecordStore,
+    StoreError,
+    check_writable,
+    read_index,
+)
 from roboirg.util.plurals import counted
 
 UNREACHABLE_AFTER = 20
@@ -86,7 +93,8 @@ def run_plan(
     """
     reporter = reporter or SilentReporter()
     jobs = plan.jobs()
-    with _sigterm_interrupts(), RecordStore(folder) as store:
+    films = without_unfinished_videos(folder / VIDEO_FOLDER)
+    with _sigterm_interrupts(), RecordStore(folder) as store, films:
         _report_damage(store, reporter)
         _check_versions(store.stored.values(), folder)
         _check_policies(plan, store.stored.values(), folder)
@@ -110,6 +118,19 @@ def run_plan(
             video_errors=tuple(loop.video_errors),
             unreachable=tuple(loop.unreachable),
         )
+
+
+def check_run(plan: Plan, folder: Path) -> None:
+    """Check what `run_plan` checks before it plays, and write nothing.
+
+    Raises:
+        StoreError: the folder cannot be written, or its records belong to another version of
+            language, environment, scene or policy.
+    """
+    check_writable(folder)
+    records = read_index(folder).values()
+    _check_versions(records, folder)
+    _check_policies(plan, records, folder)
 
 
 class _RunLoop:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -32,6 +32,7 @@ LAST_FRAME_REPEATS = 8
 """The last frame stays for most of a second, so that a viewer sees how the episode ended."""
 
 POSTER_SUFFIX = ".jpg"
+_PARTIAL_SUFFIX = ".part"
 
 _TEXT_SCALE, _TEXT_LINE, _TEXT_MARGIN = 0.4, 16, 6
 _MAX_LINES = 12
@@ -147,7 +148,7 @@ class VideoWriter:
     @property
     def partial(self) -> Path:
         """Path of the unfinished video; a later video of the same name overwrites it."""
-        return self.path.with_name(f".{self.path.name}.part")
+        return self.path.with_name(f".{self.path.name}{_PARTIAL_SUFFIX}")
 
     def add_frame(self, source: PictureSource, is_demonstration: bool = False) -> None:
         """Add a frame with the current pictures.
@@ -237,6 +238,26 @@ class VideoWriter:
             container.mux(stream.encode(None))
             container.close()
         self._container = self._stream = None
+
+
+@contextlib.contextmanager
+def without_unfinished_videos(folder: Path) -> Iterator[None]:
+    """Delete what processes that died left of videos, before and after the body.
+
+    Args:
+        folder: of the videos, to which no other run writes.
+    """
+    _delete_unfinished(folder)
+    try:
+        yield
+    finally:
+        _delete_unfinished(folder)
+
+
+def _delete_unfinished(folder: Path) -> None:
+    for left in folder.glob(f".*{_PARTIAL_SUFFIX}"):
+        with contextlib.suppress(OSError):
+            left.unlink()
 
 
 def write_poster(frame: Frame, path: Path) -> None:

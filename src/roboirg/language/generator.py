@@ -191,7 +191,7 @@ def expressible(
 
 
 def _request(episode: Episode, options: InstructionOptions) -> InstructionRequest:
-    _check_options(options)
+    check_options(options)
     task = get_task(episode.task)
     wordings = None
     if options.wordings is not None and options.wordings not in POOLS:
@@ -216,7 +216,13 @@ def _missing(request: InstructionRequest) -> str | None:
     )
 
 
-def _check_options(options: InstructionOptions) -> None:
+def check_options(options: InstructionOptions) -> None:
+    """Check all options of an instruction, those that its setting does not read included.
+
+    Raises:
+        UnknownNameError: a form, kind of distractor, frame, … does not exist.
+        InvalidValueError: the stages or the number of distractors are not possible.
+    """
     if options.stages not in STAGE_SETS:
         sets = ", ".join(str(one) for one in STAGE_SETS)
         raise InvalidValueError(f"The stages {options.stages} must be one of {sets}.")

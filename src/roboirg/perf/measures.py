@@ -14,6 +14,7 @@ from roboirg.perf import (
     remote_rates,
     reset_times,
     step_times,
+    vector_rates,
 )
 from roboirg.perf.workloads import Workload, as_in_demonstrations, over_the_table
 from roboirg.simulation.rendering.render_settings import LIGHT
@@ -55,6 +56,7 @@ def measures() -> tuple[Measure, ...]:
         *_reset_measures(),
         *_process_measures(),
         *_worker_measures(),
+        *_vector_measures(),
         *_large_run_measures(),
     )
 
@@ -187,6 +189,26 @@ def _worker_measures() -> tuple[Measure, ...]:
             "s",
         ),
         Measure("memory of a worker", lambda: costs(slow, 16).worker_gib, None, "", 0.5, "GiB"),
+    )
+
+
+def _vector_measures() -> tuple[Measure, ...]:
+    """Return measures of the vector environment; AsyncVectorEnv draws at every step."""
+    rows: tuple[tuple[Timing, str, float], ...] = (
+        (vector_rates.separate_rate, f"{vector_rates.cores()} processes", 0.9),
+        (vector_rates.async_rate, "AsyncVectorEnv", 1.5),
+    )
+    return tuple(
+        Measure(
+            "steps a second of a vector environment",
+            vector_rates.vector_rate,
+            baseline,
+            against,
+            goal,
+            unit="1/s",
+            inverse=True,
+        )
+        for baseline, against, goal in rows
     )
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import importlib
+import importlib.util
 import inspect
 import pkgutil
 from collections.abc import Mapping
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -15,6 +18,8 @@ from roboirg.policies.batch_policy import make_batched, takes_batches
 from roboirg.policies.policy_urls import is_url
 from roboirg.policies.protocols import protocols_by_scheme
 from roboirg.policies.requirements import REQUIREMENTS
+
+_MAX_SHOWN = 3
 
 BUILTIN: Mapping[str, str] = {
     "oracle": "roboirg.policies.builtin.oracle_policy:OraclePolicy",
@@ -50,6 +55,8 @@ def find_class(spec: str) -> type[Any]:
         _check_requirements(spec, policy_class(spec))
         return policy_class
     if spec not in BUILTIN and ":" not in spec:
+        if (hint := _describe_module(spec)) is not None:
+            raise InvalidValueError(f"Policy {spec!r} {hint}")
         raise UnknownNameError("policy", spec, [*BUILTIN, "package.module:Class", *_examples()])
     module_name, _, name = BUILTIN.get(spec, spec).partition(":")
     module = _module(spec, module_name)
@@ -142,6 +149,24 @@ def _url_class(spec: str) -> type[Any]:
     if scheme not in protocols:
         raise UnknownNameError("policy scheme", scheme, url_schemes())
     return protocols[scheme].clients[scheme]
+
+
+def _describe_module(spec: str) -> str | None:
+    """Return what a spec is if it names a module and no class, and how to name one; else None."""
+    try:
+        found = importlib.util.find_spec(spec.removesuffix(".py").replace("/", "."))
+        source = Path(found.origin).read_bytes() if found and found.origin else None
+        tree = None if source is None else ast.parse(source)
+    except (ImportError, ValueError, AttributeError, OSError, SyntaxError):
+        return None
+    if found is None:
+        return None
+    classes = [] if tree is None else [one for one in tree.body if isinstance(one, ast.ClassDef)]
+    shown = [f"{found.name}:{one.name}" for one in classes if not one.name.startswith("_")]
+    return (
+        "is a module; name its class, "
+        f"{' or '.join(shown[:_MAX_SHOWN]) or f'such as {found.name}:MyPolicy'}."
+    )
 
 
 def _examples() -> list[str]:

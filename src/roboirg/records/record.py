@@ -338,6 +338,10 @@ class Record(Result):
         metadata: of the instruction: reasoning pattern, relation, stages, landmarks, template
             ids, ….
         policy_metadata: what the policy reports about itself: checkpoint, server, model, ….
+        action_log: digest of the executed actions, as in `roboirg.records.action_log`; None if they
+            were not kept.
+        end_state: hash of the state in which the episode left the world and the judge; None if it
+            did not come to an end.
         events: facts that became true or false, in order.
         usage: what models queried by the policy cost: ``calls``, ``input_tokens``,
             ``output_tokens``, ``cost_usd``.
@@ -359,6 +363,8 @@ class Record(Result):
     goal: dict[str, str | int | tuple[str, ...] | tuple[int, ...]]
     metadata: dict[str, JsonValue]
     policy_metadata: dict[str, JsonValue] = {}
+    action_log: str | None = None
+    end_state: str | None = None
     events: tuple[EventRecord, ...] = ()
     usage: dict[str, float] = {}
     timings: dict[str, float] = {}

@@ -260,6 +260,22 @@ def read_index(folder: Path) -> dict[RecordKey, RecordIndexEntry]:
     }
 
 
+def check_writable(folder: Path) -> None:
+    """Check that a run's folder can be written, or made; nothing is.
+
+    Raises:
+        StoreError: it cannot.
+    """
+    place = next(one for one in (folder, *folder.absolute().parents) if one.exists())
+    records = folder / RECORDS_FILE
+    if not place.is_dir():
+        raise StoreError(f"Cannot write to {folder}: {place} is not a folder.")
+    if not os.access(place, os.W_OK | os.X_OK) or (
+        records.exists() and not os.access(records, os.W_OK)
+    ):
+        raise StoreError(f"Cannot write to {folder}: Permission denied.")
+
+
 class LinePlace(NamedTuple):
     """Where a line is: its number from 1, its first byte, and its bytes without the newline."""
 
@@ -279,6 +295,7 @@ class StoredRun(Generic[Identified]):
 
     Attributes:
         newest: what is kept of each record, in the order of the file.
+        replaced: of earlier records of the same episodes.
 
     Raises:
         StoreError: there are no records, or a line is not a record of this schema version.
@@ -288,8 +305,12 @@ class StoredRun(Generic[Identified]):
         self._path = folder / RECORDS_FILE
         lines = _RecordsFile(self._path)
         kept: dict[RecordKey, tuple[Identified, LinePlace]] = {}
+        self.replaced: list[Identified] = []
         for one in lines.parse(parse_line):
-            kept[identity_key(one)] = (one, lines.place)
+            key = identity_key(one)
+            if key in kept:
+                self.replaced.append(kept[key][0])
+            kept[key] = (one, lines.place)
         if not kept:
             raise StoreError(
                 f"There are no records in {folder}; give the --out folder of a `roboirg run`."

@@ -87,6 +87,12 @@ class Body:
             self.physics.set_angular_velocity(np.zeros(3))
 
     @property
+    def segment(self) -> int:
+        """The object's number in segmented pictures; of a button only its cap counts (RoboMME)."""
+        entity = self.entity if self.button is None else self.button.links[1].entity
+        return int(entity.per_scene_id)
+
+    @property
     def pressed_depth(self) -> float:
         """Distance by which a button's cap is down, m; 0 for other objects."""
         return -float(self.button.get_qpos()[0]) if self.button is not None else 0.0

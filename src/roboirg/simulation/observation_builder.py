@@ -99,18 +99,20 @@ class ObservationBuilder:
 
     def read(self) -> dict[str, Any]:
         """Return the current observation without the instruction."""
-        return self._read(self._spec.cameras, self._picture_fields)
+        return {**self.read_pictures(self._picture_fields), **self.read_proprioception()}
 
     def read_history_entry(self) -> dict[str, Any]:
         """Return the current observation for ``history``, without the instruction."""
-        return self._read(self._spec.for_history.cameras, self._history_picture_fields)
-
-    def _read(self, cameras: Sequence[str], picture_fields: Sequence[str]) -> dict[str, Any]:
-        if picture_fields:
-            # All cameras start drawing before the first picture is fetched.
-            self._world.cameras.draw(cameras)
-        pictures = {field: read_picture(self._world, field) for field in picture_fields}
+        pictures = self.read_pictures(self._history_picture_fields)
         return {**pictures, **self.read_proprioception()}
+
+    def read_pictures(self, fields: Sequence[str]) -> dict[str, NDArray[Any]]:
+        """Return the given fields that are drawn, for example ``front_rgb``."""
+        if fields:
+            # All cameras start drawing before the first picture is fetched.
+            cameras = dict.fromkeys(field.rpartition("_")[0] for field in fields)
+            self._world.cameras.draw(tuple(cameras))
+        return {field: read_picture(self._world, field) for field in fields}
 
     def read_proprioception(self) -> dict[str, Any]:
         """Return the observation fields that need no drawing: proprioception and calibration."""

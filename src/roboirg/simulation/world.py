@@ -15,6 +15,7 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.observations import CAMERAS
 from roboirg.simulation import bodies, physics_settings
 from roboirg.simulation.fact_detection import FactDetector
+from roboirg.simulation.fork_check import check_drawing_process
 from roboirg.simulation.motion_player import MotionContext, MotionPlayer
 from roboirg.simulation.panda import Panda
 from roboirg.simulation.rendering.cameras import Cameras
@@ -43,6 +44,7 @@ class World:
         physics_settings.apply_physics_settings()
         systems: list[Any] = [sapien.physx.PhysxCpuSystem()]
         if visible:
+            check_drawing_process()
             systems.append(render_system(keep_engine=rendering.quick_start))
             physics_settings.apply_render_settings()
         self._scene = sapien.Scene(systems)

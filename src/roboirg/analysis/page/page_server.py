@@ -84,6 +84,9 @@ class _PageHandler(LoopbackRequestHandler):
             found = (folder / path.lstrip("/")).resolve()
             if not found.is_relative_to(folder) or not found.is_file():
                 return None
+            # The lock, and videos that are not finished, are the run's own.
+            if any(part.startswith(".") for part in found.relative_to(folder).parts):
+                return None
             return found.open("rb")
         except (OSError, ValueError):
             return None

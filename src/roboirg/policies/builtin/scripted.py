@@ -17,6 +17,7 @@ from roboirg.tasks import get_task
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
+    from roboirg.simulation.expert.primitives import MotionPrimitives
 
 HOVER = "hover"
 """A primitive that touches nothing."""
@@ -36,6 +37,7 @@ class ScriptedPolicy(ABC):
 
     Attributes:
         listens: whether it waits for the command.
+        stage: the stage that the last chunk belongs to; None before the first one.
     """
 
     cameras: ClassVar[tuple[str, ...]] = ()
@@ -46,6 +48,13 @@ class ScriptedPolicy(ABC):
         self._env: RoboIRGEnv | None = None
         self._chunks: Iterator[NDArray[np.float64]] = iter(())
         self._heard: list[str] = []
+        self.stage: Stage | None = None
+
+    def make_primitives(self, env: RoboIRGEnv) -> MotionPrimitives:
+        """Return the expert that executes the stages."""
+        from roboirg.simulation.expert.primitives import MotionPrimitives
+
+        return MotionPrimitives(env.session.world)
 
     @abstractmethod
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
@@ -78,35 +87,33 @@ class ScriptedPolicy(ABC):
             self._chunks = iter(())
             return
         stages = get_task(env.episode.task).stages(env.episode.scene, goal)
-        self._chunks = _execute(env, stages)
+        self._chunks = self._execute(env, stages)
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:  # noqa: ARG002
         """Return the next chunk of the motion; without one, actions that hold still."""
         chunk = next(self._chunks, None)
         return chunk if chunk is not None else _hold_still(self._attached())
 
+    def _execute(self, env: RoboIRGEnv, stages: tuple[Stage, ...]) -> Iterator[NDArray[np.float64]]:
+        """Yield action chunks, stage by stage; a primitive that fails is retried."""
+        primitives, progress = self.make_primitives(env), _StageProgress(env, stages)
+        index, retries = 0, 0
+        while index < len(stages):
+            self.stage = stages[index]
+            primitive = self.stage.primitive
+            yield from primitives.execute(primitive)
+            if progress.completed() > index:
+                index += 1
+            elif retries < MAX_RETRIES:
+                retries += 1
+                index -= primitive.kind in UNDOES_PICK and index > 0
+            else:
+                return
+
     def _attached(self) -> RoboIRGEnv:
         if self._env is None:
             raise RuntimeError(f"{type(self).__name__} needs attach(env) before reset().")
         return self._env
-
-
-def _execute(env: RoboIRGEnv, stages: tuple[Stage, ...]) -> Iterator[NDArray[np.float64]]:
-    """Yield action chunks, stage by stage; a primitive that fails is retried."""
-    from roboirg.simulation.expert.primitives import MotionPrimitives
-
-    primitives, progress = MotionPrimitives(env.session.world), _StageProgress(env, stages)
-    index, retries = 0, 0
-    while index < len(stages):
-        primitive = stages[index].primitive
-        yield from primitives.execute(primitive)
-        if progress.completed() > index:
-            index += 1
-        elif retries < MAX_RETRIES:
-            retries += 1
-            index -= primitive.kind in UNDOES_PICK and index > 0
-        else:
-            return
 
 
 def _get_ready(env: RoboIRGEnv) -> Iterator[NDArray[np.float64]]:

@@ -67,6 +67,11 @@ class GoalSchema:
     goals: Mapping[str, Goal]
     thing: str
 
+    @functools.cached_property
+    def answers(self) -> Mapping[Goal, str]:
+        """The answer that names each goal, as canonical JSON."""
+        return {goal: answer for answer, goal in self.goals.items()}
+
     def schema(self, reasoning: str | None = None) -> dict[str, Any]:
         """Return the JSON schema of an answer; `reasoning` describes a field in which to think."""
         properties: dict[str, Any] = {}

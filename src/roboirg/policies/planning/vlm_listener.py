@@ -7,7 +7,7 @@ the goal.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ConfigDict
@@ -17,9 +17,10 @@ from roboirg.core.episode import Goal
 from roboirg.core.observations import Demonstration
 from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.policies.planning.config_fingerprint import config_version
-from roboirg.policies.planning.goal_schema import Field, GoalSchema, goal_schema
-from roboirg.policies.planning.model_content import ChatTurn, Part, Picture, summary_clip
-from roboirg.policies.planning.models import ModelOptions, ModelQuery
+from roboirg.policies.planning.goal_schema import GoalSchema, goal_schema
+from roboirg.policies.planning.listener_query import PROMPTS, question_texts
+from roboirg.policies.planning.model_content import ChatTurn, Clip, Picture, summary_clip
+from roboirg.policies.planning.models import Model, ModelOptions, ModelQuery, make_model
 from roboirg.policies.planning.prompts import load_prompts
 from roboirg.policies.planning.vlm_query import VLMQuery
 from roboirg.tasks import get_task
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
 CAMERA = "front"
-PROMPTS = "listener"
 
 
 class ListenerOptions(BaseModel):
@@ -62,19 +62,29 @@ class VLMListener(ScriptedPolicy):
     not have, the robot holds still until time is up: a failure that cannot succeed by luck.
     `usage` counts both cases (``unparsed``, ``impossible``).
 
+    Args:
+        options: of the listener and its model.
+        seed: unused.
+        connect: connects the model.
+
     Raises:
         InvalidValueError: the prompts cannot be read.
     """
 
     cameras = (CAMERA,)
 
-    def __init__(self, options: ListenerOptions, seed: int = 0) -> None:
+    def __init__(
+        self,
+        options: ListenerOptions,
+        seed: int = 0,
+        connect: Callable[[ModelOptions], Model] = make_model,
+    ) -> None:
         super().__init__(seed)
         self.options = options
         self.demonstration_frames = options.frames_every
         self.prompts = load_prompts(PROMPTS, options.prompts)
         self.understood: Goal | None = None
-        self._vlm = VLMQuery(options.model, self.prompts["again"])
+        self._vlm = VLMQuery(options.model, self.prompts["again"], connect)
         self._demonstration: Demonstration = {}
         self._impossible = 0
 
@@ -147,42 +157,12 @@ class VLMListener(ScriptedPolicy):
         self._vlm.close()
 
     def _build_query(self, schema: GoalSchema, instruction: str, picture: Picture) -> ModelQuery:
-        prompts, reasoning = self.prompts, None
-        if self.options.reasoning:
-            reasoning = prompts.fill("reasoning_field")
-        fields = "\n".join(self._describe_fields(schema, reasoning))
-        parts: tuple[Part, ...] = (
-            prompts.fill("instruction", instruction=instruction),
-            *self._video(),
-            prompts.fill("now"),
-            picture,
-            prompts.fill("question", fields=fields),
-        )
-        return ModelQuery(
-            prompts.fill("system"), (ChatTurn("user", parts),), schema.schema(reasoning)
-        )
-
-    def _video(self) -> Iterator[Part]:
+        reasoning = self.prompts.fill("reasoning_field") if self.options.reasoning else None
         steps = len(self._demonstration.get("joint_positions", ()))
-        if not steps:
-            yield self.prompts.fill("no_video")
-            return
-        yield self.prompts.fill("video", steps=str(steps))
-        yield summary_clip(self._demonstration[f"{CAMERA}_rgb"], self.options.frames, steps)
-
-    def _describe_fields(self, schema: GoalSchema, reasoning: str | None) -> Iterator[str]:
-        if reasoning is not None:
-            yield f"- reasoning: {reasoning}"
-        for field in schema.fields:
-            meaning = self.prompts.fill(
-                f"meanings.{field.kind}", color=field.name, thing=schema.thing
-            )
-            values = self._values(field)
-            yield self.prompts.fill("field", name=field.name, meaning=meaning, values=values)
-
-    def _values(self, field: Field) -> str:
-        listed = ", ".join(map(str, field.values))
-        if field.lengths is None:
-            return self.prompts.fill("values.one", values=listed)
-        least, most = map(str, field.lengths)
-        return self.prompts.fill("values.list", values=listed, least=least, most=most)
+        texts = question_texts(self.prompts, schema, instruction, steps, reasoning)
+        video: tuple[Picture | Clip, ...] = ()
+        if steps:
+            frames = self._demonstration[f"{CAMERA}_rgb"]
+            video = (summary_clip(frames, self.options.frames, steps),)
+        parts = texts.parts(video, picture)
+        return ModelQuery(texts.system, (ChatTurn("user", parts),), schema.schema(reasoning))

@@ -29,6 +29,7 @@ class VLMQuery:
     Attributes:
         options: of the model, which is connected at the first query.
         again: prompt for the second try, with ``$why``.
+        connect: connects the model.
         calls: requests, second tries included.
         input_tokens, output_tokens: of all calls.
         unparsed: queries without a usable reply even at the second try.
@@ -36,6 +37,7 @@ class VLMQuery:
 
     options: ModelOptions
     again: Template
+    connect: Callable[[ModelOptions], Model] = make_model
     calls: int = field(default=0, init=False)
     input_tokens: int = field(default=0, init=False)
     output_tokens: int = field(default=0, init=False)
@@ -90,7 +92,7 @@ class VLMQuery:
 
     def _request(self, query: ModelQuery) -> ModelReply:
         if self._model is None:
-            self._model = make_model(self.options)
+            self._model = self.connect(self.options)
         self.calls += 1
         reply = self._model.answer(query)
         self.input_tokens += reply.input_tokens

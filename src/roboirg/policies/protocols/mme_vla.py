@@ -22,12 +22,13 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.observations import Demonstration, Observation
+from roboirg.core.observations import Demonstration, Observation, proprioception
 from roboirg.policies.base import Policy, close_policy
 from roboirg.policies.protocol import Protocol
 from roboirg.policies.remote.endpoints import RemoteOptions
-from roboirg.policies.remote.remote_policy import RemotePolicy, proprioception
+from roboirg.policies.remote.remote_policy import RemotePolicy
 from roboirg.policies.serving.service import (
+    PICTURE_BYTES,
     Handler,
     MakePolicy,
     Message,
@@ -35,6 +36,7 @@ from roboirg.policies.serving.service import (
     act,
     read_request,
     read_state,
+    request_limit,
     tell_change,
 )
 
@@ -170,6 +172,9 @@ class MmeVlaPolicy(RemotePolicy):
 
 class MmeVlaService(Service):
     """Answers ``reset``, ``add_buffer`` and requests for actions, in that order of precedence."""
+
+    # The original client sends a video in one message, with the pictures of the front camera.
+    max_request_bytes: ClassVar[int] = request_limit(PICTURE_BYTES)
 
     def __init__(self, make_policy: MakePolicy) -> None:
         super().__init__(make_policy)

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from roboirg.core.errors import PolicyConnectionError
-from roboirg.core.observations import Demonstration, Observation
+from roboirg.core.observations import Demonstration, Observation, proprioception
 from roboirg.policies.base import Policy, close_policy
 from roboirg.policies.protocol import Protocol
 from roboirg.policies.remote.endpoints import MIB, ActionSpaceName, RemoteOptions
-from roboirg.policies.remote.remote_policy import RemotePolicy, proprioception
+from roboirg.policies.remote.remote_policy import RemotePolicy
 from roboirg.policies.serving.service import (
     Handler,
     MakePolicy,

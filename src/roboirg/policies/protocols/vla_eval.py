@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from roboirg.core.errors import InvalidValueError, PolicyReplyError, RoboIRGError
-from roboirg.core.observations import Demonstration, Observation
+from roboirg.core.observations import Demonstration, Observation, proprioception
 from roboirg.policies.protocol import Protocol
 from roboirg.policies.remote.endpoints import ActionSpaceName, RemoteOptions
-from roboirg.policies.remote.remote_policy import RemotePolicy, proprioception
+from roboirg.policies.remote.remote_policy import RemotePolicy
 from roboirg.policies.transport import Transport
 
 TASK = {"name": "RoboIRGBench"}

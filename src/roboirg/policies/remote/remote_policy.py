@@ -169,22 +169,6 @@ class RemotePolicy(ABC):
             raise
 
 
-def proprioception(joints: NDArray[Any], gripper: NDArray[Any]) -> NDArray[np.float32]:
-    """Return the state as openpi and MME-VLA define it.
-
-    Args:
-        joints: (..., 7) rad.
-        gripper: (..., 2) finger positions, m.
-
-    Returns:
-        (..., 8): the joints and the first finger.
-    """
-    state: NDArray[np.float32] = np.concatenate(
-        [joints, gripper[..., :1]], axis=-1, dtype=np.float32
-    )
-    return state
-
-
 def as_json(value: object) -> Any:  # noqa: ANN401 - JSON has no narrower type
     """Return a message's content as JSON values; large arrays are described, long texts cut."""
     if isinstance(value, Mapping):

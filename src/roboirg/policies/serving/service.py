@@ -25,6 +25,21 @@ MakePolicy = Callable[[], Policy]
 STATE_SIZE = 8
 """Seven joints and the first finger, as in openpi and MME-VLA."""
 _PICTURE_AXES = 3
+PICTURE_BYTES, DEPTH_BYTES = 256 * 256 * 3, 256 * 256 * 2
+"""Of one camera at one step."""
+MAX_STEPS_SHOWN = 1500
+"""Control steps in one message: the longest video of the splits has 1187, and a policy may ask for
+all that it did in an episode of the challenge."""
+
+
+def request_limit(step_bytes: int, steps: int = MAX_STEPS_SHOWN) -> int:
+    """Return the size in bytes that a message needs at most.
+
+    Args:
+        step_bytes: of the pictures of a step; everything else of it is far below 1 KiB.
+        steps: that a message shows.
+    """
+    return MIB + steps * (step_bytes + 1024)
 
 
 class Service(ABC):
@@ -37,10 +52,11 @@ class Service(ABC):
 
     Attributes:
         make_policy: makes a fresh policy.
-        max_request_bytes: size limit of a message.
+        max_request_bytes: size limit of a message; by default, that of a video with the pictures
+            and depth of two cameras.
     """
 
-    max_request_bytes: ClassVar[int] = 1024 * MIB
+    max_request_bytes: ClassVar[int] = request_limit(2 * (PICTURE_BYTES + DEPTH_BYTES))
 
     def __init__(self, make_policy: MakePolicy) -> None:
         self.make_policy = make_policy

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.episode import Episode
@@ -31,9 +32,12 @@ class DemonstrationVideo(Mapping[str, NDArray[Any]]):
         proprioception: the fields that are not drawn, with a leading axis T.
         sequences: the fields that are drawn.
         length: control steps in the video, T.
+        actions: (T, 8) joint targets (rad) and the gripper, that led to each step.
 
     Attributes:
         length: control steps in the video, T.
+        actions: (T, 8) joint targets (rad) and the gripper, that led to each step; no policy sees
+            them.
     """
 
     def __init__(
@@ -41,8 +45,9 @@ class DemonstrationVideo(Mapping[str, NDArray[Any]]):
         proprioception: Mapping[str, NDArray[Any]],
         sequences: Mapping[str, FrameSequence],
         length: int,
+        actions: NDArray[np.float64],
     ) -> None:
-        self.length = length
+        self.length, self.actions = length, actions
         self._arrays = dict(proprioception)
         self._sequences = dict(sequences)
 
@@ -105,4 +110,5 @@ def make_video(
         if selection != "none"
     }
     arrays = stack_proprioception(proprioception, spec)
-    return DemonstrationVideo(arrays, sequences, len(proprioception))
+    actions = recording.video_actions(episode)
+    return DemonstrationVideo(arrays, sequences, len(proprioception), actions)

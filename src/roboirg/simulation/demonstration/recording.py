@@ -54,10 +54,14 @@ class Recording:
         for stage, action in zip(self.stages, self.actions, strict=True):
             yield RecordedStep(int(stage), action)
 
+    def video_actions(self, episode: Episode) -> NDArray[np.float64]:
+        """Return the actions (T, 8) of the steps in the episode's video."""
+        recorded = np.array([stage.recorded for stage in episode.demonstration], dtype=bool)
+        return self.actions[recorded[self.stages]] if len(recorded) else self.actions[:0]
+
     def video_length(self, episode: Episode) -> int:
         """Return the number of steps in the episode's video."""
-        recorded = np.array([stage.recorded for stage in episode.demonstration], dtype=bool)
-        return int(np.count_nonzero(recorded[self.stages])) if len(recorded) else 0
+        return len(self.video_actions(episode))
 
     def to_bytes(self) -> bytes:
         """Serialize without loss."""

@@ -54,9 +54,6 @@ class PixelGrounding:
 
     def _pixel(self, name: str) -> tuple[int, int] | None:
         """Return the mean row and column of an object's visible pixels; None if it has none."""
-        body = self._bodies[name]
-        # For a button, only the cap counts (RoboMME).
-        entity = body.entity if body.button is None else body.button.links[1].entity
-        seen = self._cameras.segmentation(CAMERA) == entity.per_scene_id
+        seen = self._cameras.segmentation(CAMERA) == self._bodies[name].segment
         rows, columns = np.nonzero(seen)
         return (int(rows.mean()), int(columns.mean())) if len(rows) else None

@@ -79,10 +79,7 @@ class OpenAIModel:
         options = self._options
         request: dict[str, Any] = {
             "model": options.model,
-            "messages": [
-                {"role": "system", "content": query.system},
-                *(self._message(turn) for turn in query.turns),
-            ],
+            "messages": chat_messages(query, options),
         }
         if options.temperature is not None:
             request["temperature"] = options.temperature
@@ -92,22 +89,6 @@ class OpenAIModel:
             form = {"name": "answer", "strict": True, "schema": dict(query.schema)}
             request["response_format"] = {"type": "json_schema", "json_schema": form}
         return request
-
-    def _message(self, turn: ChatTurn) -> dict[str, Any]:
-        if turn.role == "model":
-            return {"role": "assistant", "content": "".join(map(str, turn.parts))}
-        content = [piece for part in turn.parts for piece in self._pieces(part)]
-        return {"role": "user", "content": content}
-
-    def _pieces(self, part: Part) -> Iterator[dict[str, Any]]:
-        if isinstance(part, str):
-            yield {"type": "text", "text": part}
-        elif isinstance(part, Picture):
-            yield _image(part)
-        elif self._options.video == "mp4":
-            yield {"type": "video_url", "video_url": {"url": _data_url("video/mp4", part.file)}}
-        else:
-            yield from map(_image, _pictures(part, self._options.clip_frames))
 
     def _read(self, completion: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server sends
         try:
@@ -139,6 +120,30 @@ class OpenAIModel:
         if isinstance(error, openai.APIStatusError):
             return PolicyReplyError(f"{self._name} refused or failed: {words}")
         return PolicyReplyError(f"{self._name} replied with something else ({words}).")
+
+
+def chat_messages(query: ModelQuery, options: ModelOptions) -> list[dict[str, Any]]:
+    """Return a query as the messages of OpenAI's chat completions."""
+    system = {"role": "system", "content": query.system}
+    return [system, *(_message(turn, options) for turn in query.turns)]
+
+
+def _message(turn: ChatTurn, options: ModelOptions) -> dict[str, Any]:
+    if turn.role == "model":
+        return {"role": "assistant", "content": "".join(map(str, turn.parts))}
+    content = [piece for part in turn.parts for piece in _pieces(part, options)]
+    return {"role": "user", "content": content}
+
+
+def _pieces(part: Part, options: ModelOptions) -> Iterator[dict[str, Any]]:
+    if isinstance(part, str):
+        yield {"type": "text", "text": part}
+    elif isinstance(part, Picture):
+        yield _image(part)
+    elif options.video == "mp4":
+        yield {"type": "video_url", "video_url": {"url": _data_url("video/mp4", part.file)}}
+    else:
+        yield from map(_image, _pictures(part, options.clip_frames))
 
 
 def _pictures(clip: Clip, most: int) -> list[Picture]:

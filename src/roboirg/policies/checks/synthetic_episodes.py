@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any, NamedTuple, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from roboirg.core.actions import ARM_JOINTS, JOINT_HIGH, JOINT_LOW, REACH_HIGH, REACH_LOW
 from roboirg.core.observations import CAMERAS, DemonstrationFrames, Observation
@@ -44,6 +46,7 @@ class SyntheticEpisodes:
         seed: of all random values.
         depth: whether there is depth beside the pictures.
         calibration: whether there are the cameras' matrices.
+        changed: fields that get other values than without this argument; all others keep theirs.
     """
 
     def __init__(
@@ -55,12 +58,14 @@ class SyntheticEpisodes:
         *,
         depth: bool = False,
         calibration: bool = False,
+        changed: Collection[str] = (),
     ) -> None:
         self._cameras = cameras
         self._depth, self._calibration = depth, calibration
         self._frames = demonstration_frames
         self._every = observe_every
         self._rng = np.random.default_rng(seed)
+        self._changed, self._other_rng = changed, np.random.default_rng([seed, 1])
 
     def episode(self, instruction: str, size: int) -> SyntheticEpisode:
         """Return an episode with a video of `size` control steps; 0 for none."""
@@ -98,7 +103,22 @@ class SyntheticEpisodes:
         return cast("Observation", broken)
 
     def _observation(self, instruction: str) -> dict[str, Any]:
-        rng = self._rng
+        observation = self._draw(instruction, self._rng)
+        if self._changed:
+            other = self._draw(instruction, self._other_rng)
+            for field in self._changed:
+                # Noise looks like noise: a policy that rounds its answers may give the same ones.
+                is_picture = field.endswith("_rgb")
+                observation[field] = self._plain_picture() if is_picture else other[field]
+        return observation
+
+    def _plain_picture(self) -> NDArray[np.uint8]:
+        """Return a picture of one color."""
+        return np.broadcast_to(
+            self._other_rng.integers(0, 256, PICTURE[-1], dtype=np.uint8), PICTURE
+        ).copy()
+
+    def _draw(self, instruction: str, rng: np.random.Generator) -> dict[str, Any]:
         pictures: dict[str, Any] = {
             f"{camera}_rgb": rng.integers(0, 256, PICTURE, dtype=np.uint8)
             for camera in self._cameras

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from roboirg.core.actions import check_chunk
 from roboirg.policies.base import close_policy
+from roboirg.policies.checks.synthetic_episodes import SyntheticEpisode
 from roboirg.policies.loading import make_policy
 from roboirg.policies.random_state import RandomState
 from roboirg.policies.requirements import wanted_actions
-from roboirg.policies.synthetic_episodes import SyntheticEpisode
 
 CALLS = 3
 Chunks = list[NDArray[np.float64]]

@@ -1,0 +1,1 @@
+"""Scores of answers to the grounding dataset."""

@@ -1,0 +1,210 @@
+"""Score answers to the grounding dataset: verdicts, and cells for the statistics."""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from roboirg.analysis.stats.cells import (
+    CellKey,
+    CellResults,
+    Cells,
+    EvalConditions,
+    PolicyRun,
+    Trial,
+    Versions,
+    sort_cells,
+)
+from roboirg.analysis.stats.intervals import SEED, Interval
+from roboirg.analysis.stats.run_summary import ALL, SummaryRow, summarize
+from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.grounding_set.answer_file import Answer
+from roboirg.evaluation.grounding_set.grounding_item import (
+    QUESTION_KINDS,
+    GroundingItem,
+    QuestionKind,
+)
+from roboirg.evaluation.grounding_set.verdicts import ReplyVerdict, guess_chance, judge_reply
+
+ANSWERS_VERSION = "answers"
+OWN_WORDS = "own"
+
+
+class JudgedItem(NamedTuple):
+    """An item with the verdict on its answer."""
+
+    item: GroundingItem
+    verdict: ReplyVerdict
+
+
+@dataclass(frozen=True)
+class GroundingScore:
+    """All answers of one model to one kind of question.
+
+    Attributes:
+        name: of the model.
+        kind: of question.
+        judged: answered items, in the order of the dataset.
+        cells: for the statistics, sorted; items without an answer are missing.
+    """
+
+    name: str
+    kind: QuestionKind
+    judged: tuple[JudgedItem, ...]
+    cells: Cells
+
+    @property
+    def unparsed(self) -> int:
+        """Number of replies that name no answer."""
+        return sum(one.verdict.understood is None for one in self.judged)
+
+    @property
+    def missing(self) -> int:
+        """Number of items without an answer."""
+        return sum(cell.missing for cell in self.cells.values())
+
+
+@dataclass(frozen=True)
+class ScoreRow:
+    """One set of options, as the unweighted mean over tasks.
+
+    Attributes:
+        summary: rate, interval, gap to explicit and its corrected p-value.
+        chance: rate of random answers.
+        command_chance: rate of a guess among the goals that fit the command alone.
+        hidden: share of the hidden slots that are right; None for other questions, or if nothing is
+            hidden.
+    """
+
+    summary: SummaryRow
+    chance: float
+    command_chance: float
+    hidden: float | None
+
+    @property
+    def corrected(self) -> float | None:
+        """The rate on a scale from random answers, 0, to 1; None if random answers are right."""
+        rate = self.summary.rate
+        return None if rate is None else above_chance(float(rate), self.chance)
+
+    @property
+    def corrected_interval(self) -> Interval | None:
+        """The interval of the rate on the same scale."""
+        if self.summary.interval is None or self.chance >= 1:
+            return None
+        low, high = self.summary.interval
+        return Interval(
+            (low - self.chance) / (1 - self.chance), (high - self.chance) / (1 - self.chance)
+        )
+
+
+def above_chance(rate: float, chance: float) -> float | None:
+    """Return a rate on a scale on which chance is 0 and all right is 1; None if chance is 1."""
+    return None if chance >= 1 else (rate - chance) / (1 - chance)
+
+
+def score_answers(
+    items: Sequence[GroundingItem], answers: Iterable[Answer], name: str
+) -> tuple[GroundingScore, ...]:
+    """Score answers, kind by kind.
+
+    A reply that names no answer is wrong. An item without an answer is missing: it is in no rate.
+
+    Args:
+        items: of the dataset, all of one split and one wording.
+        answers: to questions of the items.
+        name: of the model that answered.
+
+    Raises:
+        InvalidValueError: the items are of several splits or wordings, or there is no answer.
+        UnknownNameError: a task is not installed.
+    """
+    by_kind: dict[QuestionKind, dict[str, str]] = {}
+    for answer in answers:
+        by_kind.setdefault(answer.kind, {})[answer.id] = answer.reply
+    if not by_kind:
+        raise InvalidValueError("There are no answers to score.")
+    run = _policy_run(items, name)
+    return tuple(
+        _score(items, by_kind[kind], run, kind) for kind in QUESTION_KINDS if kind in by_kind
+    )
+
+
+def score_rows(score: GroundingScore) -> tuple[ScoreRow, ...]:
+    """Return a row for each set of options, with intervals and corrected tests."""
+    found = summarize(score.cells, np.random.default_rng(SEED))
+    return tuple(_row(score, one) for one in found if one.scope == ALL)
+
+
+def _policy_run(items: Sequence[GroundingItem], name: str) -> PolicyRun:
+    kinds = {
+        (one.split, one.wordings, one.language_version, one.environment_version) for one in items
+    }
+    if len(kinds) != 1:
+        raise InvalidValueError(
+            "The items are of several splits, wordings or versions, which are not averaged; "
+            "export and score each by itself."
+        )
+    ((split, wordings, language, environment),) = kinds
+    conditions = EvalConditions(split, wordings=None if wordings == OWN_WORDS else wordings)
+    return PolicyRun(name, conditions, Versions(ANSWERS_VERSION, language, environment))
+
+
+def _score(
+    items: Sequence[GroundingItem], replies: Mapping[str, str], run: PolicyRun, kind: QuestionKind
+) -> GroundingScore:
+    judged = tuple(
+        JudgedItem(item, judge_reply(item, kind, replies[item.id]))
+        for item in items
+        if item.id in replies
+    )
+    verdicts: dict[CellKey, dict[Trial, bool]] = defaultdict(dict)
+    for item, verdict in judged:
+        verdicts[CellKey(run, item.task, item.options)][Trial(item.episode, 0)] = verdict.right
+    missing: dict[CellKey, int] = defaultdict(int)
+    for item in items:
+        missing[CellKey(run, item.task, item.options)] += item.id not in replies
+    cells = {
+        key: CellResults(verdicts.get(key, {}), missing=number) for key, number in missing.items()
+    }
+    return GroundingScore(run.policy, kind, judged, sort_cells(cells, [run]))
+
+
+def _row(score: GroundingScore, summary: SummaryRow) -> ScoreRow:
+    own = [one for one in score.judged if one.item.options == summary.options]
+    return ScoreRow(
+        summary,
+        chance=_mean_over_tasks((item, guess_chance(item, score.kind)) for item, _ in own),
+        command_chance=_mean_over_tasks((item, item.command_chance) for item, _ in own),
+        hidden=_hidden_share(own) if score.kind == "slots" else None,
+    )
+
+
+def _mean_over_tasks(values: Iterable[tuple[GroundingItem, float]]) -> float:
+    """Return the mean over tasks of the means, weighted as the rates are; 0 without values."""
+    by_task: dict[str, list[float]] = defaultdict(list)
+    for item, value in values:
+        by_task[item.task].append(value)
+    means = [float(np.mean(own)) for own in by_task.values()]
+    return float(np.mean(means)) if means else 0.0
+
+
+def _hidden_share(judged: Iterable[JudgedItem]) -> float | None:
+    shares = [verdict.parts[field] for item, verdict in judged for field in hidden_fields(item)]
+    return float(np.mean(shares)) if shares else None
+
+
+def hidden_fields(item: GroundingItem) -> tuple[str, ...]:
+    """Return the fields of the answer that the command leaves to its context.
+
+    An answer has a field for each amount, while the goal has two slots for all of them.
+    """
+    fields = json.loads(item.answer)
+    hidden = tuple(field for field in fields if field in item.hidden_slots)
+    amounts = not hidden and item.hidden_slots
+    return tuple(fields) if amounts else hidden

@@ -1,0 +1,276 @@
+"""Commands for demonstrations: ``roboirg export demonstrations`` and ``roboirg replay``."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, cast
+
+import typer
+
+from roboirg.cli.options import (
+    Distractor,
+    Forms,
+    Frame,
+    Reasoning,
+    Rival,
+    Settings,
+    Split,
+    Stages,
+    Tasks,
+    Wordings,
+    Workers,
+)
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.util.plurals import counted
+
+if TYPE_CHECKING:
+    from roboirg.demonstrations.export_plan import ExportPlan
+
+_LINE_EVERY = 10.0
+"""Seconds between two lines of progress where the output is no terminal."""
+
+
+def export_demonstrations(
+    out: Annotated[Path, typer.Option(help="Folder of the data set.")],
+    format: Annotated[  # noqa: A002
+        str, typer.Option(help="lerobot-v3, lerobot-v2.1 or robomme-hdf5.")
+    ] = "lerobot-v3",
+    split: Split = "train",
+    tasks: Tasks = "all",
+    episodes: Annotated[
+        str, typer.Option(help="all, 4 for the first four, or a list such as 0,3,5-9.")
+    ] = "all",
+    settings: Settings = "all",
+    forms: Forms = "implicit",
+    stages: Stages = "1-5",
+    distractor: Distractor = "neutral",
+    frame: Frame = "robot",
+    rival: Rival = "none",
+    reasoning: Reasoning = "plain",
+    wordings: Wordings = None,
+    delivery: Annotated[
+        str, typer.Option(help="prompt, or turns: in language columns and the table of episodes.")
+    ] = "prompt",
+    pictures: Annotated[
+        str, typer.Option(help="png or lossless-video, both without loss; lossy-video; or none.")
+    ] = "png",
+    video: Annotated[
+        str | None,
+        typer.Option(
+            help="Frames of the video: none, prefix (marked), or sidecar (a data set beside).  "
+            "(none; of robomme-hdf5 prefix)"
+        ),
+    ] = None,
+    names: Annotated[
+        str | None,
+        typer.Option(help="Names of the features: lerobot or openpi.  (by format)"),
+    ] = None,
+    actions: Annotated[
+        str, typer.Option(help="Further descriptions of actions: delta, pose, or both; or none.")
+    ] = "none",
+    variations: Annotated[
+        int, typer.Option(help="Trajectories per episode; all but the first vary.")
+    ] = 1,
+    policy: Annotated[
+        str, typer.Option(help="Who moves the robot; the words change nothing for the oracle.")
+    ] = "oracle",
+    outcomes: Annotated[str, typer.Option(help="successes or all.")] = "successes",
+    language_columns: Annotated[
+        bool, typer.Option(help="Add LeRobot's language columns; LeRobot 0.6 or later reads them.")
+    ] = False,
+    trajectories: Annotated[
+        Path | None,
+        typer.Option(help="Folder that keeps recorded trajectories for further exports."),
+    ] = None,
+    workers: Workers = None,
+    dry_run: Annotated[bool, typer.Option(help="Estimate the size and record nothing.")] = False,
+) -> None:
+    """Export demonstrations for training, recorded once per episode, told in every setting."""
+    from roboirg.core.instruction_options import InstructionOptions
+    from roboirg.demonstrations.export_plan import ExportPlan
+    from roboirg.demonstrations.export_run import run_export
+    from roboirg.demonstrations.size_estimate import size_text
+    from roboirg.evaluation.executors.executor import core_count
+    from roboirg.evaluation.plan_parsing import means_all, parse_names, parse_stages
+    from roboirg.language import FORMS, open_wordings
+    from roboirg.policies import load_policy_class
+    from roboirg.tasks import find_tasks
+
+    load_policy_class(policy)
+    options = InstructionOptions(
+        stages=parse_stages(stages),
+        distractor=distractor,
+        frame=frame,
+        wordings=open_wordings(wordings),
+        delivery=delivery,
+        rival=rival,
+        reasoning=reasoning,
+    )
+    # `validated` checks the names that are cast.
+    plan = ExportPlan(
+        tasks=tuple(find_tasks(parse_names("task", tasks))),
+        split=split,
+        episodes=_episodes(split, episodes),
+        settings=_settings(settings),
+        forms=FORMS if means_all(forms) else parse_names("form", forms),
+        options=options,
+        format=cast("Any", format),
+        pictures=cast("Any", pictures),
+        video=cast("Any", video or _default_video(format)),
+        names=cast("Any", names or _default_names(format, pictures)),
+        extra_actions=cast("Any", () if actions == "none" else parse_names("action", actions)),
+        variations=variations,
+        policy=policy,
+        outcomes=cast("Any", outcomes),
+        language_columns=language_columns,
+    ).validated()
+    _print_estimate(plan)
+    if dry_run:
+        return
+    count = core_count() if workers is None else workers
+    with _progress() as report:
+        summary = run_export(plan, out, count, report, trajectories)
+    ends = ", ".join(f"{number} {status}" for status, number in summary.statuses.items())
+    typer.echo(
+        f"{counted(summary.episodes, 'episode')}, {size_text(summary.size)}: {out} "
+        f"(trajectories: {ends})"
+    )
+
+
+def _episodes(split: str, text: str) -> tuple[int, ...]:
+    """Return the positions of episodes in a split."""
+    from roboirg.episodes.splits import SIZES, check_split
+    from roboirg.evaluation.plan_parsing import means_all, parse_episodes
+
+    size = SIZES[check_split(split)]
+    if not means_all(text):
+        return parse_episodes(text, split)
+    if split == "random":
+        raise InvalidValueError(
+            f"The split 'random' has {size:,} episodes; say how many with --episodes."
+        )
+    return tuple(range(size))
+
+
+def _settings(text: str) -> tuple[str, ...]:
+    """Return the names of settings."""
+    from roboirg.evaluation.plan_parsing import means_all, parse_names
+    from roboirg.language import setting_names
+
+    names = setting_names() if means_all(text) else parse_names("setting", text)
+    for name in names:
+        if name not in setting_names():
+            raise UnknownNameError("setting", name, setting_names())
+    return names
+
+
+def _default_video(format_name: str) -> str:
+    """Return how the video is treated unless the user says so."""
+    return "prefix" if format_name == "robomme-hdf5" else "none"
+
+
+def _default_names(format_name: str, pictures: str) -> str:
+    """Return openpi's names for the format with pictures in tables that only openpi reads."""
+    return "openpi" if (format_name, pictures) == ("lerobot-v2.1", "png") else "lerobot"
+
+
+def _print_estimate(plan: ExportPlan) -> None:
+    from roboirg.demonstrations.size_estimate import estimate_size, size_text
+
+    estimate = estimate_size(plan)
+    typer.echo(
+        f"{counted(estimate.trajectories, 'trajectory', 'trajectories')}, "
+        f"{counted(estimate.episodes, 'episode')}, about {estimate.frames:,} frames and "
+        f"{size_text(estimate.size)}",
+        err=True,
+    )
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[str, int, int, int], None]]:
+    """Show what is done, the time left and the size: a bar on a terminal, else a line at times."""
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    from roboirg.demonstrations.size_estimate import size_text
+
+    console = Console(stderr=True)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[size]}"),
+    )
+    started: dict[str, tuple[float, int]] = {}
+    last_line = 0.0
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as bar:
+        bars = {}
+
+        def report(kind: str, done: int, total: int, size: int) -> None:
+            nonlocal last_line
+            if kind not in bars:
+                bars[kind] = bar.add_task(kind, total=total, size="")
+                started[kind] = time.monotonic(), done
+            amount = size_text(size) if size else ""
+            bar.update(bars[kind], completed=done, total=total, size=amount)
+            now = time.monotonic()
+            if not console.is_terminal and (now - last_line > _LINE_EVERY or done == total):
+                last_line = now
+                left = _time_left(now, *started[kind], done, total)
+                console.print(f"{kind} {done}/{total} {left} {amount}".rstrip(), highlight=False)
+
+        yield report
+
+
+def _time_left(now: float, start: float, first: int, done: int, total: int) -> str:
+    """Return the time left at the rate so far, in words."""
+    if done in (total, first):
+        return ""
+    seconds = (now - start) / (done - first) * (total - done)
+    return f"{seconds / 60:.0f} min left" if seconds >= 60 else f"{seconds:.0f} s left"  # noqa: PLR2004
+
+
+def replay(
+    dataset: Annotated[
+        Path,
+        typer.Argument(help="Folder of an export, or of RoboMME's HDF5 files, or such a file."),
+    ],
+    workers: Workers = None,
+) -> None:
+    """Execute the actions of a data set in the simulator, and compare states and verdicts."""
+    from collections import Counter
+
+    from roboirg.demonstrations.dataset_replay import TOLERANCE, replay_dataset
+    from roboirg.evaluation.executors.executor import core_count
+
+    count, largest = Counter[str](), 0.0
+    for one in replay_dataset(dataset, core_count() if workers is None else workers):
+        count["trajectories"] += 1
+        count["same verdict"] += one.status == one.recorded_status
+        count["agree"] += one.agrees
+        largest = max(largest, one.final)
+        if not one.agrees:
+            typer.echo(
+                f"{one.name}: {one.status} after {one.steps} of {one.recorded_steps} steps "
+                f"(recorded: {one.recorded_status}); final state differs by {one.final:.2g}, "
+                f"any by at most {one.largest:.2g}"
+            )
+    typer.echo(
+        f"{counted(count['trajectories'], 'trajectory', 'trajectories')}: {count['same verdict']} "
+        f"with the same verdict, {count['agree']} also with a final state within {TOLERANCE:g} "
+        f"(largest difference {largest:.2g})"
+    )
+    if count["agree"] < count["trajectories"]:
+        raise typer.Exit(1)

@@ -1,0 +1,1 @@
+"""Demonstrations for training: recorded once per episode, written in the trainers' formats."""

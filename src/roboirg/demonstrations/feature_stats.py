@@ -1,0 +1,81 @@
+"""Statistics of a data set's features, as LeRobot stores them, computed in one pass."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+QUANTILES: Mapping[str, float] = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
+PICTURE_PIXELS = 256 * 256
+_MAX_VALUE = 255.0
+
+FeatureStats = dict[str, list[Any]]
+"""Nested lists by statistic: min, max, mean, std, count and the quantiles."""
+
+
+def vector_stats(values: NDArray[Any]) -> FeatureStats:
+    """Return the statistics of a feature over its frames.
+
+    Args:
+        values: (frames, size), frames >= 1.
+
+    Returns:
+        Lists of `size` numbers, and `count`, a list with the number of frames.
+    """
+    numbers = values.astype(np.float64)
+    found = {
+        "min": numbers.min(axis=0),
+        "max": numbers.max(axis=0),
+        "mean": numbers.mean(axis=0),
+        "std": numbers.std(axis=0),
+        **dict(zip(QUANTILES, np.quantile(numbers, list(QUANTILES.values()), axis=0), strict=True)),
+    }
+    stats: FeatureStats = {name: array.tolist() for name, array in found.items()}
+    return stats | {"count": [len(numbers)]}
+
+
+def picture_stats(counts: NDArray[np.int64]) -> FeatureStats:
+    """Return the statistics of all pixels of a camera, exactly, from the counts of their values.
+
+    Args:
+        counts: (3, 256) how often each value occurs in each channel.
+
+    Returns:
+        Nested lists (3, 1, 1) in 0 to 1, and `count`, a list with the number of pictures.
+    """
+    channels = [_channel_stats(channel) for channel in counts]
+    stats: FeatureStats = {
+        name: [[[channel[name] / _MAX_VALUE]] for channel in channels] for name in channels[0]
+    }
+    return stats | {"count": [int(counts[0].sum()) // PICTURE_PIXELS]}
+
+
+def _channel_stats(counts: NDArray[np.int64]) -> dict[str, float]:
+    values, total = np.arange(len(counts), dtype=np.float64), int(counts.sum())
+    present = np.flatnonzero(counts)
+    mean = float(counts @ values) / total
+    spread = float(counts @ (values - mean) ** 2) / total
+    return {
+        "min": float(present[0]),
+        "max": float(present[-1]),
+        "mean": mean,
+        "std": spread**0.5,
+        **{name: _quantile(counts, share) for name, share in QUANTILES.items()},
+    }
+
+
+def _quantile(counts: NDArray[np.int64], share: float) -> float:
+    """Return the quantile of counted values, with linear interpolation as in NumPy."""
+    ends = np.cumsum(counts)
+    place = (int(ends[-1]) - 1) * share
+    below = int(np.floor(place))
+    low, high = np.searchsorted(ends, [below, min(below + 1, int(ends[-1]) - 1)], side="right")
+    return float(low + (place - below) * (high - low))
+
+
+def gather_vectors(parts: Sequence[NDArray[Any]]) -> FeatureStats:
+    """Return the statistics of a feature over the frames of several arrays (frames, size)."""
+    return vector_stats(np.concatenate(parts))

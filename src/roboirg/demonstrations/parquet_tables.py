@@ -1,0 +1,115 @@
+"""Tables in Parquet: frames with their pictures, and tables of facts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.errors import MissingDependencyError
+from roboirg.util.atomic_write import replacing
+
+_DICTIONARY_LIMIT = 2**30
+"""Bytes of pictures that a file stores once although several instructions refer to them."""
+
+
+def check_parquet_support() -> None:
+    """Check early that Parquet files can be written.
+
+    Raises:
+        MissingDependencyError: pyarrow is not installed.
+    """
+    try:
+        import pyarrow.parquet  # noqa: F401
+    except ImportError as error:
+        raise MissingDependencyError(
+            "LeRobot's formats need pyarrow: pip install 'roboirgbench[export]'."
+        ) from error
+
+
+def number_column(values: NDArray[Any]) -> Any:  # noqa: ANN401 - pyarrow ships no types
+    """Return numbers (frames, size) as a column: plain for size 1, else lists of fixed size."""
+    import pyarrow as pa
+
+    if values.shape[1] == 1:
+        return pa.array(np.ascontiguousarray(values[:, 0]))
+    flat = pa.array(np.ascontiguousarray(values).ravel())
+    return pa.FixedSizeListArray.from_arrays(flat, values.shape[1])
+
+
+def picture_column(pictures: Sequence[bytes]) -> Any:  # noqa: ANN401
+    """Return PNGs as a column of ``{bytes, path}``, as Hugging Face's `datasets` reads it."""
+    import pyarrow as pa
+
+    paths = pa.array([f"{row:06d}.png" for row in range(len(pictures))], pa.string())
+    return pa.StructArray.from_arrays([pa.array(pictures, pa.binary()), paths], ["bytes", "path"])
+
+
+def text_column(texts: Sequence[str]) -> Any:  # noqa: ANN401
+    """Return texts as a column."""
+    import pyarrow as pa
+
+    return pa.array(texts, pa.string())
+
+
+def write_frames(
+    path: Path,
+    order: Sequence[str],
+    shared: Mapping[str, Any],
+    own: Sequence[Mapping[str, Any]],
+    pictures: Sequence[str],
+) -> None:
+    """Write the frames of one trajectory, once for each of its instructions.
+
+    Pictures are stored once, whatever the number of instructions.
+
+    Args:
+        path: file to write.
+        order: names of the columns.
+        shared: columns that are the same for every instruction.
+        own: for each instruction its other columns.
+        pictures: names of the columns that hold pictures.
+    """
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    tables = [pa.table({name: {**shared, **one}[name] for name in order}) for one in own]
+    table = pa.concat_tables(tables)
+    repeated = [f"{name}.bytes" for name in pictures] if len(own) > 1 else []
+    texts = [name for name in order if pa.types.is_string(table.schema.field(name).type)]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as part:
+        parquet.write_table(
+            table,
+            part,
+            compression={
+                **dict.fromkeys(order, "snappy"),
+                **{f"{name}.bytes": "none" for name in pictures},
+                **{f"{name}.path": "snappy" for name in pictures},
+            },
+            use_dictionary=[*repeated, *texts],
+            dictionary_pagesize_limit=_DICTIONARY_LIMIT,
+            row_group_size=max(len(table), 1),
+            write_statistics=[name for name in order if name not in pictures],
+        )
+
+
+def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write a table of facts, with types as inferred from all rows."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as part:
+        parquet.write_table(pa.Table.from_pylist([dict(one) for one in rows]), part)
+
+
+def read_rows(path: Path) -> list[dict[str, Any]]:
+    """Return the rows of a table."""
+    from pyarrow import parquet
+
+    rows: list[dict[str, Any]] = parquet.read_table(path).to_pylist()
+    return rows

@@ -1,0 +1,262 @@
+"""A recorded trajectory: one file per episode, from which every format is written.
+
+The file is a ZIP archive without compression: ``facts.json``, an array per name as ``NAME.npy``,
+and the pictures as ``CAMERA/000000.png`` or ``CAMERA.mp4``. It appears whole or not at all.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.observations import CAMERAS
+from roboirg.util.atomic_write import replacing
+
+TRAJECTORY_VERSION = 1
+"""Increases with any change of what a file holds."""
+SUFFIX = ".zip"
+
+PictureCoding = Literal["png", "lossless-video", "lossy-video", "none"]
+
+_FACTS = "facts.json"
+_ARRAY = ".npy"
+
+
+@dataclass(frozen=True)
+class TrajectoryFacts:
+    """What identifies a trajectory, and how it ended.
+
+    Attributes:
+        task: name of the task.
+        split: of the episode.
+        episode: position in the split.
+        seed: of the scene.
+        difficulty: of the scene.
+        variation: 0 is the oracle's own way, others differ from it by their seeds.
+        policy: who moved the robot.
+        status: success, failure or timeout.
+        cause: why it is no success; empty for a success.
+        video_length: rows of the video before the policy's first observation.
+        steps: control steps of the policy.
+        demonstration_source: who moved the robot in the video: recorded, planned or none.
+        environment_version: of scenes, rules and physics.
+        coding: how the pictures are stored.
+        depth: whether depth and calibration are stored.
+        picture_error: of a lossy video, for each camera the mean absolute error, the largest error
+            (both of 255) and the PSNR (dB), over all of its frames; empty if lossless.
+        version: of the file.
+    """
+
+    task: str
+    split: str
+    episode: int
+    seed: int
+    difficulty: str
+    variation: int
+    policy: str
+    status: str
+    cause: str
+    video_length: int
+    steps: int
+    demonstration_source: str
+    environment_version: int
+    coding: PictureCoding
+    depth: bool
+    picture_error: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    version: int = TRAJECTORY_VERSION
+
+    @property
+    def rows(self) -> int:
+        """Number of observations: of the video, the policy's first, and one after each step."""
+        return self.video_length + 1 + self.steps
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """One episode as it was played, without its pictures, which stay in the file.
+
+    Row r is an observation, and ``actions[r]`` is the action that led to it. First come the rows of
+    the video, then the policy's first observation (after a step at home), then one for each step of
+    the policy.
+
+    Attributes:
+        path: of the file.
+        facts: what identifies it.
+        joint_positions: (rows, 7) float32, rad.
+        gripper: (rows, 2) float32 finger positions, m.
+        end_effector: (rows, 6) float64: position (m) and unwrapped extrinsic x-y-z angles (rad) of
+            the tool in the world frame.
+        actions: (rows, 8) float64: joint targets (rad) and the gripper, +1 open to -1 closed; each
+            value is that of a float32.
+        pose_actions: (rows, 7) float64: the tool's pose at those joint targets, as `end_effector`,
+            and the gripper.
+        subgoals: (rows,) texts: what the robot was doing in the step that led to the row.
+        online_subgoals: (rows,) texts: what had to happen next, by the judge.
+        grounded_subgoals: as `subgoals`, with the pixel of the object.
+        grounded_online_subgoals: as `online_subgoals`, with the pixel of the object.
+        histograms: for each camera (2, 3, 256) int64: how often each value of red, green and blue
+            occurs in the video, and in the policy's rows without the last, after which no action
+            follows.
+        calibration: ``front_extrinsic`` (rows, 3, 4), ``front_intrinsic`` (3, 3) and the same for
+            the wrist, float32; empty without depth.
+    """
+
+    path: Path
+    facts: TrajectoryFacts
+    joint_positions: NDArray[np.float32]
+    gripper: NDArray[np.float32]
+    end_effector: NDArray[np.float64]
+    actions: NDArray[np.float64]
+    pose_actions: NDArray[np.float64]
+    subgoals: NDArray[np.str_]
+    online_subgoals: NDArray[np.str_]
+    grounded_subgoals: NDArray[np.str_]
+    grounded_online_subgoals: NDArray[np.str_]
+    histograms: Mapping[str, NDArray[np.int64]]
+    calibration: Mapping[str, NDArray[np.float32]]
+
+    @property
+    def state(self) -> NDArray[np.float32]:
+        """(rows, 8): the joints and the first finger, as policies of LeRobot and openpi get it."""
+        return np.column_stack([self.joint_positions, self.gripper[:, 0]])
+
+
+def load_trajectory(path: Path) -> Trajectory:
+    """Read a trajectory without its pictures.
+
+    Raises:
+        InvalidValueError: the file is missing or damaged, or of another version.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            facts = _read_facts(archive, path)
+            arrays = {
+                name.removesuffix(_ARRAY): _read_array(archive, name)
+                for name in archive.namelist()
+                if name.endswith(_ARRAY)
+            }
+    except (OSError, zipfile.BadZipFile, ValueError, KeyError) as error:
+        raise InvalidValueError(f"The trajectory {str(path)!r} cannot be read: {error}.") from error
+    histograms = {one: arrays.pop(f"{one}_histogram") for one in CAMERAS}
+    matrices = [name for name in arrays if name.endswith(("_extrinsic", "_intrinsic"))]
+    calibration = {name: arrays.pop(name) for name in matrices}
+    return Trajectory(path, facts, histograms=histograms, calibration=calibration, **arrays)
+
+
+def load_facts(path: Path) -> TrajectoryFacts:
+    """Read what identifies a trajectory.
+
+    Raises:
+        InvalidValueError: the file is missing or damaged, or of another version.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return _read_facts(archive, path)
+    except (OSError, zipfile.BadZipFile, ValueError, KeyError) as error:
+        raise InvalidValueError(f"The trajectory {str(path)!r} cannot be read: {error}.") from error
+
+
+def _read_facts(archive: zipfile.ZipFile, path: Path) -> TrajectoryFacts:
+    fields = json.loads(archive.read(_FACTS))
+    if fields.get("version") != TRAJECTORY_VERSION:
+        raise InvalidValueError(
+            f"{str(path)!r} is a trajectory of version {fields.get('version')}; "
+            f"this package reads version {TRAJECTORY_VERSION}. Delete it to record it again."
+        )
+    return TrajectoryFacts(**fields)
+
+
+def _read_array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+    array: NDArray[Any] = np.load(io.BytesIO(archive.read(name)), allow_pickle=False)
+    return array
+
+
+class TrajectoryFile:
+    """Writes one trajectory; pictures go to the disk as they come.
+
+    Args:
+        archive: the open archive.
+    """
+
+    def __init__(self, archive: zipfile.ZipFile) -> None:
+        self._archive = archive
+
+    def add_file(self, name: str, content: bytes) -> None:
+        """Add an encoded picture or a video under its name."""
+        self._archive.writestr(name, content)
+
+    def finish(self, facts: TrajectoryFacts, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Add the arrays and the facts."""
+        for name, array in arrays.items():
+            file = io.BytesIO()
+            np.save(file, array, allow_pickle=False)
+            self._archive.writestr(name + _ARRAY, file.getvalue())
+        self._archive.writestr(_FACTS, json.dumps(asdict(facts)))
+
+
+def picture_name(track: str, row: int) -> str:
+    """Return the name of one PNG of a track: a camera, or ``CAMERA_depth``."""
+    return f"{track}/{row:06d}.png"
+
+
+class PictureFile:
+    """The pictures of one trajectory, read from its open file.
+
+    Args:
+        archive: the open archive.
+    """
+
+    def __init__(self, archive: zipfile.ZipFile) -> None:
+        self._archive = archive
+
+    def encoded(self, track: str, row: int) -> bytes:
+        """Return the PNG of a row of a track: a camera, or ``CAMERA_depth``."""
+        return self._archive.read(picture_name(track, row))
+
+    def picture(self, camera: str, row: int) -> NDArray[np.uint8]:
+        """Return a row's picture, RGB, (256, 256, 3)."""
+        data = np.frombuffer(self.encoded(camera, row), np.uint8)
+        found = np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR))
+        return np.asarray(cv2.cvtColor(found, cv2.COLOR_BGR2RGB), dtype=np.uint8)
+
+    def depth(self, camera: str, row: int) -> NDArray[np.int16]:
+        """Return a row's depth, mm, (256, 256, 1)."""
+        data = np.frombuffer(self.encoded(f"{camera}_depth", row), np.uint8)
+        found = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
+        return np.asarray(found).astype(np.int16)[..., None]
+
+    def video(self, name: str) -> bytes:
+        """Return an encoded video."""
+        return self._archive.read(name)
+
+
+def drop_pictures(path: Path) -> None:
+    """Replace a trajectory's file by one without pictures; does nothing if it has none."""
+    with zipfile.ZipFile(path) as archive:
+        kept = [name for name in archive.namelist() if name.endswith(_ARRAY) or name == _FACTS]
+        if len(kept) == len(archive.namelist()):
+            return
+        with replacing(path) as part, zipfile.ZipFile(part, "w") as smaller:
+            for name in kept:
+                smaller.writestr(name, archive.read(name))
+
+
+def has_pictures(path: Path) -> bool:
+    """Return whether a trajectory's file holds pictures."""
+    with zipfile.ZipFile(path) as archive:
+        return any(not name.endswith((_ARRAY, _FACTS)) for name in archive.namelist())
+
+
+def stack_texts(texts: Sequence[str]) -> NDArray[np.str_]:
+    """Return texts as an array that needs no pickle."""
+    return np.array(texts, dtype=np.str_)

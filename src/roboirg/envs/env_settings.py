@@ -1,0 +1,147 @@
+"""The options of an environment with their defaults, and which of them a reset may change."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from roboirg.core.actions import JOINT_ANGLE
+from roboirg.core.episode import Episode
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.instruction_options import (
+    ALL_STAGES,
+    DEFAULT_DELIVERY,
+    DEFAULT_DISTRACTOR,
+    DEFAULT_DISTRACTORS,
+    DEFAULT_FRAME,
+    DEFAULT_REASONING,
+    DEFAULT_RIVAL,
+    InstructionOptions,
+)
+from roboirg.core.observations import CAMERAS, DemonstrationFrames
+from roboirg.episodes.splits import SIZES, check_split, get_episode
+from roboirg.language.wordings.wording_store import open_wordings
+from roboirg.simulation.observation_builder import ObservationSpec
+from roboirg.simulation.rendering.render_settings import find_render_settings
+
+MAX_STEPS = 1300
+"""Control steps a policy has, as in RoboMME's published experiments."""
+RENDER_MODES = ("rgb_array",)
+RESET_OPTIONS = ("split", "episode", *InstructionOptions._fields)
+"""Options that `reset` takes: which episode is played, and in which words."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EnvSettings:
+    """Options of an environment; `roboirg.make` documents them.
+
+    Raises:
+        UnknownNameError: there is no such render mode.
+        InvalidValueError: `max_steps` is no positive integer.
+    """
+
+    setting: str = "explicit"
+    form: str = "implicit"
+    split: str = "test"
+    episode: int | None = 0
+    stages: Sequence[int] = ALL_STAGES
+    distractor: str = DEFAULT_DISTRACTOR
+    distractors: int = DEFAULT_DISTRACTORS
+    frame: str = DEFAULT_FRAME
+    wordings: str | Path | None = None
+    delivery: str = DEFAULT_DELIVERY
+    rival: str = DEFAULT_RIVAL
+    reasoning: str = DEFAULT_REASONING
+    actions: str = JOINT_ANGLE.name
+    cameras: Sequence[str] = CAMERAS
+    depth: bool = False
+    calibration: bool = False
+    grounded: bool = False
+    demonstration_frames: DemonstrationFrames = "all"
+    observe_every: int | None = None
+    history_cameras: Sequence[str] | None = None
+    meshes: str = "faithful"
+    max_steps: int = MAX_STEPS
+    render_mode: str | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.max_steps, int) or self.max_steps < 1:
+            raise InvalidValueError(f"max_steps is {self.max_steps!r}; it must be an integer >= 1.")
+        if self.render_mode is not None and self.render_mode not in RENDER_MODES:
+            raise UnknownNameError("render mode", self.render_mode, RENDER_MODES)
+
+    @property
+    def episodes(self) -> int:
+        """Number of episodes in the split.
+
+        Raises:
+            UnknownNameError: there is no such split.
+        """
+        return SIZES[check_split(self.split)]
+
+    def instruction_options(self) -> InstructionOptions:
+        """Return the options of the instruction; opens the wording file.
+
+        Raises:
+            InvalidValueError: the wording file cannot be read.
+        """
+        values = {name: getattr(self, name) for name in InstructionOptions._fields}
+        words = {"stages": tuple(self.stages), "wordings": open_wordings(self.wordings)}
+        return InstructionOptions(**{**values, **words})
+
+    def observation_spec(self) -> ObservationSpec:
+        """Return the fields of observations and of the video.
+
+        Raises:
+            UnknownNameError: a camera or kind of meshes does not exist.
+            InvalidValueError: a value is invalid.
+        """
+        return ObservationSpec(
+            self.cameras,
+            self.depth,
+            self.calibration,
+            self.demonstration_frames,
+            self.observe_every,
+            self.history_cameras,
+            find_render_settings(self.meshes),
+        ).validated()
+
+    def with_reset_options(self, options: Mapping[str, Any]) -> EnvSettings:
+        """Return the settings of one reset.
+
+        Raises:
+            UnknownNameError: an option is not one that a reset may change.
+        """
+        for name in options:
+            if name not in RESET_OPTIONS:
+                raise UnknownNameError("reset option", name, RESET_OPTIONS)
+        return replace(self, **options)
+
+    def find_episode(self, task: str | Episode, index: int) -> Episode:
+        """Return the episode to play: number `index`, or `task` itself if it is an episode.
+
+        Raises:
+            UnknownNameError: there is no such task or split.
+            InvalidValueError: the split has no episode of that number.
+        """
+        return task if isinstance(task, Episode) else get_episode(task, self.split, index)
+
+
+def choose_index(settings: EnvSettings, seed: int | None, last: int | None) -> int:
+    """Return the number of the episode that a reset plays.
+
+    Args:
+        settings: of the reset. If they name an episode, it is that one.
+        seed: of the reset. Without a named episode, ``seed % episodes`` is played.
+        last: the episode played before; without a seed, the next one is played, from 0 on.
+
+    Raises:
+        UnknownNameError: there is no such split.
+    """
+    if settings.episode is not None:
+        return settings.episode
+    if seed is not None:
+        return seed % settings.episodes
+    return 0 if last is None else (last + 1) % settings.episodes

@@ -1,0 +1,77 @@
+"""The observation space, with a text that survives Gymnasium's shared memory."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector.utils import shared_memory
+
+from roboirg.simulation.observation_builder import (
+    ObservationSpec,
+    history_space,
+    observation_space,
+)
+
+MAX_INSTRUCTION_LENGTH = 100_000
+PRINTABLE = "".join(chr(code) for code in range(32, 127))
+
+
+class InstructionSpace(spaces.Text):
+    """Printable ASCII text of up to `MAX_INSTRUCTION_LENGTH` characters.
+
+    `gymnasium.vector.AsyncVectorEnv` reads its shared memory only once: arrays are views of it, but
+    of any `Text` only blanks are ever returned. The functions below make a view of texts.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(MAX_INSTRUCTION_LENGTH, charset=PRINTABLE)
+
+
+class _TextView(Sequence[str]):
+    """The texts in a block of shared memory, one for each environment; copies are tuples."""
+
+    def __init__(self, block: Any) -> None:  # noqa: ANN401 - a synchronized array of ctypes
+        bytes_of_all = np.frombuffer(block.get_obj(), np.uint8)
+        self.rows = bytes_of_all.reshape(-1, MAX_INSTRUCTION_LENGTH)
+
+    def __getitem__(self, index: Any) -> Any:  # noqa: ANN401 - as the Sequence protocol has it
+        if isinstance(index, slice):
+            return tuple(self)[index]
+        return self.rows[index].tobytes().rstrip(b"\0").decode("ascii")
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __deepcopy__(self, memo: object) -> tuple[str, ...]:
+        return tuple(self)
+
+
+@shared_memory.create_shared_memory.register(InstructionSpace)
+def _create(space: InstructionSpace, n: int = 1, ctx: Any = None) -> Any:  # noqa: ANN401, ARG001
+    return ctx.Array(ctypes.c_uint8, n * MAX_INSTRUCTION_LENGTH)
+
+
+@shared_memory.write_to_shared_memory.register(InstructionSpace)
+def _write(space: InstructionSpace, index: int, values: str, block: Any) -> None:  # noqa: ANN401, ARG001
+    text, row = values.encode("ascii"), _TextView(block).rows[index]
+    row[: len(text)] = np.frombuffer(text, np.uint8)
+    row[len(text) :] = 0
+
+
+@shared_memory.read_from_shared_memory.register(InstructionSpace)
+def _read(space: InstructionSpace, block: Any, n: int = 1) -> _TextView:  # noqa: ANN401, ARG001
+    return _TextView(block)
+
+
+def make_observation_space(spec: ObservationSpec) -> spaces.Dict:
+    """Return the space of the observations of an environment."""
+    instruction = InstructionSpace()
+    fields = {**observation_space(spec), "instruction": instruction}
+    if spec.observe_every is not None:
+        entry = spaces.Dict({**history_space(spec), "instruction": instruction})
+        fields["history"] = spaces.Sequence(entry)
+    return spaces.Dict(fields)

@@ -1,0 +1,137 @@
+"""Answers of those who do not look: oracle, chance, the command alone, shortcuts, words alone."""
+
+from __future__ import annotations
+
+import functools
+import json
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+import numpy as np
+
+from roboirg.core.episode import Episode, Goal
+from roboirg.core.errors import UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.episodes.splits import get_episode, split_episodes
+from roboirg.evaluation.grounding_set.answer_file import Answer
+from roboirg.evaluation.grounding_set.grounding_item import LETTERS, GroundingItem
+from roboirg.evaluation.grounding_set.verdicts import right_reply
+from roboirg.language.command_chance import fitting_goals
+from roboirg.language.settings import EXPLICIT
+from roboirg.language.shortcuts import SURFACE_RULES, draw_goal, guess_goal
+from roboirg.language.shortcuts.learned_floor import LearnedFloor, places_of
+from roboirg.language.shortcuts.shortcut_tables import TRAINING_SPLIT
+from roboirg.language.variants import instructions
+from roboirg.policies.planning.goal_schema import goal_schema
+from roboirg.tasks import get_task
+
+ORACLE, CHANCE, COMMAND = "oracle", "chance", "command"
+LEARNED_EXPLICIT, LEARNED_SETTING = "words-explicit", "words-setting"
+
+Guess = Callable[[GroundingItem, Episode, np.random.Generator], Goal | None]
+"""Returns the goal that an item is taken to mean; None for none of the scene."""
+
+
+def floor_answers(name: str, items: Sequence[GroundingItem], seed: int = 0) -> Iterator[Answer]:
+    """Yield the answers of a floor to slots and choices; of oracle and chance also to points.
+
+    A choice is that of the goal that was guessed, or a random one if it is not among them. Random
+    numbers depend on seed and item alone.
+
+    Args:
+        name: of `FLOORS`.
+        items: questions.
+        seed: of all random choices.
+
+    Raises:
+        UnknownNameError: there is no such floor.
+        MissingDependencyError: a learned floor is wanted, and scikit-learn is not installed.
+    """
+    if name not in FLOORS:
+        raise UnknownNameError("floor", name, FLOORS)
+    learned = _learn(items, name) if name in (LEARNED_EXPLICIT, LEARNED_SETTING) else {}
+    for item in items:
+        rng = np.random.default_rng([seed, zlib.crc32(f"{name} {item.id}".encode())])
+        if name == ORACLE:
+            for kind in ("slots", "choice", "points"):
+                yield Answer(item.id, kind, right_reply(item, kind))
+            continue
+        if learned:
+            yield from _goal_answers(item, learned[item.id], rng)
+            continue
+        episode = get_episode(item.task, item.split, item.episode)
+        yield from _goal_answers(item, _GUESSES[name](item, episode, rng), rng)
+        if name == CHANCE:
+            yield Answer(item.id, "points", _random_points(item, rng))
+
+
+def _goal_answers(
+    item: GroundingItem, goal: Goal | None, rng: np.random.Generator
+) -> Iterator[Answer]:
+    answer = None if goal is None else goal_schema(item.task).answers[goal]
+    yield Answer(item.id, "slots", answer or "")
+    if answer in item.choice_answers:
+        place = item.choice_answers.index(answer)
+    else:
+        place = int(rng.integers(len(item.choices)))
+    yield Answer(item.id, "choice", LETTERS[place])
+
+
+def _random_points(item: GroundingItem, rng: np.random.Generator) -> str:
+    found = []
+    for point in item.points:
+        height, width = point.size
+        found.append({"x": int(rng.integers(width)), "y": int(rng.integers(height))})
+    return json.dumps({"points": found})
+
+
+def _random_goal(_item: GroundingItem, episode: Episode, rng: np.random.Generator) -> Goal:
+    goals = get_task(episode.task).goals(episode.scene)
+    return goals[int(rng.integers(len(goals)))]
+
+
+def _command_goal(item: GroundingItem, episode: Episode, rng: np.random.Generator) -> Goal:
+    goals = fitting_goals(item.turns[-1], episode)
+    return goals[int(rng.integers(len(goals)))]
+
+
+def _rule_goal(
+    rule: str, item: GroundingItem, episode: Episode, rng: np.random.Generator
+) -> Goal | None:
+    return draw_goal(guess_goal(rule, item.text, item.task), episode, rng)
+
+
+_GUESSES: Mapping[str, Guess] = {
+    CHANCE: _random_goal,
+    COMMAND: _command_goal,
+    **{rule: functools.partial(_rule_goal, rule) for rule in SURFACE_RULES},
+}
+
+FLOORS = (ORACLE, *_GUESSES, LEARNED_EXPLICIT, LEARNED_SETTING)
+"""Names: the truth; a goal of the scene at random; one that fits the command alone; the surface
+rules; and classifiers of words, trained on explicit instructions or those of the same options."""
+
+
+def _learn(items: Sequence[GroundingItem], name: str) -> dict[str, Goal | None]:
+    """Return what a floor that learned from the words of the train split makes of each item."""
+    groups: dict[tuple[str, InstructionOptions], list[GroundingItem]] = {}
+    for item in items:
+        groups.setdefault((item.task, item.options), []).append(item)
+    found: dict[str, Goal | None] = {}
+    for (task, options), members in groups.items():
+        wanted = InstructionOptions(EXPLICIT) if name == LEARNED_EXPLICIT else options
+        predicted = _trained(task, wanted).predict([item.text for item in members])
+        goals = {
+            tuple(map(str, places_of(goal.as_mapping(), task).values())): goal
+            for goal in goal_schema(task).answers
+        }
+        for item, places in zip(members, predicted, strict=True):
+            found[item.id] = goals.get(tuple(places.values()))
+    return found
+
+
+@functools.lru_cache(maxsize=256)
+def _trained(task: str, options: InstructionOptions) -> LearnedFloor:
+    episodes = split_episodes([task], [TRAINING_SPLIT])
+    told = instructions(episodes, (options.setting,), (options.form,), options)
+    return LearnedFloor(list(told))

@@ -1,0 +1,77 @@
+"""Multiple choice: the goal that is meant among goals that the command alone leaves open."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from roboirg.core.episode import Episode, Goal
+from roboirg.language import instruct
+from roboirg.language.command_chance import blind_goals, is_right
+from roboirg.language.instruction import Instruction
+from roboirg.tasks import get_task
+
+MOST = 4
+_BLOCK = 12
+"""Neighboring episodes among which the right choice has every place equally often; 12 can be
+divided by every number of choices."""
+
+
+class GoalChoices(NamedTuple):
+    """The choices of an item.
+
+    Attributes:
+        goals: two to four goals of the scene, or one if it has no other.
+        right: index of the goal that is meant.
+    """
+
+    goals: tuple[Goal, ...]
+    right: int
+
+
+def draw_choices(episode: Episode, instruction: Instruction, identity: str) -> GoalChoices:
+    """Return the choices, in an order that does not depend on the goal.
+
+    The others are goals that fit the command alone: who ignores its context can only guess. Where
+    the command leaves none, they are goals with as many values, or any goals of the scene.
+
+    Args:
+        episode: the episode.
+        instruction: what is said.
+        identity: of the item; equal identities have equal choices.
+    """
+    wrong = _wrong_goals(episode, instruction)
+    drawn = _generator("goals", identity).permutation(len(wrong))[: MOST - 1]
+    others = [wrong[index] for index in drawn]
+    block, place = divmod(episode.index, _BLOCK)
+    group = (episode.task, episode.split, repr(instruction.setting), instruction.form, str(block))
+    right = int(_generator("place", *group).permutation(_BLOCK)[place]) % (len(others) + 1)
+    return GoalChoices((*others[:right], episode.goal, *others[right:]), right)
+
+
+def explicit_command(episode: Episode, goal: Goal, pool: str) -> str:
+    """Return the explicit command of a goal of the scene, in words of a pool."""
+    stages = get_task(episode.task).stages(episode.scene, goal)
+    return instruct(replace(episode, goal=goal, stages=stages), "explicit", wordings=pool).text
+
+
+def _wrong_goals(episode: Episode, instruction: Instruction) -> Sequence[Goal]:
+    every = [
+        goal for goal in get_task(episode.task).goals(episode.scene) if not is_right(goal, episode)
+    ]
+    blind = set(blind_goals(instruction, episode))
+    alike = [goal for goal in every if _shape(goal) == _shape(episode.goal)]
+    return [goal for goal in every if goal in blind] or alike or every
+
+
+def _shape(goal: Goal) -> tuple[int, ...]:
+    return tuple(len(value) if isinstance(value, tuple) else 1 for _, value in goal.slots)
+
+
+def _generator(*parts: str) -> np.random.Generator:
+    digest = hashlib.sha256("\n".join(parts).encode()).digest()
+    return np.random.default_rng(int.from_bytes(digest[:16]))

@@ -1,0 +1,1 @@
+"""RoboIRGBench in Inspect: ``inspect eval roboirg/listener --model openai/gpt-4o``."""

@@ -1,0 +1,86 @@
+"""A process that plays one episode of the VLM listener; its model is asked in the parent."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from multiprocessing.connection import Connection
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from roboirg.core.errors import PolicyConnectionError
+from roboirg.policies.planning.models import ModelOptions, ModelQuery, ModelReply
+from roboirg.policies.planning.models.openai_compatible import chat_messages
+from roboirg.policies.planning.vlm_listener import ListenerOptions, VLMListener
+from roboirg.records.record import Job
+from roboirg.util.child_process import exit_with_parent
+
+if TYPE_CHECKING:
+    Pipe = Connection[Any, Any]
+    """Not at run time: before Python 3.13 the class takes no parameters."""
+
+
+class ModelRequest(NamedTuple):
+    """A query on its way to the parent.
+
+    Attributes:
+        messages: as OpenAI's chat completions take them.
+        schema: JSON schema of the reply; None for free text.
+    """
+
+    messages: list[dict[str, Any]]
+    schema: Mapping[str, Any] | None
+
+
+class PipeModel:
+    """A model behind a pipe.
+
+    Args:
+        pipe: to the parent.
+        options: how clips are sent.
+    """
+
+    def __init__(self, pipe: Pipe, options: ModelOptions) -> None:
+        self._pipe, self._options = pipe, options
+
+    def answer(self, query: ModelQuery) -> ModelReply:
+        """Return the parent's reply; see `Model`."""
+        self._pipe.send(ModelRequest(chat_messages(query, self._options), query.schema))
+        try:
+            return ModelReply(*self._pipe.recv())
+        except EOFError as error:
+            raise PolicyConnectionError("Inspect ended the episode.") from error
+
+    def close(self) -> None:
+        """Do nothing; the pipe ends with the process."""
+
+
+class PipedListener(VLMListener):
+    """The VLM listener of this process."""
+
+    pipe: Pipe
+    chosen: ListenerOptions
+
+    def __init__(self, seed: int = 0) -> None:
+        super().__init__(self.chosen, seed, lambda options: PipeModel(self.pipe, options))
+
+
+def play(pipe: Pipe, job: Job, options: ListenerOptions, parent: int) -> None:
+    """Play an episode; send model requests, and at last its record as JSON text.
+
+    Args:
+        pipe: to the parent.
+        job: the episode; its policy's spec is `PipedListener`.
+        options: of the listener.
+        parent: process id of the parent.
+    """
+    from roboirg.evaluation.rollout import play_episode
+    from roboirg.evaluation.rollout_result import make_record, utc_now
+
+    exit_with_parent(parent)
+    PipedListener.pipe, PipedListener.chosen = pipe, options
+    started = utc_now()
+    record = make_record(job, play_episode(job), started_at=started)
+    pipe.send(json.dumps(record.model_dump(mode="json")))
+
+
+SPEC = f"{PipedListener.__module__}:{PipedListener.__name__}"

@@ -1,0 +1,172 @@
+"""The grounding dataset as a task of Inspect.
+
+```sh
+inspect eval roboirg/integrations/inspect_grounding.py -T data=grounding --model openai/gpt-4o
+```
+
+The slots question is the listener's, second try included, and verdicts are those of
+`roboirg score grounding`.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from pathlib import Path
+
+from inspect_ai import Task, task
+from inspect_ai.dataset import MemoryDataset, Sample
+from inspect_ai.log import EvalLog
+from inspect_ai.model import (
+    ChatMessage,
+    ChatMessageSystem,
+    ChatMessageUser,
+    Content,
+    ContentImage,
+    ContentText,
+)
+from inspect_ai.scorer import Score, Scorer, Target, accuracy, grouped, scorer, stderr
+from inspect_ai.solver import Generate, Solver, TaskState, solver
+
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.evaluation.grounding_set.answer_file import Answer
+from roboirg.evaluation.grounding_set.grounding_item import (
+    QUESTION_KINDS,
+    GroundingItem,
+    QuestionKind,
+    read_items,
+)
+from roboirg.evaluation.grounding_set.verdicts import judge_reply, right_reply
+from roboirg.evaluation.plan_parsing import means_all, parse_names
+from roboirg.policies.planning.goal_schema import goal_schema
+from roboirg.policies.planning.listener_query import PROMPTS, QuestionTexts
+from roboirg.policies.planning.prompts import load_prompts
+from roboirg.policies.planning.vlm_query import SILENCE, UnparsableReplyError
+
+EPISODE = "episode"
+
+
+@task
+def roboirg_grounding(
+    data: str = "grounding", question: str = "slots", settings: str = "all", tasks: str = "all"
+) -> Task:
+    """Ask one kind of question about every item of an exported dataset.
+
+    Args:
+        data: folder that `roboirg export grounding` wrote.
+        question: slots, choice or points.
+        settings: names of settings, separated by commas, or all.
+        tasks: names of tasks, separated by commas, or all.
+
+    Raises:
+        InvalidValueError: the folder holds no dataset, or none of its items is selected.
+        UnknownNameError: there is no such question.
+    """
+    kind, folder = _known_kind(question), Path(data)
+    chosen = [
+        _sample(item, kind, folder)
+        for item in _items(data).values()
+        if _selects(settings, item.setting) and _selects(tasks, item.task)
+    ]
+    if not chosen:
+        raise InvalidValueError(
+            f"{data!r} has no item of the settings {settings} and the tasks {tasks}."
+        )
+    return Task(
+        dataset=MemoryDataset(chosen, name=f"roboirg_grounding_{kind}"),
+        solver=ask(data, kind),
+        scorer=right(data, kind),
+        metadata={"question": kind},
+    )
+
+
+@solver
+def ask(data: str, question: str) -> Solver:
+    """Query the model; an unusable answer about slots is asked for once more, with the reason."""
+    again = load_prompts(PROMPTS)["again"]
+
+    async def solve(state: TaskState, generate: Generate) -> TaskState:
+        state = await generate(state)
+        if question == "slots":
+            item = _items(data)[str(state.sample_id)]
+            try:
+                goal_schema(item.task).read(state.output.completion)
+            except UnparsableReplyError as error:
+                if not state.output.completion:
+                    state.messages[-1].content = SILENCE
+                state.messages.append(ChatMessageUser(content=again.substitute(why=str(error))))
+                state = await generate(state)
+        return state
+
+    return solve
+
+
+@scorer(metrics=[accuracy(), stderr(cluster=EPISODE), grouped(accuracy(), "setting")])
+def right(data: str, question: str) -> Scorer:
+    """Score replies as `roboirg score grounding` does."""
+    kind = _known_kind(question)
+
+    async def score(state: TaskState, target: Target) -> Score:
+        item, reply = _items(data)[str(state.sample_id)], state.output.completion
+        verdict = judge_reply(item, kind, reply)
+        return Score(
+            value=float(verdict.right),
+            answer=verdict.understood,
+            explanation=f"Meant: {target.text}",
+            metadata={"parts": dict(verdict.parts)},
+        )
+
+    return score
+
+
+def log_answers(log: EvalLog) -> list[Answer]:
+    """Return the answers of a log, for `write_answers` and `roboirg score grounding`."""
+    kind = _known_kind(str((log.eval.metadata or {}).get("question")))
+    return [Answer(str(sample.id), kind, sample.output.completion) for sample in log.samples or ()]
+
+
+def _sample(item: GroundingItem, kind: QuestionKind, folder: Path) -> Sample:
+    texts = QuestionTexts(
+        item.system_prompt(kind), item.said, item.shown, item.now, item.question(kind)
+    )
+    frames = tuple(_picture(folder / path) for path in item.frames)
+    parts = texts.parts(frames, _picture(folder / item.picture))
+    content: list[Content] = [
+        ContentText(text=part) if isinstance(part, str) else part for part in parts
+    ]
+    messages: list[ChatMessage] = [
+        ChatMessageSystem(content=texts.system),
+        ChatMessageUser(content=content),
+    ]
+    return Sample(
+        input=messages,
+        target=right_reply(item, kind),
+        id=item.id,
+        metadata={
+            "task": item.task,
+            "setting": item.setting,
+            "form": item.form,
+            EPISODE: f"{item.task}/{item.split}/{item.episode}",
+            "pattern": item.pattern,
+        },
+    )
+
+
+def _picture(path: Path) -> ContentImage:
+    return ContentImage(image=str(path.resolve()))
+
+
+@functools.cache
+def _items(data: str) -> Mapping[str, GroundingItem]:
+    return {item.id: item for item in read_items(Path(data))}
+
+
+def _selects(names: str, name: str) -> bool:
+    return means_all(names) or name in parse_names("name", names)
+
+
+def _known_kind(name: str) -> QuestionKind:
+    for kind in QUESTION_KINDS:
+        if name == kind:
+            return kind
+    raise UnknownNameError("question", name, QUESTION_KINDS)

@@ -1,0 +1,213 @@
+"""Results of other harnesses as records, so that tables, statistics and the page read them.
+
+| harness | file | what its records lack |
+| --- | --- | --- |
+| lerobot | ``eval_info.json`` of lerobot-eval | steps, causes, events, errors, times |
+| vla-eval | ``recording-ID.sqlite`` | causes, events |
+| inspect | a log as JSON (``inspect log convert --to json``) | nothing; errors: events |
+
+What a harness does not tell is named in ``policy_metadata["imported"]``, with the harness and the
+file. Versions of words and environment are those of this package: import with the version that was
+played. Failures have no attribution, because without events it would be a guess.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import datetime as dt
+import json
+import sqlite3
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from pydantic import JsonValue, ValidationError
+
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.episodes.splits import SIZES, check_split
+from roboirg.evaluation.policy_descriptions import PolicyDescription
+from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.records.record import DEFAULT_MAX_STEPS, ErrorKind, Job, Record
+from roboirg.records.store import RecordStore
+
+LEROBOT_SEED = 1000
+"""The seed of lerobot-eval's first episode, if none is given."""
+UNTOLD_CAUSE = "the harness does not tell the cause"
+
+_ERRORS: Mapping[str, ErrorKind] = {
+    "timeout": "timeout",
+    "server_unreachable": "connection",
+    "connection_closed": "connection",
+    "model_act": "policy",
+}
+"""vla-eval's reasons that are not due to the environment."""
+_NAMES = {"action_space": "actions"}
+"""Parameters of our vla-eval class that have another name in jobs."""
+
+
+class ImportOptions(NamedTuple):
+    """What the files of a harness do not say.
+
+    Attributes:
+        policy: name of the policy in the records.
+        seed: of LeRobot's first episode.
+        fields: fields of `roboirg.records.record.Job` that differ from their defaults.
+    """
+
+    policy: str
+    seed: int = LEROBOT_SEED
+    fields: Mapping[str, Any] = {}
+
+
+def import_results(harness: str, path: Path, out: Path, options: ImportOptions) -> int:
+    """Write the results of a harness as records into a run's folder; return their number.
+
+    Args:
+        harness: lerobot, vla-eval or inspect.
+        path: its file of results.
+        out: folder of the records; it may already hold some.
+        options: what the file does not say.
+
+    Raises:
+        UnknownNameError: there is no such harness, or a task, setting or split does not exist.
+        InvalidValueError: the file is not what the harness writes, or has an episode twice.
+        StoreError: the records cannot be written.
+    """
+    if harness not in _READERS:
+        raise UnknownNameError("harness", harness, _READERS)
+    try:
+        records = list(_READERS[harness](path, options))
+    except OSError as error:
+        raise InvalidValueError(f"{path} cannot be read: {error.strerror}.") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        raise InvalidValueError(f"{path}: {place}: {first['msg']}.") from error
+    except (KeyError, TypeError, AttributeError, json.JSONDecodeError, sqlite3.Error) as error:
+        raise InvalidValueError(
+            f"{path} is not a file of results of {harness} ({type(error).__name__}: {error})."
+        ) from error
+    _refuse_repeated(records, path)
+    with RecordStore(out) as store:
+        store.extend(record.model_dump_json().encode() for record in records)
+    return len(records)
+
+
+def _read_lerobot(path: Path, options: ImportOptions) -> Iterator[Record]:
+    """Yield the records of lerobot-eval; its groups are called ``task-setting-split``."""
+    lacks = ("steps", "cause", "events", "errors", "timings", "started_at")
+    for entry in json.loads(path.read_text(encoding="utf-8"))["per_task"]:
+        names = entry["task_group"].rsplit("-", 2)
+        if len(names) != 3:  # noqa: PLR2004
+            raise InvalidValueError(
+                f"{path}: {entry['task_group']!r} is not one of our groups, task-setting-split."
+            )
+        task, setting, split = names
+        for index, success in enumerate(entry["metrics"]["successes"]):
+            job = _job(
+                options, task=task, setting=setting, split=split,
+                episode=(options.seed + index) % SIZES[check_split(split)],
+            )  # fmt: skip
+            result = _verdict(bool(success), job)
+            yield _record(job, result, "lerobot", path, lacks)
+
+
+def _read_vla_eval(path: Path, options: ImportOptions) -> Iterator[Record]:
+    """Yield the records of a recording of vla-eval."""
+    if not path.is_file():  # SQLite would create it
+        raise InvalidValueError(f"There is no file {path}.")
+    lacks = ("cause", "events", "started_at")
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        configs = {
+            name: json.loads(metadata)["config"]["params"]
+            for name, metadata in database.execute("SELECT eval_id, metadata FROM eval_metadata")
+        }
+        rows = database.execute(
+            "SELECT eval_id, task_name, status, steps, elapsed_sec, context, failure_reason,"
+            " failure_detail FROM episode_results ORDER BY rowid"
+        ).fetchall()
+    for name, task, status, steps, seconds, context, reason, detail in rows:
+        params = {_NAMES.get(key, key): value for key, value in configs[name].items()}
+        told = {key: value for key, value in params.items() if key in Job.model_fields}
+        job = _job(
+            options, **{"setting": "explicit", "split": "test", **told},
+            task=task, episode=json.loads(context)["episode_idx"],
+        )  # fmt: skip
+        result = _verdict(status == "success", job)
+        if status == "error":
+            kind = _ERRORS.get(reason, "environment")
+            if "InvalidActionError" in (detail or ""):
+                kind = "invalid_action"
+            result.record_error(kind, f"{kind}: vla-eval reports {reason}", detail)
+        result.steps = int(steps or 0)
+        yield _record(job, result, "vla-eval", path, lacks, float(seconds or 0.0))
+
+
+def _read_inspect(path: Path, options: ImportOptions) -> Iterator[Record]:
+    """Yield the records in a log of Inspect, which holds them whole, and those of its errors."""
+    if path.suffix == ".eval":
+        raise InvalidValueError(
+            f"{path} is a packed log; convert it: inspect log convert --to json --output-dir LOGS "
+            f"{path.name}."
+        )
+    for sample in json.loads(path.read_text(encoding="utf-8"))["samples"]:
+        scores = sample.get("scores") or {}
+        found = next((one["metadata"]["record"] for one in scores.values()), None)
+        if found is not None:
+            record = Record.model_validate(found)
+            yield record.model_copy(update={"policy": options.policy, **options.fields})
+            continue
+        job = _job(options, **{**sample["metadata"]["job"], "policy": options.policy})
+        error, result = sample.get("error") or {}, RolloutResult()
+        cause = f"environment: {error.get('message', 'the sample has no score')}"
+        result.record_error("environment", cause, error.get("traceback"))
+        yield _record(job, result, "inspect", path, ("steps", "events", "timings"))
+
+
+def _job(options: ImportOptions, **fields: Any) -> Job:  # noqa: ANN401 - values of JSON
+    named = {"policy": options.policy, "max_steps": DEFAULT_MAX_STEPS, **fields}
+    return Job.model_validate({**named, **options.fields})
+
+
+def _verdict(success: bool, job: Job) -> RolloutResult:
+    result = RolloutResult(policy=PolicyDescription("unknown", is_privileged=False))
+    status = "success" if success else "failure"
+    result.record_status(status, None if success else UNTOLD_CAUSE, job.max_steps)
+    return result
+
+
+def _record(
+    job: Job,
+    result: RolloutResult,
+    harness: str,
+    path: Path,
+    lacks: tuple[str, ...],
+    seconds: float = 0.0,
+) -> Record:
+    imported: dict[str, JsonValue] = {
+        "from": harness, "file": path.name, "lacks": [*lacks, "attribution", "policy_version"],
+    }  # fmt: skip
+    result.policy = result.policy or PolicyDescription("unknown", is_privileged=False)
+    result.policy_metadata = {"imported": imported}
+    written = dt.datetime.fromtimestamp(path.stat().st_mtime, dt.UTC).isoformat(timespec="seconds")
+    record = make_record(job, result, started_at=written, duration_s=round(seconds, 3))
+    return record.model_copy(update={"attribution": None})
+
+
+def _refuse_repeated(records: list[Record], path: Path) -> None:
+    """Raise if an episode is there twice: a harness has repeated episodes, or files were joined."""
+    seen: set[Job] = set()
+    for record in records:
+        if record.identity in seen:
+            raise InvalidValueError(
+                f"{path} has {record.task}, {record.split} {record.episode}, more than once."
+            )
+        seen.add(record.identity)
+
+
+_READERS: Mapping[str, Callable[[Path, ImportOptions], Iterator[Record]]] = {
+    "lerobot": _read_lerobot,
+    "vla-eval": _read_vla_eval,
+    "inspect": _read_inspect,
+}
+HARNESSES = tuple(_READERS)

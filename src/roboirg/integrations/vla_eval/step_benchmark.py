@@ -1,0 +1,212 @@
+"""The benchmark as vla-eval drives it; observations have the names of its RoboMME benchmark."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from vla_eval.benchmarks.base import StepBenchmark, StepResult, repeat_last_hold
+from vla_eval.render import configure_sapien_render
+from vla_eval.specs import IMAGE_RGB, LANGUAGE, DimSpec
+
+from roboirg.core.actions import JOINT_ANGLE, find_action_space
+from roboirg.core.instruction_options import DEFAULT_DELIVERY, DEFAULT_REASONING, DEFAULT_RIVAL
+from roboirg.core.observations import FRONT, WRIST, proprioception
+from roboirg.tasks import ALL, find_tasks
+
+if TYPE_CHECKING:
+    from roboirg.envs.environment import RoboIRGEnv
+
+MAX_STEPS = 1300
+"""As in RoboMME's protocol; vla-eval's own default is 300."""
+TOLD_TASK = {"name": "RoboIRGBench"}
+"""All that a policy is told of the task besides the observations."""
+ICD_VARIABLE = "ROBOIRG_LAVAPIPE_ICD"
+"""Environment variable with the path of lavapipe's Vulkan manifest, for ``render: cpu``."""
+_STATE = DimSpec("state", 8, "joint_positions7_finger1")
+_ACTION_FORMATS = {
+    JOINT_ANGLE.name: "absolute_joint_angle_gripper",
+    "ee_pose": "absolute_xyz_euler_gripper",
+    "waypoint": "absolute_xyz_euler_gripper_waypoint",
+}
+
+
+class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no types here
+    """Episodes of all tasks in one setting; episode i of the harness is ours of the same number.
+
+    Observation: `images` with `agentview` and `wrist`, uint8 (256, 256, 3); `states` float32 (8,),
+    seven joints (rad) and the first finger (m); `task_description`, what was said last. The first
+    one of an episode with a video also has `video_history`, `wrist_video_history` and
+    `episode_restart`. Names of tasks, settings and episodes stay with the harness: what it sends at
+    an episode's start is `TOLD_TASK`.
+
+    Action: `actions`, (8,), or (7,) in the other action spaces.
+
+    Args:
+        tasks: names of tasks; None for the benchmark's.
+        setting, form, split, delivery, rival, reasoning, meshes: as in `roboirg.make`.
+        action_space: joint_angle, ee_pose or waypoint.
+        max_steps: control steps that a policy has.
+        send_wrist_image, send_state, send_video_history: what observations hold; a model server may
+            choose those that the configuration leaves out.
+
+    Raises:
+        UnknownNameError: there is no such task or action space.
+    """
+
+    render_backends = frozenset({"gpu", "cpu"})
+    _ALL_RECORD_FIELDS: ClassVar[frozenset[str]] = frozenset({"reward", "terminated", "truncated"})
+
+    def __init__(
+        self,
+        tasks: Sequence[str] | None = None,
+        setting: str = "explicit",
+        form: str = "implicit",
+        split: str = "test",
+        action_space: str = JOINT_ANGLE.name,
+        max_steps: int = MAX_STEPS,
+        delivery: str = DEFAULT_DELIVERY,
+        rival: str = DEFAULT_RIVAL,
+        reasoning: str = DEFAULT_REASONING,
+        meshes: str = "faithful",
+        send_wrist_image: bool = True,
+        send_state: bool = True,
+        send_video_history: bool = True,
+    ) -> None:
+        super().__init__()
+        self.tasks = find_tasks(tasks or [ALL])
+        self.setting, self.split = setting, split
+        self.action_space = find_action_space(action_space)
+        self.max_steps = max_steps
+        self._words = {
+            "setting": setting, "form": form, "delivery": delivery, "rival": rival,
+            "reasoning": reasoning,
+        }  # fmt: skip
+        self._meshes = meshes
+        self._cameras = (FRONT, WRIST) if send_wrist_image else (FRONT,)
+        self._sends_state, self._sends_video = send_state, send_video_history
+        self._env: RoboIRGEnv | None = None
+        self._video: dict[str, Any] = {}
+
+    @classmethod
+    def configure_render(cls, mode: str) -> dict[str, str]:
+        """Choose the GPU's Vulkan driver or lavapipe before the simulator is imported."""
+        chosen: dict[str, str] = configure_sapien_render(mode, ICD_VARIABLE)
+        return chosen
+
+    def get_tasks(self) -> list[dict[str, Any]]:
+        """Return the tasks, for the harness's results; a policy is not told."""
+        return [{"name": task, "suite": f"{self.setting}-{self.split}"} for task in self.tasks]
+
+    def reset(self, task: dict[str, Any]) -> dict[str, Any]:
+        """Start an episode.
+
+        Args:
+            task: one of `get_tasks`, with the harness's ``episode_idx``. Its contents are replaced
+                by `TOLD_TASK`, because the harness sends them to the policy.
+        """
+        from roboirg.envs.factory import make
+
+        name, index = task["name"], task["episode_idx"]
+        task.clear()
+        task.update(TOLD_TASK)
+        self.cleanup()
+        self._env = make(
+            name,
+            split=self.split,
+            episode=index,
+            actions=self.action_space.name,
+            cameras=self._cameras,
+            demonstration_frames="all" if self._sends_video else "none",
+            max_steps=self.max_steps,
+            meshes=self._meshes,
+            **self._words,  # type: ignore[arg-type] # all are texts
+        )
+        observation, info = self._env.reset()
+        video = info["demonstration"]
+        if self._sends_video and video.length:
+            video.draw()
+            self._video = {
+                "video_history": list(video["front_rgb"]),
+                **({"wrist_video_history": list(video["wrist_rgb"])} if self._has_wrist else {}),
+                "episode_restart": True,
+            }
+        self._recorder.record_video(observation["front_rgb"])
+        return observation
+
+    def step(self, action: Mapping[str, Any]) -> StepResult:
+        """Execute one action.
+
+        Raises:
+            InvalidActionError: it is missing, of a wrong shape, or not finite.
+        """
+        rows = action.get("actions", action.get("action"))
+        observation, reward, terminated, truncated, info = self._playing.step(rows)
+        self._recorder.record_video(observation["front_rgb"])
+        self._recorder.record_step(reward=reward, terminated=terminated, truncated=truncated)
+        return StepResult(observation, reward, terminated or truncated, info)
+
+    def make_obs(self, raw_obs: Mapping[str, Any], task: Mapping[str, Any]) -> dict[str, Any]:  # noqa: ARG002
+        """Return what the policy is shown; the video only once."""
+        shown: dict[str, Any] = {
+            "images": {"agentview": raw_obs["front_rgb"]},
+            "task_description": raw_obs["instruction"],
+            **self._video,
+        }
+        self._video = {}
+        if self._has_wrist:
+            shown["images"]["wrist"] = raw_obs["wrist_rgb"]
+        if self._sends_state:
+            shown["states"] = proprioception(raw_obs["joint_positions"], raw_obs["gripper"])
+        return shown
+
+    def get_step_result(self, step_result: StepResult) -> dict[str, Any]:
+        """Return the verdict and nothing else: the harness sends it to the policy."""
+        return {"success": bool(step_result.info.get("is_success", False))}
+
+    def get_metadata(self) -> dict[str, Any]:
+        """Return the limits; without them the harness stops after 300 steps."""
+        from roboirg.episodes.splits import SIZES, check_split
+
+        episodes = SIZES[check_split(self.split)]
+        return {"max_steps": self.max_steps, "max_episodes_per_task": episodes}
+
+    def get_action_spec(self) -> dict[str, DimSpec]:
+        """Declare the action."""
+        space = self.action_space
+        return {"action": DimSpec("action", space.size, _ACTION_FORMATS[space.name])}
+
+    def get_observation_spec(self) -> dict[str, DimSpec]:
+        """Declare the observation."""
+        fields = {"agentview": IMAGE_RGB, "language": LANGUAGE}
+        if self._has_wrist:
+            fields["wrist"] = IMAGE_RGB
+        if self._sends_state:
+            fields["state"] = _STATE
+        return fields
+
+    def get_hold_action(self, last_action: dict[str, Any] | None) -> dict[str, Any]:
+        """Return the last action again, or at first one that keeps the joints where they are."""
+        if last_action is None and self.action_space.name == JOINT_ANGLE.name:
+            seen = self._last_result.obs
+            opened = np.append(seen["joint_positions"], 1.0).astype(np.float32)
+            return {"actions": opened}
+        held: dict[str, Any] = repeat_last_hold(last_action, self.action_space.size)
+        return held
+
+    def cleanup(self) -> None:
+        """Close the environment."""
+        if self._env is not None:
+            self._env.close()
+        self._env, self._video = None, {}
+
+    @property
+    def _has_wrist(self) -> bool:
+        return WRIST in self._cameras
+
+    @property
+    def _playing(self) -> RoboIRGEnv:
+        if self._env is None:
+            raise RuntimeError("No episode has begun; call reset() first.")
+        return self._env

@@ -1,0 +1,42 @@
+"""What a check of a policy says."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+from roboirg.core.errors import RoboIRGError
+
+Verdict = Literal["pass", "fail", "warn", "note"]
+PASS: Verdict = "pass"  # noqa: S105 - a verdict
+FAIL: Verdict = "fail"
+WARN: Verdict = "warn"
+NOTE: Verdict = "note"
+
+_MAX_ERROR_LENGTH = 300
+
+
+class CheckResult(NamedTuple):
+    """The result of one check.
+
+    Attributes:
+        check: its name.
+        verdict: pass; fail for what is certainly wrong; warn for what a sound policy hardly does;
+            note for what is allowed but worth knowing.
+        message: what was seen, what it usually means, and what to change.
+    """
+
+    check: str
+    verdict: Verdict
+    message: str
+
+
+class CheckAbortedError(Exception):
+    """The checks cannot go on; the arguments are those of the last `CheckResult`."""
+
+
+def describe_error(error: Exception) -> str:
+    """Return an error as one sentence of limited length."""
+    words = " ".join(str(error).split())
+    if not isinstance(error, RoboIRGError):
+        words = f"{type(error).__name__}: {words}"
+    return words[:_MAX_ERROR_LENGTH].rstrip(": .") + "."

@@ -1,0 +1,446 @@
+"""Scores of answers to the grounding dataset: verdicts, chance, gaps, floors, the report."""
+
+import functools
+import json
+import math
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from roboirg.analysis.grounding_scores.answer_scores import (
+    above_chance,
+    hidden_fields,
+    score_answers,
+    score_rows,
+)
+from roboirg.analysis.grounding_scores.score_report import confusion_tables, report_text
+from roboirg.analysis.grounding_scores.score_tables import breakdown_tables, range_label
+from roboirg.analysis.stats.chance import floor_level
+from roboirg.cli.app import app
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.episodes.splits import get_episode
+from roboirg.evaluation.grounding_set.answer_file import Answer, read_answers, write_answers
+from roboirg.evaluation.grounding_set.answer_floors import FLOORS, floor_answers
+from roboirg.evaluation.grounding_set.grounding_item import (
+    ITEMS_FILE,
+    LETTERS,
+    QUESTION_KINDS,
+    PointTarget,
+    encode_items,
+    encode_mask,
+)
+from roboirg.evaluation.grounding_set.item_builder import (
+    EpisodeMedia,
+    make_items,
+    wanted_options,
+)
+from roboirg.evaluation.grounding_set.verdicts import guess_chance, judge_reply, right_reply
+from roboirg.language import setting_names
+from roboirg.records.record import Job
+
+TASKS = ("PickXtimes", "BinFill", "VideoUnmask", "VideoPlaceButton", "StopCube")
+
+
+def media():
+    """Two masks, each of 8 x 8 pixels, without pictures."""
+    points = []
+    for left in (10, 30):
+        mask = np.zeros((256, 256), bool)
+        mask[40:48, left : left + 8] = True
+        points.append(
+            PointTarget(
+                kind="cube",
+                picture="first",
+                x=left,
+                y=40,
+                size=(256, 256),
+                counts=encode_mask(mask),
+            )
+        )
+    return EpisodeMedia("pictures/0.png", None, (), 0, tuple(points), 0.46)
+
+
+@functools.cache
+def items(tasks=TASKS, episodes=12, every_variant=False):
+    found = []
+    for task in tasks:
+        for index in range(episodes):
+            episode = get_episode(task, "test", index)
+            wanted = wanted_options(
+                episode,
+                setting_names(),
+                ("implicit",),
+                InstructionOptions(),
+                every_variant=every_variant,
+            )
+            found += make_items(episode, media(), list(wanted))
+    return found
+
+
+def rows_of(answers, kind, dataset=None):
+    (score,) = [
+        one for one in score_answers(dataset or items(), answers, "model") if one.kind == kind
+    ]
+    return score, {row.summary.options.setting: row for row in score_rows(score)}
+
+
+def item_of(task, setting="direct", index=0):
+    return next(
+        one for one in items() if (one.task, one.setting, one.episode) == (task, setting, index)
+    )
+
+
+@pytest.mark.parametrize("kind", QUESTION_KINDS)
+def test_the_oracle_is_always_right(kind):
+    score, rows = rows_of(floor_answers("oracle", items()), kind)
+    assert score.unparsed == score.missing == 0
+    assert set(rows) == set(setting_names())
+    for row in rows.values():
+        assert row.summary.rate == 1
+        assert row.corrected == 1
+        assert row.summary.gap is None or row.summary.gap.value == 0
+
+
+@pytest.mark.parametrize("kind", ["slots", "choice"])
+def test_random_answers_are_at_chance(kind):
+    """Within two points, over ten thousand answers."""
+    right = expected = answers = 0
+    for seed in range(math.ceil(10_000 / len(items()))):
+        given = [one for one in floor_answers("chance", items(), seed) if one.kind == kind]
+        known = {item.id: item for item in items()}
+        for answer in given:
+            item = known[answer.id]
+            right += judge_reply(item, kind, answer.reply).right
+            expected += guess_chance(item, kind)
+            answers += 1
+    assert answers >= 10_000
+    assert abs(right - expected) / answers < 0.02
+
+
+def test_random_pixels_hit_as_often_as_masks_are_large():
+    item = item_of("StopCube")
+    one = encode_one_mask(item)
+    assert guess_chance(one, "points") == pytest.approx(64 / 256**2)
+    assert guess_chance(item, "points") == pytest.approx((64 / 256**2) ** 2)
+
+
+def encode_one_mask(item):
+    import msgspec
+
+    return msgspec.structs.replace(item, points=item.points[:1])
+
+
+@pytest.mark.parametrize(
+    ("reply", "right", "understood"),
+    [
+        ("B", "B", "B"),
+        (" b ", "B", "B"),
+        ("(C)", "C", "C"),
+        ("C. Put the cube there.", "C", "C"),
+        ("C because it was named first", "C", "C"),
+        ("**A**", "A", "A"),
+        ("A: the green cube", "A", "A"),
+        ("Let me see. A cube ... The answer is B.", "B", "B"),
+        ("Not A. Answer: D", None, None),  # there are three choices
+        ('{"choice": "B"}', "B", "B"),
+        ("A cube is meant.", None, None),
+        ("Because it is red.", None, None),
+        ("The answer is a red cube", None, None),
+        ("E", None, None),
+        ("", None, None),
+    ],
+)
+def test_letters_are_read(reply, right, understood):
+    item = next(one for one in items() if len(one.choices) == 3)
+    verdict = judge_reply(item, "choice", reply)
+    assert verdict.understood == understood
+    assert verdict.right == (right == item.choice)
+
+
+def test_slots_are_judged_one_by_one():
+    item = item_of("PickXtimes")
+    answer = json.loads(item.answer)
+    other = {**answer, "repeats": answer["repeats"] % 5 + 1}
+    verdict = judge_reply(item, "slots", f"I think: ```json\n{json.dumps(other)}\n```")
+    assert verdict.parts == {"color": True, "repeats": False}
+    assert not verdict.right
+    assert json.loads(verdict.understood) == other
+    nonsense = judge_reply(item, "slots", "red, I guess")
+    assert nonsense == (False, None, {"color": False, "repeats": False})
+    assert judge_reply(item, "slots", json.dumps(answer)).right
+
+
+@pytest.mark.parametrize(
+    ("points", "right", "parts"),
+    [
+        ([(10, 40), (30, 40)], True, [True, True]),
+        ([(17.9, 47.9), (37, 47)], True, [True, True]),
+        ([(18, 40), (30, 40)], False, [False, True]),
+        ([(10, 48), (30, 40)], False, [False, True]),
+        ([(30, 40), (10, 40)], False, [False, False]),
+        ([(10, 40)], False, [True, False]),
+        ([(10, 40), (30, 40), (10, 40)], False, [True, True]),
+        ([(-1, 40), (300, 40)], False, [False, False]),
+    ],
+)
+def test_points_must_lie_in_the_masks_in_order(points, right, parts):
+    item = item_of("PickXtimes")
+    reply = json.dumps({"points": [{"x": x, "y": y} for x, y in points]})
+    verdict = judge_reply(item, "points", reply)
+    assert verdict.right == right
+    assert list(verdict.parts.values()) == parts
+
+
+def test_points_of_amounts_have_no_order():
+    item = item_of("BinFill")
+    assert not item.points_in_order
+    swapped = [{"x": 30, "y": 40}, {"x": 10, "y": 40}]
+    assert judge_reply(item, "points", json.dumps({"points": swapped})).right
+    assert not judge_reply(item, "points", json.dumps({"points": [swapped[0]] * 2})).right
+
+
+@pytest.mark.parametrize(
+    "reply", ["", "[1, 2]", '{"points": 3}', '{"points": []}', '{"x": true, "y": 1}',
+              '{"points": [{"x": "a", "y": 2}]}', '{"x": NaN, "y": 1}']
+)  # fmt: skip
+def test_replies_that_point_nowhere_are_no_answer(reply):
+    verdict = judge_reply(item_of("PickXtimes"), "points", reply)
+    assert verdict.understood is None
+    assert not verdict.right
+
+
+def test_masks_agree_with_the_quick_test_of_a_pixel():
+    item = item_of("PickXtimes")
+    mask = item.points[0].mask
+    rng = np.random.default_rng(0)
+    for x, y in rng.integers(0, 60, size=(200, 2)).tolist():
+        reply = json.dumps({"points": [{"x": x, "y": y}, {"x": 30, "y": 40}]})
+        assert judge_reply(item, "points", reply).parts["1"] == mask[y, x]
+
+
+def test_gaps_are_paired_and_tested_by_the_same_statistics():
+    """All explicit and no direct answer is right: the gap is -100 points on every episode."""
+    given = [
+        Answer(item.id, "slots", item.answer if item.setting == "explicit" else "{}")
+        for item in items()
+    ]
+    score, rows = rows_of(given, "slots")
+    assert rows["direct"].summary.gap.value == -1
+    assert rows["direct"].summary.gap.p_value == pytest.approx(2 * 0.5 ** (12 * len(TASKS)))
+    assert rows["direct"].summary.p_holm >= rows["direct"].summary.gap.p_value
+    assert rows["direct"].hidden == 0
+    assert rows["explicit"].hidden is None
+    assert score.unparsed == sum(item.setting != "explicit" for item in items())
+
+
+def test_items_without_an_answer_are_in_no_rate():
+    given = [Answer(item.id, "slots", item.answer) for item in items() if item.episode < 6]
+    score, rows = rows_of(given, "slots")
+    assert rows["direct"].summary.rate == 1
+    assert rows["direct"].summary.trials == 6 * len(TASKS)
+    assert score.missing == sum(item.episode >= 6 for item in items())
+
+
+def test_rates_are_corrected_for_chance():
+    assert above_chance(0.25, 0.25) == 0
+    assert above_chance(0.625, 0.25) == 0.5
+    assert above_chance(0.0, 0.5) == -1
+    assert above_chance(1.0, 1.0) is None
+
+
+@pytest.mark.parametrize("rule", ["first-mention", "surface"])
+def test_shortcuts_are_right_as_often_as_their_probability_says(rule):
+    """The expected success of the listeners in `roboirg tables --floors`."""
+    dataset = items(episodes=50, tasks=("PickXtimes", "VideoPlaceButton"))
+    _, rows = rows_of(floor_answers(rule, dataset), "slots", dataset)
+    for setting in ("direct", "reasoning", "contextual"):
+        jobs = [
+            Job(policy=rule, task=item.task, split="test", episode=item.episode, setting=setting)
+            for item in dataset
+            if item.setting == setting
+        ]
+        assert float(rows[setting].summary.rate) == pytest.approx(
+            float(floor_level(rule, jobs)), abs=0.1
+        )
+
+
+def test_the_command_alone_is_right_as_often_as_it_leaves_goals():
+    dataset = items(episodes=50, tasks=("PickXtimes", "VideoPlaceButton"))
+    for kind in ("slots", "choice"):
+        _, rows = rows_of(floor_answers("command", dataset), kind, dataset)
+        for setting in ("direct", "reasoning"):
+            row = rows[setting]
+            assert float(row.summary.rate) == pytest.approx(row.command_chance, abs=0.12)
+        assert rows["explicit"].summary.rate == 1
+
+
+def test_the_words_alone_are_learned_from_the_train_split():
+    pytest.importorskip("sklearn")
+    dataset = items(tasks=("StopCube",), episodes=50)
+    rates = {
+        name: rows_of(floor_answers(name, dataset), "slots", dataset)[1]
+        for name in ("words-explicit", "words-setting")
+    }
+    chance = rates["words-explicit"]["direct"].chance
+    assert rates["words-explicit"]["explicit"].summary.rate > chance + 0.3
+    assert rates["words-setting"]["direct"].summary.rate > chance + 0.3
+
+
+def test_floors_depend_on_items_alone():
+    few = items()[:40]
+    for name in ("chance", "command", "elimination"):
+        assert set(floor_answers(name, few)) <= set(floor_answers(name, items()))
+    with pytest.raises(UnknownNameError, match="no floor 'luck'"):
+        list(floor_answers("luck", few))
+
+
+def test_confusions_and_distances_say_what_went_wrong():
+    given = []
+    for item in items():
+        answer = json.loads(item.answer)
+        if "color" in answer:
+            answer["color"] = "red"
+        given.append(Answer(item.id, "slots", json.dumps(answer)))
+    score, _ = rows_of(given, "slots")
+    tables = {table.key: table for table in confusion_tables(score)}
+    colors = tables["confusion_color"]
+    assert [column.name for column in colors.columns] == ["red"]
+    assert {row.name for row in colors.rows} == {"red", "green", "blue"}
+    assert sum(int(row.entries[0].text) for row in colors.rows) == sum(
+        "color" in hidden_fields(item) for item in items()
+    )
+    keys = {table.key for table in breakdown_tables(score)}
+    assert keys == {"by_pattern", "by_expression", "by_slots", "by_words_back", "by_meters"}
+
+
+def test_amounts_are_hidden_as_a_whole():
+    item = item_of("BinFill")
+    assert hidden_fields(item) == tuple(json.loads(item.answer))
+    assert hidden_fields(item_of("BinFill", "explicit")) == ()
+
+
+def test_ranges_have_their_units():
+    assert range_label(4, (0, 5, 10), "words") == "0 to below 5 words"
+    assert range_label(5, (0, 5, 10), "words") == "5 to below 10 words"
+    assert range_label(10, (0, 5, 10), "words") == "10 words or more"
+
+
+def test_the_report_shows_what_was_meant_beside_what_was_understood(tmp_path):
+    item = item_of("PickXtimes")
+    wrong = {**json.loads(item.answer), "repeats": 9}
+    given = [Answer(one.id, "slots", one.answer) for one in items() if one.id != item.id]
+    scores = score_answers(items(), [*given, Answer(item.id, "slots", json.dumps(wrong))], "m")
+    text = report_text(scores, tmp_path / "set", tmp_path / "report.md")
+    assert "instead: 1 of 1 mistake" in text
+    assert item.text in text
+    assert f"meant `{item.answer}`, understood `no answer`" in text
+    assert f"(set/{item.picture})" in text
+
+
+def dataset_in(folder):
+    folder.mkdir()
+    (folder / ITEMS_FILE).write_bytes(encode_items(list(items())))
+    return folder
+
+
+def test_answers_are_read_in_every_form(tmp_path):
+    first, second, third = items()[:3]
+    path = tmp_path / "model.jsonl"
+    lines = [
+        {"id": first.id, "answer": json.loads(first.answer), "choice": first.choice},
+        {"id": second.id, "reply": f"It is {second.answer}"},
+        {"id": third.id, "kind": "choice", "reply": third.choice},
+        {"id": third.id, "points": [{"x": 10, "y": 40}, {"x": 30, "y": 40}]},
+    ]
+    path.write_text("\n".join(map(json.dumps, lines)) + "\n\n")
+    found = read_answers(path, items())
+    known = {item.id: item for item in items()}
+    assert len(found) == 5
+    assert all(judge_reply(known[one.id], one.kind, one.reply).right for one in found)
+    again = tmp_path / "again.jsonl"
+    write_answers(again, found)
+    assert read_answers(again, items()) == found
+
+
+def test_answers_of_vlmevalkit_are_read(tmp_path):
+    path = tmp_path / "model.tsv"
+    rows = [
+        "index\tid\tprediction",
+        *(f"{i}\t{one.id}\t{one.choice}" for i, one in enumerate(items())),
+    ]
+    path.write_text("\n".join(rows))
+    _, found = rows_of(read_answers(path, items()), "choice")
+    assert all(row.summary.rate == 1 for row in found.values())
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("{", "line 1: not JSON"),
+        ('{"answer": {}}', 'an object with the "id"'),
+        ('{"id": "g1", "answer": {}}', "no item 'g1'"),
+        ('{"id": "ID"}', "has no reply and none of answer, choice, points"),
+        ('{"id": "ID", "kind": "poem", "reply": ""}', "kind is 'poem'; it is slots"),
+        ('{"id": "ID", "choice": "A"}\n{"id": "ID", "choice": "B"}', "line 2: choice of item"),
+        ("", "there are none"),
+    ],
+)
+def test_bad_files_are_one_sentence(tmp_path, line, words):
+    path = tmp_path / "answers.jsonl"
+    path.write_text(line.replace("ID", items()[0].id))
+    with pytest.raises(InvalidValueError, match=words):
+        read_answers(path, items())
+    with pytest.raises(InvalidValueError, match="cannot be read"):
+        read_answers(tmp_path / "none.jsonl", items())
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["score", "grounding", *map(str, arguments)])
+
+
+def test_the_command_scores_compares_and_reports(tmp_path):
+    data = dataset_in(tmp_path / "set")
+    good, bad = tmp_path / "good.jsonl", tmp_path / "bad.jsonl"
+    write_answers(good, (Answer(item.id, "slots", item.answer) for item in items()))
+    write_answers(bad, (Answer(item.id, "slots", "{}") for item in items()))
+    done = run(good, bad, "--data", data, "--floor", "chance", "--write-floors", tmp_path / "f",
+               "--report", tmp_path / "report.md")  # fmt: skip
+    assert done.exit_code == 0, done.output
+    assert "good, slots" in done.output
+    assert "good (slots) is better, +100.0 points" in done.output
+    assert "replies without an answer" in done.output
+    assert "Confusion of color" in (tmp_path / "report.md").read_text()
+    assert len(read_answers(tmp_path / "f" / "chance.jsonl", items())) == 3 * len(items())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ((), "nothing to score"),
+        (("--floor", "luck"), "no floor 'luck'"),
+        (("--data", "nowhere", "--floor", "chance"), "holds no grounding dataset"),
+    ],
+)
+def test_wrong_commands_are_one_sentence(tmp_path, arguments, words):
+    options = () if "--data" in arguments else ("--data", dataset_in(tmp_path / "set"))
+    done = run(*arguments, *options)
+    with pytest.raises(InvalidValueError, match=words):
+        raise done.exception
+
+
+def test_every_floor_answers_every_item():
+    few = [item for item in items() if item.task == "StopCube" and item.episode < 2]
+    for name in FLOORS:
+        found = list(floor_answers(name, few))
+        assert {one.id for one in found} == {item.id for item in few}
+        assert all(one.reply in LETTERS for one in found if one.kind == "choice")
+
+
+def test_right_replies_are_right():
+    assert all(
+        judge_reply(item, kind, right_reply(item, kind)).right
+        for item in items()
+        for kind in QUESTION_KINDS
+    )

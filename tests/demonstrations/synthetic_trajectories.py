@@ -1,0 +1,99 @@
+"""Trajectories without a simulator: short, with pictures that are easy to tell apart."""
+
+import zipfile
+
+import numpy as np
+
+from roboirg.core.episode import ENVIRONMENT_VERSION
+from roboirg.core.observations import CAMERAS
+from roboirg.demonstrations.trajectory import TrajectoryFacts, TrajectoryFile, stack_texts
+from roboirg.demonstrations.trajectory_recorder import _keep_facts, _PictureTracks
+from roboirg.util.atomic_write import replacing
+
+STEPS = 6
+
+
+def picture(camera, seed, row):
+    """Return a picture (256, 256, 3) with large areas and some noise."""
+    rng = np.random.default_rng((CAMERAS.index(camera), seed, row))
+    found = np.zeros((256, 256, 3), np.uint8)
+    found[:] = rng.integers(0, 256, 3)
+    found[40:60, 10 * row % 200 : 10 * row % 200 + 30] = rng.integers(0, 256, (20, 30, 3))
+    return found
+
+
+def depth(seed, row):
+    return np.full((256, 256, 1), 400 + seed % 100 + row, np.int16)
+
+
+def arrays_of(episode, rows, video_length, *, has_depth):
+    rng = np.random.default_rng(episode.seed)
+    labels = ["pick up the cube"] * (rows // 2) + ["press the button"] * (rows - rows // 2)
+    grounded = [f"{text} at <3, {row // 4}>" for row, text in enumerate(labels)]
+    actions = rng.normal(size=(rows, 8)).astype(np.float32).astype(np.float64)
+    arrays = {
+        "joint_positions": rng.normal(size=(rows, 7)).astype(np.float32),
+        "gripper": rng.uniform(0, 0.04, (rows, 2)).astype(np.float32),
+        "end_effector": rng.normal(size=(rows, 6)),
+        "actions": actions,
+        "pose_actions": rng.normal(size=(rows, 7)),
+        "subgoals": stack_texts(labels),
+        "online_subgoals": stack_texts(labels),
+        "grounded_subgoals": stack_texts(grounded),
+        "grounded_online_subgoals": stack_texts(grounded),
+    }
+    for camera in CAMERAS if has_depth else ():
+        arrays[f"{camera}_extrinsic"] = rng.normal(size=(rows, 3, 4)).astype(np.float32)
+        arrays[f"{camera}_intrinsic"] = rng.normal(size=(3, 3)).astype(np.float32)
+    return arrays
+
+
+def record(
+    episode,
+    policy,
+    path,
+    spec,
+    *,
+    options=None,
+    policy_name="oracle",
+    variation=0,
+    only_successes=True,
+    steps=STEPS,
+    status=None,
+):
+    """Stand in for `record_trajectory`; episode 1 of a task fails."""
+    status = status or ("failure" if episode.index == 1 else "success")
+    video_length = 4 if spec.video and episode.demonstration else 0
+    rows = video_length + 1 + steps + variation
+    with replacing(path) as part:
+        with zipfile.ZipFile(part, "w") as archive:
+            file = TrajectoryFile(archive)
+            tracks = _PictureTracks(file, spec)
+            for row in range(rows):
+                seen = {f"{one}_rgb": picture(one, episode.seed, row) for one in CAMERAS}
+                seen |= {f"{one}_depth": depth(episode.seed, row) for one in CAMERAS}
+                tracks.add(seen, is_video=row < video_length)
+            facts = TrajectoryFacts(
+                task=episode.task,
+                split=episode.split,
+                episode=episode.index,
+                seed=episode.seed,
+                difficulty=episode.difficulty,
+                variation=variation,
+                policy=policy_name,
+                status=status,
+                cause="" if status == "success" else "dropped the cube",
+                video_length=video_length,
+                steps=steps + variation,
+                demonstration_source="planned" if video_length else "none",
+                environment_version=ENVIRONMENT_VERSION,
+                coding=spec.coding,
+                depth=spec.depth,
+                picture_error=tracks.finish(),
+            )
+            arrays = arrays_of(episode, rows, video_length, has_depth=spec.depth)
+            counts = {f"{one}_histogram": tracks.histograms[one] for one in CAMERAS}
+            file.finish(facts, arrays | counts)
+        if only_successes and status != "success":
+            _keep_facts(part, facts)
+    return facts

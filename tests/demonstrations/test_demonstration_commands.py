@@ -1,0 +1,91 @@
+"""The commands: what they print, and what they say of bad input."""
+
+import sys
+
+import pytest
+
+from roboirg.cli import app as cli
+from roboirg.demonstrations import dataset_replay
+from roboirg.demonstrations.dataset_replay import ReplayResult
+
+FEW = ("--tasks", "PickXtimes", "--episodes", "2", "--settings", "explicit,direct")
+
+
+@pytest.fixture
+def roboirg(monkeypatch, capsys):
+    def call(*words):
+        monkeypatch.setattr(sys, "argv", ["roboirg", *map(str, words)])
+        try:
+            cli.main()
+            code = 0
+        except SystemExit as left:
+            code = left.code or 0
+        return code, *capsys.readouterr()
+
+    return call
+
+
+def test_a_dry_run_says_how_big_it_gets_and_writes_nothing(roboirg, tmp_path):
+    words = ("export", "demonstrations", *FEW, "--dry-run", "--out", tmp_path / "data")
+    code, out, err = roboirg(*words)
+    assert (code, out) == (0, "")
+    assert "2 trajectories, 4 episodes, about 2,128 frames and 218 MB" in err
+    assert not (tmp_path / "data").exists()
+
+
+def test_an_export_tells_its_progress_and_its_end(roboirg, tmp_path, synthetic):
+    root = tmp_path / "data"
+    words = ("export", "demonstrations", *FEW, "--workers", "0", "--out", root)
+    code, out, err = roboirg(*words)
+    assert code == 0
+    assert "record 2/2" in err
+    assert "write 1/1" in err
+    assert "2 episodes" in out
+    assert "1 success, 1 failure" in out
+    assert (root / "meta/info.json").exists()
+    code, _, err = roboirg(*words)
+    assert code == 2
+    assert "complete export already" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--format", "lerobot-v2"), "There is no format 'lerobot-v2'; known: lerobot-v3,"),
+        (("--pictures", "jpeg"), "There is no way to store pictures 'jpeg'"),
+        (("--video", "first"), "There is no way to treat the video 'first'"),
+        (("--settings", "indirect"), "There is no setting 'indirect'"),
+        (("--split", "training"), "There is no split 'training'"),
+        (("--split", "random", "--episodes", "all"), "say how many with --episodes"),
+        (("--episodes", "101"), "There is no episode 100"),
+        (("--actions", "tool"), "There is no description of actions 'tool'"),
+        (("--policy", "oracel"), "Did you mean 'oracle'?"),
+        (("--forms", "literal"), "There is no form 'literal'"),
+    ],
+)
+def test_bad_input_is_one_sentence(roboirg, tmp_path, words, message):
+    code, out, err = roboirg("export", "demonstrations", *FEW, *words, "--out", tmp_path / "data")
+    assert (code, out) == (2, "")
+    assert message in err
+    assert err.count("\n") == 1
+
+
+def test_a_replay_prints_what_deviates(roboirg, export, monkeypatch):
+    root = export(tasks=("PickXtimes",), episodes=(0, 2))
+
+    def replay(recorded):
+        final = 0.0 if recorded.index == 0 else 0.5
+        status = "success" if recorded.index == 0 else "failure"
+        return ReplayResult(recorded.name, recorded.task, status, "success", 3, 6, final, final)
+
+    monkeypatch.setattr(dataset_replay, "replay", replay)
+    code, out, _ = roboirg("replay", root, "--workers", "0")
+    assert code == 1
+    assert "PickXtimes/train/2/0: failure after 3 of 6 steps (recorded: success)" in out
+    assert "2 trajectories: 1 with the same verdict, 1 also with a final state" in out
+
+
+def test_a_folder_without_a_data_set_cannot_be_replayed(roboirg, tmp_path):
+    code, _, err = roboirg("replay", tmp_path)
+    assert code == 2
+    assert "holds no data set" in err

@@ -1,0 +1,210 @@
+"""Exports that are stopped, killed, continued, or refused."""
+
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import killed_export
+import numpy as np
+import pytest
+import synthetic_trajectories
+from pyarrow import parquet
+
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.demonstrations import export_run
+from roboirg.demonstrations.dataset_reading import read_dataset
+from roboirg.demonstrations.size_estimate import estimate_size
+from roboirg.episodes.splits import get_episode
+
+HERE = Path(__file__).parent
+KILLS = int(os.environ.get("ROBOIRG_TEST_KILLS", "4"))
+
+
+def quiet(*_):
+    pass
+
+
+def contents(root):
+    """Return a hash of every file."""
+    return {
+        str(path.relative_to(root)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in root.rglob("*")
+        if path.is_file()
+    }
+
+
+def start(out):
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(HERE), *sys.path])}
+    return subprocess.Popen(
+        [sys.executable, HERE / "killed_export.py", out, "0"],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=environment,
+    )
+
+
+def check_never_broken(out):
+    """Check that what is there is a data set that can be read as a whole, or none at all."""
+    for root in (out, out / export_run.VIDEO_DATASET):
+        if not (root / "meta/info.json").exists():
+            continue
+        tables = [parquet.read_table(path) for path in sorted((root / "data").rglob("*.parquet"))]
+        index = np.concatenate([np.asarray(table["index"]) for table in tables])
+        assert index.tolist() == list(range(len(index)))
+
+
+def test_a_killed_export_continues_without_a_broken_file(tmp_path, synthetic):
+    whole = tmp_path / "whole"
+    export_run.run_export(killed_export.PLAN, whole, 0, quiet)
+    out, rng, kills = tmp_path / "killed", np.random.default_rng(0), 0
+    while True:
+        process = start(out)
+        assert process.stdout.readline() == "started\n"
+        if kills < KILLS:
+            time.sleep(float(rng.uniform(0.0, 0.4)))
+            process.send_signal(signal.SIGKILL)
+        rest, _ = process.communicate()
+        check_never_broken(out)
+        if rest == "finished\n":
+            break
+        assert process.returncode == -signal.SIGKILL
+        kills += 1
+    assert contents(out) == {
+        name: content
+        if not name.endswith("README.md")
+        else contents(out)[name]  # it names the folder
+        for name, content in contents(whole).items()
+    }
+
+
+def test_each_trajectory_is_recorded_once(tmp_path, synthetic, make_plan, monkeypatch):
+    played = []
+
+    def record(episode, *args, **options):
+        if len(played) == 3:
+            raise KeyboardInterrupt
+        played.append((episode.task, episode.index))
+        return synthetic_trajectories.record(episode, *args, **options)
+
+    monkeypatch.setattr(export_run, "record_trajectory", record)
+    with pytest.raises(KeyboardInterrupt):
+        export_run.run_export(make_plan(), tmp_path / "data", 0, quiet)
+    before, told = list(played), []
+    played.append(None)  # no further interruption
+    export_run.run_export(make_plan(), tmp_path / "data", 0, lambda *now: told.append(now))
+    assert len(before) == 3
+    assert not set(before) & set(played[4:])
+    assert len(played[4:]) == 3
+    assert told[0][:3] == ("record", 3, 6)
+    assert told[-1][:3] == ("write", 4, 4)
+    assert not (tmp_path / "data" / export_run.WORK_FOLDER).exists()
+
+
+def test_kept_trajectories_serve_other_formats(tmp_path, synthetic, make_plan, monkeypatch):
+    kept = tmp_path / "kept"
+    export_run.run_export(make_plan(), tmp_path / "v3", 0, quiet, kept)
+    monkeypatch.setattr(export_run, "record_trajectory", None)
+    plan = make_plan(format="lerobot-v2.1", settings=("reasoning",))
+    summary = export_run.run_export(plan, tmp_path / "v21", 0, quiet, kept)
+    assert summary.recorded == 0
+    assert summary.episodes == 4
+
+
+def test_failures_are_exported_only_on_request(export):
+    successes = list(read_dataset(export("successes")))
+    everything = list(read_dataset(export("all", outcomes="all")))
+    assert {one.status for one in successes} == {"success"}
+    assert [one.status for one in everything].count("failure") == 2
+    assert len(everything) == len(successes) + 2
+
+
+def test_variations_are_trajectories_of_their_own(export):
+    found = list(read_dataset(export(tasks=("PickXtimes",), variations=3)))
+    assert [(one.name, len(one.actions)) for one in found] == [
+        (f"PickXtimes/train/{episode}/{variation}", synthetic_trajectories.STEPS + variation)
+        for episode in (0, 2)
+        for variation in range(3)
+    ]
+
+
+def test_a_policy_is_recorded_in_every_setting(export):
+    root = export(tasks=("PickXtimes",), policy="listener", episodes=(0,))
+    assert [one.name for one in read_dataset(root)] == [
+        "PickXtimes/train/0/0/explicit-implicit",
+        "PickXtimes/train/0/0/direct-implicit",
+    ]
+    table = parquet.read_table(root / "meta/demonstrations.parquet")
+    assert set(table["policy"].to_pylist()) == {"listener"}
+
+
+def test_other_options_and_folders_are_refused(tmp_path, export, make_plan, monkeypatch):
+    root = export()
+    with pytest.raises(InvalidValueError, match="complete export already"):
+        export_run.run_export(make_plan(), root, 0, quiet)
+    strange = tmp_path / "strange"
+    strange.mkdir()
+    (strange / "thesis.tex").touch()
+    with pytest.raises(InvalidValueError, match="is not empty and no export"):
+        export_run.run_export(make_plan(), strange, 0, quiet)
+    assert [one.name for one in strange.iterdir()] == ["thesis.tex"]
+
+    def stop(*args, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(export_run, "record_trajectory", stop)
+    with pytest.raises(KeyboardInterrupt):
+        export_run.run_export(make_plan(), tmp_path / "stopped", 0, quiet)
+    with pytest.raises(InvalidValueError, match="started with other options"):
+        export_run.run_export(make_plan(settings=("direct",)), tmp_path / "stopped", 0, quiet)
+
+
+def test_plans_that_make_no_sense_are_refused(make_plan):
+    with pytest.raises(UnknownNameError, match=r"Did you mean 'lerobot-v3'\?"):
+        make_plan(format="lerobot-v4")
+    with pytest.raises(InvalidValueError, match="variations is 0; it must be at least 1"):
+        make_plan(variations=0)
+    with pytest.raises(
+        InvalidValueError, match="only the oracle varies, and the policy is 'random'"
+    ):
+        make_plan(variations=2, policy="random")
+    with pytest.raises(InvalidValueError, match="Language columns belong to"):
+        make_plan(language_columns=True, format="lerobot-v2.1")
+    with pytest.raises(InvalidValueError, match="holds lossless pictures"):
+        make_plan(format="robomme-hdf5", pictures="lossy-video")
+
+
+def test_the_card_tells_counts_and_measured_errors(export):
+    card = (export(pictures="lossy-video") / "README.md").read_text()
+    assert "| all | 4 | 8 | 48 |" in card
+    assert "4 success, 2 failure" in card
+    assert "front: mean error" in card
+    assert "lerobot-train" in card
+    text = (export("v21", format="lerobot-v2.1", names="openpi") / "README.md").read_text()
+    config = text.split("```python\n")[1].split("```")[0]
+    compile(config, "config", "exec")
+    assert '"observation/wrist_image": "wrist_image"' in config
+
+
+def test_the_estimate_counts_words_once_for_pictures(make_plan):
+    one, two = estimate_size(make_plan(settings=("explicit",))), estimate_size(make_plan())
+    assert (one.trajectories, one.episodes) == (6, 6)
+    assert (two.trajectories, two.episodes) == (6, 12)
+    assert two.frames == 2 * one.frames
+    assert one.size < two.size < 1.1 * one.size
+    apart = estimate_size(make_plan(format="lerobot-v2.1"))
+    assert apart.size > 1.8 * one.size
+    assert get_episode("PickXtimes", "train", 0).task in make_plan().tasks
+
+
+def test_states_alone_need_no_pictures(export):
+    root = export(pictures="none", video="prefix")
+    assert "There are no pictures." in (root / "README.md").read_text()
+    assert [one.task for one in read_dataset(root)] == ["PickXtimes"] * 2 + ["VideoUnmask"] * 2
+    info = json.loads((root / "meta/info.json").read_text())
+    assert not [name for name in info["features"] if "image" in name]
+    assert sum(path.stat().st_size for path in root.rglob("*") if path.is_file()) < 300_000

@@ -1,0 +1,64 @@
+"""Statistics of features, against NumPy on all values."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from roboirg.demonstrations.feature_stats import (
+    PICTURE_PIXELS,
+    QUANTILES,
+    gather_vectors,
+    picture_stats,
+    vector_stats,
+)
+from roboirg.demonstrations.picture_coding import count_values
+
+FINITE = st.floats(-1e3, 1e3, width=32)
+
+
+@given(arrays(np.float32, st.tuples(st.integers(1, 40), st.integers(1, 8)), elements=FINITE))
+def test_vectors_agree_with_numpy(values):
+    stats = vector_stats(values)
+    exact = values.astype(np.float64)
+    assert stats["min"] == exact.min(axis=0).tolist()
+    assert stats["max"] == exact.max(axis=0).tolist()
+    assert np.allclose(stats["mean"], exact.mean(axis=0))
+    assert np.allclose(stats["std"], exact.std(axis=0))
+    for name, share in QUANTILES.items():
+        assert np.allclose(stats[name], np.quantile(exact, share, axis=0))
+    assert stats["count"] == [len(values)]
+
+
+def test_parts_are_one_whole():
+    parts = [np.arange(6.0).reshape(3, 2), np.arange(8.0).reshape(4, 2)]
+    assert gather_vectors(parts) == vector_stats(np.concatenate(parts))
+
+
+@settings(max_examples=30)
+@given(st.integers(1, 3), st.integers(1, 6), st.integers(0, 2**32 - 1))
+def test_pictures_agree_with_numpy_on_all_pixels(count, colors, seed):
+    rng = np.random.default_rng(seed)
+    palette = rng.integers(0, 256, (colors, 3), dtype=np.uint8)
+    pictures = palette[rng.integers(0, colors, (count, 256, 256))]
+    stats = picture_stats(sum(count_values(one) for one in pictures))
+    pixels = pictures.reshape(-1, 3) / 255.0
+    for name, expected in {
+        "min": pixels.min(axis=0),
+        "max": pixels.max(axis=0),
+        "mean": pixels.mean(axis=0),
+        "std": pixels.std(axis=0),
+        **{name: np.quantile(pixels, share, axis=0) for name, share in QUANTILES.items()},
+    }.items():
+        assert np.shape(stats[name]) == (3, 1, 1)
+        assert np.ravel(stats[name]) == pytest.approx(expected, abs=1e-9)
+    assert stats["count"] == [count]
+
+
+def test_one_pixel_more_or_less_moves_the_median():
+    counts = np.zeros((3, 256), np.int64)
+    counts[:, 10] = counts[:, 20] = PICTURE_PIXELS // 2
+    assert np.ravel(picture_stats(counts)["q50"]) == pytest.approx([15 / 255] * 3)
+    counts[0, 20] += 1
+    assert np.ravel(picture_stats(counts)["q50"])[0] == pytest.approx(20 / 255)

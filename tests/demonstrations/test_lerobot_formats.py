@@ -1,0 +1,233 @@
+"""LeRobot's formats: every frame of an export is what was recorded."""
+
+import io
+import json
+
+import av
+import numpy as np
+import pandas as pd
+import pytest
+import synthetic_trajectories as synthetic
+from PIL import Image
+from pyarrow import parquet
+
+from roboirg.demonstrations.dataset_reading import read_dataset
+from roboirg.episodes.splits import get_episode
+from roboirg.language import instruct
+
+CAMERAS = ("front", "wrist")
+
+
+def read_json(path):
+    return json.loads(path.read_text())
+
+
+def frames_of(path):
+    with av.open(str(path)) as container:
+        return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+
+
+def decoded(entry):
+    return np.asarray(Image.open(io.BytesIO(entry["bytes"])))
+
+
+def load_v3(root):
+    """Read a data set of version 3 as LeRobot does: by its own metadata."""
+    info = read_json(root / "meta/info.json")
+    episodes = parquet.read_table(root / "meta/episodes/chunk-000/file-000.parquet").to_pylist()
+    for row in episodes:
+        place = {"chunk_index": row["data/chunk_index"], "file_index": row["data/file_index"]}
+        frames = parquet.read_table(root / info["data_path"].format(**place)).to_pylist()
+        yield row, [one for one in frames if one["episode_index"] == row["episode_index"]]
+
+
+def test_every_frame_of_version_3_is_as_recorded(export):
+    root = export(extra_actions=("delta", "pose"))
+    info, index = read_json(root / "meta/info.json"), 0
+    facts = pd.read_parquet(root / "meta/demonstrations.parquet").set_index("episode_index")
+    tasks = pd.read_parquet(root / "meta/tasks.parquet")
+    assert (info["fps"], info["codebase_version"]) == (20, "v3.0")
+    assert None not in [one["names"] for one in info["features"].values()]
+    for row, frames in load_v3(root):
+        number = row["episode_index"]
+        told = facts.loc[number]
+        episode = get_episode(told.task, told.split, int(told.episode))
+        assert told.text == instruct(episode, told.setting, told.form).text == row["tasks"][0]
+        assert told.explicit == instruct(episode).text
+        assert row["length"] == len(frames) == synthetic.STEPS
+        assert (row["dataset_from_index"], row["dataset_to_index"]) == (index, index + len(frames))
+        expected = synthetic.arrays_of(episode, len(frames) + 1, 0, has_depth=False)
+        for time, frame in enumerate(frames):
+            assert frame["index"] == index
+            assert frame["frame_index"] == time
+            assert frame["timestamp"] == pytest.approx(time / 20, abs=1e-6)
+            assert tasks.iloc[frame["task_index"]].name == told.text
+            state = [*expected["joint_positions"][time], expected["gripper"][time, 0]]
+            assert frame["observation.state"] == state
+            action = expected["actions"][time + 1]
+            assert frame["action"] == action.tolist()
+            moved = action[:7] - expected["joint_positions"][time]
+            assert frame["delta_action"] == pytest.approx([*moved, action[7]], abs=1e-6)
+            assert frame["pose_action"] == pytest.approx(expected["pose_actions"][time + 1])
+            assert frame["subgoal"] == expected["subgoals"][time + 1]
+            assert frame["next.done"] == frame["next.success"] == (time == len(frames) - 1)
+            assert frame["next.reward"] == float(time == len(frames) - 1)
+            assert not frame["is_video_demo"]
+            for camera in CAMERAS:
+                picture = decoded(frame[f"observation.images.{camera}"])
+                assert np.array_equal(picture, synthetic.picture(camera, episode.seed, time))
+            index += 1
+    assert (info["total_frames"], info["total_tasks"]) == (index, len(tasks))
+    assert info["splits"] == {"train": f"0:{info['total_episodes']}"}
+    # Two tasks and settings; episode 1 of each task fails.
+    assert info["total_episodes"] == len(facts) == 8
+    assert set(info["features"]) == set(frame)
+
+
+def test_statistics_are_those_of_the_frames(export):
+    root = export()
+    stats = read_json(root / "meta/stats.json")
+    frames = [frame for _, own in load_v3(root) for frame in own]
+    for name in ("observation.state", "action", "index", "next.success"):
+        values = np.array([np.atleast_1d(frame[name]) for frame in frames], dtype=float)
+        assert np.allclose(stats[name]["mean"], values.mean(axis=0))
+        assert np.allclose(stats[name]["q99"], np.quantile(values, 0.99, axis=0))
+        assert stats[name]["count"] == [len(frames)]
+    name = "observation.images.wrist"
+    pixels = np.stack([decoded(frame[name]) for frame in frames]).reshape(-1, 3) / 255.0
+    assert np.ravel(stats[name]["mean"]) == pytest.approx(pixels.mean(axis=0))
+    assert np.ravel(stats[name]["q01"]) == pytest.approx(np.quantile(pixels, 0.01, axis=0))
+    row, own = next(load_v3(root))
+    state = np.array([frame["observation.state"] for frame in own])
+    assert np.allclose(row["stats/observation.state/max"], state.max(axis=0))
+    assert set(stats) == set(read_json(root / "meta/info.json")["features"]) - {
+        "subgoal",
+        "grounded_subgoal",
+    }
+
+
+def test_pictures_of_several_settings_are_stored_once(export):
+    one = export("one", settings=("explicit",))
+    both = export("both", settings=("explicit", "direct"))
+    sizes = [
+        sum(path.stat().st_size for path in (root / "data").rglob("*.parquet"))
+        for root in (one, both)
+    ]
+    assert sizes[1] < 1.3 * sizes[0]
+
+
+@pytest.mark.parametrize("pictures", ["lossless-video", "png"])
+def test_the_video_comes_before_the_policy_and_is_marked(export, pictures):
+    root = export(video="prefix", pictures=pictures, tasks=("VideoUnmask",), episodes=(0,))
+    episode = get_episode("VideoUnmask", "train", 0)
+    for row, frames in load_v3(root):
+        assert [frame["is_video_demo"] for frame in frames] == [True] * 4 + [False] * 6
+        expected = synthetic.arrays_of(episode, len(frames) + 1, 4, has_depth=False)
+        assert frames[3]["action"] == expected["actions"][4].tolist()
+        if pictures == "png":
+            continue
+        key = "videos/observation.images.wrist"
+        assert row[f"{key}/from_timestamp"] == 0.0
+        assert row[f"{key}/to_timestamp"] == pytest.approx(len(frames) / 20)
+        video = frames_of(root / f"{key}/chunk-000/file-000.mp4")
+        for time in range(len(frames)):
+            assert np.array_equal(video[time], synthetic.picture("wrist", episode.seed, time))
+
+
+@pytest.mark.parametrize("pictures", ["lossless-video", "png"])
+def test_videos_have_a_data_set_of_their_own(export, pictures):
+    root = export(video="sidecar", pictures=pictures)
+    side = root / "demonstration_videos"
+    main = list(load_v3(root))
+    shown = list(load_v3(side))
+    assert {len(frames) for _, frames in main} == {synthetic.STEPS}
+    assert {len(frames) for _, frames in shown} == {4}
+    facts = pd.read_parquet(side / "meta/demonstrations.parquet")
+    assert set(facts.task) == {"VideoUnmask"}
+    assert all(frame["is_video_demo"] for _, frames in shown for frame in frames)
+    seed, first = facts.seed[0], synthetic.picture
+    if pictures == "png":
+        assert np.array_equal(
+            decoded(shown[0][1][2]["observation.images.front"]), first("front", seed, 2)
+        )
+        return
+    for folder, start in ((side, 0), (root, 4)):
+        number = 0 if folder == side else 2  # two trajectories of PickXtimes come first
+        path = folder / f"videos/observation.images.front/chunk-000/file-{number:03d}.mp4"
+        assert np.array_equal(frames_of(path)[0], first("front", seed, start))
+
+
+def test_language_columns_tell_subtasks_and_other_words(export):
+    root = export(language_columns=True, tasks=("PickXtimes",), episodes=(0,))
+    info = read_json(root / "meta/info.json")
+    assert info["features"]["language_persistent"]["dtype"] == "language"
+    for row, frames in load_v3(root):
+        spoken = frames[0]["language_persistent"]
+        assert all(frame["language_persistent"] == spoken for frame in frames)
+        subtasks = [(one["content"], one["timestamp"]) for one in spoken if one["role"] != "user"]
+        changes = [0, *(i for i in range(1, 6) if frames[i]["subgoal"] != frames[i - 1]["subgoal"])]
+        assert subtasks == [
+            (frames[i]["subgoal"], pytest.approx(i / 20, abs=1e-6)) for i in changes
+        ]
+        others = [one["content"] for one in spoken if one["style"] == "task_aug"]
+        assert others == ([] if row["episode_index"] == 0 else [next(load_v3(root))[0]["tasks"][0]])
+        assert all(frame["language_events"] == [] for frame in frames)
+
+
+def test_version_2_1_has_a_file_per_episode(export):
+    root = export(format="lerobot-v2.1", names="openpi")
+    info = read_json(root / "meta/info.json")
+    episodes = [json.loads(one) for one in (root / "meta/episodes.jsonl").read_text().splitlines()]
+    tasks = [json.loads(one) for one in (root / "meta/tasks.jsonl").read_text().splitlines()]
+    stats = (root / "meta/episodes_stats.jsonl").read_text().splitlines()
+    assert info["total_episodes"] == len(episodes) == len(stats) == 8
+    assert (info["total_videos"], info["total_chunks"]) == (0, 1)
+    index = 0
+    facts = pd.read_parquet(root / "meta/demonstrations.parquet")
+    for row in episodes:
+        number = row["episode_index"]
+        path = info["data_path"].format(episode_chunk=0, episode_index=number)
+        frames = parquet.read_table(root / path).to_pylist()
+        assert len(frames) == row["length"]
+        for time, frame in enumerate(frames):
+            assert tasks[frame["task_index"]]["task"] == row["tasks"][0]
+            assert (frame["index"], frame["episode_index"]) == (index, number)
+            shown = synthetic.picture("wrist", facts.seed[number], time)
+            assert np.array_equal(decoded(frame["wrist_image"]), shown)
+            index += 1
+        assert {"image", "wrist_image", "state", "actions"} < set(frames[0])
+    modality = read_json(root / "meta/modality.json")
+    assert modality["state"]["gripper"] == {"start": 7, "end": 8, "original_key": "state"}
+
+
+def test_version_2_1_has_videos_for_groot(export):
+    root = export(format="lerobot-v2.1", pictures="lossless-video", tasks=("PickXtimes",))
+    info = read_json(root / "meta/info.json")
+    facts = pd.read_parquet(root / "meta/demonstrations.parquet")
+    assert info["total_videos"] == 2 * info["total_episodes"] == 2 * len(facts)
+    for number, seed in zip(facts.episode_index, facts.seed, strict=True):
+        path = info["video_path"].format(
+            video_key="observation.images.front", episode_chunk=0, episode_index=number
+        )
+        found = frames_of(root / path)
+        for time in range(synthetic.STEPS):
+            assert np.array_equal(found[time], synthetic.picture("front", seed, time))
+
+
+@pytest.mark.parametrize("version", ["lerobot-v3", "lerobot-v2.1"])
+def test_actions_are_read_back_once_per_trajectory(export, version):
+    root = export(format=version, video="prefix")
+    found = list(read_dataset(root))
+    assert [(one.task, one.index) for one in found] == [
+        ("PickXtimes", 0),
+        ("PickXtimes", 2),
+        ("VideoUnmask", 0),
+        ("VideoUnmask", 2),
+    ]
+    for one in found:
+        video = 4 * (one.task == "VideoUnmask")
+        episode, rows = get_episode(one.task, "train", one.index), video + 1 + synthetic.STEPS
+        expected = synthetic.arrays_of(episode, rows, video, has_depth=False)
+        assert np.array_equal(one.actions, expected["actions"][video + 1 :])
+        assert np.array_equal(one.states[:, :7], expected["joint_positions"][video + 1 :])
+        assert np.array_equal(one.final_state[7:], expected["gripper"][-1])

@@ -1,0 +1,114 @@
+"""Files of trajectories, and the coding of their pictures."""
+
+import io
+import zipfile
+
+import av
+import numpy as np
+import pytest
+import synthetic_trajectories as synthetic
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.demonstrations.picture_coding import VideoEncoder, encode_depth, encode_png
+from roboirg.demonstrations.trajectory import (
+    PictureFile,
+    drop_pictures,
+    has_pictures,
+    load_facts,
+    load_trajectory,
+)
+from roboirg.demonstrations.trajectory_recorder import RecordingSpec, _with_pixels
+from roboirg.episodes.splits import get_episode
+
+
+def frames_of(content):
+    with av.open(io.BytesIO(content)) as container:
+        return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+
+
+def test_a_trajectory_is_read_as_it_was_written(tmp_path):
+    episode, path = get_episode("VideoUnmask", "train", 0), tmp_path / "one.zip"
+    facts = synthetic.record(episode, None, path, RecordingSpec(video=True, depth=True))
+    found = load_trajectory(path)
+    assert found.facts == load_facts(path) == facts
+    assert (facts.video_length, facts.rows) == (4, 4 + 1 + synthetic.STEPS)
+    assert found.state.shape == (facts.rows, 8)
+    assert found.state.dtype == np.float32
+    assert set(found.calibration) == {
+        f"{camera}_{kind}" for camera in ("front", "wrist") for kind in ("extrinsic", "intrinsic")
+    }
+    with zipfile.ZipFile(path) as archive:
+        pictures = PictureFile(archive)
+        for row in range(facts.rows):
+            for camera in ("front", "wrist"):
+                expected = synthetic.picture(camera, episode.seed, row)
+                assert np.array_equal(pictures.picture(camera, row), expected)
+                assert np.array_equal(
+                    pictures.depth(camera, row), synthetic.depth(episode.seed, row)
+                )
+
+
+def test_pictures_can_be_dropped_and_nothing_else(tmp_path):
+    path = tmp_path / "one.zip"
+    synthetic.record(get_episode("PickXtimes", "train", 0), None, path, RecordingSpec())
+    before = load_trajectory(path)
+    assert has_pictures(path)
+    for _ in range(2):
+        drop_pictures(path)
+        assert not has_pictures(path)
+    after = load_trajectory(path)
+    assert after.facts == before.facts
+    assert np.array_equal(after.actions, before.actions)
+
+
+def test_a_damaged_trajectory_is_named(tmp_path):
+    path = tmp_path / "one.zip"
+    path.write_bytes(b"no archive")
+    with pytest.raises(InvalidValueError, match=r"one\.zip' cannot be read"):
+        load_trajectory(path)
+
+
+def test_png_and_depth_are_lossless():
+    rng = np.random.default_rng(0)
+    noise = rng.integers(0, 256, (256, 256, 3), dtype=np.uint8)
+    far = rng.integers(0, 2**15, (256, 256, 1)).astype(np.int16)
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr("front/000000.png", encode_png(noise))
+        archive.writestr("front_depth/000000.png", encode_depth(far))
+    with zipfile.ZipFile(file) as archive:
+        assert np.array_equal(PictureFile(archive).picture("front", 0), noise)
+        assert np.array_equal(PictureFile(archive).depth("front", 0), far)
+
+
+def test_a_lossless_video_holds_the_same_bits():
+    encoder = VideoEncoder("lossless-video")
+    pictures = [synthetic.picture("front", 7, row) for row in range(25)]
+    for one in pictures:
+        encoder.add(one)
+    for found, expected in zip(frames_of(encoder.finish()), pictures, strict=True):
+        assert np.array_equal(found, expected)
+    assert encoder.error["largest"] == 0
+
+
+def test_the_error_of_a_lossy_video_is_what_a_reader_sees():
+    encoder = VideoEncoder("lossy-video")
+    pictures = np.stack([synthetic.picture("front", 7, row) for row in range(25)])
+    for one in pictures:
+        encoder.add(one)
+    found = np.stack(frames_of(encoder.finish()))
+    difference = np.abs(found.astype(int) - pictures)
+    assert encoder.error["largest"] == difference.max() > 0
+    assert encoder.error["mean"] == pytest.approx(difference.mean())
+    psnr = 10 * np.log10(255**2 / np.mean(difference.astype(float) ** 2))
+    assert encoder.error["psnr"] == pytest.approx(psnr)
+
+
+def test_subgoals_keep_the_pixel_that_was_found_for_them():
+    templates = ["pick up the cube {at} again", "pick up the cube {at} again", "press the button"]
+    online = ["pick up the cube again", "pick up the cube at <3, 4> again", "press the button"]
+    assert _with_pixels(templates, online) == [
+        "pick up the cube again",
+        "pick up the cube at <3, 4> again",
+        "press the button",
+    ]

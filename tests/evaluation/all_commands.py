@@ -1,0 +1,72 @@
+"""All commands, with words for each with which it does its work."""
+
+import typer.main
+
+from roboirg.cli.app import app
+from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.records.record import Job
+from roboirg.records.store import RecordStore
+
+
+def all_commands():
+    """Return the commands by their words."""
+
+    def walk(command, name):
+        for word, inner in getattr(command, "commands", {}).items():
+            yield from walk(inner, [*name, word])
+        if not hasattr(command, "commands"):
+            yield " ".join(name), command
+
+    return dict(walk(typer.main.get_command(app), []))
+
+
+def make_run(folder):
+    """Write a run of two policies, one of which succeeds, and return its folder."""
+    with RecordStore(folder) as store:
+        for number in range(6):
+            job = Job(policy="random", task="PickXtimes", split="test", episode=number // 2,
+                      setting="direct")  # fmt: skip
+            result = RolloutResult("failure", cause="timeout", steps=7)
+            if number % 2:
+                job = job.model_copy(update={"policy": "oracle"})
+                result = RolloutResult("success", cause=None, steps=7)
+            store.append(make_record(job, result, started_at="now"))
+    return folder
+
+
+def words_of(folder, run):
+    """Return words for each command with which it does its work where all is installed."""
+    return {
+        "bench": ["--rounds", "1"],
+        "run": ["--policy", "random", "--tasks", "PickXtimes", "--episodes", "1", "--workers", "0",
+                "--settings", "explicit", "--out", f"{folder}/out"],
+        "merge": [run, "--out", f"{folder}/merged"],
+        "report": [run],
+        "view": [run],
+        "tables": [run],
+        "figures": [run, "--out", f"{folder}/figures"],
+        "compare": [f"{run}:random", f"{run}:oracle"],
+        "serve": ["random"],
+        "check-policy": ["random"],
+        "demo": ["--out", f"{folder}/demo"],
+        "doctor": [],
+        "tasks": [],
+        "build-splits": ["--tasks", "PickXtimes", "--split", "val", "--workers", "0"],
+        "show": ["PickXtimes", "0", "--out", f"{folder}/sheet.png"],
+        "instruct": ["PickXtimes", "0"],
+        "language stats": ["--tasks", "PickXtimes", "--split", "val"],
+        "language validate": ["--tasks", "PickXtimes", "--split", "val", "--workers", "0"],
+        "language card": [],
+        "language shortcuts": ["--tasks", "PickXtimes", "--split", "val", "--learned"],
+        "export instructions": ["--tasks", "PickXtimes", "--split", "val",
+                                "--out", f"{folder}/words.jsonl"],
+        "export episodes": ["--tasks", "PickXtimes", "--split", "val",
+                            "--out", f"{folder}/episodes.jsonl"],
+        "export records": [run, "--out", f"{folder}/records.parquet"],
+        "real plan": ["--policy", "random", "--tasks", "PutInBox", "--trials", "1", "--no-sheet",
+                      "--demonstrations", "1", "--out", f"{folder}/study"],
+        "real run": [f"{folder}/study"],
+        "real score": [f"{folder}/study"],
+        "real figure": [run, "--out", f"{folder}/figures"],
+        "wordings import-robomme": ["--help"],
+    }  # fmt: skip

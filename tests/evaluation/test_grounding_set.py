@@ -1,0 +1,420 @@
+"""The grounding dataset: what interpreter and scene say, and pictures that show it."""
+
+import ast
+import base64
+import csv
+import io
+import itertools
+import json
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from roboirg.cli.app import app
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.envs.environment import RoboIRGEnv
+from roboirg.episodes.splits import SIZES, get_episode
+from roboirg.evaluation.grounding_set import dataset_export
+from roboirg.evaluation.grounding_set.dataset_export import (
+    EpisodeName,
+    ExportRequest,
+    export_grounding,
+)
+from roboirg.evaluation.grounding_set.grounding_item import (
+    LETTERS,
+    PointTarget,
+    decode_mask,
+    encode_mask,
+    read_items,
+)
+from roboirg.evaluation.grounding_set.item_builder import (
+    EpisodeMedia,
+    item_id,
+    make_items,
+    wanted_options,
+    words_back,
+)
+from roboirg.evaluation.grounding_set.referents import find_referents, pointed_kinds
+from roboirg.evaluation.grounding_set.seen_scene import nearest_to_center
+from roboirg.language import FORMS, instruct, setting_names
+from roboirg.language.interpreter import interpret
+from roboirg.language.settings import all_settings
+from roboirg.policies.planning.goal_schema import goal_schema
+from roboirg.policies.planning.prompts import load_prompts
+from roboirg.tasks import all_tasks, get_task
+
+BENCHMARK = [name for name, task in all_tasks().items() if task.suite != "real"]
+SEEN = [
+    ("PickXtimes", 3),
+    ("BinFill", 3),
+    ("ButtonUnmaskSwap", 0),
+    ("StopCube", 0),
+    ("VideoUnmask", 1),
+]
+"""Without and with a video; hidden things, things that come later, amounts."""
+
+
+def unseen(steps=0):
+    """Media in place of pictures, for tests of words and answers."""
+    point = PointTarget(kind="cube", picture="first", x=0, y=0, size=(2, 2), counts=[0, 1, 3])
+    return EpisodeMedia("pictures/0.png", None, (), steps, (point,), 0.5)
+
+
+def items_of(task, index, *, forms=("implicit",), every_variant=False, split="test"):
+    episode = get_episode(task, split, index)
+    wanted = wanted_options(
+        episode, setting_names(), forms, InstructionOptions(), every_variant=every_variant
+    )
+    return episode, make_items(episode, unseen(), list(wanted))
+
+
+@pytest.mark.parametrize("task", BENCHMARK)
+def test_answers_are_what_the_words_mean_in_the_scene(task):
+    schema = goal_schema(task)
+    for index in range(5):
+        episode, items = items_of(task, index, forms=FORMS, every_variant=index == 0)
+        for item in items:
+            goals = interpret(item.text, episode.scene, task).goals
+            assert [schema.answers[goal] for goal in goals] == [item.answer] == item.answers
+            assert item.answer in item.goals
+            assert len(set(item.goals)) == len(item.goals)
+            assert set(item.goals) == {
+                schema.answers[goal] for goal in get_task(task).goals(episode.scene)
+            }
+
+
+@pytest.mark.parametrize("task", BENCHMARK)
+def test_choices_are_goals_of_the_scene_in_other_words_and_one_is_right(task):
+    schema = goal_schema(task)
+    for index in range(8):
+        episode, items = items_of(task, index)
+        for item in items:
+            assert 2 <= len(item.choices) == len(set(item.choices)) <= 4
+            assert item.choice_answers[LETTERS.index(item.choice)] == item.answer
+            assert item.choice_answers.count(item.answer) == 1
+            for command, answer in zip(item.choices, item.choice_answers, strict=True):
+                (goal,) = interpret(command, episode.scene, task).goals
+                assert schema.answers[goal] == answer
+                assert command not in item.text
+
+
+def test_who_hears_the_command_alone_can_only_guess_among_the_choices():
+    for task, index in itertools.product(BENCHMARK, range(4)):
+        episode, items = items_of(task, index)
+        for item in (one for one in items if one.command_chance < 1):
+            fitting = interpret(item.turns[-1], episode.scene, task).goals
+            answers = [goal_schema(task).answers[goal] for goal in fitting]
+            assert set(item.choice_answers) <= set(answers), item.text
+
+
+def test_places_of_the_right_choice_are_balanced():
+    places = Counter(
+        (item.setting, item.choice)
+        for index in range(48)
+        for item in items_of("StopCube", index)[1]
+        if item.setting != "reasoning"  # which leaves three goals in some scenes
+    )
+    assert set(places.values()) == {12}
+    assert len(places) == 3 * 4
+
+
+def test_ids_are_unique_stable_and_the_same_whatever_the_answer():
+    found = [
+        item.id
+        for task, index in itertools.product(BENCHMARK, range(3))
+        for item in items_of(task, index, forms=FORMS, every_variant=True)[1]
+    ]
+    assert len(set(found)) == len(found)
+    episode = get_episode("PickXtimes", "test", 3)
+    options = InstructionOptions("direct")
+    name = item_id(episode, options)
+    assert name == "gff74ca36371d2267"
+    others = get_task("PickXtimes").goals(episode.scene)
+    assert {item_id(replace(episode, goal=goal), options) for goal in others} == {name}
+    assert item_id(get_episode("PickXtimes", "val", 3), options) != name
+
+
+def test_the_test_split_has_2550_items():
+    counts = Counter(
+        options.setting
+        for task in BENCHMARK
+        for index in range(SIZES["test"])
+        for options in wanted_options(
+            get_episode(task, "test", index),
+            setting_names(),
+            ("implicit",),
+            InstructionOptions(),
+            every_variant=False,
+        )
+    )
+    spatial = sum(get_task(task).spatial for task in BENCHMARK)
+    assert counts["spatial"] == 50 * spatial
+    assert counts.total() == 50 * (4 * len(BENCHMARK) + spatial) == 2550
+
+
+def test_options_that_a_setting_does_not_read_keep_their_defaults():
+    episode = get_episode("PickXtimes", "test", 3)
+    changed = InstructionOptions(rival="drawn", reasoning="open", frame="camera")
+    for options in wanted_options(episode, setting_names(), FORMS, changed, every_variant=True):
+        reads = all_settings()[options.setting].reads
+        for name in ("rival", "reasoning", "frame"):
+            value = getattr(options, name)
+            assert value == getattr(InstructionOptions(), name) or name in reads
+
+
+@given(st.data())
+def test_masks_survive_their_run_lengths(data):
+    height, width = data.draw(st.integers(1, 9)), data.draw(st.integers(1, 9))
+    bits = data.draw(st.lists(st.booleans(), min_size=height * width, max_size=height * width))
+    mask = np.array(bits).reshape(height, width)
+    counts = encode_mask(mask)
+    assert sum(counts) == mask.size
+    assert sum(counts[1::2]) == mask.sum()
+    assert all(counts[1:])
+    assert (decode_mask(counts, mask.shape) == mask).all()
+    if mask.any():
+        assert mask[nearest_to_center(mask)]
+
+
+def test_runs_that_do_not_fill_the_picture_are_refused():
+    with pytest.raises(InvalidValueError, match="cover 3 pixels; they must cover 2 x 2"):
+        decode_mask([1, 2], (2, 2))
+
+
+def test_run_lengths_go_down_the_columns():
+    mask = np.array([[False, True], [True, True]])
+    assert encode_mask(mask) == [1, 3]
+
+
+@pytest.mark.parametrize(
+    ("task", "kinds"),
+    [
+        ("PickXtimes", ("cube",)),
+        ("StopCube", ("target",)),
+        ("SwingXtimes", ("cube",)),
+        ("BinFill", ("cube",)),
+        ("VideoUnmaskSwap", ("container",)),
+        ("ButtonUnmask", ("container",)),
+        ("VideoRepick", ("cube",)),
+        ("VideoPlaceButton", ("cube", "target")),
+        ("VideoPlaceOrder", ("cube", "target")),
+        ("PutInBox", ("box",)),
+        ("PickByCount", ("tape",)),
+    ],
+)
+def test_things_to_point_at_are_those_that_the_words_tell_apart(task, kinds):
+    assert pointed_kinds(task) == kinds
+
+
+def test_what_is_not_there_yet_is_pointed_at_by_what_is_in_its_place():
+    episode = get_episode("ButtonUnmask", "test", 0)
+    (referent,) = find_referents(episode)
+    assert episode.scene[referent.objects[0]].color == episode.goal.texts("colors")[0]
+    assert referent.kind == "hidden_cube"
+    episode = get_episode("VideoUnmask", "test", 0)
+    (referent,) = find_referents(episode)
+    inside = episode.scene.hidden_in(referent.objects[0])
+    assert inside.color == episode.goal.texts("colors")[0]
+
+
+def test_of_an_amount_every_thing_of_the_color_will_do():
+    episode = next(
+        one
+        for one in (get_episode("BinFill", "test", index) for index in range(50))
+        if len(one.goal.texts("colors")) > 1
+    )
+    for referent in find_referents(episode):
+        (color,) = {episode.scene[name].color for name in referent.objects}
+        alike = [one for one in episode.scene.of_kind("cube") if one.color == color]
+        assert len(alike) == len(referent.objects)
+
+
+def test_words_back_are_the_words_between_a_value_and_the_expression_for_it():
+    episode = get_episode("StopCube", "test", 1)
+    instruction = instruct(episode, "direct")
+    # "The cube's fourth visit is my favorite. Push ... during that visit."
+    said = instruction.text.split()
+    value = max(i for i, word in enumerate(said) if "fourth" in word)
+    distance = words_back(instruction)
+    assert said[value + 1 + distance].startswith(("that", "during"))
+    assert words_back(instruct(episode, "explicit")) is None
+
+
+def test_the_question_is_the_listener_s_and_the_others_share_its_beginning():
+    own, listener = load_prompts("grounding_questions"), load_prompts("listener")
+    assert listener.fill("system").startswith(own.fill("system"))
+    _, items = items_of("PickXtimes", 0)
+    for item in items:
+        assert item.text in item.said
+        for line in (
+            f"{letter}. {one}" for letter, one in zip(LETTERS, item.choices, strict=False)
+        ):
+            assert line in item.choice_question
+
+
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("grounding") / "set"
+    request = ExportRequest(
+        tuple(EpisodeName(task, "test", index) for task, index in SEEN),
+        setting_names(),
+        ("implicit",),
+        frames=4,
+        frames_every=16,
+    )
+    return request, folder, export_grounding(request, folder, 0)
+
+
+@pytest.mark.sim
+def test_pixels_lie_in_masks_of_the_right_things(exported):
+    """The right place is computed from poses and the camera, not from the segmentation."""
+    _, folder, _ = exported
+    items = {item.task: item for item in read_items(folder) if item.setting == "direct"}
+    for task, index in SEEN:
+        episode, item = get_episode(task, "test", index), items[task]
+        referents = find_referents(episode)
+        env = RoboIRGEnv(episode, cameras=("front",), calibration=True, demonstration_frames="none")
+        observation, _ = env.reset()
+        for point, referent in zip(item.points, referents, strict=True):
+            mask = point.mask
+            assert mask[point.y, point.x]
+            seen = 0
+            for name in referent.objects:
+                column, row = project(observation, env.session.world.bodies[name].position)
+                near = mask[max(0, row - 9) : row + 10, max(0, column - 9) : column + 10]
+                seen += near.any()
+            assert seen
+            rows, columns = np.nonzero(mask)
+            if len(referent.objects) == 1:
+                assert np.hypot(rows.mean() - row, columns.mean() - column) < 12
+
+
+def project(observation, position):
+    """Column and row of a point of the world in the front picture."""
+    place = observation["front_extrinsic"] @ np.append(position, 1.0)
+    x, y, depth = observation["front_intrinsic"] @ place
+    return round(x / depth), round(y / depth)
+
+
+@pytest.mark.sim
+def test_masks_of_cubes_have_the_color_of_the_answer(exported):
+    _, folder, _ = exported
+    cv2 = pytest.importorskip("cv2")
+    for item in read_items(folder):
+        if item.task not in ("PickXtimes", "BinFill", "ButtonUnmaskSwap"):
+            continue
+        answer = json.loads(item.answer)
+        colors = answer.get("colors") or ([answer["color"]] if "color" in answer else None)
+        colors = colors or [name for name in answer if answer[name]]
+        picture = cv2.imread(str(folder / item.picture))
+        shown = [
+            ["blue", "green", "red"][int(picture[point.mask].mean(axis=0).argmax())]
+            for point in item.points
+        ]
+        assert sorted(shown) == sorted(colors)
+
+
+@pytest.mark.sim
+def test_an_export_goes_on_and_gives_the_same_bytes(exported, monkeypatch):
+    request, folder, facts = exported
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    monkeypatch.setattr(dataset_export, "store_media", None)  # nothing is drawn again
+    assert export_grounding(request, folder, 0) == facts
+    assert {path: path.read_bytes() for path in before} == before
+    with pytest.raises(InvalidValueError, match="pictures of another frames; choose another"):
+        export_grounding(request._replace(frames=5), folder, 0)
+    fewer = export_grounding(request._replace(settings=("direct",)), folder, 0)
+    assert fewer.items == len(SEEN)
+    export_grounding(request, folder, 0)
+
+
+@pytest.mark.sim
+def test_pictures_are_stored_once_and_all_are_there(exported):
+    _, folder, facts = exported
+    items = read_items(folder)
+    paths = {path for item in items for path in (item.picture, *item.frames)}
+    assert facts.pictures == len(paths) == sum(1 for _ in (folder / "pictures").iterdir())
+    assert all((folder / path).is_file() for path in paths)
+    video = next(item for item in items if item.task == "VideoUnmask")
+    assert (folder / video.video).read_bytes()[4:8] == b"ftyp"
+    assert 0 < len(video.frames) <= 4
+    assert all(item.video is None for item in items if not item.task.startswith("Video"))
+    card = (folder / "README.md").read_text()
+    assert facts.sha256 in card
+    assert "license: apache-2.0" in card
+
+
+@pytest.mark.sim
+def test_pandas_reads_the_tables(exported):
+    pandas = pytest.importorskip("pandas")
+    _, folder, facts = exported
+    items = read_items(folder)
+    table = pandas.read_parquet(folder / "data" / "test-00000-of-00001.parquet")
+    assert table["id"].tolist() == [item.id for item in items]
+    assert len(table) == facts.items
+    for item, picture, frames in zip(items, table["picture"], table["frames"], strict=True):
+        assert picture["bytes"] == (folder / item.picture).read_bytes()
+        assert [one["path"] for one in frames] == item.frames
+    lines = pandas.read_json(folder / "items.jsonl", lines=True)
+    assert lines["answer"].tolist() == table["answer"].tolist()
+
+
+@pytest.mark.sim
+def test_datasets_reads_the_tables(exported):
+    datasets = pytest.importorskip("datasets")
+    _, folder, facts = exported
+    found = datasets.load_dataset(
+        "parquet", data_files=str(folder / "data" / "*.parquet"), split="train"
+    )
+    assert len(found) == facts.items
+    assert found[0]["picture"].size == (256, 256)
+    assert found[-1]["frames"][0].size == (256, 256)
+
+
+@pytest.mark.sim
+def test_the_tsv_names_earlier_items_in_place_of_their_pictures(exported):
+    _, folder, _ = exported
+    csv.field_size_limit(1 << 30)
+    text = (folder / "vlmevalkit" / "roboirg_grounding_test.tsv").read_text()
+    rows = list(csv.DictReader(io.StringIO(text), delimiter="\t"))
+    items = read_items(folder)
+    for row, item in zip(rows, items, strict=True):
+        assert row["answer"] == item.choice
+        assert [row[letter] for letter in LETTERS if row[letter]] == item.choices
+        image = row["image"] if len(row["image"]) > 64 else rows[int(row["image"])]["image"]
+        images = ast.literal_eval(image) if image.startswith("[") else [image]
+        wanted = [(folder / path).read_bytes() for path in (*item.frames, item.picture)]
+        assert [base64.b64decode(one) for one in images] == wanted
+        assert item.text in row["question"]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--tasks", "PickXtime"], "no task or suite 'PickXtime'|no task 'PickXtime'"),
+        (["--formats", "csv"], "no format 'csv'"),
+        (["--forms", "vague"], "no form 'vague'"),
+        (["--tasks", "StopCube", "--settings", "spatial"], "None of these episodes"),
+    ],
+)
+def test_wrong_requests_are_one_sentence(tmp_path, options, words):
+    done = CliRunner().invoke(
+        app,
+        ["export", "grounding", "--out", str(tmp_path / "set"), "--workers", "0", *options],
+    )
+    assert done.exit_code != 0
+    with pytest.raises(InvalidValueError, match=words):
+        raise done.exception
+
+
+def test_a_folder_of_something_else_is_not_touched(tmp_path):
+    (tmp_path / "thesis.tex").write_text("mine")
+    request = ExportRequest((EpisodeName("StopCube", "test", 0),), ("explicit",), ("implicit",))
+    with pytest.raises(InvalidValueError, match="not an empty folder"):
+        export_grounding(request, tmp_path, 0)

@@ -1,0 +1,80 @@
+"""Every command in an environment with the core alone: it works, or names the extra it needs."""
+
+import json
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from all_commands import all_commands, make_run, words_of
+
+from roboirg.cli.missing_extras import _MODULES, describe_missing
+
+WALK = """
+import io, json, sys, traceback
+from contextlib import redirect_stderr, redirect_stdout
+
+class Without:
+    def __init__(self, finder):
+        self.finder = finder
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] not in refused:
+            return self.finder.find_spec(name, path, target)
+
+refused, commands = set(json.loads(sys.argv[1])), json.loads(sys.argv[2])
+sys.meta_path[:] = map(Without, sys.meta_path)
+from roboirg.cli import app
+found = {}
+for name, words in commands.items():
+    out, err, code = io.StringIO(), io.StringIO(), 0
+    sys.argv = ["roboirg", *name.split(), *words]
+    with redirect_stdout(out), redirect_stderr(err):
+        try:
+            app.main()
+        except SystemExit as left:
+            code = left.code or 0
+        except BaseException:
+            code = traceback.format_exc()
+    found[name] = [code, out.getvalue(), err.getvalue()]
+sys.__stdout__.write(json.dumps(found))
+"""
+
+NEEDS = {
+    "bench": "sim", "run": "sim", "show": "sim", "demo": "report", "report": "report",
+    "view": "report", "figures": "report", "compare": "report", "serve": "remote",
+    "export records": "export", "real run": "sim", "real score": "report",
+    "language shortcuts": "report", "real figure": "report",
+}  # fmt: skip
+"""The extra of each command that cannot do its work without one; all others work."""
+
+
+@pytest.fixture(scope="module")
+def walked(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("core")
+    words = words_of(str(folder), str(make_run(folder / "run")))
+    assert set(words) == set(all_commands())
+    refused = sorted({module for modules in _MODULES.values() for module in modules})
+    done = subprocess.run(
+        [sys.executable, "-c", WALK, json.dumps(refused), json.dumps(words)],
+        check=True, capture_output=True, text=True, cwd=folder,
+    )  # fmt: skip
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("command", sorted(all_commands()))
+def test_a_command_works_or_names_its_extra(walked, command):
+    code, out, err = walked[command]
+    if command in NEEDS:
+        assert (code, out) == (2, ""), walked[command]
+        assert err.startswith("roboirg: ")
+        assert len(err.splitlines()) == 1
+        assert f"'roboirgbench[{NEEDS[command]}]'" in err, err
+    else:
+        assert code == (1 if command == "doctor" else 0), walked[command]
+
+
+def test_the_modules_of_every_extra_are_known():
+    extras = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]
+    assert set(_MODULES) | {"world", "dev"} == set(extras["optional-dependencies"])
+    assert describe_missing(ModuleNotFoundError("", name="numpyy")) is None

@@ -1,0 +1,86 @@
+"""Wrong invocations of every command: one sentence, exit code 2, nothing written."""
+
+import sys
+
+import pytest
+from all_commands import all_commands, make_run, words_of
+
+from roboirg.cli import app as cli
+
+NAMES = {
+    "--tasks": "PickXtime", "--settings": "spatail", "--setting": "spatail", "--forms": "implict",
+    "--form": "implict", "--split": "tset", "--episodes": "four", "--policy-seeds": "one",
+    "--stages": "9-1", "--distractor": "nutral", "--frame": "robt", "--delivery": "turn",
+    "--rival": "dravn", "--reasoning": "plane", "--wordings": "nowhere.toml", "--actions": "joints",
+    "--demonstration-frames": "some", "--meshes": "lite", "--video": "som", "--protocol": "opnpi",
+    "--policy-process": "mine", "--long-prompts": "cut", "--retry-on": "conection",
+    "--executor": "slurm", "--plan": "papr", "--api-key-env": "NO_SUCH_VARIABLE", "--which": "mian",
+    "--format": "pdf", "--by": "colour", "--robot": "twn", "--score": "me",
+}  # fmt: skip
+"""A value that no command takes, for every option that takes names."""
+
+
+TEXTS = {
+    "--out", "--operator", "--policy", "--address", "--devices", "--host", "--allow-host",
+}  # fmt: skip
+"""Options that take any text; all others take numbers or names."""
+
+
+def wrong_words(command, words):
+    """Yield wrong variations of right words for a command."""
+    yield "unknown option", [*words, "--no-such-option"]
+    yield "surplus words", [*words, "surplus", "words", "here"]
+    for one in command.params:
+        names = [name for name in one.opts if name.startswith("--")]
+        if not names or names[0] in ("--help", "--version"):
+            continue
+        if one.is_flag:
+            yield f"{names[0]} with a value", [*words, f"{names[0]}=maybe"]
+        elif names[0] not in TEXTS:
+            bad = NAMES.get(names[0], "many")
+            yield f"{names[0]} {bad}", [*words, names[0], bad]
+        if one.required:
+            yield f"without {names[0]}", [word for word in words if word != names[0]]
+        if not one.is_flag:
+            yield f"{names[0]} without a value", [*words, names[0]]
+
+
+def right_words(name):
+    words = words_of("out", "run")[name]
+    return ["nowhere", "--out", "words.toml"] if words == ["--help"] else words
+
+
+CASES = [
+    pytest.param(name, number, id=f"{name}: {label}")
+    for name, command in all_commands().items()
+    for number, (label, _) in enumerate(wrong_words(command, right_words(name)))
+]
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("wrong")
+    make_run(folder / "run")
+    return folder
+
+
+def test_a_hundred_and_more_are_tried():
+    assert len(CASES) > 200
+
+
+@pytest.mark.parametrize(("name", "number"), CASES)
+def test_a_wrong_invocation_is_one_sentence(name, number, home, monkeypatch, capsys):
+    monkeypatch.chdir(home)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    command = all_commands()[name]
+    _, words = list(wrong_words(command, right_words(name)))[number]
+    before = sorted(home.rglob("*"))
+    monkeypatch.setattr(sys, "argv", ["roboirg", *name.split(), *words])
+    with pytest.raises(SystemExit) as left:
+        cli.main()
+    told = capsys.readouterr()
+    assert left.value.code == 2, told
+    assert told.out == ""
+    assert told.err.startswith("roboirg: ")
+    assert told.err.count("\n") == 1
+    assert sorted(home.rglob("*")) == before
