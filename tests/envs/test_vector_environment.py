@@ -205,7 +205,7 @@ def test_wrong_input_is_refused_before_anything_moves():
 def test_a_lost_worker_is_named():
     vector = roboirg.make_vec("PickXtimes", 2, cameras=(), workers=2)
     vector.reset()
-    os.kill(vector._processes._processes[1].pid, signal.SIGKILL)
+    os.kill(vector._processes._children[1].pid, signal.SIGKILL)
     with pytest.raises(SubEnvironmentError, match=r"worker of sub-environments 1 .* signal 9"):
         vector.step(np.tile(HOME_ACTION, (2, 1)))
     vector.close()

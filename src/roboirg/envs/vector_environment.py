@@ -90,7 +90,6 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
             Recipe(task, options, shared, eager=not lazy),
             num_envs,
             min(num_envs, workers or os.cpu_count() or 1),
-            context,
         )
 
     def reset(

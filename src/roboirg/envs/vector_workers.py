@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
-import multiprocessing
-import os
-import signal
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
 from typing import Any, NamedTuple
 
 from numpy.typing import NDArray
@@ -19,10 +14,7 @@ from roboirg.core.errors import RoboIRGError
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.envs.factory import EnvOptions
 from roboirg.envs.shared_arrays import SharedArrays, picture_fields
-from roboirg.util.child_process import describe_exit, exit_with_parent
-
-CLOSE_TIMEOUT_S = 10.0
-"""Seconds that a worker has to end by itself."""
+from roboirg.util.child_process import ChildExit, ChildProcess, serve
 
 
 class SubEnvironmentError(RoboIRGError):
@@ -152,29 +144,15 @@ class WorkerProcesses:
         recipe: how the environments are made.
         count: number of sub-environments.
         workers: number of processes.
-        context: how they are started.
     """
 
-    def __init__(
-        self,
-        recipe: Recipe,
-        count: int,
-        workers: int,
-        context: multiprocessing.context.SpawnContext,
-    ) -> None:
+    def __init__(self, recipe: Recipe, count: int, workers: int) -> None:
         self._places = [(index % workers) for index in range(count)]
-        self._pipes: list[Connection[Any, Any]] = []
-        self._processes: list[BaseProcess] = []
-        for worker in range(workers):
-            ours, theirs = context.Pipe()
-            rows = [index for index, place in enumerate(self._places) if place == worker]
-            process = context.Process(
-                target=_serve, args=(theirs, recipe, rows, os.getpid()), daemon=True
-            )
-            process.start()
-            theirs.close()
-            self._pipes.append(ours)
-            self._processes.append(process)
+        self._children = [
+            # A program may end without closing its environment.
+            ChildProcess.spawn(_work, recipe, range(worker, count, workers), daemon=True)
+            for worker in range(workers)
+        ]
 
     def ask(self, requests: Mapping[int, Request]) -> dict[int, Any]:
         """Return the answer of each sub-environment that is asked; all work at the same time.
@@ -186,61 +164,46 @@ class WorkerProcesses:
         for index, request in requests.items():
             batches.setdefault(self._places[index], {})[index] = request
         for worker, batch in batches.items():
-            with self._attributed(worker):
-                self._pipes[worker].send(batch)
+            self._children[worker].send(batch)
         answers: dict[int, Any] = {}
         failures: dict[int, str] = {}
         for worker in batches:
-            with self._attributed(worker):
-                done, failed = self._pipes[worker].recv()
-            answers |= done
-            failures |= failed
+            reply = self._children[worker].receive()
+            if isinstance(reply, ChildExit):
+                rows = [str(index) for index, place in enumerate(self._places) if place == worker]
+                raise SubEnvironmentError(
+                    f"The worker of sub-environments {', '.join(rows)} was lost: {reply}."
+                )
+            answers |= reply[0]
+            failures |= reply[1]
         for index, failure in sorted(failures.items()):
             raise SubEnvironmentError(f"Sub-environment {index} raised: {failure}")
         return answers
 
     def close(self) -> None:
         """End the workers."""
-        for pipe in self._pipes:
-            pipe.close()
-        for process in self._processes:
-            process.join(CLOSE_TIMEOUT_S)
-            if process.is_alive():
-                process.kill()
-                process.join()
-
-    @contextlib.contextmanager
-    def _attributed(self, worker: int) -> Iterator[None]:
-        try:
-            yield
-        except (EOFError, OSError) as error:
-            process = self._processes[worker]
-            process.join(CLOSE_TIMEOUT_S)
-            rows = [str(index) for index, place in enumerate(self._places) if place == worker]
-            raise SubEnvironmentError(
-                f"The worker of sub-environments {', '.join(rows)} was lost: "
-                f"{describe_exit(process.exitcode)}."
-            ) from error
+        for child in self._children:
+            child.connection.close()  # all at the same time
+        for child in self._children:
+            child.close()
 
 
-def _serve(pipe: Connection[Any, Any], recipe: Recipe, rows: Sequence[int], parent: int) -> None:
-    """Answer requests until the pipe is closed."""
-    exit_with_parent(parent)
-    # Ctrl-C reaches the whole process group; only the parent handles it.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _work(connection: Connection, recipe: Recipe, rows: Sequence[int]) -> None:
+    """Answer requests until the connection is closed."""
     arrays = recipe.arrays.open()
     environments = {row: SubEnvironment(recipe, arrays, row) for row in rows}
-    with contextlib.suppress(EOFError, OSError):
-        while True:
-            batch: dict[int, Request] = pipe.recv()
-            done: dict[int, Any] = {}
-            failed: dict[int, str] = {}
-            for index, (name, args) in batch.items():
-                try:
-                    done[index] = _method(environments[index], name)(*args)
-                except Exception as error:  # noqa: BLE001 - reported to the parent
-                    failed[index] = _describe(error)
-            pipe.send((done, failed))
+
+    def answer(batch: Mapping[int, Request]) -> tuple[dict[int, Any], dict[int, str]]:
+        done: dict[int, Any] = {}
+        failed: dict[int, str] = {}
+        for index, (name, args) in batch.items():
+            try:
+                done[index] = _method(environments[index], name)(*args)
+            except Exception as error:  # noqa: BLE001 - reported to the parent
+                failed[index] = _describe(error)
+        return done, failed
+
+    serve(connection, answer)
 
 
 def _method(environment: SubEnvironment, name: str) -> Callable[..., Any]:

@@ -81,13 +81,21 @@ class ChildProcess:
         self._process, self.connection, self.output = process, connection, output
 
     @classmethod
-    def spawn(cls, work: Callable[..., None], *args: Any) -> Self:  # noqa: ANN401
-        """Start ``work(connection, *args)`` in a new interpreter; all of it must be picklable."""
+    def spawn(cls, work: Callable[..., None], *args: Any, daemon: bool = False) -> Self:  # noqa: ANN401
+        """Start ``work(connection, *args)`` in a new interpreter; all of it must be picklable.
+
+        Args:
+            work: runs in the child.
+            *args: its arguments.
+            daemon: whether a parent that exits without closing it ends it, instead of waiting for
+                it; it may then have no processes of its own by `multiprocessing`.
+        """
         # Spawned, not forked: a forked Vulkan driver or thread pool is undefined behavior.
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
-        # Not a daemon in multiprocessing's sense: policies may have processes of their own.
-        process = context.Process(target=_begin_work, args=(os.getpid(), work, theirs, args))
+        process = context.Process(
+            target=_begin_work, args=(os.getpid(), work, theirs, args), daemon=daemon
+        )
         process.start()
         # Only the child may keep this end open: then its death reads as end of file.
         theirs.close()

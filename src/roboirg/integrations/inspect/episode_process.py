@@ -12,7 +12,6 @@ from roboirg.policies.planning.models import ModelOptions, ModelQuery, ModelRepl
 from roboirg.policies.planning.models.openai_compatible import chat_messages
 from roboirg.policies.planning.vlm_listener import ListenerOptions, VLMListener
 from roboirg.records.record import Job
-from roboirg.util.child_process import exit_with_parent
 
 if TYPE_CHECKING:
     Pipe = Connection[Any, Any]
@@ -64,19 +63,17 @@ class PipedListener(VLMListener):
         super().__init__(self.chosen, seed, lambda options: PipeModel(self.pipe, options))
 
 
-def play(pipe: Pipe, job: Job, options: ListenerOptions, parent: int) -> None:
+def play(pipe: Pipe, job: Job, options: ListenerOptions) -> None:
     """Play an episode; send model requests, and at last its record as JSON text.
 
     Args:
         pipe: to the parent.
         job: the episode; its policy's spec is `PipedListener`.
         options: of the listener.
-        parent: process id of the parent.
     """
     from roboirg.evaluation.rollout import play_episode
     from roboirg.evaluation.rollout_result import make_record, utc_now
 
-    exit_with_parent(parent)
     PipedListener.pipe, PipedListener.chosen = pipe, options
     started = utc_now()
     record = make_record(job, play_episode(job), started_at=started)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import multiprocessing
-import os
 from collections.abc import Iterator
 from typing import Any
 
@@ -38,6 +36,7 @@ from roboirg.policies.planning.models import ModelOptions
 from roboirg.policies.planning.vlm_listener import ListenerOptions
 from roboirg.records.record import DEFAULT_MAX_STEPS, Job
 from roboirg.tasks import find_tasks
+from roboirg.util.child_process import ChildExit, ChildProcess
 
 RECORD = "record"
 """Under this key the metadata of a score hold our record."""
@@ -140,27 +139,20 @@ async def _play(
     model: Model, job: Job, options: ListenerOptions, state: TaskState
 ) -> dict[str, Any]:
     """Return the record of an episode."""
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe()
-    process = context.Process(target=play, args=(theirs, job, options, os.getpid()), daemon=True)
     # The kernel ends the child with the thread that started it, so that must be this one.
-    process.start()
-    theirs.close()
+    child = ChildProcess.spawn(play, job, options)
     try:
         while True:
-            try:
-                said = await anyio.to_thread.run_sync(ours.recv, abandon_on_cancel=True)
-            except EOFError:
-                raise RoboIRGError(f"The process of {state.sample_id} was lost.") from None
+            said = await anyio.to_thread.run_sync(child.receive, abandon_on_cancel=True)
+            if isinstance(said, ChildExit):
+                raise RoboIRGError(f"The process of {state.sample_id} was lost: {said}.")
             if not isinstance(said, ModelRequest):
                 record: dict[str, Any] = json.loads(said)
                 return record
             reply = await _ask(model, said, options, state)
-            await anyio.to_thread.run_sync(ours.send, reply)
+            await anyio.to_thread.run_sync(child.send, reply)
     finally:
-        process.kill()
-        process.join()
-        ours.close()
+        child.end()
 
 
 async def _ask(
