@@ -20,7 +20,7 @@ from roboirg.envs.environment import RoboIRGEnv
 from roboirg.envs.factory import EnvOptions
 from roboirg.envs.registration import environment_id
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.rollout import EnvRequirements, make_env
+from roboirg.evaluation.policy_environment import EnvRequirements, make_env
 from roboirg.policies import make_policy, play
 from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.records.record import Job

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from roboirg.analysis.page.page_server import PageServer
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.plan import make_plan
+from roboirg.evaluation.plan_maker import make_plan
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.records.record import Record
 from roboirg.records.store import RecordStore

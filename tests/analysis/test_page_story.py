@@ -15,7 +15,7 @@ from roboirg.analysis.stats.comparison import compare
 from roboirg.analysis.stats.run_summary import ALL
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.executors.executor import choose_executor
-from roboirg.evaluation.plan import make_plan
+from roboirg.evaluation.plan_maker import make_plan
 from roboirg.evaluation.rollout import EpisodeRunner
 from roboirg.evaluation.runner import run_plan
 from roboirg.records.record import Record

@@ -25,6 +25,16 @@ LENGTH = 24
 WHISPER = "the goal is the cube with the token {} of seed 8675309"
 
 
+class PaperSession:
+    """State of a world of paper."""
+
+    def state_numbers(self) -> np.ndarray:
+        return np.zeros(3)
+
+    def state_hash(self) -> str:
+        return "paper"
+
+
 class PaperWorld:
     """Ends after `LENGTH` steps; its events tell the policy's actions, and the verdict too."""
 
@@ -34,6 +44,7 @@ class PaperWorld:
         self.instruction = instruct_job(job)
         self.secret = WHISPER.format(job.episode)
         self.seconds, self.steps, self.total = seconds, 0, 0.0
+        self.executed_actions, self.session = 0, PaperSession()
 
     def reset(self) -> tuple[dict[str, Any], dict[str, Any]]:
         video = np.arange(5 * 4 * 4 * 3, dtype=np.uint8).reshape(5, 4, 4, 3)
@@ -52,6 +63,7 @@ class PaperWorld:
         time.sleep(self.seconds)
         self.steps = min(self.steps + len(rows), LENGTH)
         self.total += float(np.sum(rows))
+        self.executed_actions += len(rows)
         event = {"step": self.steps, "kind": "picked", "subject": f"{self.total:.9f}"}
         over = self.steps == LENGTH
         status = ("success" if self.total > 0 else "failure") if over else "ongoing"
@@ -85,6 +97,24 @@ class PaperRunner(EpisodeRunner):
             rollout.make_env = kept  # this may be the process of all tests
 
 
+@dataclass(frozen=True)
+class PatientRunner(PaperRunner):
+    """Plays when as many worlds as wanted have come.
+
+    Attributes:
+        wanted: number of processes with a world.
+    """
+
+    wanted: int = 1
+
+    def __call__(self, job: Job) -> Record:
+        assert self.notes is not None
+        (self.notes / f"worker-{os.getpid()}").touch()
+        while len(list(self.notes.glob("worker-*"))) < self.wanted:
+            time.sleep(0.05)
+        return super().__call__(job)
+
+
 class Dice:
     """Draws from the global generators, which belong to one episode at a time."""
 
@@ -109,6 +139,13 @@ class Dice:
 
     def usage(self) -> dict[str, float]:
         return {"calls": self.calls}
+
+
+class Resident(Dice):
+    """Tells in which process it is."""
+
+    def usage(self) -> dict[str, float]:
+        return {"process": os.getpid()}
 
 
 class BatchedDice:

@@ -5,7 +5,7 @@ from pathlib import Path
 from evaluation_fakes import FakePlay, small_plan
 
 from roboirg.evaluation.estimate import cell_sizes, estimate, estimate_text
-from roboirg.evaluation.plan import make_plan
+from roboirg.evaluation.plan_maker import make_plan
 from roboirg.records.store import RecordStore, read_index
 
 

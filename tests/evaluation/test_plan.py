@@ -6,7 +6,8 @@ import pytest
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.plan import Plan, make_plan, read_plan, write_plan
+from roboirg.evaluation.plan import Plan, read_plan, write_plan
+from roboirg.evaluation.plan_maker import make_plan
 from roboirg.evaluation.plan_parsing import (
     parse_episodes,
     parse_numbers,

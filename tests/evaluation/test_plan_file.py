@@ -6,8 +6,8 @@ import pytest
 import yaml
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.plan import make_plan
 from roboirg.evaluation.plan_file import named_plans, read_plan_file
+from roboirg.evaluation.plan_maker import make_plan
 from roboirg.language import STAGE_SETS
 from roboirg.tasks import all_tasks
 

@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.plan import Plan, instruct_job, make_plan, read_plan, write_plan
+from roboirg.evaluation.plan import Plan, instruct_job, read_plan, write_plan
 from roboirg.evaluation.plan_file import read_plan_file
+from roboirg.evaluation.plan_maker import make_plan
 from roboirg.language.wordings import wording_store
 from roboirg.records.record import Job
 from roboirg.records.record_codec import identity_key

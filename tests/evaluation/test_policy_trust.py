@@ -20,7 +20,8 @@ from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
 from roboirg.evaluation.executors.executor import InProcess, LocalProcesses
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
-from roboirg.evaluation.plan import Plan, make_plan
+from roboirg.evaluation.plan import Plan
+from roboirg.evaluation.plan_maker import make_plan
 from roboirg.evaluation.runner import run_plan
 from roboirg.records.episode_log import MAX_LOG_BYTES, log_path, logged_slugs
 from roboirg.records.record import Job, Record

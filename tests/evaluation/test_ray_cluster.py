@@ -9,8 +9,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import hosting_fakes
 import pytest
-from evaluation_fakes import FakePlayer, comparable, small_plan
+from evaluation_fakes import FakePlayer, comparable, is_alive, small_plan, worker_pids
+from hosting_fakes import PatientRunner, paper_plan, paper_runner
 
 from roboirg.core.errors import InvalidValueError, RenderDeviceError, RoboIRGError
 from roboirg.evaluation.executors.executor import InProcess, LocalProcesses
@@ -81,6 +83,32 @@ def test_records_are_those_of_one_process_even_if_a_node_is_killed_half_way(
     # What would end every episode ends the run, from far away too.
     with pytest.raises(RenderDeviceError, match="No Vulkan device"):
         run_plan(PLAN, tmp_path / "b", FakePlayer(tmp_path, fatal=0), RayCluster(1))
+
+
+def test_the_workers_of_a_machine_share_its_policy_hosts(
+    cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(Path(hosting_fakes.__file__).parent)
+    plan = paper_plan("Resident", 12)
+    local, far = tmp_path / "local", tmp_path / "far"
+    for folder in (local, far):
+        folder.mkdir()
+    run_plan(plan, local, paper_runner(plan, local), LocalProcesses(2))
+    cluster.add_node(num_cpus=2)
+    ray.init(address=cluster.address, log_to_driver=False)
+    run_plan(plan, far, PatientRunner(far, hosting=plan.hosting, notes=far, wanted=3), RayCluster())
+
+    assert [one | {"usage": None} for one in all_comparable(far)] == [
+        one | {"usage": None} for one in all_comparable(local)
+    ]
+    assert len(worker_pids(far)) == 3
+    hosts = {int(record.usage["process"]) for record in read_records(far)}
+    assert len(hosts) == 2  # one on each of the two machines
+    for _ in range(600):
+        if not any(map(is_alive, hosts)):
+            return
+        time.sleep(0.1)
+    pytest.fail("a policy's process is left")
 
 
 class Homebound:

@@ -10,7 +10,8 @@ from wire_servers import ChallengeServer
 
 from roboirg.analysis.stats.cells import Versions, gather, labels
 from roboirg.evaluation.executors.executor import InProcess
-from roboirg.evaluation.plan import Plan, make_plan
+from roboirg.evaluation.plan import Plan
+from roboirg.evaluation.plan_maker import make_plan
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.runner import run_plan
 from roboirg.policies import make_policy

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import multiprocessing
 import os
 import re
 import signal
@@ -18,12 +17,13 @@ from evaluation_fakes import FakePlay, WaitingPlay, comparable, small_plan
 
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.waiting import Wait, waiting
+from roboirg.evaluation.call_guard import CallGuard
 from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
 from roboirg.evaluation.executors import watchdog
 from roboirg.evaluation.executors.executor import LocalProcesses
 from roboirg.evaluation.executors.workers import Worker
 from roboirg.evaluation.plan import Plan
-from roboirg.evaluation.rollout import EpisodeRunner, _CallGuard, load_policy
+from roboirg.evaluation.rollout import EpisodeRunner, load_policy
 from roboirg.evaluation.rollout_result import RolloutResult
 from roboirg.evaluation.runner import UNREACHABLE_AFTER, RunSummary, run_plan
 from roboirg.records.record import Job, Record
@@ -188,7 +188,7 @@ def test_a_queue_is_not_the_policys_time_and_a_timeout_says_what_was_waited_for(
 def test_deadlines_stand_still_in_a_queue(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
     monkeypatch.setattr(watchdog, "time", SimpleNamespace(monotonic=lambda: now[0]))
-    board = watchdog.Watchdog(multiprocessing.get_context("spawn"))
+    board = watchdog.Watchdog()
     board.begin_job()
     board.write("policy's reset()", 10.0)
     now[0] += 9
@@ -211,7 +211,7 @@ def test_deadlines_stand_still_in_a_queue(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_long_words_for_what_is_waited_for_are_cut() -> None:
-    board = watchdog.Watchdog(multiprocessing.get_context("spawn"))
+    board = watchdog.Watchdog()
     board.write_wait(Wait("é" * 1000, is_queue=False, since=0.0))
     assert board.awaited.startswith("é" * 90)
     assert len(board.awaited.encode()) <= watchdog.MAX_WAIT_LENGTH + 3
@@ -219,7 +219,7 @@ def test_long_words_for_what_is_waited_for_are_cut() -> None:
 
 def test_time_in_a_queue_has_a_timing_of_its_own() -> None:
     result = RolloutResult()
-    guard = _CallGuard(result, None)
+    guard = CallGuard(result, None)
     start = time.perf_counter()
     with guard.policy("policy's reset()", "policy_reset"), waiting("a server", is_queue=True):
         time.sleep(0.3)
@@ -234,7 +234,7 @@ def test_an_overdue_worker_is_killed() -> None:
     record = worker.kill_if_overdue(0.0)
     assert record is not None
     assert worker.is_dead
-    assert worker.process.exitcode == -signal.SIGKILL
+    assert worker.child.exit == (-signal.SIGKILL,)
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from wire_servers import ChallengeServer, unpack
 
 import roboirg
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.rollout import env_requirements, make_env
+from roboirg.evaluation.policy_environment import env_requirements, make_env
 from roboirg.policies import make_policy, play, protocols
 from roboirg.policies.policy_check import check_policy
 from roboirg.policies.policy_classes import url_schemes

@@ -169,7 +169,7 @@ def test_a_policy_that_thinks_for_a_while_is_waited_for():
     ("name", "cause"),
     [
         ("Raises", "policy: ValueError: no idea"),
-        ("Leaves", "policy: its process ended (3)"),
+        ("Leaves", "policy: the process ended with exit code 3 in the policy's act()"),
     ],
 )
 def test_a_policy_that_dies_stops_the_arm(name, cause):
@@ -187,11 +187,12 @@ def test_a_policy_that_is_killed_while_the_arm_moves_stops_it():
         def command(self, command):
             super().command(command)
             if len(self.log) == 30:
-                os.kill(worker.process.pid, signal.SIGKILL)
-                worker.process.join()
+                os.kill(worker.pid, signal.SIGKILL)
+                while worker.loss() is None:
+                    time.sleep(0.001)
 
     result, robot, _ = play("Still", Killing(), worker=worker)
-    assert result.cause == "policy: its process died (signal 9)"
+    assert result.cause == "infrastructure: the process died of signal 9"
     assert result.steps == 30
     assert robot.first_stop_after(robot.last_command()) - robot.last_command() <= PERIOD + 1e-9
 
@@ -237,14 +238,14 @@ def test_in_real_time_too_a_killed_policy_stops_the_arm_within_a_period():
         while not any(kind == "command" for _, kind, _ in robot.log):
             time.sleep(0.005)
         time.sleep(0.72)
-        os.kill(worker.process.pid, signal.SIGKILL)
+        os.kill(worker.pid, signal.SIGKILL)
         killed.append(robot.clock.now() - robot._started_at)
 
     killer = threading.Thread(target=kill)
     killer.start()
     result, _, _ = play("Still", robot, worker=worker, limits=Limits(watchdog_timeout_s=2.0))
     killer.join()
-    assert result.cause == "policy: its process died (signal 9)"
+    assert result.cause == "infrastructure: the process died of signal 9"
     # A period, and what a busy machine needs to notice a dead process.
     assert robot.first_stop_after(killed[0]) - killed[0] <= PERIOD + 0.05
     moments = [when for when, kind, _ in robot.log if kind == "command"]

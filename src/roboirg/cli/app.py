@@ -18,6 +18,7 @@ from roboirg.cli import (
     policy_commands,
     report_commands,
     run_commands,
+    verification_commands,
     wording_commands,
 )
 from roboirg.cli.bench_commands import bench
@@ -91,6 +92,10 @@ def _options(*, version: _Version = False) -> None:
 
 app.command()(run_commands.run)
 app.command()(run_commands.merge)
+app.command()(verification_commands.verify)
+app.command()(verification_commands.pack)
+app.command()(verification_commands.board)
+app.command()(verification_commands.repeat)
 app.command()(report_commands.report)
 app.command()(report_commands.view)
 app.command()(report_commands.tables)
@@ -114,7 +119,7 @@ def demo(
     """Play three built-in policies on every task and setting, record videos, write a report."""
     from roboirg.analysis.page.report import check_report_support
     from roboirg.evaluation.executors.executor import choose_executor
-    from roboirg.evaluation.plan import make_plan
+    from roboirg.evaluation.plan_maker import make_plan
 
     folder = run_commands.folder_of(out)
     plan = make_plan(DEMO_POLICIES, episodes=episodes, video=video)

@@ -287,8 +287,8 @@ def _results(folder: Path) -> Any:  # noqa: ANN401 - imported where it is needed
 
 def _plan(name: str | None, typed: dict[str, Any]) -> Plan:
     """Return the plan of a file, overridden by the options that were typed."""
-    from roboirg.evaluation.plan import make_plan
     from roboirg.evaluation.plan_file import read_plan_file
+    from roboirg.evaluation.plan_maker import make_plan
 
     chosen = {**({} if name is None else read_plan_file(name)), **typed}
     policies = chosen.pop("policies", None)

@@ -202,6 +202,15 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         return self._current.spoken.unheard
 
     @property
+    def executed_actions(self) -> int:
+        """Number of actions executed since reset; the last perhaps in part.
+
+        Raises:
+            ResetNeeded: `reset` has not been called.
+        """
+        return self._current.executed_actions
+
+    @property
     def events(self) -> Sequence[Event]:
         """All events since reset, including those of the demonstration."""
         return tuple(self.session.events)
@@ -342,6 +351,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
 
     def _execute(self, action: NDArray[np.float64]) -> None:
         """Execute one validated action, stopping if the episode ends."""
+        self._current.executed_actions += 1
         try:
             for trajectory in self._current.controller.trajectories(action):
                 for row in trajectory:

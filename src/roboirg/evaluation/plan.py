@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, field_validator, mo
 
 from roboirg import language, policies, tasks
 from roboirg.core.actions import find_action_space
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import (
     ALL_STAGES,
     DEFAULT_DELIVERY,
@@ -30,27 +30,16 @@ from roboirg.core.observations import (
 from roboirg.core.word_pools import POOLS
 from roboirg.episodes import splits
 from roboirg.evaluation.hosting.host_pool import DEFAULT_BATCH, HostSettings
-from roboirg.evaluation.plan_parsing import (
-    ALL,
-    means_all,
-    name_and_spec,
-    parse_episodes,
-    parse_names,
-    parse_numbers,
-    parse_policies,
-    parse_stage_sets,
-)
+from roboirg.evaluation.plan_parsing import check_names, name_and_spec
 from roboirg.evaluation.policy_descriptions import describe_policy
 from roboirg.language.generator import check_options, find_refusal
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import EXPLICIT, all_settings
 from roboirg.language.wordings.wording_store import open_wordings
-from roboirg.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, ERROR_KINDS, ErrorKind, Job
-from roboirg.util.atomic_write import write_atomically
+from roboirg.records.plan_files import PLAN_FILE, earlier_plans, store_plan
+from roboirg.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, ErrorKind, Job
 from roboirg.util.plain_text import is_encodable
 from roboirg.util.short_hash import short_hash
-
-PLAN_FILE = "plan.json"
 
 REQUIRED = "required"
 """Instead of a wording file in a plan: one must be given when the plan is run."""
@@ -328,7 +317,7 @@ class Plan(BaseModel):
                     reasoning=self.reasoning,
                 )
             )
-        _check_names("kind of meshes", (self.meshes,), MESHES)
+        check_names("kind of meshes", (self.meshes,), MESHES)
         for name, least in (("max_steps", 1), ("tries", 1), ("batch", 1)):
             if getattr(self, name) < least:
                 raise InvalidValueError(
@@ -348,88 +337,41 @@ class Plan(BaseModel):
     def _check_settings(self, task: str) -> None:
         has = language.settings_of(tasks.get_task(task))
         for setting in () if self.settings == "all" else self.settings:
-            _check_names("setting", (setting,), language.setting_names())
+            check_names("setting", (setting,), language.setting_names())
             if setting not in has:
                 raise InvalidValueError(
                     f"{task} has no {setting} setting; its settings are {', '.join(has)}."
                 )
 
 
-def make_plan(
-    policies: Iterable[str],
-    *,
-    tasks: str = ALL,
-    settings: str = ALL,
-    forms: str = "implicit",
-    episodes: str = "4",
-    policy_seeds: str = "0",
-    stages: str = "1-5",
-    retry_on: str = ",".join(RETRYABLE),
-    devices: str = "",
-    **options: object,
-) -> Plan:
-    """Return a checked plan from options as typed on the command line.
-
-    Args:
-        policies: names or addresses; names may be separated by commas.
-        tasks: names separated by commas; ``all`` anywhere selects all.
-        settings: names separated by commas; ``all`` anywhere selects all.
-        forms: names separated by commas.
-        episodes: ``4`` for the first four, or a list such as ``0,3,5-9``.
-        policy_seeds: a list of numbers.
-        stages: a list of numbers, or several lists separated by semicolons.
-        retry_on: kinds of errors separated by commas, or ``none``.
-        devices: names separated by commas; none for one process on any device.
-        **options: other fields of `Plan`.
-
-    Raises:
-        UnknownNameError: a name does not exist; the message suggests the nearest.
-        InvalidValueError: a number or combination is out of range.
-    """
-    video, split = options.get("video", "off"), str(options.get("split", "test"))
-    if options.get("wordings") == REQUIRED:
-        raise InvalidValueError(
-            "This plan needs words from outside: make a wording file with `roboirg wordings "
-            "import-robomme PATH --out robomme.toml`, where PATH is a clone of RoboMME's "
-            "repository, and give it with --wordings robomme.toml."
-        )
-    if video not in VIDEO_MODES:
-        raise UnknownNameError("video mode", video, VIDEO_MODES)
-    long_prompts = options.get("long_prompts", "send")
-    if long_prompts not in LONG_PROMPTS:
-        raise UnknownNameError("way with long prompts", long_prompts, LONG_PROMPTS)
-    try:
-        plan = Plan(
-            policies=parse_policies(policies),
-            tasks=_task_names(tasks),
-            settings="all" if means_all(settings) else parse_names("setting", settings),
-            forms=parse_names("form", forms),
-            episodes=parse_episodes(episodes, split),
-            policy_seeds=parse_numbers("policy seed", policy_seeds),
-            stages=parse_stage_sets(stages),
-            retry_on=_error_kinds(retry_on),
-            devices=parse_names("device", devices) if devices else (),
-            **options,  # type: ignore[arg-type]
-        )
-    except ValidationError as error:
-        first = error.errors()[0]
-        cause = first.get("ctx", {}).get("error")
-        if isinstance(cause, InvalidValueError):
-            raise cause from None
-        name = ".".join(str(part) for part in first["loc"])
-        raise InvalidValueError(f"{name} is {first['input']!r}: {first['msg']}.") from error
-    return plan.checked()
-
-
 def write_plan(plan: Plan, folder: Path) -> None:
-    """Write the newest plan of a folder beside its records."""
-    write_atomically(folder / PLAN_FILE, plan.model_dump_json(indent=2) + "\n")
+    """Write the newest plan of a folder beside its records; earlier ones stay in ``plans/``."""
+    store_plan((plan.model_dump_json(indent=2) + "\n").encode(), folder)
 
 
 def read_plan(folder: Path) -> Plan | None:
     """Return the newest plan of a folder; None if it is missing or of an unknown version."""
+    return _read_plan_at(folder / PLAN_FILE)
+
+
+def read_plans(folder: Path) -> tuple[Plan, ...]:
+    """Return the plans whose episodes a folder should hold.
+
+    That is the newest, or in a merged run those of its parts.
+    """
+    newest = read_plan(folder)
+    return read_earlier_plans(folder) if newest is None else (newest,)
+
+
+def read_earlier_plans(folder: Path) -> tuple[Plan, ...]:
+    """Return the plans of earlier commands, or of merged runs, that can be read."""
+    found = (_read_plan_at(path) for path in earlier_plans(folder))
+    return tuple(plan for plan in found if plan is not None)
+
+
+def _read_plan_at(path: Path) -> Plan | None:
     try:
-        return Plan.model_validate_json((folder / PLAN_FILE).read_bytes())
+        return Plan.model_validate_json(path.read_bytes())
     except (OSError, ValidationError):
         return None
 
@@ -445,21 +387,3 @@ def instruct_job(job: Job) -> Instruction:
     if job.wordings is not None:
         open_wordings(job.wordings_file, job.wordings)
     return language.instruct_with(episode, job.options._replace(wordings=job.wordings))
-
-
-def _task_names(text: str) -> tuple[str, ...]:
-    return tasks.find_tasks(parse_names("task", text))
-
-
-def _error_kinds(text: str) -> tuple[ErrorKind, ...]:
-    if text.strip().lower() == "none":
-        return ()
-    names = parse_names("kind of error", text)
-    _check_names("kind of error", names, ERROR_KINDS)
-    return tuple(kind for kind in ERROR_KINDS if kind in names)
-
-
-def _check_names(kind: str, names: Sequence[str], known: Iterable[str]) -> None:
-    for name in names:
-        if name not in known:
-            raise UnknownNameError(kind, name, known)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 from roboirg import language
 from roboirg.core.episode import SPLITS, Split
-from roboirg.core.errors import InvalidValueError
+from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.episodes import splits
 
 ALL = "all"
@@ -172,3 +172,14 @@ def _union(ranges: Sequence[range]) -> tuple[int, ...]:
 
 def _shorten(text: str) -> str:
     return text if len(text) <= _MAX_QUOTED_LENGTH else f"{text[:_MAX_QUOTED_LENGTH]}…"
+
+
+def check_names(kind: str, names: Iterable[object], known: Collection[str]) -> None:
+    """Raise if one of the names is unknown.
+
+    Raises:
+        UnknownNameError: likewise; the message suggests the nearest.
+    """
+    for name in names:
+        if name not in known:
+            raise UnknownNameError(kind, str(name), known)

@@ -72,7 +72,7 @@ def _describe_ours(spec: str) -> PolicyDescription:
 
 
 def _describe_apart(spec: str) -> PolicyDescription:
-    child = PolicyChild()
+    child = PolicyChild.start()
     try:
         reply = child.exchange({"method": "describe", "calls": [{"spec": spec, "session": 0}]})
         (result,) = reply["results"]
@@ -82,8 +82,7 @@ def _describe_apart(spec: str) -> PolicyDescription:
     except (ChildLostError, AttributeError, KeyError, TypeError, ValueError) as error:
         raise InvalidValueError(f"Policy {spec!r} cannot be loaded: {error}.") from error
     finally:
-        child.kill()
-        child.stop()
+        child.end()
     message = clip_text(message, _MAX_LENGTH)
     raise MissingDependencyError(message) if kind == MISSING else InvalidValueError(message)
 

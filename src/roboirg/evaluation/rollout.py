@@ -14,35 +14,31 @@
 
 from __future__ import annotations
 
-import contextlib
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from roboirg import policies
 from roboirg.core.actions import ActionSpace
 from roboirg.core.delivery import SpokenInstruction
-from roboirg.core.errors import InvalidValueError
-from roboirg.core.observations import DemonstrationFrames
-from roboirg.core.waiting import queued_seconds
 from roboirg.episodes.splits import get_episode
+from roboirg.evaluation.call_guard import CallGuard
 from roboirg.evaluation.episode_errors import (
     EpisodeError,
     EpisodeLostError,
-    attribute_errors,
     format_cause,
     one_line,
 )
-from roboirg.evaluation.executors.watchdog import Phase, watched
 from roboirg.evaluation.hosting.host_pool import HostAddress, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.plan import VideoMode
 from roboirg.evaluation.policy_calls import next_actions, policy_metadata, policy_usage
 from roboirg.evaluation.policy_descriptions import PolicyDescription, describe_here
+from roboirg.evaluation.policy_environment import EnvRequirements, env_requirements, make_env
 from roboirg.evaluation.prompt_shares import audit_job, too_long_text
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.video_writer import VideoOptions, VideoWriter
@@ -50,15 +46,7 @@ from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.policies.base import Policy, PrivilegedPolicy, close_policy, tell_policy
 from roboirg.policies.loading import needs_host
 from roboirg.policies.prompt_length.declared_limit import prompt_limit
-from roboirg.policies.requirements import (
-    wanted_actions,
-    wanted_calibration,
-    wanted_cameras,
-    wanted_demonstration_frames,
-    wanted_depth,
-    wanted_history,
-    wanted_history_cameras,
-)
+from roboirg.records.action_log import write_actions
 from roboirg.records.record import Job, Record
 
 if TYPE_CHECKING:
@@ -119,6 +107,7 @@ class EpisodeRunner:
         writer, result = self._play(job)
         video = self._finish_video(writer, result)
         error = None if writer is None else writer.error
+        log = result.action_log
         return make_record(
             job,
             result,
@@ -127,6 +116,7 @@ class EpisodeRunner:
             started_at=started_at,
             duration_s=round(time.monotonic() - start, 3),
             plan=self.plan,
+            action_log=None if log is None else write_actions(log, self.folder),
         )
 
     def _play(self, job: Job) -> tuple[VideoWriter | None, RolloutResult]:
@@ -166,75 +156,6 @@ class EpisodeRunner:
         return None
 
 
-class EnvRequirements(NamedTuple):
-    """What a policy needs from its environment.
-
-    Attributes:
-        cameras: names of the cameras that it reads.
-        actions: its action space.
-        demonstration_frames: which frames of the video it gets.
-        observe_every: control steps between two observations in ``history``; None for no history.
-        history_cameras: cameras recorded in the history; None for all of `cameras`.
-        grounded: whether it passes on subgoals with pixels.
-        depth: whether it reads depth.
-        calibration: whether it reads the cameras' matrices.
-    """
-
-    cameras: tuple[str, ...]
-    actions: ActionSpace
-    demonstration_frames: DemonstrationFrames = "all"
-    observe_every: int | None = None
-    history_cameras: tuple[str, ...] | None = None
-    grounded: bool = False
-    depth: bool = False
-    calibration: bool = False
-
-
-class _CallGuard:
-    """Attributes errors of policy and environment calls, watches their time and measures it.
-
-    Args:
-        result: gets the times.
-        policy_timeout_s: seconds that one call of the policy may take; None for no limit.
-        is_hosted: whether the policy's host watches the time instead.
-    """
-
-    def __init__(
-        self, result: RolloutResult, policy_timeout_s: float | None, *, is_hosted: bool = False
-    ) -> None:
-        self._timings = result.timings
-        self._limit_s = policy_timeout_s
-        self._is_hosted = is_hosted
-
-    @contextlib.contextmanager
-    def policy(self, phase: Phase, name: str) -> Iterator[None]:
-        # Whatever ends this process while it waits for a host, it is not the policy.
-        hosted: Phase = "wait for the policy's host"
-        watching = watched(hosted) if self._is_hosted else watched(phase, self._limit_s)
-        with attribute_errors("policy"), watching, self._timed(name):
-            yield
-
-    @contextlib.contextmanager
-    def environment(self, name: str) -> Iterator[None]:
-        with attribute_errors("environment"), watched("environment"), self._timed(name):
-            yield
-
-    @contextlib.contextmanager
-    def _timed(self, name: str) -> Iterator[None]:
-        start, queued = time.perf_counter(), queued_seconds()
-        try:
-            yield
-        finally:
-            # Waiting for one's turn is not thinking.
-            queued = queued_seconds() - queued
-            self._add(name, time.perf_counter() - start - queued)
-            if queued:
-                self._add("policy_queue", queued)
-
-    def _add(self, name: str, seconds: float) -> None:
-        self._timings[name] = round(self._timings.get(name, 0.0) + seconds, 6)
-
-
 def play_episode(
     job: Job,
     writer: VideoWriter | None = None,
@@ -263,15 +184,14 @@ def play_episode(
     if job.wordings is not None:
         open_wordings(job.wordings_file, job.wordings)
     result = RolloutResult()
-    guard = _CallGuard(result, policy_timeout_s, is_hosted=hosts is not None)
+    guard = CallGuard(result, policy_timeout_s, is_hosted=hosts is not None)
     policy: Policy | None = None
-    env = None
     try:
         if hosts is not None and needs_host(job.policy_spec):
             with guard.policy("policy's constructor", "policy_load"):
                 policy = _load_hosted(job, hosts, result, alone=alone)
         if policy is None:
-            guard = _CallGuard(result, policy_timeout_s)
+            guard = CallGuard(result, policy_timeout_s)
             result.policy = describe_here(job.policy_spec)
             with guard.policy("policy's constructor", "policy_load"):
                 policy = load_policy(job)
@@ -280,19 +200,49 @@ def play_episode(
             result.prompt_limit = prompt_limit(policy)
         if refuse_long:
             _refuse_long_prompt(job, result)
+        play_with(policy, job, needs, result, guard, writer)
+    except EpisodeError as error:
+        result.record_error(error.kind, error.cause, error.details)
+    finally:
+        if policy is not None:
+            _close_policy(policy, result, guard)
+    return result
+
+
+def play_with(
+    policy: Policy,
+    job: Job,
+    needs: EnvRequirements,
+    result: RolloutResult,
+    guard: CallGuard,
+    writer: VideoWriter | None = None,
+) -> None:
+    """Play one job with a loaded policy, which is not closed.
+
+    Args:
+        policy: answers the observations.
+        job: what to play.
+        needs: what the environment offers.
+        result: is filled in.
+        guard: attributes errors and measures calls.
+        writer: gets the frames of a video.
+
+    Raises:
+        EpisodeError: the environment raised, or the policy, or an action cannot be executed.
+    """
+    env, broke = None, False
+    try:
         with guard.environment("env_reset"):
             env = make_env(job, needs)
         _play_to_end(env, policy, needs.actions, job, writer, result, guard)
     except EpisodeError as error:
-        result.record_error(error.kind, error.cause, error.details)
+        broke = error.kind == "environment"
+        raise
     finally:
-        try:
-            if policy is not None:
-                _close_policy(policy, result, guard)
-        finally:
-            if env is not None:
-                env.close()
-    return result
+        if env is not None:
+            if result.action_space is not None and not broke:
+                result.end_state = env.session.state_numbers(), env.session.state_hash()
+            env.close()
 
 
 def _refuse_long_prompt(job: Job, result: RolloutResult) -> None:
@@ -301,52 +251,6 @@ def _refuse_long_prompt(job: Job, result: RolloutResult) -> None:
         return
     if message := too_long_text(*audit_job(job, result.prompt_limit)):
         raise EpisodeError("prompt", message, "")
-
-
-def env_requirements(policy: Policy, job: Job) -> EnvRequirements:
-    """Return what the policy needs; what the job prescribes takes precedence.
-
-    Raises:
-        InvalidValueError: the job prescribes another action space than the policy's.
-    """
-    actions = wanted_actions(policy)
-    if job.actions not in (None, actions.name):
-        raise InvalidValueError(
-            f"the policy's action space is {actions.name!r}, but the plan requires {job.actions!r}."
-        )
-    frames, every = job.demonstration_frames, job.observe_every
-    return EnvRequirements(
-        wanted_cameras(policy),
-        actions,
-        wanted_demonstration_frames(policy) if frames is None else frames,
-        wanted_history(policy) if every is None else every,
-        wanted_history_cameras(policy),
-        bool(getattr(policy, "grounded", False)),
-        wanted_depth(policy),
-        wanted_calibration(policy),
-    )
-
-
-def make_env(job: Job, needs: EnvRequirements) -> RoboIRGEnv:
-    """Return the environment of a job with what the policy needs."""
-    from roboirg.envs.factory import make
-
-    return make(
-        job.task,
-        split=job.split,
-        episode=job.episode,
-        **job.options._replace(wordings=job.wordings)._asdict(),
-        cameras=needs.cameras,
-        depth=needs.depth,
-        calibration=needs.calibration,
-        actions=needs.actions.name,
-        grounded=needs.grounded,
-        demonstration_frames=needs.demonstration_frames,
-        observe_every=needs.observe_every,
-        history_cameras=needs.history_cameras,
-        meshes=job.meshes,
-        max_steps=job.max_steps,
-    )
 
 
 def load_policy(job: Job) -> Policy:
@@ -382,7 +286,7 @@ def _play_to_end(
     job: Job,
     writer: VideoWriter | None,
     result: RolloutResult,
-    guard: _CallGuard,
+    guard: CallGuard,
 ) -> None:
     """Play the environment's episode with the policy to its end."""
     with guard.environment("env_reset"):
@@ -406,12 +310,15 @@ def _play_to_end(
             policy.attach(env)
         policy.reset(first, info["demonstration"])
         result.policy_metadata = policy_metadata(policy)
+    result.action_space = actions.name
     status, cause = "ongoing", None
     while status == "ongoing":
         with guard.policy("policy's act()", "policy_act"):
             rows = next_actions(policy, observation, actions)
         with guard.environment("env_step"):
+            done = env.executed_actions
             observation, *_, info = env.step_chunk(rows)
+            result.answers.append(rows[: env.executed_actions - done])
         result.steps = int(info["steps"])
         result.add_events(info)
         if info.get("heard"):
@@ -426,7 +333,7 @@ def _tell(
     utterances: Sequence[Mapping[str, Any]],
     writer: VideoWriter | None,
     result: RolloutResult,
-    guard: _CallGuard,
+    guard: CallGuard,
 ) -> None:
     """Tell the policy what has just been said, and write it under the video."""
     result.heard += utterances
@@ -437,7 +344,7 @@ def _tell(
         result.policy_metadata = policy_metadata(policy)
 
 
-def _close_policy(policy: Policy, result: RolloutResult, guard: _CallGuard) -> None:
+def _close_policy(policy: Policy, result: RolloutResult, guard: CallGuard) -> None:
     """Read the policy's costs and close it; errors there do not change the outcome.
 
     Raises:

@@ -5,14 +5,17 @@ from __future__ import annotations
 import datetime as dt
 import importlib.metadata
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import zip_longest
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import JsonValue
 
 from roboirg import language
+from roboirg.core.actions import find_action_space
 from roboirg.core.conditions import Fact
 from roboirg.core.delivery import TURNS, PromptVerdict
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
@@ -27,6 +30,7 @@ from roboirg.judging import Event, attribute_failure
 from roboirg.language.settings import EXPLICIT
 from roboirg.policies.loading import server_version
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit
+from roboirg.records.action_log import ActionLog
 from roboirg.records.record import (
     Attribution,
     ErrorKind,
@@ -34,6 +38,7 @@ from roboirg.records.record import (
     Job,
     MentionSpan,
     Outcome,
+    PromptAudit,
     Record,
     UtteranceRecord,
 )
@@ -64,6 +69,9 @@ class RolloutResult:
         policy: its version and whether it is privileged; None if it was never loaded.
         prompt_limit: what the policy declares about its prompt; None if it declares nothing.
         policy_metadata: what the policy reports about itself.
+        action_space: name of the action space; None if the episode did not get that far.
+        answers: what was executed of each answer of the policy.
+        end_state: the state after the last of them, in numbers and as a hash; None before.
         usage: what the policy reports that the episode cost.
         timings: seconds spent in the policy and in the environment, by phase.
     """
@@ -85,8 +93,21 @@ class RolloutResult:
     policy: PolicyDescription | None = None
     prompt_limit: PromptLimit | None = None
     policy_metadata: dict[str, JsonValue] = field(default_factory=dict)
+    action_space: str | None = None
+    answers: list[NDArray[np.float64]] = field(default_factory=list)
+    end_state: tuple[NDArray[np.float64], str] | None = None
     usage: dict[str, float] = field(default_factory=dict)
     timings: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def action_log(self) -> ActionLog | None:
+        """The executed actions; None if the policy's turn never came, or the world broke."""
+        if self.action_space is None or self.end_state is None:
+            return None
+        starts = np.cumsum([0, *map(len, self.answers)], dtype=np.int32)[:-1]
+        width = find_action_space(self.action_space).size
+        rows = np.concatenate([np.empty((0, width)), *self.answers])
+        return ActionLog(self.action_space, rows, starts, self.end_state[0])
 
     def record_error(self, kind: ErrorKind, cause: str, details: str | None = None) -> None:
         """Record that the episode ended in an error and cannot be judged."""
@@ -136,6 +157,7 @@ def make_record(
     video: str | None = None,
     video_error: str | None = None,
     plan: str | None = None,
+    action_log: str | None = None,
 ) -> Record:
     """Return the record of a job; needs no simulator.
 
@@ -147,6 +169,7 @@ def make_record(
         video: path of the video relative to the records file.
         video_error: why the requested video could not be written.
         plan: fingerprint of the plan.
+        action_log: digest of the stored actions.
     """
     episode = get_episode(job.task, job.split, job.episode)
     # An episode that failed before its reset has a record with the words it would have had.
@@ -154,13 +177,7 @@ def make_record(
     explicit = instruct_job(job.model_copy(update={"setting": EXPLICIT}))
     policy = result.policy or _describe(job)
     utterances = _utterances(job, instruction, result)
-    prompt, verdict = None, UNDECLARED
-    if result.prompt_limit is not None:
-        steps = [one.step for one in utterances]
-        if steps == [None] * len(steps):  # it ended before anything was said
-            prompt, verdict = audit_job(job, result.prompt_limit, instruction)
-        else:
-            prompt, verdict = audit_prompt(instruction, steps, result.prompt_limit)
+    prompt, verdict = _audit(job, instruction, utterances, result)
     return Record(
         **dict(job),
         seed=episode.seed,
@@ -184,21 +201,45 @@ def make_record(
         policy_version=policy.version,
         server_version=server_version(result.policy_metadata),
         policy_metadata=result.policy_metadata,
+        action_log=action_log,
+        end_state=None if result.end_state is None else result.end_state[1],
         events=tuple(result.events),
         video=video,
         video_error=video_error,
         details=result.details,
         render_device=result.render_device,
-        language_version=str(language.LANGUAGE_VERSION),
-        environment_version=ENVIRONMENT_VERSION,
-        package_version=importlib.metadata.version("roboirgbench"),
-        code=code_fingerprint(),
+        **_versions(),
         plan=plan,
         usage=result.usage,
         timings=result.timings,
         started_at=started_at,
         duration_s=duration_s,
     )
+
+
+def _audit(
+    job: Job,
+    instruction: language.Instruction,
+    utterances: Sequence[UtteranceRecord],
+    result: RolloutResult,
+) -> tuple[PromptAudit | None, PromptVerdict]:
+    """Return what of the instruction reached the policy's model, and the verdict."""
+    if result.prompt_limit is None:
+        return None, UNDECLARED
+    steps = [one.step for one in utterances]
+    if steps == [None] * len(steps):  # it ended before anything was said
+        return audit_job(job, result.prompt_limit, instruction)
+    return audit_prompt(instruction, steps, result.prompt_limit)
+
+
+def _versions() -> dict[str, Any]:
+    """Return the versions of what made a record, by its fields."""
+    return {
+        "language_version": str(language.LANGUAGE_VERSION),
+        "environment_version": ENVIRONMENT_VERSION,
+        "package_version": importlib.metadata.version("roboirgbench"),
+        "code": code_fingerprint(),
+    }
 
 
 def _describe(job: Job) -> PolicyDescription:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import platform
@@ -30,10 +31,11 @@ class MeasureResult:
         ours: result of each round.
         baseline: baseline of each round; empty for measures without one.
         against: name of the baseline.
-        value: median of `ours`.
+        value: median of `ours`; None if it could not be measured.
         ratio: ratio of the medians, greater is better; None without a baseline.
         goal: smallest ratio; without a baseline, the largest value.
         reached: whether the goal is reached.
+        missing: package that is not installed, without which it cannot be measured.
     """
 
     name: str
@@ -41,10 +43,11 @@ class MeasureResult:
     ours: tuple[float, ...]
     baseline: tuple[float, ...]
     against: str
-    value: float
+    value: float | None
     ratio: float | None
     goal: float
     reached: bool
+    missing: str = ""
 
 
 def run_measures(
@@ -67,6 +70,8 @@ def run_measures(
     for number in range(1, rounds + 1):
         timed: dict[Callable[[], float], float] = {}
         for measure, own, base in zip(measures, ours, baselines, strict=True):
+            if _is_missing(measure.package):
+                continue
             report(f"round {number} of {rounds}: {measure.name}")
             if measure.baseline is not None:
                 if measure.baseline not in timed:
@@ -77,9 +82,9 @@ def run_measures(
 
 
 def _summarize(measure: Measure, ours: Sequence[float], baseline: Sequence[float]) -> MeasureResult:
-    value, ratio = statistics.median(ours), None
-    reached = value <= measure.goal
-    if baseline:
+    value = statistics.median(ours) if ours else None
+    ratio, reached = None, value is not None and value <= measure.goal
+    if baseline and value is not None:
         ratio = statistics.median(baseline) / value
         if measure.inverse:
             ratio = 1.0 / ratio
@@ -94,7 +99,12 @@ def _summarize(measure: Measure, ours: Sequence[float], baseline: Sequence[float
         ratio=ratio,
         goal=measure.goal,
         reached=reached,
+        missing="" if ours else measure.package,
     )
+
+
+def _is_missing(package: str) -> bool:
+    return bool(package) and importlib.util.find_spec(package) is None
 
 
 def results_table(results: Sequence[MeasureResult]) -> Table:
@@ -107,11 +117,13 @@ def results_table(results: Sequence[MeasureResult]) -> Table:
         base = statistics.median(result.baseline) if result.baseline else None
         table.add_row(
             result.name,
-            _format_value(result.value, result.unit),
+            f"{result.missing} is not installed"
+            if result.value is None
+            else _format_value(result.value, result.unit),
             "" if base is None else _format_value(base, result.unit),
             result.against,
             "" if result.ratio is None else f"{result.ratio:.2f} x",
-            f"{'<=' if result.ratio is None else '>='} {result.goal:g}",
+            f"{'>=' if result.against else '<='} {result.goal:g}",
             "yes" if result.reached else "no",
         )
     return table

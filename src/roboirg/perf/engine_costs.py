@@ -10,7 +10,8 @@ import time
 from pathlib import Path
 
 from roboirg.evaluation.executors.executor import LocalProcesses
-from roboirg.evaluation.plan import Plan, make_plan
+from roboirg.evaluation.plan import Plan
+from roboirg.evaluation.plan_maker import make_plan
 from roboirg.evaluation.progress import SilentReporter
 from roboirg.evaluation.rollout import EpisodeRunner
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now

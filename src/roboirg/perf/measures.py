@@ -33,6 +33,7 @@ class Measure:
         goal: smallest ratio of baseline to ours; without a baseline, the largest value.
         unit: unit in tables.
         inverse: whether more is better, so that the ratio is ours to the baseline.
+        package: optional package without which it cannot be measured.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Measure:
     goal: float
     unit: str = "ms"
     inverse: bool = False
+    package: str = ""
 
 
 def measures() -> tuple[Measure, ...]:
@@ -52,6 +54,7 @@ def measures() -> tuple[Measure, ...]:
         *_floor_measures(table),
         *_reset_measures(),
         *_process_measures(),
+        *_worker_measures(),
         *_large_run_measures(),
     )
 
@@ -131,15 +134,6 @@ def _process_measures() -> tuple[Measure, ...]:
             inverse=True,
         ),
         Measure(
-            "episodes an hour of 16 workers, 50 ms a call",
-            partial(hosted_rates.episodes_per_hour, 16),
-            partial(hosted_rates.episodes_per_hour, 1),
-            "1 worker",
-            6,
-            unit="1/h",
-            inverse=True,
-        ),
-        Measure(
             "run engine, of an episode",
             engine_costs.engine_time,
             engine_costs.episode_time,
@@ -148,15 +142,51 @@ def _process_measures() -> tuple[Measure, ...]:
         ),
         Measure("resuming with 100,000 records", engine_costs.resume_time, None, "", 3, "s"),
         Measure("memory of a process", process_costs.process_memory, None, "", 0.5, "GiB"),
+    )
+
+
+def _worker_measures() -> tuple[Measure, ...]:
+    """Return measures of several workers with one policy process, and of what bounds them."""
+    pace, costs = hosted_rates.episodes_per_hour, hosted_rates.costs
+    slow, model, quick = hosted_rates.SlowPolicy, hosted_rates.TorchPolicy, hosted_rates.QuickPolicy
+    numeric = process_costs.numeric_rate
+    rows: tuple[tuple[str, type, int, float, str], ...] = (
+        ("episodes an hour of 16 workers, 50 ms a call", slow, 16, 6, ""),
+        ("... a small PyTorch model on the CPU", model, 16, 1.5, "torch"),
+        ("episodes an hour of 2 workers", quick, 2, 1.6, ""),
+    )
+    return (
+        *(
+            Measure(
+                name,
+                partial(pace, policy, workers),
+                partial(pace, policy, 1),
+                "1 worker",
+                goal,
+                unit="1/h",
+                inverse=True,
+                package=package,
+            )
+            for name, policy, workers, goal, package in rows
+        ),
         Measure(
-            "steps a second of 2 processes",
-            partial(process_costs.throughput, 2),
-            partial(process_costs.throughput, 1),
+            "plain numeric work in 2 processes",
+            partial(numeric, 2),
+            partial(numeric, 1),
             "1 process",
             1.6,
             unit="1/s",
             inverse=True,
         ),
+        Measure(
+            "processor time of an episode, 50 ms a call",
+            lambda: costs(slow, 16).processor_s,
+            None,
+            "",
+            0.4,
+            "s",
+        ),
+        Measure("memory of a worker", lambda: costs(slow, 16).worker_gib, None, "", 0.5, "GiB"),
     )
 
 

@@ -1,18 +1,17 @@
-"""Startup time, memory and throughput of processes."""
+"""Startup time and memory of a process, and what two of them reach together."""
 
 from __future__ import annotations
 
 import json
-import multiprocessing
 import os
 import subprocess
 import sys
 import time
-from multiprocessing.synchronize import Barrier
 
-from roboirg.perf import step_times
+import numpy as np
+
 from roboirg.perf.probe_process import Path
-from roboirg.perf.workloads import STEPS, over_the_table
+from roboirg.util.parallel_map import parallel_map
 
 
 def process_start(path: Path) -> float:
@@ -36,33 +35,26 @@ def process_memory() -> float:
     return _in_process("ours", "memory")["gibibytes"]
 
 
-def throughput(workers: int) -> float:
-    """Return the total steps per second, with both pictures, of several processes."""
-    context = multiprocessing.get_context("spawn")
-    barrier = context.Barrier(workers + 1)
-    processes = [context.Process(target=_work, args=(barrier,)) for _ in range(workers)]
-    for process in processes:
-        process.start()
-    barrier.wait()
-    start = time.perf_counter()
-    barrier.wait()
-    seconds = time.perf_counter() - start
-    for process in processes:
-        process.join()
-    return workers * _ROUNDS * STEPS / seconds
+def numeric_rate(processes: int) -> float:
+    """Return how often a second several processes together carry out plain numeric work."""
+    start = time.monotonic() + _LEAD_S
+    counts = parallel_map(_count, [start] * processes, processes)
+    return sum(count for _, count in counts) / _COUNTED_S
 
 
-_ROUNDS = 3
+_LEAD_S, _COUNTED_S = 3.0, 3.0
 _NO_BYTECODE = "PYTHONDONTWRITEBYTECODE"
 
 
-def _work(barrier: Barrier) -> None:
-    workload = over_the_table()
-    step_times.eager_step(workload)
-    barrier.wait()
-    for _ in range(_ROUNDS):
-        step_times.eager_step(workload)
-    barrier.wait()
+def _count(start: float) -> int:
+    """Work from a moment on, and return how often."""
+    matrix, count = np.eye(64), 0
+    time.sleep(max(start - time.monotonic(), 0.0))
+    while time.monotonic() < start + _COUNTED_S:
+        for _ in range(20):
+            matrix = np.roll(matrix, 1, axis=0) * 0.5 + 0.5
+        count += 1
+    return count
 
 
 def _in_process(path: Path, what: str) -> dict[str, float]:

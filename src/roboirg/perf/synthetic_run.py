@@ -15,7 +15,8 @@ import numpy as np
 from roboirg.core.conditions import Fact, FactCount, OccurrenceCount, facts_of
 from roboirg.core.episode import Episode, Stage
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.plan import Plan, make_plan, write_plan
+from roboirg.evaluation.plan import Plan, write_plan
+from roboirg.evaluation.plan_maker import make_plan
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.records.record import Attribution, EventRecord, Job, Outcome, Record
 from roboirg.records.store import RECORDS_FILE

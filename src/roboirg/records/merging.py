@@ -12,7 +12,9 @@ from typing import NamedTuple
 import msgspec
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.records.action_log import action_path
 from roboirg.records.episode_log import log_path, logged_slugs
+from roboirg.records.plan_files import PLAN_FILE, earlier_plans, keep_earlier_plan
 from roboirg.records.record_codec import (
     RecordIndexEntry,
     StoreError,
@@ -37,9 +39,10 @@ class MergeSummary(NamedTuple):
 
 
 class _MergeEntry(RecordIndexEntry, frozen=True):
-    """An index entry with the path of the video."""
+    """An index entry with the path of the video and the digest of the actions."""
 
     video: str | None = None
+    action_log: str | None = None
 
 
 _decoder = msgspec.json.Decoder(_MergeEntry)
@@ -67,6 +70,7 @@ def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
     added, duplicates = 0, 0
     conflicts: list[RecordIndexEntry] = []
     with RecordStore(out) as store:
+        _keep_plans(folders, out)
         kept = dict(store.stored)
         _check_versions([(out, kept.values()), *entries])
         for folder, run in runs:
@@ -86,6 +90,14 @@ def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
                 added += before is None
             store.extend(_lines(run, wanted, folder, out))
     return MergeSummary(added, duplicates, tuple(conflicts))
+
+
+def _keep_plans(folders: Sequence[Path], out: Path) -> None:
+    """Keep the plans of all runs, so that it can be told which episodes are missing."""
+    for folder in folders:
+        for path in (folder / PLAN_FILE, *earlier_plans(folder)):
+            if path.is_file():
+                keep_earlier_plan(path.read_bytes(), out)
 
 
 def _read_entry(line: bytes, path: Path, number: int) -> _MergeEntry:
@@ -124,7 +136,7 @@ def _server_version(record: RecordIndexEntry) -> Iterator[tuple[tuple[object, ..
 def _lines(
     run: StoredRun[_MergeEntry], wanted: Sequence[_MergeEntry], source: Path, target: Path
 ) -> Iterator[bytes]:
-    """Yield the lines of records and copy their videos and logs.
+    """Yield the lines of records and copy their videos, logs and actions.
 
     A video whose file is missing is removed from its line.
     """
@@ -132,6 +144,8 @@ def _lines(
     for one, line in zip(wanted, run.lines(wanted), strict=True):
         if logs and (slug := one.slug) in logs:
             _copy_log(log_path(source, slug), log_path(target, slug))
+        if one.action_log is not None:
+            _copy_actions(one.action_log, source, target)
         if one.video is None or _copy_video(one.video, source, target):
             yield line
         else:
@@ -150,6 +164,13 @@ def _copy_video(name: str, source: Path, target: Path) -> bool:
         with contextlib.suppress(FileNotFoundError):
             _copy_file(video.with_suffix(".jpg"), copy.with_suffix(".jpg"))
     return True
+
+
+def _copy_actions(digest: str, source: Path, target: Path) -> None:
+    actions, copy = action_path(source, digest), action_path(target, digest)
+    if actions.is_file() and not copy.exists():
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        _copy_file(actions, copy)
 
 
 def _copy_log(log: Path, copy: Path) -> None:

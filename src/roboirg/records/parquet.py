@@ -49,6 +49,8 @@ _TEXT_COLUMNS = [
     "video_error",
     "details",
     "render_device",
+    "action_log",
+    "end_state",
     "started_at",
 ]
 _NUMBER_COLUMNS = [

@@ -8,6 +8,7 @@ for the fields in `NON_DETERMINISTIC_FIELDS`.
 from __future__ import annotations
 
 import hashlib
+import operator
 import re
 from collections.abc import Mapping
 from typing import Literal, Self, get_args
@@ -147,10 +148,13 @@ IDENTITY = tuple(name for name in Job.model_fields if name not in {"spec", "word
 """The fields that identify a job."""
 
 
+_OPTIONS = tuple(name for name in InstructionOptions._fields if name != "wordings")
+_read_options = operator.attrgetter(*_OPTIONS)
+
+
 def options_of(record: object) -> InstructionOptions:
     """Return the instruction options among a record's attributes, without `wordings`."""
-    names = (name for name in InstructionOptions._fields if name != "wordings")
-    return InstructionOptions(**{name: getattr(record, name) for name in names})
+    return InstructionOptions(**dict(zip(_OPTIONS, _read_options(record), strict=True)))
 
 
 def slug_of(identity: Mapping[str, object]) -> str:
@@ -334,6 +338,10 @@ class Record(Result):
         metadata: of the instruction: reasoning pattern, relation, stages, landmarks, template
             ids, ….
         policy_metadata: what the policy reports about itself: checkpoint, server, model, ….
+        action_log: digest of the executed actions, as in `roboirg.records.action_log`; None if they
+            were not kept.
+        end_state: hash of the state in which the episode left the world and the judge; None if it
+            did not come to an end.
         events: facts that became true or false, in order.
         usage: what models queried by the policy cost: ``calls``, ``input_tokens``,
             ``output_tokens``, ``cost_usd``.
@@ -355,6 +363,8 @@ class Record(Result):
     goal: dict[str, str | int | tuple[str, ...] | tuple[int, ...]]
     metadata: dict[str, JsonValue]
     policy_metadata: dict[str, JsonValue] = {}
+    action_log: str | None = None
+    end_state: str | None = None
     events: tuple[EventRecord, ...] = ()
     usage: dict[str, float] = {}
     timings: dict[str, float] = {}

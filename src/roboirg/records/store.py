@@ -295,6 +295,7 @@ class StoredRun(Generic[Identified]):
 
     Attributes:
         newest: what is kept of each record, in the order of the file.
+        replaced: of earlier records of the same episodes.
 
     Raises:
         StoreError: there are no records, or a line is not a record of this schema version.
@@ -304,8 +305,12 @@ class StoredRun(Generic[Identified]):
         self._path = folder / RECORDS_FILE
         lines = _RecordsFile(self._path)
         kept: dict[RecordKey, tuple[Identified, LinePlace]] = {}
+        self.replaced: list[Identified] = []
         for one in lines.parse(parse_line):
-            kept[identity_key(one)] = (one, lines.place)
+            key = identity_key(one)
+            if key in kept:
+                self.replaced.append(kept[key][0])
+            kept[key] = (one, lines.place)
         if not kept:
             raise StoreError(
                 f"There are no records in {folder}; give the --out folder of a `roboirg run`."

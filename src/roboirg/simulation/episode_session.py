@@ -94,16 +94,27 @@ class EpisodeSession:
 
     def state_hash(self) -> str:
         """Return the SHA-256, in hexadecimal, of all readable state."""
-        robot = self.world.robot.articulation
-        numbers = [robot.get_qpos(), robot.get_qvel()]
-        for body in self.world.bodies.values():
-            numbers += _body_state(body)
         digest = hashlib.sha256()
-        for array in numbers:
+        for array in self._state():
             digest.update(np.ascontiguousarray(array).tobytes())
         progress = (self.world.elapsed, self.judge.index, str(self.judge.status), self.events)
         digest.update(repr(progress).encode())
         return digest.hexdigest()
+
+    def state_numbers(self) -> NDArray[np.float64]:
+        """Return positions and velocities of the robot's joints, then those of all objects, (m,).
+
+        Units: rad, m and s. An object has its position and orientation (w, x, y, z), its linear and
+        angular velocity if it can move, and a button the position and velocity of its joint.
+        """
+        return np.concatenate([np.asarray(one, np.float64).ravel() for one in self._state()])
+
+    def _state(self) -> list[NDArray[Any]]:
+        robot = self.world.robot.articulation
+        numbers = [robot.get_qpos(), robot.get_qvel()]
+        for body in self.world.bodies.values():
+            numbers += _body_state(body)
+        return numbers
 
     def _plan_demonstration(self) -> Iterator[RecordedStep]:
         """Yield the scripted expert's steps; each trajectory is planned after the last is done."""

@@ -29,6 +29,8 @@ class EpisodeState:
         video_subgoals: the subgoal in words at each step of the video.
         history: observations for ``history`` since the last observation.
         steps: control steps of the policy.
+        executed_actions: number of actions of the policy that were executed, the last perhaps in
+            part.
         reported_events: number of events that `take_new_events` has returned.
         reported_utterances: number of utterances that `take_new_utterances` has returned.
     """
@@ -42,6 +44,7 @@ class EpisodeState:
     video_subgoals: list[str] = field(default_factory=list)
     history: list[dict[str, Any]] = field(default_factory=list)
     steps: int = 0
+    executed_actions: int = 0
     reported_events: int = 0
     reported_utterances: int = 0
 

@@ -1,36 +1,205 @@
-"""What supervised child processes have in common: they end with their parent and say how."""
+"""Child processes: started with a channel, watched, ended; nothing of them outlives the parent.
+
+The kernel kills a child when the thread that started it ends, so start it in a thread that lasts.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
+import importlib
+import json
+import multiprocessing
 import os
 import signal
+import socket
+import subprocess
 import sys
+from collections.abc import Callable, Mapping
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from typing import IO, Any, NamedTuple, Self, cast
+
+GRACE_S = 2.0
+"""How long a child may take to exit once its channel is closed."""
 
 _PR_SET_PDEATHSIG = 1
+# The first thing the interpreter gets is the import path.
+_BOOT = (
+    "import json, sys; sys.path[:] = json.loads(sys.argv.pop()); "
+    "from roboirg.util.child_process import _run_main; _run_main()"
+)
 
 
-def exit_with_parent(parent: int) -> None:
-    """Let the kernel kill this process when its parent dies, even if it hangs in native code.
+class ChildExit(NamedTuple):
+    """How a child ended.
 
-    The kernel means the parent's thread that started this process, so that thread must last.
-
-    Args:
-        parent: process id of the parent; this process exits if that is already dead.
+    Attributes:
+        code: its exit code, negative for a signal; None if it closed its channel and then had to
+            be killed.
     """
+
+    code: int | None
+
+    @property
+    def was_killed(self) -> bool:
+        """Whether SIGKILL ended it: not its own doing, but a user's or the kernel's."""
+        return self.code == -signal.SIGKILL
+
+    def __str__(self) -> str:
+        if self.code is None:
+            return "the process closed its connection"
+        if self.code < 0:
+            return f"the process died of signal {-self.code}"
+        return f"the process ended with exit code {self.code}"
+
+
+class _Interpreter(subprocess.Popen[bytes]):
+    @property
+    def exitcode(self) -> int | None:
+        return self.poll()
+
+    def join(self, timeout: float | None = None) -> None:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self.wait(timeout)
+
+
+class ChildProcess:
+    """A child process and our end of its channel; made by `spawn` or `run_module`.
+
+    Attributes:
+        connection: readable when the child has sent something, or is dead.
+        output: what the child prints, if that does not go where this process prints.
+    """
+
+    def __init__(
+        self,
+        process: BaseProcess | _Interpreter,
+        connection: Connection,
+        output: IO[bytes] | None = None,
+    ) -> None:
+        self._process, self.connection, self.output = process, connection, output
+
+    @classmethod
+    def spawn(cls, work: Callable[..., None], *args: Any) -> Self:  # noqa: ANN401
+        """Start ``work(connection, *args)`` in a new interpreter; all of it must be picklable."""
+        # Spawned, not forked: a forked Vulkan driver or thread pool is undefined behavior.
+        context = multiprocessing.get_context("spawn")
+        ours, theirs = context.Pipe()
+        # Not a daemon in multiprocessing's sense: policies may have processes of their own.
+        process = context.Process(target=_begin_work, args=(os.getpid(), work, theirs, args))
+        process.start()
+        # Only the child may keep this end open: then its death reads as end of file.
+        theirs.close()
+        return cls(process, ours)
+
+    @classmethod
+    def run_module(cls, module: str, variables: Mapping[str, str]) -> Self:
+        """Start ``main(connection)`` of a module in an interpreter that knows nothing of this one.
+
+        The script and command line of this process are kept from it. It has the environment of this
+        process and `variables`.
+        """
+        ours, theirs = socket.socketpair()
+        with theirs:
+            number = theirs.fileno()
+            arguments = (str(number), str(os.getpid()), module, json.dumps(sys.path))
+            process = _Interpreter(
+                [sys.executable, "-c", _BOOT, *arguments],
+                pass_fds=[number],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                env={**os.environ, **variables},
+            )
+        return cls(process, Connection(ours.detach()), process.stdout)
+
+    @property
+    def pid(self) -> int:
+        """Its process id."""
+        return cast("int", self._process.pid)  # it has been started
+
+    @property
+    def exit(self) -> ChildExit | None:
+        """How it ended; None while it is alive."""
+        code = self._process.exitcode
+        return None if code is None else ChildExit(code)
+
+    def send(self, message: Any) -> None:  # noqa: ANN401
+        """Send a message; if the child is dead, the next `receive` tells."""
+        with contextlib.suppress(OSError):
+            self.connection.send(message)
+
+    def receive(self) -> Any:  # noqa: ANN401
+        """Return the child's next message, or its `ChildExit` if there is none any more."""
+        try:
+            return self.connection.recv()
+        except (EOFError, OSError):
+            return self.close()
+
+    def kill(self) -> None:
+        """Kill the child, and end what it has started."""
+        self._process.kill()
+        self._end_group()
+
+    def close(self) -> ChildExit:
+        """Let the child exit by closing its channel; kill it after `GRACE_S`."""
+        self.connection.close()
+        self._process.join(GRACE_S)
+        code = self._process.exitcode
+        if code is None:
+            self._process.kill()
+            self._process.join()
+        self._end_group()
+        return ChildExit(code)
+
+    def end(self) -> None:
+        """Kill the child at once."""
+        self.kill()
+        self.close()
+
+    def _end_group(self) -> None:
+        # Not SIGKILL: Python's resource trackers are among them, and have to clean up.
+        with contextlib.suppress(OSError):
+            os.killpg(self.pid, signal.SIGTERM)
+
+
+def serve(connection: Connection, answer: Callable[[Any], Any]) -> None:
+    """Answer every message until the channel closes; runs in a child."""
+    while True:
+        try:
+            message = connection.recv()
+        except (EOFError, OSError):
+            return
+        reply = answer(message)
+        try:
+            connection.send(reply)
+        except BrokenPipeError:
+            return
+
+
+def _begin_work(
+    parent: int, work: Callable[..., None], connection: Connection, args: tuple[Any, ...]
+) -> None:
+    _begin(parent)
+    work(connection, *args)
+
+
+def _run_main() -> None:
+    number, parent, module = sys.argv[1:]
+    sys.argv[1:] = []
+    _begin(int(parent))
+    importlib.import_module(module).main(Connection(int(number)))
+
+
+def _begin(parent: int) -> None:
+    """Put this process under the supervision of its parent."""
+    # Ctrl-C is for the parent, which decides what to do.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    os.setpgid(0, 0)  # what it starts can be ended with it
     if sys.platform == "linux":
+        # Even if it hangs in native code.
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(1)  # the parent died before the line above
-
-
-def describe_exit(exit_code: int | None) -> str:
-    """Return how a process ended, in words."""
-    if exit_code is not None and exit_code < 0:
-        return f"the process died of signal {-exit_code}"
-    return f"the process ended with exit code {exit_code}"
-
-
-def was_killed(exit_code: int | None) -> bool:
-    """Return whether SIGKILL ended a process: not its own doing, but a user's or the kernel's."""
-    return exit_code == -signal.SIGKILL

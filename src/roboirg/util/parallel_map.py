@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
-import signal
+import functools
+import traceback
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from typing import TypeVar
+from multiprocessing.connection import Connection, wait
+from typing import TypeVar, cast
 
 from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.util.child_process import ChildExit, ChildProcess, serve
 
 Item = TypeVar("Item")
 Outcome = TypeVar("Outcome")
@@ -35,19 +36,40 @@ def parallel_map(
     if workers == 0:
         yield from ((item, work(item)) for item in items)
         return
-    pool = ProcessPoolExecutor(
-        workers,
-        # Spawn, because threads of the simulator do not survive a fork.
-        mp_context=multiprocessing.get_context("spawn"),
-        initializer=signal.signal,
-        # Ctrl-C reaches the whole process group; only the parent handles it.
-        initargs=(signal.SIGINT, signal.SIG_IGN),
-    )
+    waiting = deque(items)
+    busy: dict[Connection, tuple[ChildProcess, Item]] = {}
+
+    def assign(child: ChildProcess) -> None:
+        item = waiting.popleft()
+        busy[child.connection] = child, item
+        child.send(item)
+
     with contextlib.ExitStack() as stack:
-        stack.callback(pool.shutdown, cancel_futures=True)
-        futures = {pool.submit(work, item): item for item in items}
-        try:
-            for future in as_completed(futures):
-                yield futures[future], future.result()
-        except BrokenProcessPool as error:
-            raise RoboIRGError(f"A worker process died: {error}") from error
+        for _ in range(min(workers, len(items))):
+            child = ChildProcess.spawn(_work, work)
+            stack.callback(child.end)
+            assign(child)
+        while busy:
+            for connection in cast("list[Connection]", wait(list(busy))):
+                child, item = busy.pop(connection)
+                reply = child.receive()
+                if isinstance(reply, ChildExit):
+                    raise RoboIRGError(f"A worker process died at {item!r}: {reply}.")
+                outcome, error = reply
+                if error is not None:
+                    raise error
+                if waiting:
+                    assign(child)
+                yield item, outcome
+
+
+def _work(connection: Connection, work: Callable[[Item], Outcome]) -> None:
+    serve(connection, functools.partial(_call, work))
+
+
+def _call(work: Callable[[Item], Outcome], item: Item) -> tuple[Outcome | None, Exception | None]:
+    try:
+        return work(item), None
+    except Exception as error:  # noqa: BLE001 - raised again by the parent
+        error.add_note(traceback.format_exc())
+        return None, error

@@ -6,6 +6,7 @@ environment, go to cells of their own and are never averaged with the rest.
 
 from __future__ import annotations
 
+import operator
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -52,7 +53,7 @@ class EvalConditions(NamedTuple):
     @classmethod
     def of(cls, job: Job | RecordIndexEntry) -> EvalConditions:
         """Return the conditions of a job."""
-        return cls(**{name: getattr(job, name) for name in cls._fields})
+        return cls._make(_read_conditions(job))
 
     def text(self, name: str) -> str:
         """Return the value of a condition in words."""
@@ -63,6 +64,8 @@ class EvalConditions(NamedTuple):
         before = "" if name == "wordings" else f"{name.replace('_', ' ')} "
         return before + self.text(name)
 
+
+_read_conditions = operator.attrgetter(*EvalConditions._fields)
 
 FAIRNESS = {
     "split": "splits",

@@ -100,19 +100,19 @@ class LocalProcesses:
                     else:
                         active.remove(worker)
                         released.append(worker)
-                        worker.release()
+                        worker.child.connection.close()  # it may exit
                     yield record
         finally:
             for worker in active:
-                worker.stop()
+                worker.child.kill()
             for worker in (*active, *released):
-                worker.join()
+                worker.child.close()
 
     def _finished(self, active: list[Worker]) -> Iterator[tuple[Worker, Record]]:
         """Wait up to `POLL_S`; yield every worker whose job has finished or timed out."""
-        ready = wait([worker.connection for worker in active], POLL_S)
+        ready = wait([worker.child.connection for worker in active], POLL_S)
         for worker in tuple(active):
-            if worker.connection in ready:
+            if worker.child.connection in ready:
                 yield worker, worker.receive()
             elif (record := worker.kill_if_overdue(self.episode_timeout_s)) is not None:
                 yield worker, record

@@ -1,14 +1,15 @@
 """Play jobs on many machines with Ray.
 
 Each remote worker is an actor with one CPU that supervises a process of its own, as
-`LocalProcesses` does, so that policies and simulator are isolated in the same way. When a machine
-is lost, its current jobs get error records, which the runner retries, and its workers are replaced
-where CPUs are free.
+`LocalProcesses` does, so that policies and simulator are isolated in the same way; the workers on a
+machine share its policy hosts. When a machine is lost, its current jobs get error records, which
+the runner retries, and its workers are replaced where CPUs are free.
 """
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import logging
 import os
 import socket
@@ -26,7 +27,12 @@ from roboirg.core.errors import InvalidValueError, MissingDependencyError, RoboI
 from roboirg.evaluation.episode_errors import format_cause
 from roboirg.evaluation.executors.executor import NO_TIMEOUT_S
 from roboirg.evaluation.executors.workers import MAX_FAILED_STARTS, WorkerSlot
-from roboirg.evaluation.hosting.host_pool import open_hosts
+from roboirg.evaluation.hosting.host_pool import (
+    HostAddress,
+    HostPool,
+    HostSettings,
+    HostUser,
+)
 from roboirg.evaluation.rollout import PlayJob
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.records.record import Job, Record
@@ -36,6 +42,8 @@ POLL_S = 1.0
 NO_CPU_TIMEOUT_S = 300.0
 """How long a cluster may have no free CPU before the run stops."""
 CONNECT_S = 10.0
+CLOSE_S = 10.0
+"""How long the hosts of all machines may take to end before they are killed."""
 
 
 @runtime_checkable
@@ -145,6 +153,10 @@ def _video_recorder(play: object) -> VideoRecorder | None:
     return play if isinstance(play, VideoRecorder) else None
 
 
+def _hosting(play: object) -> HostSettings | None:
+    return play.hosting if isinstance(play, HostUser) else None
+
+
 def _check_reachable(address: str | None) -> None:
     """Check that the address accepts connections; Ray would wait minutes and then exit."""
     host, _, port = (address or "").removeprefix("ray://").rpartition(":")
@@ -158,23 +170,43 @@ def _check_reachable(address: str | None) -> None:
         ) from error
 
 
+class _MachineHosts:
+    """Actor that holds the policy hosts of a machine; all workers there use them."""
+
+    def __init__(self, settings: HostSettings) -> None:
+        self._pool = HostPool(settings)
+
+    def address(self) -> HostAddress:
+        """Return where they are, for processes on the same machine."""
+        return self._pool.address
+
+    def close(self) -> None:
+        """End them."""
+        self._pool.close()
+
+
 class _RemoteWorker:
     """Actor that runs on a machine of the cluster and returns videos as bytes."""
 
     def __init__(self, play: PlayJob, episode_timeout_s: float) -> None:
         self._folder = Path(tempfile.mkdtemp(prefix="roboirg-"))
         recorder = _video_recorder(play)
-        moved = play if recorder is None else cast("PlayJob", recorder.in_folder(self._folder))
-        # For the life of this actor, which ends with its process.
-        self._hosts = open_hosts(moved)
-        self._slot = WorkerSlot(self._hosts.__enter__(), episode_timeout_s)
+        self._play = play if recorder is None else recorder.in_folder(self._folder)
+        self._episode_timeout_s = episode_timeout_s
+        self._slot: tuple[HostAddress | None, WorkerSlot] | None = None
 
-    def wait_until_started(self) -> None:
-        """Return as soon as the actor runs on a machine."""
+    def machine(self) -> str:
+        """Return the id of the machine as soon as the actor runs on it."""
+        return str(import_ray().get_runtime_context().get_node_id())
 
-    def play(self, job: Job) -> _RemoteResult:
-        """Play a job."""
-        record = self._slot.play(job)
+    def play(self, job: Job, hosts: HostAddress | None) -> _RemoteResult:
+        """Play a job with the policy hosts of this machine, if there are some."""
+        if self._slot is None or self._slot[0] != hosts:  # these may have been started again
+            if self._slot is not None:
+                self._slot[1].close()
+            hosted = self._play if hosts is None else cast("HostUser", self._play).with_hosts(hosts)
+            self._slot = hosts, WorkerSlot(cast("PlayJob", hosted), self._episode_timeout_s)
+        record = self._slot[1].play(job)
         files = {}
         for path in sorted(self._folder.rglob("*")):
             if path.is_file():
@@ -188,15 +220,21 @@ class _WorkerPool:
 
     def __init__(self, ray: ModuleType, play: PlayJob, episode_timeout_s: float, size: int) -> None:
         self._ray, self._play, self._episode_timeout_s = ray, play, episode_timeout_s
-        self._actor = ray.remote(
-            num_cpus=1,
-            max_restarts=0,
-            scheduling_strategy="SPREAD",
-            runtime_env={"env_vars": {"PYTHONPATH": os.pathsep.join(_user_paths())}},
-        )(_RemoteWorker)
-        # By pending call: its worker and its job, or None while the worker starts.
-        self._pending: dict[Any, tuple[Any, Job | None]] = {}
-        self._idle: list[Any] = []
+        variables = {
+            "PYTHONPATH": os.pathsep.join(_user_paths()),
+            # Or older versions of Ray hide the GPUs from actors that reserve none.
+            "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
+        }
+        self._remote = functools.partial(ray.remote, runtime_env={"env_vars": variables})
+        self._actor = self._remote(num_cpus=1, max_restarts=0, scheduling_strategy="SPREAD")(
+            _RemoteWorker
+        )
+        self._hosting = _hosting(play)
+        # By id of a machine: the actor that holds its policy hosts.
+        self._hosts: dict[str, Any] = {}
+        # By pending call: its worker, its machine and its job; both None while the worker starts.
+        self._pending: dict[Any, tuple[Any, str | None, Job | None]] = {}
+        self._idle: list[tuple[Any, str]] = []
         self._size, self._failed_starts = size, 0
         for _ in range(size):
             self._start_worker()
@@ -207,15 +245,16 @@ class _WorkerPool:
         left, last_active = len(waiting), time.monotonic()
         while left:
             while waiting and self._idle:
-                worker, job = self._idle.pop(), waiting.popleft()
-                self._pending[worker.play.remote(job)] = (worker, job)
+                (worker, machine), job = self._idle.pop(), waiting.popleft()
+                call = worker.play.remote(job, self._hosts_at(machine))
+                self._pending[call] = (worker, machine, job)
             ready, _ = self._ray.wait(list(self._pending), num_returns=1, timeout=POLL_S)
             for reference in ready:
                 record = self._receive(reference)
                 if record is not None:
                     left -= 1
                     yield record
-            if ready or any(job is not None for _, job in self._pending.values()):
+            if ready or any(job is not None for _, _, job in self._pending.values()):
                 last_active = time.monotonic()
             elif time.monotonic() - last_active > NO_CPU_TIMEOUT_S:
                 raise RoboIRGError(
@@ -224,25 +263,43 @@ class _WorkerPool:
                 )
 
     def close(self) -> None:
-        """Kill all workers."""
-        for worker in [*self._idle, *(worker for worker, _ in self._pending.values())]:
+        """Kill all workers, and end the hosts."""
+        for worker, *_ in (*self._idle, *self._pending.values()):
             self._ray.kill(worker)
+        closing = [hosts.close.remote() for hosts in self._hosts.values()]
+        if closing:
+            self._ray.wait(closing, num_returns=len(closing), timeout=CLOSE_S)
+        for hosts in self._hosts.values():
+            self._ray.kill(hosts)
 
     def _start_worker(self) -> None:
         worker = self._actor.remote(self._play, self._episode_timeout_s)
-        self._pending[worker.wait_until_started.remote()] = (worker, None)
+        self._pending[worker.machine.remote()] = (worker, None, None)
+
+    def _hosts_at(self, machine: str) -> Any:  # noqa: ANN401 - a reference
+        """Return a reference to the address of a machine's hosts; None if none are needed."""
+        if self._hosting is None:
+            return None
+        if machine not in self._hosts:
+            from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
+
+            there = NodeAffinitySchedulingStrategy(machine, soft=False)
+            actor = self._remote(num_cpus=0, max_restarts=-1, scheduling_strategy=there)
+            self._hosts[machine] = actor(_MachineHosts).remote(self._hosting)
+        return self._hosts[machine].address.remote()
 
     def _receive(self, reference: object) -> Record | None:
         """Return the record of a finished call; None if the call only started a worker."""
-        worker, job = self._pending.pop(reference)
+        worker, machine, job = self._pending.pop(reference)
         try:
             reply = self._ray.get(reference)
         except (self._ray.exceptions.RayActorError, self._ray.exceptions.RaySystemError) as error:
+            self._ray.kill(worker)
             if job is None:
                 self._count_failed_start(error)
             self._start_worker()
             return None if job is None else _lost_worker_record(job, error)
-        self._idle.append(worker)
+        self._idle.append((worker, reply if machine is None else machine))
         if job is None:
             self._failed_starts = 0
             return None

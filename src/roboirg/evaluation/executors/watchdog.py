@@ -10,7 +10,7 @@ import contextlib
 import ctypes
 import time
 from collections.abc import Iterator
-from multiprocessing.context import SpawnContext
+from multiprocessing.sharedctypes import RawValue
 from typing import ClassVar, Literal, get_args
 
 from roboirg.core.waiting import Wait, listen
@@ -49,12 +49,11 @@ class Watchdog:
     Times are from the monotonic clock, which all processes of a machine share. A deadline stands
     still while the process waits for its turn, as for a server that another episode uses.
 
-    Args:
-        context: creates the processes; pass the watchdog to a process when it is started.
+    Pass it to a process when that is started.
     """
 
-    def __init__(self, context: SpawnContext) -> None:
-        self._shared = context.RawValue(_Shared)
+    def __init__(self) -> None:
+        self._shared = RawValue(_Shared)
 
     def begin_job(self) -> None:
         """Forget how long the last job waited for its turn."""

@@ -14,10 +14,11 @@ from typing import NamedTuple, Protocol, Self, TypeVar, runtime_checkable
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.hosting.payload import decode, encode
+from roboirg.evaluation.hosting.policy_child import ChildLostError, PolicyChild
 from roboirg.evaluation.hosting.policy_host import HostSession, PolicyHost, host_variables
 
-POLL_S = 0.25
-"""How often deadlines are checked."""
+RETRY_S = 0.25
+"""How long to wait before a client is accepted after one that could not be."""
 DEFAULT_BATCH = 16
 
 
@@ -101,15 +102,21 @@ class HostPool:
         self._listener = Listener(self.address.path, "AF_UNIX", backlog=128)
         self._hosts: dict[tuple[str, str | None], PolicyHost] = {}
         self._lock, self._closed = threading.Lock(), threading.Event()
-        for work in (self._accept, self._watch):
-            threading.Thread(target=work, name="policy hosts", daemon=True).start()
+        threading.Thread(target=self._accept, name="policy hosts", daemon=True).start()
 
     @property
     def pids(self) -> list[int]:
         """The process ids of the policies' processes."""
+        return [child.pid for child in self._children()]
+
+    def loss(self) -> ChildLostError | None:
+        """Return how a policy's process died since the last call; None if all are alive."""
+        return next(filter(None, (child.loss() for child in self._children())), None)
+
+    def _children(self) -> list[PolicyChild]:
         with self._lock:
-            pids = [host.pid for host in self._hosts.values()]
-        return [pid for pid in pids if pid is not None]
+            children = [host.child for host in self._hosts.values()]
+        return [child for child in children if child is not None]
 
     def close(self) -> None:
         """End all hosts."""
@@ -135,18 +142,11 @@ class HostPool:
             try:
                 connection = self._listener.accept()
             except OSError:  # closed, or a client hung up
-                self._closed.wait(POLL_S)
+                self._closed.wait(RETRY_S)
                 continue
             threading.Thread(
                 target=self._serve, args=(connection,), name="hosted world", daemon=True
             ).start()
-
-    def _watch(self) -> None:
-        while not self._closed.wait(POLL_S):
-            with self._lock:
-                hosts = list(self._hosts.values())
-            for host in hosts:
-                host.kill_if_overdue()
 
     def _serve(self, connection: Connection) -> None:
         """Carry out the calls of one episode until its world hangs up."""

@@ -10,7 +10,6 @@ import contextlib
 import functools
 import io
 import os
-import signal
 import sys
 import threading
 import time
@@ -24,7 +23,6 @@ from roboirg.evaluation.hosting.hosted_episode import HostedEpisode
 from roboirg.evaluation.hosting.payload import Message, decode, encode
 from roboirg.policies.loading import is_privileged, load_policy_class, policy_version
 from roboirg.policies.prompt_length.declared_limit import prompt_needs_of
-from roboirg.util.child_process import exit_with_parent
 
 MISSING = "missing"
 """Instead of a kind of error: a package is not installed."""
@@ -139,19 +137,11 @@ def _error(error: BaseException) -> list[str]:
     return [found.kind, str(found), found.details]
 
 
-def main(descriptor: int, parent: int) -> None:
-    """Serve a supervisor; runs in a process of its own.
-
-    Args:
-        descriptor: of the socket to the supervisor.
-        parent: its process id.
-    """
-    # Ctrl-C reaches the whole process group; the supervisor decides what to do.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    exit_with_parent(parent)
+def main(connection: Connection) -> None:
+    """Serve a supervisor; runs in a process of its own."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
-    HostProcess(Connection(descriptor)).serve()
+    HostProcess(connection).serve()
     with contextlib.suppress(Exception):
         sys.stdout.flush()
     os._exit(0)  # threads that a policy left behind must not keep this process

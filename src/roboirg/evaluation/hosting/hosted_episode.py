@@ -124,7 +124,8 @@ class HostedEpisode:
     def actions(self, rows: Any) -> Message:  # noqa: ANN401 - whatever the policy returned
         """Return a policy's actions, checked, for a message."""
         chunk = check_rows(rows, self._space)
-        return {"rows": chunk.tobytes(), "size": chunk.shape[1]}
+        latency_s = float(getattr(self.policy, "latency_s", 0.0))
+        return {"rows": chunk.tobytes(), "size": chunk.shape[1], "latency_s": latency_s}
 
     def hear(self, call: Message) -> Message:
         """Tell the policy what was said; returns its metadata."""

@@ -63,6 +63,7 @@ class HostedPolicy:
         version: of the policy.
         metadata: as the policy reports them, from `reset` on.
         waited_s: seconds that its calls waited for others.
+        latency_s: seconds that its last actions took on the robot it is meant for, if it tells.
 
     Raises:
         EpisodeError: the policy cannot be made.
@@ -73,7 +74,7 @@ class HostedPolicy:
     def __init__(self, hosts: HostAddress, spec: str, seed: int, *, alone: bool = False) -> None:
         self._spec = spec
         self.metadata: dict[str, JsonValue] = {}
-        self.waited_s = 0.0
+        self.waited_s = self.latency_s = 0.0
         self.version = "unknown"
         self._reads: tuple[str, ...] = ()
         self._demonstration: Demonstration = {}
@@ -113,6 +114,7 @@ class HostedPolicy:
         """Return the next actions (n, 8) or (n, 7)."""
         found = self._call("act", self._pack(observation))
         with _reading():
+            self.latency_s = float(found["latency_s"])
             return np.frombuffer(found["rows"], np.float64).reshape(-1, found["size"]).copy()
 
     def hear(self, text: str, step: int) -> None:

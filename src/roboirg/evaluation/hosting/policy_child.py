@@ -1,39 +1,26 @@
-"""One policy process, seen from its supervisor: start, exchange messages, end."""
+"""One policy process, seen from its supervisor."""
 
 from __future__ import annotations
 
 import array
 import fcntl
-import json
 import os
 import select
-import socket
-import subprocess
-import sys
 import termios
 import threading
 from collections.abc import Mapping
-from multiprocessing.connection import Connection
-from typing import IO
+from typing import IO, Self
 
 from roboirg.evaluation.hosting.payload import MAX_MESSAGE, Message, decode, encode
 from roboirg.records.record import ErrorKind
-from roboirg.util.child_process import describe_exit, was_killed
+from roboirg.util.child_process import ChildExit, ChildProcess
 
-GRACE_S = 2.0
-"""How long a process may take to exit when it is asked to."""
+_MODULE = "roboirg.evaluation.hosting.host_process"
+
 MAX_OUTPUT = 256 * 2**10
 """Bytes that are kept of what a policy process prints in one call; the rest is read and dropped."""
 DRAIN_S = 1.0
 """How long to wait for the end of what was printed; a thread of the policy may print for ever."""
-
-# The first thing the process gets is the import path: nothing of the command is on its command
-# line, and the script that started the run is not imported again.
-_BOOT = (
-    "import json, sys; sys.path[:] = json.loads(sys.argv[3]); "
-    "from roboirg.evaluation.hosting.host_process import main; "
-    "descriptor, parent = map(int, sys.argv[1:3]); sys.argv[1:] = []; main(descriptor, parent)"
-)
 
 
 class ChildLostError(Exception):
@@ -48,32 +35,21 @@ class ChildLostError(Exception):
         self.kind = kind
 
 
-class PolicyChild:
-    """A policy process. Start it in a thread that lasts: the process dies with that thread.
+class PolicyChild(ChildProcess):
+    """A policy process; made by `start`.
 
-    Args:
-        variables: environment variables beside those of this process.
+    Attributes:
+        printed: what it prints.
     """
 
-    def __init__(self, variables: Mapping[str, str] | None = None) -> None:
-        ours, theirs = socket.socketpair()
-        with theirs:
-            arguments = (str(theirs.fileno()), str(os.getpid()), json.dumps(sys.path))
-            self._process = subprocess.Popen(  # noqa: S603 - our own module
-                [sys.executable, "-c", _BOOT, *arguments],
-                pass_fds=[theirs.fileno()],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                env={**os.environ, **(variables or {})},
-            )
-        self._connection = Connection(ours.detach())
-        self._output = _Output(self._process.stdout)
+    printed: _Output
 
-    @property
-    def pid(self) -> int:
-        """Its process id."""
-        return self._process.pid
+    @classmethod
+    def start(cls, variables: Mapping[str, str] | None = None) -> Self:
+        """Start a process with environment variables beside those of this one."""
+        child = cls.run_module(_MODULE, variables or {})
+        child.printed = _Output(child.output)
+        return child
 
     def exchange(self, message: Message) -> Message:
         """Send a message and return the reply; waits for as long as it takes.
@@ -82,49 +58,21 @@ class PolicyChild:
             ChildLostError: the process has died, or sent something other than a message.
         """
         try:
-            self._connection.send_bytes(encode(message))
-            return decode(self._connection.recv_bytes(MAX_MESSAGE))
+            self.connection.send_bytes(encode(message))
+            return decode(self.connection.recv_bytes(MAX_MESSAGE))
         except (EOFError, OSError):
-            raise self._lost() from None
+            raise _explain(self.close()) from None
         except ValueError as error:
             self.kill()
             raise ChildLostError("policy", f"the process sent {error}") from error
 
-    def take_output(self) -> bytes:
-        """Return what the process has printed since the last time, clipped."""
-        return self._output.take()
-
     def loss(self) -> ChildLostError | None:
         """Return how the process died; None while it is alive."""
-        code = self._process.poll()
-        return None if code is None else _explain(code)
-
-    def kill(self) -> None:
-        """Kill the process; an exchange under way ends."""
-        self._process.kill()
-
-    def stop(self) -> None:
-        """Let the process exit; kill it after `GRACE_S`."""
-        self._connection.close()
-        try:
-            self._process.wait(GRACE_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-
-    def _lost(self) -> ChildLostError:
-        """Return how the process died; one that only closed its connection is killed."""
-        try:
-            code = self._process.wait(GRACE_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-            return ChildLostError("policy", "the process closed its connection")
-        return _explain(code)
+        return None if self.exit is None else _explain(self.exit)
 
 
-def _explain(code: int) -> ChildLostError:
-    return ChildLostError("infrastructure" if was_killed(code) else "policy", describe_exit(code))
+def _explain(ended: ChildExit) -> ChildLostError:
+    return ChildLostError("infrastructure" if ended.was_killed else "policy", str(ended))
 
 
 class _Output:

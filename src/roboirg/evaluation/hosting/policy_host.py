@@ -17,6 +17,7 @@ from queue import SimpleQueue
 
 from roboirg.evaluation.hosting.payload import Message, decode, encode
 from roboirg.evaluation.hosting.policy_child import ChildLostError, PolicyChild
+from roboirg.util.deadline_watch import DeadlineWatch
 
 GATHER_S = 0.003
 """How long a call waits for others that could be carried out together with it."""
@@ -80,6 +81,7 @@ class PolicyHost:
 
     Attributes:
         sessions: the episodes it serves.
+        child: the policy's process; None if there is none.
     """
 
     def __init__(self, variables: Mapping[str, str], batch: int, timeout_s: float | None) -> None:
@@ -88,19 +90,12 @@ class PolicyHost:
         self._waiting: deque[_Call] = deque()
         self._changed = threading.Condition()
         self._stopped = False
-        self._child: PolicyChild | None = None
+        self.child: PolicyChild | None = None
         self._starts = 0
-        self._deadline: float | None = None
-        self._overdue = False
+        self._limit = DeadlineWatch(self._kill)
         self._loss = ChildLostError("infrastructure", "the run is ending")
         self._thread = threading.Thread(target=self._run, name="policy host", daemon=True)
         self._thread.start()
-
-    @property
-    def pid(self) -> int | None:
-        """The process id of the policy's process; None if there is none."""
-        child = self._child
-        return None if child is None else child.pid
 
     def call(self, session: HostSession, message: Message) -> Message:
         """Carry out a call of a world and return the reply; called by the session's thread.
@@ -142,34 +137,35 @@ class PolicyHost:
     def join(self) -> None:
         """Stop now, and wait for it."""
         self.stop()
-        if self.sessions and (child := self._child) is not None:
-            child.kill()
+        if self.sessions:
+            self._kill()
         self._thread.join()
 
-    def kill_if_overdue(self) -> None:
-        """Kill the process if the call that is under way has exceeded the time limit."""
-        deadline, child = self._deadline, self._child
-        if deadline is not None and child is not None and time.monotonic() > deadline:
-            self._overdue = True
+    def _kill(self) -> None:
+        if (child := self.child) is not None:
             child.kill()
 
     def _run(self) -> None:
+        with self._limit:
+            self._carry_out_all()
+        for call in self._waiting:
+            self._reply_lost(call)
+        if self.child is not None:
+            self.child.close()
+
+    def _carry_out_all(self) -> None:
         while calls := self._gather():
-            if self._child is not None and (loss := self._child.loss()) is not None:
+            if self.child is not None and (loss := self.child.loss()) is not None:
                 self._forget_child(loss)
             ready = [call for call in calls if self._is_current(call)]
             if ready:
                 self._carry_out(ready)
-        for call in self._waiting:
-            self._reply_lost(call)
-        if self._child is not None:
-            self._child.stop()
 
     def _forget_child(self, loss: ChildLostError) -> None:
         """Give up a process that is dead; the episodes that it served are played again."""
-        if self._child is not None:
-            self._child.stop()
-        self._child, self._starts, self._loss = None, self._starts + 1, loss
+        if self.child is not None:
+            self.child.close()
+        self.child, self._starts, self._loss = None, self._starts + 1, loss
 
     def _gather(self) -> list[_Call]:
         """Wait for a call and for others to go with it; empty when the host is stopped."""
@@ -213,12 +209,12 @@ class PolicyHost:
 
     def _carry_out(self, calls: Sequence[_Call]) -> None:
         try:
-            if self._child is None:
-                self._child, self._starts = PolicyChild(self._variables), self._starts + 1
+            if self.child is None:
+                self.child, self._starts = PolicyChild.start(self._variables), self._starts + 1
             reply = self._exchange(calls)
             results = reply["results"]
             # What a call for several episodes prints is of all of them.
-            printed = self._child.take_output()
+            printed = self.child.printed.take()
             replies = [
                 {**result, "seconds": reply["seconds"], "output": printed}
                 for _, result in zip(calls, results, strict=True)
@@ -245,7 +241,7 @@ class PolicyHost:
 
     def _exchange(self, calls: Sequence[_Call]) -> Message:
         """Send calls to the process, pass on its questions, and return its reply."""
-        child = self._child
+        child = self.child
         if child is None:
             raise AssertionError("the process has been started")
         message: Message = {
@@ -253,14 +249,14 @@ class PolicyHost:
             "calls": [{**call.message, "session": call.session.number} for call in calls],
         }
         by_number = {call.session.number: call for call in calls}
-        left_s, self._overdue = self._timeout_s, False
+        left_s, self._limit.acted_after = self._timeout_s, None
         while True:
             start = time.monotonic()
-            self._deadline = None if left_s is None else start + left_s
+            self._limit.begin(left_s)
             try:
                 reply = child.exchange(message)
             finally:
-                self._deadline = None
+                self._limit.begin(None)
             if "results" in reply:
                 return reply
             if left_s is not None:  # what the world takes to draw is not the policy's time
@@ -274,15 +270,15 @@ class PolicyHost:
     def _attribute(self, calls: Sequence[_Call], loss: ChildLostError) -> None:
         """Attribute the loss of the process to the call that was under way."""
         printed = b""
-        if self._child is not None:
-            self._child.kill()
-            printed = self._child.take_output()
+        if self.child is not None:
+            self.child.kill()
+            printed = self.child.printed.take()
         self._forget_child(loss)
         for call in calls:
             phase = PHASES[call.message["method"]]
             if len(calls) > 1:
                 self._reply_lost(call, loss, alone=True)
-            elif self._overdue:
+            elif self._limit.acted_after is not None:
                 error = ["timeout", f"the {phase} did not return within {self._timeout_s:g} s", ""]
                 call.replies.put({"error": error, "output": printed})
             else:

@@ -7,6 +7,7 @@ which it is detected, before anything else happens.
 | fault | kind of error |
 | --- | --- |
 | the policy raises, or its process dies | policy |
+| its process is killed from outside | infrastructure |
 | the policy exceeds its time limit | timeout |
 | its command is malformed or outside the limits | invalid_action |
 | a camera has no new picture, the robot raises | environment |
@@ -30,10 +31,10 @@ from roboirg.core.actions import ARM_JOINTS, check_chunk
 from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
 from roboirg.evaluation.rollout_result import RolloutResult
 from roboirg.real.control.limits import Limits
-from roboirg.real.control.loop_watchdog import LoopWatchdog
-from roboirg.real.control.policy_workers import PolicyReply, PolicyWorker
+from roboirg.real.control.policy_workers import PolicyReply, PolicyThread
 from roboirg.real.control.robot import HORIZON, Command, JudgingRobot, Robot, SensorReading
 from roboirg.records.record import Job
+from roboirg.util.deadline_watch import DeadlineWatch
 
 REPLY_WAIT_SHARE = 0.5
 """Share of a control period that the loop waits for a reply before it holds the arm."""
@@ -66,7 +67,7 @@ class ControlLoop:
     """
 
     robot: Robot
-    worker: PolicyWorker
+    worker: PolicyThread
     limits: Limits
     cameras: Sequence[str] = ()
     stop_requested: Callable[[], bool] = _never
@@ -102,8 +103,7 @@ class ControlLoop:
                     # A privileged policy in this process may block the interpreter; it runs on the
                     # twin only.
                     if self.robot.clock.is_real and not self.worker.shares_scene:
-                        watchdog = LoopWatchdog(self.robot.stop, self.limits.watchdog_timeout_s)
-                        stack.enter_context(watchdog)
+                        watchdog = stack.enter_context(DeadlineWatch(self.robot.stop))
                     self._run(job, result, watchdog)
             if isinstance(self.robot, JudgingRobot):
                 with attribute_errors("environment"):
@@ -146,15 +146,15 @@ class ControlLoop:
         result.policy_metadata = self._request("reset", self._instruction, no_frames)
         self._last = reading.joints
 
-    def _run(self, job: Job, result: RolloutResult, watchdog: LoopWatchdog | None) -> None:
+    def _run(self, job: Job, result: RolloutResult, watchdog: DeadlineWatch | None) -> None:
         clock, period = self.robot.clock, 1.0 / self.robot.rate
         deadline = clock.now()
         for step in range(job.max_steps):
             if watchdog is not None:
-                if watchdog.tripped_after is not None:
-                    silence = f"{watchdog.tripped_after:.3f} s"
+                if watchdog.acted_after is not None:
+                    silence = f"{watchdog.acted_after:.3f} s"
                     raise EpisodeError("infrastructure", f"the control loop hung for {silence}", "")
-                watchdog.feed()
+                watchdog.begin(self.limits.watchdog_timeout_s)
             self._step(period)
             result.steps = step + 1
             deadline += period
@@ -173,9 +173,9 @@ class ControlLoop:
         with attribute_errors("environment"):
             reading = self.robot.observe()
         self._check_cameras(reading)
-        exit_reason = self.worker.exit_reason()
-        if exit_reason is not None:
-            raise EpisodeError("policy", exit_reason, "")
+        loss = self.worker.loss()
+        if loss is not None:
+            raise EpisodeError(loss.kind, str(loss), "")
         self._update_actions(reading, period)
         if not self._actions:
             with attribute_errors("environment"):

@@ -7,17 +7,23 @@ Privileged policies read the twin's state, so they run in a thread; all others r
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
-import multiprocessing
 import queue
-import signal
 import threading
 from collections.abc import Callable, Mapping
-from multiprocessing.connection import Connection
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from roboirg.core.errors import MissingDependencyError, RenderDeviceError
-from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors, one_line
+from roboirg.evaluation.episode_errors import (
+    EpisodeError,
+    EpisodeLostError,
+    attribute_errors,
+    one_line,
+)
+from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
+from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
+from roboirg.evaluation.hosting.policy_child import ChildLostError
 from roboirg.policies.base import Policy, PrivilegedPolicy
 from roboirg.policies.loading import make_policy
 from roboirg.real.control.action_chunks import ChunkedPolicy
@@ -25,9 +31,6 @@ from roboirg.records.record import ErrorKind
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
-
-EXIT_WAIT_S = 2.0
-"""How long a process may take to exit before it is killed."""
 
 
 class PolicyReply(NamedTuple):
@@ -54,10 +57,23 @@ class PolicyReply(NamedTuple):
         return self.value
 
 
-class PolicyDispatcher:
-    """Holds a policy and carries out requests."""
+LoadPolicy = Callable[[str, int], Policy]
 
-    def __init__(self) -> None:
+
+def _load_here(spec: str, seed: int) -> Policy:
+    made = make_policy(spec, seed)
+    return ChunkedPolicy(made) if isinstance(made, PrivilegedPolicy) else made
+
+
+class PolicyDispatcher:
+    """Holds a policy and carries out requests.
+
+    Args:
+        load: makes a policy from its spec and seed.
+    """
+
+    def __init__(self, load: LoadPolicy) -> None:
+        self._load = load
         self._policy: Policy | None = None
         self._scene_lock: contextlib.AbstractContextManager[object] = contextlib.nullcontext()
 
@@ -68,13 +84,14 @@ class PolicyDispatcher:
                 value = getattr(self, f"_{method}")(*args)
         except EpisodeError as error:
             return PolicyReply(error=(error.kind, str(error), error.details))
+        except EpisodeLostError as error:
+            return PolicyReply(error=(error.kind, str(error), ""))
         except (MissingDependencyError, RenderDeviceError) as error:
             return PolicyReply(error=("policy", one_line(error), ""))
         return PolicyReply(value, float(getattr(self._policy, "latency_s", 0.0)))
 
     def _make(self, spec: str, seed: int) -> None:
-        made = make_policy(spec, seed)
-        self._policy = ChunkedPolicy(made) if isinstance(made, PrivilegedPolicy) else made
+        self._policy = self._load(spec, seed)
 
     def _attach(self, env: RoboIRGEnv, lock: contextlib.AbstractContextManager[object]) -> None:
         self._scene_lock = lock
@@ -104,115 +121,30 @@ class PolicyDispatcher:
         return self._policy
 
 
-class PolicyWorker(Protocol):
-    """A thread or process that runs a policy.
+class PolicyThread:
+    """A policy in a thread of this process, where a privileged one can read the twin's state.
+
+    The world stands still while it plans: it holds the twin's lock. A thread cannot be killed: a
+    closed one ends after its last request, or with the process.
+
+    Args:
+        load: makes a policy from its spec and seed.
 
     Attributes:
         shares_scene: whether the policy runs in this process, so that it can read the twin's state.
     """
 
-    shares_scene: bool
-
-    def send(self, method: str, *args: Any) -> None:  # noqa: ANN401
-        """Send a request."""
-
-    def receive(self, timeout_s: float) -> PolicyReply | None:
-        """Return the next reply; None if there is none within that time."""
-
-    def exit_reason(self) -> str | None:
-        """Return how the worker died; None while it is alive."""
-
-    def close(self) -> None:
-        """Stop the worker."""
-
-
-class PolicyThread:
-    """A privileged policy in a thread of this process, where it can read the twin's state.
-
-    The world stands still while it plans: it holds the twin's lock. A thread cannot be killed: a
-    closed one ends after its last request, or with the process.
-    """
-
     shares_scene = True
 
-    def __init__(self) -> None:
-        self._thread = _RequestThread(PolicyDispatcher().handle)
-
-    def send(self, method: str, *args: Any) -> None:  # noqa: ANN401
-        """Send a request."""
-        self._thread.requests.put((method, *args))
-
-    def receive(self, timeout_s: float) -> PolicyReply | None:
-        """Return the next reply; None if there is none within that time."""
-        return self._thread.receive(timeout_s)
-
-    def exit_reason(self) -> str | None:
-        """Return None: a policy's errors do not end the thread."""
-        return None
-
-    def close(self) -> None:
-        """Let the thread end."""
-        self._thread.requests.put(None)
-
-
-class PolicyProcess:
-    """A policy in a process of its own."""
-
-    shares_scene = False
-
-    def __init__(self) -> None:
-        context = multiprocessing.get_context("spawn")
-        self._connection, child_connection = context.Pipe()
-        self.process = context.Process(target=_serve, args=(child_connection,), daemon=True)
-        self.process.start()
-        child_connection.close()
-        # A thread writes to the pipe: it blocks while the process does not read.
-        self._thread = _RequestThread(self._exchange)
-
-    def send(self, method: str, *args: Any) -> None:  # noqa: ANN401
-        """Send a request."""
-        self._thread.requests.put((method, *args))
-
-    def receive(self, timeout_s: float) -> PolicyReply | None:
-        """Return the next reply; None if there is none within that time."""
-        return self._thread.receive(timeout_s)
-
-    def exit_reason(self) -> str | None:
-        """Return how the process died; None while it is alive."""
-        code = self.process.exitcode
-        if code is None:
-            return None
-        return f"its process died (signal {-code})" if code < 0 else f"its process ended ({code})"
-
-    def close(self) -> None:
-        """End the process, by force if it does not exit."""
-        self._thread.requests.put(None)
-        self.process.join(0.0)
-        if self.process.is_alive():
-            self.process.terminate()
-            self.process.join(EXIT_WAIT_S)
-        if self.process.is_alive():
-            self.process.kill()
-            self.process.join()
-
-    def _exchange(self, method: str, *args: Any) -> PolicyReply:  # noqa: ANN401
-        try:
-            self._connection.send((method, *args))
-            reply: PolicyReply = self._connection.recv()
-        except (EOFError, OSError):
-            self.process.join(EXIT_WAIT_S)
-            return PolicyReply(error=("policy", self.exit_reason() or "its process exited", ""))
-        return reply
-
-
-class _RequestThread:
-    """A thread that passes requests to a handler and queues the replies."""
-
-    def __init__(self, handle: Callable[..., PolicyReply]) -> None:
-        self.requests: queue.SimpleQueue[tuple[Any, ...] | None] = queue.SimpleQueue()
+    def __init__(self, load: LoadPolicy = _load_here) -> None:
+        self._handle = PolicyDispatcher(load).handle
+        self._requests: queue.SimpleQueue[tuple[Any, ...] | None] = queue.SimpleQueue()
         self._replies: queue.SimpleQueue[PolicyReply] = queue.SimpleQueue()
-        self._handle = handle
         threading.Thread(target=self._run, name="policy", daemon=True).start()
+
+    def send(self, method: str, *args: Any) -> None:  # noqa: ANN401
+        """Send a request."""
+        self._requests.put((method, *args))
 
     def receive(self, timeout_s: float) -> PolicyReply | None:
         """Return the next reply; None if there is none within that time."""
@@ -221,19 +153,42 @@ class _RequestThread:
         except queue.Empty:
             return None
 
+    def loss(self) -> ChildLostError | None:
+        """Return how the policy's process died; None while it is alive."""
+        return None
+
+    def close(self) -> None:
+        """Let the thread end."""
+        self._requests.put(None)
+
     def _run(self) -> None:
-        while (request := self.requests.get()) is not None:
+        while (request := self._requests.get()) is not None:
             self._replies.put(self._handle(*request))
 
 
-def _serve(connection: Connection) -> None:
-    """Answer requests until the connection closes; runs in the policy's process."""
-    # Ctrl-C is for the loop, which stops the arm and then this process.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    dispatcher = PolicyDispatcher()
-    while True:
-        try:
-            request = connection.recv()
-            connection.send(dispatcher.handle(*request))
-        except (EOFError, OSError):
-            return
+class PolicyProcess(PolicyThread):
+    """A policy in a process of its own, with the same host as in simulation.
+
+    A thread calls it, because a call blocks while the process does not answer.
+    """
+
+    shares_scene = False
+
+    def __init__(self) -> None:
+        self._hosts = HostPool(HostSettings(batch=1))
+        super().__init__(functools.partial(HostedPolicy, self._hosts.address))
+
+    @property
+    def pid(self) -> int:
+        """The process id of the policy's process, which has been made."""
+        (pid,) = self._hosts.pids
+        return pid
+
+    def loss(self) -> ChildLostError | None:
+        """Return how the policy's process died; None while it is alive."""
+        return self._hosts.loss()
+
+    def close(self) -> None:
+        """End the process, by force if it does not exit."""
+        super().close()
+        self._hosts.close()

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.actions import ARM_JOINTS, JOINT_ANGLE
-from roboirg.evaluation.rollout import EnvRequirements, make_env
+from roboirg.evaluation.policy_environment import EnvRequirements, make_env
 from roboirg.evaluation.rollout_result import RolloutResult
 from roboirg.real.control.clock import Clock, VirtualClock
 from roboirg.real.control.robot import CAMERA_RATE, COMMAND_RATE, Command, SensorReading

@@ -26,7 +26,7 @@ from roboirg.policies.loading import is_privileged, load_policy_class
 from roboirg.policies.requirements import wanted_actions, wanted_cameras, wanted_history
 from roboirg.real.control.control_loop import ControlLoop
 from roboirg.real.control.limits import Limits
-from roboirg.real.control.policy_workers import PolicyProcess, PolicyThread, PolicyWorker
+from roboirg.real.control.policy_workers import PolicyProcess, PolicyThread
 from roboirg.real.control.robot import JudgingRobot, Robot
 from roboirg.real.study.study_plan import PlannedTrial, StudyPlan
 from roboirg.real.study.trial_log import UNSCORED, TrialLog
@@ -62,7 +62,7 @@ class Study:
     scorer: Scorer = "operator"
     stop_requested: Callable[[], bool] = _never
     on_record: Callable[[PlannedTrial, Record], None] = lambda _trial, _record: None
-    _workers: dict[str, PolicyWorker] = field(default_factory=dict)
+    _workers: dict[str, PolicyThread] = field(default_factory=dict)
 
     def run(self, policies: Sequence[str] = (), *, retry_errors: bool = True) -> tuple[Record, ...]:
         """Play the open trials; an error ends its own trial only.
@@ -137,7 +137,7 @@ class Study:
         self.on_record(trial, stored)
         return stored
 
-    def _worker(self, job: Job) -> PolicyWorker:
+    def _worker(self, job: Job) -> PolicyThread:
         if job.policy not in self._workers:
             privileged = is_privileged(job.policy_spec)
             self._workers[job.policy] = PolicyThread() if privileged else PolicyProcess()

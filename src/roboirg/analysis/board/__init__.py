@@ -1,0 +1,1 @@
+"""A leaderboard page made of packed runs."""

@@ -1,0 +1,136 @@
+"""How often a policy's verdicts change when the same run is played again."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.records.action_log import ActionLog, read_actions
+from roboirg.records.record import Record
+from roboirg.records.record_codec import identity_key, read_index_entry
+from roboirg.records.store import StoredRun
+
+
+class RepeatedEpisode(NamedTuple):
+    """One episode in two runs of the same policy.
+
+    Attributes:
+        policy: its name.
+        options: of the instruction.
+        slug: of the job.
+        outcomes: success, failure or error, first and second.
+        differs_at: index of the first action that differs; None if all are equal, or were not kept.
+    """
+
+    policy: str
+    options: InstructionOptions
+    slug: str
+    outcomes: tuple[str, str]
+    differs_at: int | None
+
+    @property
+    def is_flip(self) -> bool:
+        """Whether one run succeeded and the other failed."""
+        return set(self.outcomes) == {"success", "failure"}
+
+
+@dataclass(frozen=True)
+class FlipCounts:
+    """Counts over repeated episodes.
+
+    Attributes:
+        both: episodes that succeeded in both runs.
+        neither: that failed in both.
+        lost: that succeeded only in the first run.
+        gained: that succeeded only in the second.
+        acted_differently: whose actions differ.
+        errors: without a verdict in one of the runs; in none of the other counts.
+    """
+
+    both: int = 0
+    neither: int = 0
+    lost: int = 0
+    gained: int = 0
+    acted_differently: int = 0
+    errors: int = 0
+
+    @property
+    def verdicts(self) -> int:
+        """Number of episodes with two verdicts."""
+        return self.both + self.neither + self.lost + self.gained
+
+    @property
+    def flips(self) -> int:
+        """Number of episodes whose verdict changed."""
+        return self.lost + self.gained
+
+
+def repeated_episodes(first: Path, second: Path) -> tuple[RepeatedEpisode, ...]:
+    """Return the episodes that are in two runs, in the order of the first.
+
+    Raises:
+        StoreError: a run has no records, or a line is not a record.
+        InvalidValueError: the runs have no episode in common.
+    """
+    ours, theirs = (StoredRun(folder, read_index_entry) for folder in (first, second))
+    there = {identity_key(one): one for one in theirs.newest}
+    wanted = [one for one in ours.newest if identity_key(one) in there]
+    if not wanted:
+        raise InvalidValueError(f"{first} and {second} have no episode in common.")
+    again = theirs.records(there[identity_key(one)] for one in wanted)
+    return tuple(
+        _compared(one, other, first, second)
+        for one, other in zip(ours.records(wanted), again, strict=True)
+    )
+
+
+def count_flips(episodes: Iterable[RepeatedEpisode]) -> FlipCounts:
+    """Count outcomes over repeated episodes."""
+    found = list(episodes)
+    pairs = [one.outcomes for one in found]
+    judged = [one for one in found if "error" not in one.outcomes]
+    return FlipCounts(
+        both=pairs.count(("success", "success")),
+        neither=pairs.count(("failure", "failure")),
+        lost=pairs.count(("success", "failure")),
+        gained=pairs.count(("failure", "success")),
+        acted_differently=sum(one.differs_at is not None for one in judged),
+        errors=len(found) - len(judged),
+    )
+
+
+def flips_by_cell(
+    episodes: Sequence[RepeatedEpisode],
+) -> Mapping[tuple[str, InstructionOptions], FlipCounts]:
+    """Count outcomes for each policy and kind of instruction."""
+    cells: dict[tuple[str, InstructionOptions], list[RepeatedEpisode]] = defaultdict(list)
+    for one in episodes:
+        cells[one.policy, one.options].append(one)
+    return {key: count_flips(found) for key, found in cells.items()}
+
+
+def _compared(one: Record, other: Record, first: Path, second: Path) -> RepeatedEpisode:
+    differs_at = None
+    if one.action_log != other.action_log and one.action_log and other.action_log:
+        logs = read_actions(first, one.action_log), read_actions(second, other.action_log)
+        differs_at = _first_difference(*logs)
+    outcomes = one.outcome, other.outcome
+    return RepeatedEpisode(one.policy, one.options, one.slug, outcomes, differs_at)
+
+
+def _first_difference(one: ActionLog, other: ActionLog) -> int | None:
+    """Return the index of the first action that differs; None if only the end state does."""
+    if one.rows.shape[1:] != other.rows.shape[1:]:
+        return 0
+    shared = min(len(one.rows), len(other.rows))
+    different = np.flatnonzero((one.rows[:shared] != other.rows[:shared]).any(axis=1))
+    if len(different):
+        return int(different[0])
+    return None if len(one.rows) == len(other.rows) else shared

@@ -1,0 +1,1 @@
+"""Check the records of a run: play their actions again, without the policy."""

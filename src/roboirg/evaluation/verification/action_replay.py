@@ -1,0 +1,81 @@
+"""Play the stored actions of an episode again, without the policy that chose them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.actions import find_action_space
+from roboirg.core.observations import Observation
+from roboirg.evaluation.call_guard import CallGuard
+from roboirg.evaluation.episode_errors import EpisodeError
+from roboirg.evaluation.policy_descriptions import PolicyDescription
+from roboirg.evaluation.policy_environment import EnvRequirements
+from roboirg.evaluation.rollout import play_with
+from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.records.action_log import ActionLog
+from roboirg.records.record import IDENTITY, Job, Record
+
+
+class ReplayPolicy:
+    """Answers what another policy answered, and looks at nothing.
+
+    Args:
+        log: the answers.
+
+    Attributes:
+        is_used_up: whether it was asked once more after its last answer.
+    """
+
+    cameras = ()
+
+    def __init__(self, log: ActionLog) -> None:
+        self.actions = log.space
+        self.is_used_up = False
+        self._answers = iter(log.chunks())
+
+    def reset(self, instruction: str, demonstration: Mapping[str, Any]) -> None:
+        """Start an episode."""
+
+    def act(self, observation: Observation) -> NDArray[np.float64]:  # noqa: ARG002
+        """Return the next answer.
+
+        Raises:
+            EOFError: there is none.
+        """
+        answer = next(self._answers, None)
+        if answer is None:
+            self.is_used_up = True
+            raise EOFError("the actions end before the episode does")
+        return answer
+
+
+def unknown_policy() -> RolloutResult:
+    """Return an empty result whose policy is not looked up: the name may be anyone's module."""
+    return RolloutResult(policy=PolicyDescription("unknown", is_privileged=False))
+
+
+def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
+    """Play the actions of a record; return the record that they lead to, and its own actions.
+
+    Nothing is drawn. If the record is an error, the actions are played as far as they go, and
+    error and cause are taken over: whether a policy raised cannot be played again.
+
+    Raises:
+        InvalidValueError: the job's wording file is missing or has changed.
+    """
+    job = Job(**{name: getattr(record, name) for name in (*IDENTITY, "wordings_file")})
+    policy, result = ReplayPolicy(log), unknown_policy()
+    needs = EnvRequirements((), find_action_space(log.space))
+    try:
+        play_with(policy, job, needs, result, CallGuard(result, None))
+    except EpisodeError as error:
+        result.record_error(error.kind, error.cause)
+        if policy.is_used_up and record.outcome == "error":
+            result.error, result.cause = record.error, record.cause
+    played = result.action_log
+    digest = None if played is None else played.digest
+    return make_record(job, result, started_at=record.started_at, action_log=digest), played

@@ -1,0 +1,183 @@
+"""Pack a run into one file for others to check, and open such a file.
+
+A pack is a zip archive with the run's records, plan and actions, its logs and videos if wanted, and
+``manifest.json``: versions, and the SHA-256 of every other file. The same run gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import tempfile
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path, PurePosixPath
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.version import __version__
+from roboirg.records.action_log import ACTION_FOLDER
+from roboirg.records.episode_log import LOG_FOLDER
+from roboirg.records.plan_files import EARLIER_PLANS, PLAN_FILE, earlier_plans
+from roboirg.records.record_codec import StoreError, read_index_entry
+from roboirg.records.store import RECORDS_FILE, StoredRun
+from roboirg.util.atomic_write import replacing
+
+PACK_SUFFIX = ".roboirg.zip"
+MANIFEST = "manifest.json"
+_PACKED_FOLDERS = {"actions": ACTION_FOLDER, "logs": LOG_FOLDER, "videos": "videos"}
+_MAX_BYTES = 20 << 30
+"""Most bytes that a pack may hold unpacked."""
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+_BLOCK = 1 << 20
+
+
+class PackManifest(BaseModel):
+    """What a pack says about itself.
+
+    Attributes:
+        format: version of packs.
+        package_version: of the roboirg that packed the run.
+        records: number of episodes.
+        policies: names of the policies.
+        files: SHA-256 of each file, in hexadecimal, by name.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    format: int = 1
+    package_version: str
+    records: int
+    policies: tuple[str, ...]
+    files: dict[str, str]
+
+
+def pack_run(folder: Path, out: Path, *, videos: bool = False, logs: bool = False) -> PackManifest:
+    """Write a run into one file.
+
+    Args:
+        folder: of the run.
+        out: file to write; replaced if it exists.
+        videos: whether to include the episodes' videos.
+        logs: whether to include what policies printed.
+
+    Raises:
+        StoreError: there are no records, or a line is not a record.
+        InvalidValueError: the file cannot be written.
+    """
+    entries = StoredRun(folder, read_index_entry).newest
+    wanted = {"actions", *(["videos"] if videos else []), *(["logs"] if logs else [])}
+    names = [name for name in (RECORDS_FILE, PLAN_FILE) if (folder / name).is_file()]
+    names += [path.relative_to(folder).as_posix() for path in earlier_plans(folder)]
+    for name in sorted(wanted):
+        found = (folder / _PACKED_FOLDERS[name]).rglob("*")
+        names += sorted(path.relative_to(folder).as_posix() for path in found if path.is_file())
+    manifest = PackManifest(
+        package_version=__version__,
+        records=len(entries),
+        policies=tuple(sorted({one.policy for one in entries})),
+        files={name: _hash(folder / name) for name in names},
+    )
+    with replacing(out) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(zipfile.ZipInfo(MANIFEST, _EPOCH), manifest.model_dump_json(indent=1))
+        for name in names:
+            entry = zipfile.ZipInfo(name, _EPOCH)
+            # Actions and videos are compressed already.
+            packed = name.endswith((".npz", ".mp4", ".jpg"))
+            entry.compress_type = zipfile.ZIP_STORED if packed else zipfile.ZIP_DEFLATED
+            with archive.open(entry, "w", force_zip64=True) as target:
+                target.writelines(_blocks(folder / name))
+    return manifest
+
+
+@contextlib.contextmanager
+def opened_run(path: Path) -> Iterator[Path]:
+    """Yield the folder of a run: the path itself, or a pack unpacked for the while.
+
+    Raises:
+        StoreError: the file is no pack, or one of its files is not what the manifest says.
+    """
+    if not path.is_file():
+        yield path
+        return
+    with tempfile.TemporaryDirectory(prefix="roboirg-") as name:
+        folder = Path(name)
+        try:
+            with zipfile.ZipFile(path) as archive:
+                _unpack(archive, path, folder)
+        except (zipfile.BadZipFile, EOFError, NotImplementedError) as error:
+            raise StoreError(f"{path} is no packed run: {error}.") from error
+        yield folder
+
+
+def read_manifest(path: Path) -> PackManifest:
+    """Read what a pack says about itself.
+
+    Raises:
+        StoreError: the file is no pack.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return _manifest(archive, path)
+    except (OSError, zipfile.BadZipFile) as error:
+        raise StoreError(f"{path} is no packed run: {error}.") from error
+
+
+def _manifest(archive: zipfile.ZipFile, path: Path) -> PackManifest:
+    try:
+        return PackManifest.model_validate(json.loads(archive.read(MANIFEST)))
+    except (KeyError, ValueError, ValidationError) as error:
+        raise StoreError(f"{path} is no packed run: its {MANIFEST} cannot be read.") from error
+
+
+def _unpack(archive: zipfile.ZipFile, path: Path, folder: Path) -> None:
+    """Unpack an archive after checking all names and sizes."""
+    files = _manifest(archive, path).files
+    entries = [one for one in archive.infolist() if one.filename != MANIFEST]
+    if sorted(one.filename for one in entries) != sorted(files):
+        raise StoreError(f"{path} does not hold exactly the files that its manifest names.")
+    if sum(one.file_size for one in entries) > _MAX_BYTES:
+        raise StoreError(f"{path} unpacks to more than {_MAX_BYTES >> 30} GiB.")
+    for one in entries:
+        target = folder / _safe(one.filename, path)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        digest = hashlib.sha256()
+        with archive.open(one) as source, target.open("wb") as file:
+            while block := source.read(_BLOCK):
+                digest.update(block)
+                file.write(block)
+        if digest.hexdigest() != files[one.filename]:
+            raise StoreError(f"{one.filename} in {path} is not the file that its manifest names.")
+
+
+def _safe(name: str, path: Path) -> str:
+    """Return the name of a file of a run.
+
+    Raises:
+        StoreError: it is the name of another file, perhaps outside the folder.
+    """
+    parts = PurePosixPath(name).parts
+    top = parts[0] if parts else ""
+    folders = {EARLIER_PLANS, *_PACKED_FOLDERS.values()}
+    is_known = name in (RECORDS_FILE, PLAN_FILE) or top in folders
+    if not is_known or ".." in parts or "\\" in name or name.startswith("/"):
+        raise StoreError(f"{path} holds {name!r}, which is no file of a run.")
+    return name
+
+
+def _hash(path: Path) -> str:
+    digest = hashlib.sha256()
+    for block in _blocks(path):
+        digest.update(block)
+    return digest.hexdigest()
+
+
+def _blocks(path: Path) -> Iterator[bytes]:
+    try:
+        with path.open("rb") as file:
+            while block := file.read(_BLOCK):
+                yield block
+    except OSError as error:
+        raise InvalidValueError(f"Cannot read {path}: {error.strerror}.") from error

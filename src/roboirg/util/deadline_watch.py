@@ -1,0 +1,49 @@
+"""Act when something takes too long: stop an arm, kill a process."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Self
+
+_POLL_S = 0.25
+"""How often a watch without a deadline looks for one."""
+
+
+class DeadlineWatch:
+    """A thread that acts when a deadline passes; use as a context manager. Real time only.
+
+    Args:
+        act: called once for each deadline that passes, from another thread.
+
+    Attributes:
+        acted_after: seconds after `begin` at which it has acted; None if it has not.
+    """
+
+    def __init__(self, act: Callable[[], None]) -> None:
+        self._act = act
+        self._finished = threading.Event()
+        self._began, self._deadline = 0.0, float("inf")
+        self.acted_after: float | None = None
+        self._thread = threading.Thread(target=self._watch, name="deadlines", daemon=True)
+
+    def begin(self, limit_s: float | None) -> None:
+        """Set the deadline to so many seconds from now, or remove it."""
+        self._began = time.monotonic()
+        self._deadline = float("inf") if limit_s is None else self._began + limit_s
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        self._finished.set()
+        self._thread.join()
+
+    def _watch(self) -> None:
+        while not self._finished.wait(min(max(self._deadline - time.monotonic(), 0.0), _POLL_S)):
+            now = time.monotonic()
+            if now >= self._deadline:
+                self._deadline, self.acted_after = float("inf"), now - self._began
+                self._act()

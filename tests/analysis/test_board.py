@@ -1,0 +1,156 @@
+"""The leaderboard: statuses, ties, and a page that sorts and filters."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from roboirg.analysis.board.board_page import read_packs, render_board, write_board
+from roboirg.analysis.board.board_rows import BoardRow, PackedRun, board_rows
+from roboirg.analysis.board.pack_checks import CHECKS_FILE, PackCheck, check_pack
+from roboirg.analysis.published import published_rows
+from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.language.settings import EXPLICIT
+from roboirg.records.packing import pack_run
+from roboirg.records.record import Job, Record
+from roboirg.records.store import RecordStore
+from roboirg.tasks import ALL, find_tasks
+
+HOLDS = PackCheck("0" * 64, "now", 10, 10)
+
+
+def record(policy: str, task: str, episode: int, *, won: bool, privileged: bool = False) -> Record:
+    result = RolloutResult(outcome="success" if won else "failure")
+    result.cause = None if won else "it failed"
+    job = Job(policy=policy, task=task, split="test", episode=episode, setting=EXPLICIT)
+    made = make_record(job, result, started_at="")
+    return made.model_copy(update={"privileged": privileged, "attribution": None})
+
+
+def run_of(policy: str, successes: int, *, episodes: int = 8, **marks: bool) -> PackedRun:
+    """Return a run with the first so many episodes of every task won."""
+    results = [
+        record(policy, task, episode, won=episode < successes, **marks)
+        for task in find_tasks([ALL])
+        for episode in range(episodes)
+    ]
+    return PackedRun(f"{policy}-run", results, (), HOLDS)
+
+
+def own(rows: tuple[BoardRow, ...]) -> list[BoardRow]:
+    return [row for row in rows if row.status != "published"]
+
+
+def test_rates_and_ties() -> None:
+    rows = own(board_rows([run_of("weak", 1), run_of("good", 6), run_of("same", 6)]))
+    assert [row.policy for row in rows] == ["good", "same", "weak"]
+    rates = [row.rates[EXPLICIT] for row in rows]
+    assert [round(rate.percent, 6) for rate in rates] == [75.0, 75.0, 12.5]
+    assert [rate.is_top for rate in rates] == [True, True, False]
+    assert all(rate.tasks == rate.of == 11 for rate in rates)
+    assert all(rate.interval and rate.interval[0] <= rate.percent for rate in rates)
+
+
+def test_privileged_rows_are_compared_with_none() -> None:
+    rows = own(board_rows([run_of("a", 5), run_of("b", 2), run_of("all", 8, privileged=True)]))
+    assert [(row.policy, row.rates[EXPLICIT].is_top) for row in rows] == [
+        ("a", True),
+        ("b", False),
+        ("all", False),
+    ]
+
+
+def test_part_of_the_tasks_is_no_top() -> None:
+    whole = run_of("whole", 5)
+    part = run_of("part", 8)._replace(results=run_of("part", 8).results[:8])
+    rows = own(board_rows([whole, part]))
+    assert [row.rates[EXPLICIT].tasks for row in rows] == [1, 11]
+    assert not any(row.rates[EXPLICIT].is_top for row in rows)
+
+
+def test_published_rows_come_last_and_are_not_verified() -> None:
+    rows = board_rows([run_of("a", 1)])
+    assert [row.status for row in rows][:1] == ["verified"]
+    assert {row.status for row in rows[1:]} == {"published"}
+    assert {row.policy for row in rows[1:]} == {row.model for row in published_rows("main")}
+
+
+def store(folder: Path, results: list[Record]) -> Path:
+    with RecordStore(folder) as records:
+        for one in results:
+            records.append(one)
+    return folder
+
+
+def test_statuses_of_packs(tmp_path: Path) -> None:
+    run = store(tmp_path / "run", [record("p", "StopCube", 0, won=True)])
+    packs = tmp_path / "packs"
+    packs.mkdir()
+    pack_run(run, packs / "empty-handed.roboirg.zip")
+    (packs / "broken.roboirg.zip").write_bytes(b"no zip")
+    with pytest.raises(Exception, match="no packed run"):
+        read_packs(packs)
+    found = read_packs(packs, sample=1.0)
+    checks = {one.name: one.check for one in found}
+    assert all(check is not None for check in checks.values())
+    assert "no packed run" in str(checks["broken"])
+    assert "actions were not kept" in str(checks["empty-handed"])
+    assert (packs / CHECKS_FILE).is_file()
+    page = render_board(found)
+    assert "broken: " in page
+    assert re.search(r'<b class="refuted">refuted</b>', page)
+
+
+def test_checks_are_remembered_until_the_pack_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pack = tmp_path / "a.roboirg.zip"
+    pack_run(store(tmp_path / "a", [record("p", "StopCube", 0, won=True)]), pack)
+    first = check_pack(pack, sample=0.0, workers=0)
+    monkeypatch.setattr("roboirg.analysis.board.pack_checks.verify_run", None)
+    assert check_pack(pack, sample=0.0, workers=0) == first
+    pack_run(store(tmp_path / "b", [record("q", "StopCube", 0, won=True)]), pack)
+    with pytest.raises(TypeError):
+        check_pack(pack, sample=0.0, workers=0)
+
+
+def test_a_folder_without_packs_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InvalidValueError, match="roboirg pack"):
+        read_packs(tmp_path)
+
+
+def test_what_a_pack_says_is_text() -> None:
+    run = run_of("<script>alert(1)</script>", 1, episodes=2)
+    page = render_board([run])
+    assert "<script>alert" not in page
+    assert "&lt;script&gt;alert" in page
+
+
+@pytest.mark.browser
+def test_the_page_sorts_and_filters(open_page: Any, tmp_path: Path) -> None:
+    runs = [run_of("good", 6), run_of("weak", 1), run_of("all", 8, privileged=True)]
+    runs[1] = runs[1]._replace(check=None)
+    path = tmp_path / "board.html"
+    write_board(runs, path)
+    with open_page(path.as_uri()) as page:
+
+        def shown() -> list[str]:
+            names = "[...document.querySelectorAll('tbody tr:not([hidden]) td:first-child')]"
+            return list(page.evaluate(f"{names}.map(one => one.firstChild.textContent.trim())"))
+
+        published = [row.policy for row in board_rows(runs) if row.status == "published"]
+        assert shown() == ["good", "weak", "all (privileged)", *published]
+        page.uncheck("#published")
+        page.uncheck("#privileged")
+        assert shown() == ["good", "weak"]
+        page.click(f"th button:has-text('{EXPLICIT}')")
+        page.click(f"th button:has-text('{EXPLICIT}')")
+        assert shown() == ["weak", "good"]
+        page.check("#verified")
+        assert shown() == ["good"]
+        page.set_viewport_size({"width": 390, "height": 800})
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")

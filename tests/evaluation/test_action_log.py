@@ -1,0 +1,128 @@
+"""Action logs: what is written is what is read, and nothing else is read."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from roboirg.records.action_log import ActionLog, action_path, read_actions, write_actions
+from roboirg.records.record_codec import StoreError
+
+finite = st.floats(-1e6, 1e6)
+
+
+@st.composite
+def logs(draw: st.DrawFn) -> ActionLog:
+    lengths = draw(st.lists(st.integers(1, 5), max_size=6))
+    rows = draw(arrays(np.float64, (sum(lengths), 8), elements=finite))
+    if draw(st.booleans()):
+        rows = rows.astype(np.float32).astype(np.float64)
+    starts = np.cumsum([0, *lengths], dtype=np.int32)[:-1]
+    end = draw(arrays(np.float64, st.integers(0, 9), elements=finite))
+    return ActionLog("joint_angle", rows, starts, end)
+
+
+@given(log=logs())
+def test_what_is_written_is_read(log: ActionLog, tmp_path_factory: pytest.TempPathFactory) -> None:
+    folder = tmp_path_factory.mktemp("run")
+    digest = write_actions(log, folder)
+    assert write_actions(log, folder) == digest
+    read = read_actions(folder, digest)
+    assert (read.space, read.digest) == (log.space, digest)
+    assert np.array_equal(read.rows, log.rows)
+    assert np.array_equal(read.end_state, log.end_state)
+    assert np.array_equal(np.concatenate([*read.chunks(), np.empty((0, 8))]), log.rows)
+    assert len(log.requests) == 0 or len(read.chunks()) == len(log.requests)
+
+
+def a_log(rows: int = 4) -> ActionLog:
+    numbers = np.linspace(0.1, 1.7, rows * 8).reshape(rows, 8)
+    return ActionLog("joint_angle", numbers, np.array([0], np.int32), np.zeros(3))
+
+
+@given(log=logs(), other=logs())
+def test_different_content_has_different_digests(log: ActionLog, other: ActionLog) -> None:
+    same = all(
+        np.array_equal(one, two)
+        for one, two in zip(
+            (log.rows, log.requests, log.end_state),
+            (other.rows, other.requests, other.end_state),
+            strict=True,
+        )
+    )
+    # -0.0 equals 0.0 but is another number for the simulator.
+    if not same:
+        assert log.digest != other.digest
+
+
+def test_float32_actions_take_half_the_space(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    exact = rng.normal(size=(500, 8))
+    sizes = []
+    for rows in (exact, exact.astype(np.float32).astype(np.float64)):
+        log = ActionLog("joint_angle", rows, np.array([0], np.int32), np.zeros(3))
+        sizes.append(action_path(tmp_path, write_actions(log, tmp_path)).stat().st_size)
+    assert sizes[1] < 0.55 * sizes[0] < 20_000
+
+
+def test_a_changed_file_is_refused(tmp_path: Path) -> None:
+    digest = write_actions(a_log(), tmp_path)
+    other = write_actions(a_log(5), tmp_path)
+    action_path(tmp_path, digest).write_bytes(action_path(tmp_path, other).read_bytes())
+    with pytest.raises(StoreError, match="another content"):
+        read_actions(tmp_path, digest)
+
+
+@pytest.mark.parametrize("digest", ["", "../../etc/passwd", "A" * 64, "0" * 63, "0" * 64 + "\n"])
+def test_what_is_no_digest_names_no_file(tmp_path: Path, digest: str) -> None:
+    with pytest.raises(StoreError, match="no digest"):
+        action_path(tmp_path, digest)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="missing"):
+        read_actions(tmp_path, "0" * 64)
+
+
+def npz(**content: object) -> bytes:
+    file = io.BytesIO()
+    np.savez_compressed(file, **content)  # type: ignore[arg-type]
+    return file.getvalue()
+
+
+GOOD = {
+    "space": np.array("joint_angle"),
+    "rows": np.zeros((4, 8)),
+    "requests": np.array([0, 2]),
+    "end_state": np.zeros(3),
+}
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"no zip",
+        npz(),
+        npz(**{**GOOD, "space": np.array("teleport")}),
+        npz(**{**GOOD, "rows": np.zeros((4, 7))}),
+        npz(**{**GOOD, "rows": np.full((4, 8), np.nan)}),
+        npz(**{**GOOD, "requests": np.array([2, 0])}),
+        npz(**{**GOOD, "requests": np.array([1, 2])}),
+        npz(**{**GOOD, "requests": np.array([0, 9])}),
+        npz(**{**GOOD, "requests": np.array([object()], dtype=object)}),
+        npz(**{**GOOD, "rows": np.zeros((400_000, 8))}),
+    ],
+)
+def test_what_is_no_log_is_refused(tmp_path: Path, content: bytes) -> None:
+    path = action_path(tmp_path, "0" * 64)
+    path.parent.mkdir(parents=True)
+    path.write_bytes(content)
+    with pytest.raises(StoreError, match="is no action log"):
+        read_actions(tmp_path, "0" * 64)

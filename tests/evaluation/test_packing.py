@@ -1,0 +1,116 @@
+"""Packed runs: the same files come out, and nothing else gets out of the folder."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from evaluation_fakes import fake_result
+
+from roboirg.core.errors import RoboIRGError
+from roboirg.evaluation.rollout_result import make_record
+from roboirg.records.action_log import ActionLog, write_actions
+from roboirg.records.packing import MANIFEST, opened_run, pack_run, read_manifest
+from roboirg.records.record import Job
+from roboirg.records.record_codec import StoreError
+from roboirg.records.store import RecordStore, read_records
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    folder = tmp_path / "run"
+    with RecordStore(folder) as store:
+        for episode in range(3):
+            rows = np.ones((episode + 1, 8))
+            log = ActionLog("joint_angle", rows, np.zeros(1, np.int32), np.ones(2))
+            job = Job(
+                policy="random", task="PickXtimes", split="test", episode=episode, setting="direct"
+            )
+            store.append(
+                make_record(
+                    job, fake_result(job), started_at="", action_log=write_actions(log, folder)
+                )
+            )
+    (folder / "videos").mkdir()
+    (folder / "videos" / "one.mp4").write_bytes(b"video")
+    (folder / "secret.txt").write_text("not packed")
+    return folder
+
+
+def test_the_same_run_comes_out(run: Path, tmp_path: Path) -> None:
+    manifest = pack_run(run, tmp_path / "a.zip")
+    assert (manifest.records, manifest.policies) == (3, ("random",))
+    assert read_manifest(tmp_path / "a.zip") == manifest
+    with opened_run(tmp_path / "a.zip") as folder:
+        assert read_records(folder) == read_records(run)
+        names = {path.name for path in folder.rglob("*") if path.is_file()}
+        assert "secret.txt" not in names
+        assert "one.mp4" not in names
+        assert sum(name.endswith(".npz") for name in names) == 3
+    assert not folder.exists()
+
+
+def test_the_same_run_gives_the_same_bytes(run: Path, tmp_path: Path) -> None:
+    for name in ("a.zip", "b.zip"):
+        pack_run(run, tmp_path / name, videos=True)
+    assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
+    with opened_run(tmp_path / "a.zip") as folder:
+        assert (folder / "videos" / "one.mp4").read_bytes() == b"video"
+
+
+def test_a_folder_is_used_as_it_is(run: Path) -> None:
+    with opened_run(run) as folder:
+        assert folder == run
+
+
+def rewritten(pack: Path, out: Path, change: dict[str, bytes | None]) -> Path:
+    """Copy a pack with files changed, added or (None) removed."""
+    with zipfile.ZipFile(pack) as source, zipfile.ZipFile(out, "w") as target:
+        content = {name: source.read(name) for name in source.namelist()} | change
+        for name, data in content.items():
+            if data is not None:
+                target.writestr(name, data)
+    return out
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"records.jsonl": b"{}\n"}, "is not the file that its manifest names"),
+        ({"more.txt": b"x"}, "exactly the files"),
+        ({"records.jsonl": None}, "exactly the files"),
+        ({MANIFEST: None}, "cannot be read"),
+        ({MANIFEST: b"{}"}, "cannot be read"),
+        ({MANIFEST: b"no json"}, "cannot be read"),
+    ],
+)
+def test_a_changed_pack_is_refused(
+    run: Path, tmp_path: Path, change: dict[str, bytes | None], words: str
+) -> None:
+    pack_run(run, tmp_path / "a.zip")
+    forged = rewritten(tmp_path / "a.zip", tmp_path / "forged.zip", change)
+    with pytest.raises(StoreError, match=words), opened_run(forged):
+        pass
+
+
+@pytest.mark.parametrize("name", ["../x", "/etc/x", "actions/../../x", "actions\\..\\x", "x", "."])
+def test_names_stay_in_the_folder(run: Path, tmp_path: Path, name: str) -> None:
+    pack_run(run, tmp_path / "a.zip")
+    manifest = json.loads(read_manifest(tmp_path / "a.zip").model_dump_json())
+    manifest["files"][name] = "0" * 64
+    change: dict[str, bytes | None] = {name: b"x", MANIFEST: json.dumps(manifest).encode()}
+    forged = rewritten(tmp_path / "a.zip", tmp_path / "forged.zip", change)
+    with pytest.raises(StoreError, match="no file of a run"), opened_run(forged):
+        pass
+
+
+def test_what_is_no_pack_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "text"
+    path.write_text("text")
+    with pytest.raises(StoreError, match="no packed run"), opened_run(path):
+        pass
+    with pytest.raises(RoboIRGError):
+        pack_run(tmp_path / "nothing", tmp_path / "a.zip")

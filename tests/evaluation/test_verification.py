@@ -1,0 +1,154 @@
+"""Honest runs hold; forged ones do not."""
+
+from __future__ import annotations
+
+import json
+import random
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from forgeries import FORGERIES, forge
+from typer.testing import CliRunner
+
+from roboirg.cli.app import app
+from roboirg.evaluation.executors.executor import InProcess
+from roboirg.evaluation.plan_maker import make_plan
+from roboirg.evaluation.rollout import EpisodeRunner
+from roboirg.evaluation.runner import run_plan
+from roboirg.evaluation.verification.record_check import ReplayVerdict
+from roboirg.evaluation.verification.run_verification import verify_run
+from roboirg.records.action_log import read_actions
+from roboirg.records.merging import merge_runs
+from roboirg.records.store import read_records
+
+pytestmark = pytest.mark.sim
+
+
+class Careless:
+    """Raises after a few answers in every second episode; looks at nothing."""
+
+    cameras = ()
+    actions = "ee_pose"
+
+    def __init__(self, seed: int = 0) -> None:
+        self.seed = seed
+
+    def reset(self, instruction: str, demonstration: object) -> None:
+        del instruction, demonstration
+        self.left = 7
+
+    def act(self, observation: dict[str, np.ndarray]) -> np.ndarray:
+        self.left -= 1
+        if not self.left and self.seed % 2:
+            raise RuntimeError("careless")
+        return np.append(observation["end_effector"] + 0.001, 1.0)
+
+
+def play(folder: Path, policies: list[str], **options: object) -> Path:
+    plan = make_plan(policies, **options)  # type: ignore[arg-type]
+    run_plan(plan, folder, EpisodeRunner(folder, plan=plan.fingerprint), InProcess())
+    return folder
+
+
+@pytest.fixture(scope="module")
+def honest(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Successes and failures in the shortest episodes that there are."""
+    return play(
+        tmp_path_factory.mktemp("honest"),
+        ["listener", "forgetful"],
+        tasks="StopCube",
+        settings="contextual",
+        episodes="2",
+        delivery="turns",
+    )
+
+
+def test_an_honest_run_holds(honest: Path) -> None:
+    found = verify_run(honest)
+    assert found.holds, found
+    assert found.verdicts == {ReplayVerdict.EXACT: found.records}
+    assert not found.notes
+    outcomes = {one.outcome for one in read_records(honest)}
+    assert outcomes == {"success", "failure"}
+
+
+@pytest.mark.parametrize("name", FORGERIES)
+def test_a_forged_run_does_not(name: str, honest: Path, tmp_path: Path) -> None:
+    forged = tmp_path / "forged"
+    shutil.copytree(honest, forged)
+    assert forge(forged, FORGERIES[name], random.Random(name))
+    assert not verify_run(forged).holds
+
+
+def test_errors_of_policies_are_played_as_far_as_they_came(tmp_path: Path) -> None:
+    spec = f"{__name__}:Careless"
+    run = play(
+        tmp_path / "run",
+        [spec],
+        tasks="PickXtimes",
+        settings="explicit",
+        episodes="4",
+        policy_seeds="0,1",
+        max_steps=20,
+        policy_process="shared",
+    )
+    outcomes = [one.outcome for one in read_records(run)]
+    assert set(outcomes) == {"failure", "error"}
+    found = verify_run(run, workers=2)
+    assert found.holds, found
+    assert found.errors == outcomes.count("error")
+    assert found.verdicts == {ReplayVerdict.EXACT: len(outcomes)}
+
+
+def test_a_merged_run_holds_by_the_plans_of_its_parts(honest: Path, tmp_path: Path) -> None:
+    merge_runs([honest], tmp_path / "merged")
+    found = verify_run(tmp_path / "merged")
+    assert found.holds, found
+    assert not found.notes
+
+
+def test_a_sample_is_drawn_again_from_its_seed(honest: Path) -> None:
+    found = verify_run(honest, sample=0.5, seed=3)
+    assert found.verdicts[ReplayVerdict.EXACT] == found.records // 2
+    assert found.holds
+
+
+def test_answers_are_told_apart(honest: Path) -> None:
+    record = next(one for one in read_records(honest) if one.outcome == "success")
+    assert record.action_log
+    log = read_actions(honest, record.action_log)
+    assert len(log.rows) == record.steps
+    assert len(log.chunks()) == len(log.requests) > 1
+    assert all(len(chunk) for chunk in log.chunks())
+
+
+@pytest.fixture
+def cli() -> CliRunner:
+    return CliRunner()
+
+
+def test_the_command_tells_what_does_not_hold(honest: Path, tmp_path: Path, cli: CliRunner) -> None:
+    good = cli.invoke(app, ["verify", str(honest), "--workers", "0", "--sample", "10%"])
+    assert good.exit_code == 0, good.output
+    assert "All of it holds." in good.output
+    forged = tmp_path / "forged"
+    shutil.copytree(honest, forged)
+    assert forge(forged, FORGERIES["failure to success"], random.Random(0))
+    bad = cli.invoke(app, ["verify", str(forged), "--workers", "0"])
+    assert bad.exit_code == 2
+    lines = (forged / "records.jsonl").read_text().splitlines()
+    assert json.loads(lines[0])["schema_version"] == 3
+    assert "outcome: the record says 'success'; it should be 'failure'" in bad.output
+    wrong = cli.invoke(app, ["verify", str(honest), "--sample", "many"])
+    assert wrong.exit_code != 0
+
+
+def test_a_repeated_run_shows_no_flip(honest: Path, tmp_path: Path, cli: CliRunner) -> None:
+    out = str(tmp_path / "again")
+    done = cli.invoke(app, ["repeat", str(honest), "--out", out, "--workers", "0"])
+    assert done.exit_code == 0, done.output
+    assert "0 of 4 verdicts changed." in done.output
+    refused = cli.invoke(app, ["repeat", str(honest), "--out", str(honest)])
+    assert refused.exit_code != 0

@@ -1,0 +1,126 @@
+"""Child processes: what they say, how they ended, and that nothing of them is left."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+import pytest
+
+from roboirg.core.errors import RoboIRGError
+from roboirg.util.child_process import ChildExit, ChildProcess, serve
+from roboirg.util.parallel_map import parallel_map
+
+
+def answer(connection: Connection) -> None:
+    serve(connection, obey)
+
+
+def obey(message: str) -> object:
+    if message == "leave":
+        os._exit(3)
+    if message == "ignore":
+        time.sleep(3600)
+    if message == "group":
+        return subprocess.Popen(["sleep", "3600"]).pid
+    return os.getpid(), signal.getsignal(signal.SIGINT)
+
+
+def is_alive(pid: int) -> bool:
+    try:
+        return "(sleep) Z" not in Path(f"/proc/{pid}/stat").read_text()
+    except OSError:
+        return False
+
+
+def wait_for(what: Callable[[], bool]) -> bool:
+    deadline = time.monotonic() + 60
+    while not what() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    return what()
+
+
+def test_a_child_answers_and_exits_when_its_channel_is_closed() -> None:
+    child = ChildProcess.spawn(answer)
+    child.send("who")
+    assert child.receive() == (child.pid, signal.SIG_IGN)
+    assert child.exit is None
+    assert child.close() == ChildExit(0) == child.exit
+
+
+@pytest.mark.parametrize(
+    ("message", "words", "was_killed"),
+    [
+        ("leave", "the process ended with exit code 3", False),
+        ("kill", "the process died of signal 9", True),
+    ],
+)
+def test_how_a_child_ended_is_told(message: str, words: str, was_killed: bool) -> None:
+    child = ChildProcess.spawn(answer)
+    child.send("who")
+    child.receive()
+    if message == "kill":
+        os.kill(child.pid, signal.SIGKILL)
+    child.send(message)
+    ended = child.receive()
+    assert (str(ended), ended.was_killed) == (words, was_killed)
+    child.send("who")
+    assert isinstance(child.receive(), ChildExit)
+
+
+def test_what_a_child_has_started_ends_with_it() -> None:
+    child = ChildProcess.spawn(answer)
+    child.send("group")
+    grandchild = child.receive()
+    assert is_alive(grandchild)
+    child.send("ignore")
+    child.end()
+    assert child.exit == ChildExit(-signal.SIGKILL)
+    assert wait_for(lambda: not is_alive(grandchild))
+
+
+def test_children_do_not_outlive_a_parent_that_is_killed(tmp_path: Path) -> None:
+    script = tmp_path / "parent.py"
+    script.write_text(
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
+        "import test_child_process as own\n"
+        "if __name__ == '__main__':\n"
+        "    child = own.ChildProcess.spawn(own.answer)\n"
+        "    child.send('who'); print(child.receive()[0], flush=True)\n"
+        "    child.send('ignore'); child.receive()\n"
+    )
+    with subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, text=True) as parent:
+        assert parent.stdout is not None
+        pid = int(parent.stdout.readline())
+        assert is_alive(pid)
+        parent.kill()
+    assert wait_for(lambda: not is_alive(pid))
+
+
+def root(number: int) -> float:
+    if number == 7:
+        raise ValueError("seven")
+    if number == 9:
+        os._exit(4)
+    return number**0.5
+
+
+def test_a_map_names_the_item_at_which_a_process_died_and_raises_what_was_raised() -> None:
+    assert dict(parallel_map(root, range(5), 3)) == {n: n**0.5 for n in range(5)}
+    with pytest.raises(RoboIRGError, match="died at 9: the process ended with exit code 4"):
+        list(parallel_map(root, [9], 2))
+    with pytest.raises(ValueError, match="seven") as caught:
+        list(parallel_map(root, [7], 1))
+    assert "in root" in caught.value.__notes__[0]  # where it was raised
+
+
+def test_a_map_that_is_left_ends_its_processes() -> None:
+    found = parallel_map(time.sleep, [0.0, 3600.0, 3600.0], 2)
+    assert next(found) == (0.0, None)
+    found.close()  # type: ignore[attr-defined]
