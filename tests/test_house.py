@@ -16,7 +16,7 @@ PACKAGE = ROOT / "src" / "roboirg"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 
 MAX_ROOMS = 20
-MAX_ARROWS = 100
+MAX_ARROWS = 102
 MAX_FILES = 20
 
 FORBIDDEN_MODULES = {
