@@ -145,7 +145,8 @@ def _url_class(spec: str) -> type[Any]:
 
 
 def _examples() -> list[str]:
-    return [*(f"{scheme}://…" for scheme in url_schemes()), "system:NAME", "vlm-listener:PROVIDER"]
+    urls = (f"{scheme}://…" for scheme in url_schemes())
+    return [*urls, "system:NAME", "vlm-listener:PROVIDER", "learned:PATH"]
 
 
 def _parameters(policy_class: type[Any]) -> Mapping[str, inspect.Parameter]:
