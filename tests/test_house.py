@@ -15,8 +15,8 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "roboirg"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 
-MAX_ROOMS = 21
-MAX_ARROWS = 110
+MAX_ROOMS = 22
+MAX_ARROWS = 125
 MAX_FILES = 20
 
 FORBIDDEN_MODULES = {

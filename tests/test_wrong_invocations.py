@@ -53,6 +53,7 @@ def right_words(name):
 CASES = [
     pytest.param(name, number, id=f"{name}: {label}")
     for name, command in all_commands().items()
+    if name in words_of("", "") and name != "verify"  # which needs kept actions
     for number, (label, _) in enumerate(wrong_words(command, right_words(name)))
 ]
 

@@ -7,7 +7,7 @@ import numpy as np
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.observations import CAMERAS
 from roboirg.demonstrations.trajectory import TrajectoryFacts, TrajectoryFile, stack_texts
-from roboirg.demonstrations.trajectory_recorder import _keep_facts, _PictureTracks
+from roboirg.demonstrations.trajectory_recorder import PictureTracks, _keep_facts
 from roboirg.util.atomic_write import replacing
 
 STEPS = 6
@@ -68,7 +68,7 @@ def record(
     with replacing(path) as part:
         with zipfile.ZipFile(part, "w") as archive:
             file = TrajectoryFile(archive)
-            tracks = _PictureTracks(file, spec)
+            tracks = PictureTracks(file, spec)
             for row in range(rows):
                 seen = {f"{one}_rgb": picture(one, episode.seed, row) for one in CAMERAS}
                 seen |= {f"{one}_depth": depth(episode.seed, row) for one in CAMERAS}

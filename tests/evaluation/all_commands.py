@@ -3,6 +3,8 @@
 import typer.main
 
 from roboirg.cli.app import app
+from roboirg.evaluation.plan import write_plan
+from roboirg.evaluation.plan_maker import make_plan
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.records.record import Job
 from roboirg.records.store import RecordStore
@@ -31,6 +33,8 @@ def make_run(folder):
                 job = job.model_copy(update={"policy": "oracle"})
                 result = RolloutResult("success", cause=None, steps=7)
             store.append(make_record(job, result, started_at="now"))
+    plan = make_plan(["random", "oracle"], tasks="PickXtimes", settings="direct", episodes="3")
+    write_plan(plan, folder)
     return folder
 
 
@@ -63,6 +67,10 @@ def words_of(folder, run):
         "export episodes": ["--tasks", "PickXtimes", "--split", "val",
                             "--out", f"{folder}/episodes.jsonl"],
         "export records": [run, "--out", f"{folder}/records.parquet"],
+        "repeat": [run, "--out", f"{folder}/again", "--workers", "0"],
+        "pack": [run, "--out", f"{folder}/packed.zip"],
+        "verify": ["--help"],
+        "board": [folder],
         "real plan": ["--policy", "random", "--tasks", "PutInBox", "--trials", "1", "--no-sheet",
                       "--demonstrations", "1", "--out", f"{folder}/study"],
         "real run": [f"{folder}/study"],

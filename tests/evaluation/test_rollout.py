@@ -387,13 +387,13 @@ TURNS = JOB.model_copy(update={"setting": "contextual", "delivery": "turns"})
 
 @pytest.mark.parametrize("policy_class", [PaperPolicy, Hearing])
 def test_a_record_holds_what_was_heard_when(
-    policy_class: type[PaperPolicy], monkeypatch: pytest.MonkeyPatch
+    policy_class: type[PaperPolicy], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     world, policy = TellingWorld((0, 3, 6, 6), length=10), policy_class()
     monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: world)
     monkeypatch.setattr(rollout, "load_policy", lambda _job: policy)
     turns = world.instruction.turns
-    record = EpisodeRunner(Path())(TURNS)
+    record = EpisodeRunner(tmp_path)(TURNS)
     assert record.outcome == "success"
     assert [(one.text, one.step) for one in record.instruction] == list(
         zip(turns, (0, 3, 6, 6, None), strict=True)

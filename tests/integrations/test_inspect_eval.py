@@ -12,7 +12,7 @@ pytest.importorskip("inspect_ai", reason="Inspect is not installed here; run `ma
 
 import inspect_ai
 from inspect_ai.log import read_eval_log
-from inspect_ai.model import ModelOutput, get_model
+from inspect_ai.model import ModelOutput, ModelUsage, get_model
 
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.rollout import play_episode
@@ -67,6 +67,8 @@ def test_outcomes_are_those_of_our_runner(tmp_path, monkeypatch):
         ours.append(play_episode(job))
     assert {one.outcome for one in ours} == {"success", "failure"}, ours
     outputs = [ModelOutput.from_content("mockllm/model", text) for text in replies()]
+    for output in outputs:  # otherwise the mock model downloads a tokenizer to count
+        output.usage = ModelUsage(input_tokens=7, output_tokens=3, total_tokens=10)
     (log,) = inspect_ai.eval(
         "roboirg/listener",
         model=get_model("mockllm/model", custom_outputs=outputs),
@@ -76,10 +78,11 @@ def test_outcomes_are_those_of_our_runner(tmp_path, monkeypatch):
         max_samples=1, display="plain", log_dir=str(tmp_path),
     )  # fmt: skip
     assert log.status == "success", log.error
-    scores = [one.scores["grounds_reference"] for one in log.samples]
+    scores = [next(iter(one.scores.values())) for one in log.samples]
     records = [Record.model_validate(one.metadata["record"]) for one in scores]
     assert [one.outcome for one in records] == [one.outcome for one in ours]
     assert [one.steps for one in records] == [one.steps for one in ours]
+    assert {one.usage["input_tokens"] for one in records} == {7}
     assert [one.value for one in scores] == [one.outcome == "success" for one in ours]
     convert = [
         str(Path(sys.executable).with_name("inspect")), "log", "convert", str(tmp_path),
@@ -105,12 +108,25 @@ def test_the_entry_point_is_found_by_inspect_s_command(tmp_path):
         "--model", "mockllm/model", "--display", "plain", "--log-dir", str(tmp_path),
         "-T", f"tasks={TASK}", "-T", "episodes=1", "-T", "max_steps=20",
     ]  # fmt: skip
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    # Inspect's mock model counts tokens with a tokenizer that it downloads; here it counts letters.
+    counter = tmp_path / "offline" / "tiktoken.py"
+    counter.parent.mkdir()
+    counter.write_text(
+        "class Letters:\n"
+        "    def encode(self, text, **_):\n"
+        "        return list(text)\n"
+        "def get_encoding(_):\n"
+        "    return Letters()\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(counter.parent)}
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=False, cwd=tmp_path, env=environment
+    )
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     (path,) = tmp_path.glob("*.eval")
     (sample,) = read_eval_log(str(path)).samples
     assert sample.id == f"{TASK}-contextual-000"
-    score = sample.scores["grounds_reference"]
+    (score,) = sample.scores.values()
     assert score.value == 0
     assert score.explanation == "not done after 20 steps"
     assert score.metadata["record"]["usage"]["unparsed"] == 1

@@ -4,7 +4,9 @@ import os
 import pickle
 import subprocess
 import sys
+import tempfile
 import weakref
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -195,9 +197,10 @@ def story(task=SHORT):
     """Everything that an environment and a run return."""
     _, observation, info = reset(task, cameras=("front", "wrist"), depth=True, grounded=True)
     job = Job(policy=f"{__name__}:Viewer", task=task, split="test", episode=1, setting="direct")
-    record = EpisodeRunner(None)(job).model_dump(
-        exclude={"started_at", "duration_s", "timings", "details"}
-    )
+    with tempfile.TemporaryDirectory() as folder:
+        record = EpisodeRunner(Path(folder))(job).model_dump(
+            exclude={"started_at", "duration_s", "timings", "details"}
+        )
     video = dict(info.pop("demonstration"))
     return {**observation, **video, "first": observation["front_rgb"]}, info, record
 

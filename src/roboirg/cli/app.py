@@ -25,6 +25,7 @@ from roboirg.cli import (
     wording_commands,
 )
 from roboirg.cli.bench_commands import bench
+from roboirg.cli.learn_commands import learn_app
 from roboirg.cli.missing_extras import describe_missing
 from roboirg.cli.options import (
     Distractor,
@@ -69,6 +70,7 @@ app = typer.Typer(
 app.add_typer(language_commands.language_app, name="language")
 app.add_typer(language_commands.export_app, name="export")
 app.add_typer(grounding_commands.score_app, name="score")
+app.add_typer(learn_app, name="learn")
 app.add_typer(real_app, name="real")
 app.add_typer(wording_commands.wordings_app, name="wordings")
 app.command()(bench)

@@ -273,4 +273,4 @@ def replay(
         f"(largest difference {largest:.2g})"
     )
     if count["agree"] < count["trajectories"]:
-        raise typer.Exit(1)
+        raise typer.Exit(2)

@@ -23,14 +23,17 @@ if TYPE_CHECKING:
 _MOST_SHOWN = 20
 
 RunOrPack = Annotated[str, typer.Argument(help="Output folder of a run, or its packed file.")]
-Sample = Annotated[str, typer.Option(help="Share of the episodes whose actions are played.")]
+SampleShare = Annotated[str, typer.Option(help="Share of the episodes whose actions are played.")]
 SampleSeed = Annotated[
     int | None, typer.Option(help="Draw the same sample again; another one each time without it.")
 ]
 
 
 def verify(
-    run: RunOrPack, sample: Sample = "100%", sample_seed: SampleSeed = None, workers: Workers = None
+    run: RunOrPack,
+    sample: SampleShare = "100%",
+    sample_seed: SampleSeed = None,
+    workers: Workers = None,
 ) -> None:
     """Play the actions of a run again and check its records; exit code 2 if one does not hold."""
     from roboirg.evaluation.executors.executor import core_count

@@ -68,7 +68,7 @@ class _Rows:
     online: list[str] = field(default_factory=list)
 
 
-class _PictureTracks:
+class PictureTracks:
     """Encodes the pictures of both cameras in the order of rows."""
 
     def __init__(self, file: TrajectoryFile, spec: RecordingSpec) -> None:
@@ -190,7 +190,7 @@ class _Recorder:
         self, env: RoboIRGEnv, policy: Policy, spec: RecordingSpec, file: TrajectoryFile
     ) -> None:
         self._env, self._policy, self._spec, self._file = env, policy, spec, file
-        self._tracks = _PictureTracks(file, spec)
+        self._tracks = PictureTracks(file, spec)
         self._rows = _Rows()
         self._video: list[Mapping[str, Any]] = []
         self._video_session: object = None

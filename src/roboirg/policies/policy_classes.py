@@ -170,7 +170,8 @@ def _describe_module(spec: str) -> str | None:
 
 
 def _examples() -> list[str]:
-    return [*(f"{scheme}://…" for scheme in url_schemes()), "system:NAME", "vlm-listener:PROVIDER"]
+    urls = (f"{scheme}://…" for scheme in url_schemes())
+    return [*urls, "system:NAME", "vlm-listener:PROVIDER", "learned:PATH"]
 
 
 def _parameters(policy_class: type[Any]) -> Mapping[str, inspect.Parameter]:

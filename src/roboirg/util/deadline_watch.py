@@ -29,7 +29,7 @@ class DeadlineWatch:
         self._thread = threading.Thread(target=self._watch, name="deadlines", daemon=True)
 
     def begin(self, limit_s: float | None) -> None:
-        """Set the deadline, `limit_s` seconds from now; None removes it."""
+        """Set the deadline to `limit_s` seconds from now, or remove it."""
         self._began = time.monotonic()
         self._deadline = float("inf") if limit_s is None else self._began + limit_s
 

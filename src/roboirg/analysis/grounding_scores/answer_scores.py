@@ -20,7 +20,7 @@ from roboirg.analysis.stats.cells import (
     Versions,
     sort_cells,
 )
-from roboirg.analysis.stats.intervals import SEED, Interval
+from roboirg.analysis.stats.intervals import SEED
 from roboirg.analysis.stats.run_summary import ALL, SummaryRow, summarize
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.grounding_set.answer_file import Answer
@@ -91,16 +91,6 @@ class ScoreRow:
         """The rate on a scale from random answers, 0, to 1; None if random answers are right."""
         rate = self.summary.rate
         return None if rate is None else above_chance(float(rate), self.chance)
-
-    @property
-    def corrected_interval(self) -> Interval | None:
-        """The interval of the rate on the same scale."""
-        if self.summary.interval is None or self.chance >= 1:
-            return None
-        low, high = self.summary.interval
-        return Interval(
-            (low - self.chance) / (1 - self.chance), (high - self.chance) / (1 - self.chance)
-        )
 
 
 def above_chance(rate: float, chance: float) -> float | None:

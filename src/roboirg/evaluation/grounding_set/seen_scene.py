@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -90,20 +89,8 @@ def _target(episode: Episode, referent: Referent, mask: Mask) -> PointTarget:
 
 
 def nearest_to_center(mask: Mask) -> tuple[int, int]:
-    """Return row and column of the pixel of a mask that is nearest to the mean of all its pixels.
-
-    Of the pixels of a mask in several parts, this may be one between no two of them, but always one
-    of the mask.
-    """
+    """Return row and column of the pixel of a mask that is nearest to the mean of all of them."""
     places = np.argwhere(mask)
     distances = np.square(places - places.mean(axis=0)).sum(axis=1)
     row, column = places[int(distances.argmin())]
     return int(row), int(column)
-
-
-def lit_share(points: Iterable[PointTarget]) -> float:
-    """Return the probability that as many random pixels, one for each mask, all hit."""
-    share = 1.0
-    for point in points:
-        share *= float(point.mask.mean())
-    return share

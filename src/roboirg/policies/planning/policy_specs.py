@@ -1,9 +1,10 @@
-"""Make policies from ``system:…`` and ``vlm-listener:…`` on the command line.
+"""Make policies from ``system:…``, ``vlm-listener:…`` and ``learned:…`` on the command line.
 
 | spec | meaning |
 | --- | --- |
 | ``system:NAME?server=host:port&vlm=URL`` | a system of the paper, or of a file |
 | ``vlm-listener:PROVIDER?model=NAME&base_url=URL`` | a model names the goal |
+| ``learned:PATH`` | a listener that `roboirg learn listener` trained names the goal |
 
 Values that contain ``&`` or ``#`` are percent-encoded.
 """
@@ -11,6 +12,7 @@ Values that contain ``&`` or ``#`` are percent-encoded.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
@@ -38,6 +40,7 @@ if TYPE_CHECKING:
 
 SYSTEM = "system"
 LISTENER = "vlm-listener"
+LEARNED = "learned"
 
 Build = Callable[[int], Policy]
 
@@ -124,7 +127,18 @@ def _listener(_spec: str, name: str, options: Mapping[str, str]) -> Build:
     return lambda seed: VLMListener(checked, seed)
 
 
+def _learned(spec: str, name: str, options: Mapping[str, str]) -> Build:
+    from roboirg.policies.learned.learned_listener import LearnedListener
+
+    for option in options:
+        raise UnknownNameError(f"option of {LEARNED}:", option, [])
+    if not name:
+        raise InvalidValueError(f"Policy {spec!r} names no file.")
+    return lambda seed: LearnedListener(Path(name), seed)
+
+
 BUILDERS: Mapping[str, Callable[[str, str, Mapping[str, str]], Build]] = {
     SYSTEM: _system,
     LISTENER: _listener,
+    LEARNED: _learned,
 }

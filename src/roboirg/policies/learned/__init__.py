@@ -1,0 +1,1 @@
+"""A listener that learns: words and pictures to slots, without privileged facts. Needs PyTorch."""
