@@ -130,7 +130,7 @@ def check_export_support(kind: ExportFormat) -> None:
     except ImportError as error:
         raise MissingDependencyError(
             "Parquet files need pyarrow: pip install 'roboirgbench[export]'; "
-            "or ask for --format jsonl."
+            "or ask for another format."
         ) from error
 
 
