@@ -55,7 +55,7 @@ def write_part(part: DatasetPart) -> None:
         own = own_columns(columns, trajectory, placed, length)
         order = [name for name in columns.features() if name in shared or name in own]
         path = part.root / _DATA.format(**_place(placed.episode_index))
-        write_frames(path, order, shared, [own], pictures)
+        write_frames(path, order, shared, [own], pictures, columns.features())
 
 
 def _write_videos(part: DatasetPart, episode_index: int) -> None:
