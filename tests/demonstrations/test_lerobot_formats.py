@@ -196,6 +196,12 @@ def test_version_2_1_has_a_file_per_episode(export):
             assert np.array_equal(decoded(frame["wrist_image"]), shown)
             index += 1
         assert {"image", "wrist_image", "state", "actions"} < set(frames[0])
+    # LeRobot reads this version without saying what the columns are.
+    described = json.loads(parquet.read_schema(root / path).metadata[b"huggingface"])
+    types = described["info"]["features"]
+    assert types["image"] == {"_type": "Image"}
+    value = {"dtype": "float32", "_type": "Value"}
+    assert types["actions"] == {"feature": value, "length": 8, "_type": "Sequence"}
     modality = read_json(root / "meta/modality.json")
     assert modality["state"]["gripper"] == {"start": 7, "end": 8, "original_key": "state"}
 

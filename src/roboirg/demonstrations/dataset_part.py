@@ -55,12 +55,17 @@ class DatasetPart:
 
 
 class DatasetWriter(Protocol):
-    """Writes one format."""
+    """Writes one format; a module for each is one."""
 
     def make_parts(
-        self, plan: ExportPlan, root: Path, recorded: Sequence[RecordedTexts]
+        self,
+        plan: ExportPlan,
+        root: Path,
+        recorded: Sequence[RecordedTexts],
+        *,
+        is_video: bool = False,
     ) -> list[DatasetPart]:
-        """Return the parts of the data set, in order."""
+        """Return the parts of the data set, or of the videos' frames, in order."""
 
     def write_part(self, part: DatasetPart) -> None:
         """Write the frames of a part; runs in a worker process."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
@@ -227,7 +227,7 @@ def recording_jobs(plan: ExportPlan) -> list[tuple[RecordingJob, tuple[TaskText,
 def texts_of(plan: ExportPlan, episode: Episode) -> tuple[TaskText, ...]:
     """Return the instructions of an episode; an explicit one is its own resolved form."""
     found = instructions([episode], plan.settings, plan.forms, plan.options)
-    explicit = instruct_with(episode, replace_words(plan.options)).text
+    explicit = instruct_with(episode, _explicit_words(plan.options)).text
     said = []
     for _, one in found:
         is_repeated = one.form == "resolved" and "implicit" in plan.forms
@@ -238,11 +238,6 @@ def texts_of(plan: ExportPlan, episode: Episode) -> tuple[TaskText, ...]:
     return tuple(said)
 
 
-def replace_words(options: InstructionOptions) -> InstructionOptions:
+def _explicit_words(options: InstructionOptions) -> InstructionOptions:
     """Return options for the explicit instruction in the same wordings."""
     return InstructionOptions(wordings=options.wordings)
-
-
-def with_tasks(plan: ExportPlan, tasks: Sequence[str]) -> ExportPlan:
-    """Return the plan for other tasks."""
-    return replace(plan, tasks=tuple(tasks))

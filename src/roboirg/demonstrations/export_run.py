@@ -16,14 +16,13 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
 from typing import NamedTuple
 
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.version import __version__
 from roboirg.demonstrations import data_card, lerobot_v3, lerobot_v21, robomme_hdf5
-from roboirg.demonstrations.dataset_part import DatasetPart, RecordedTexts
+from roboirg.demonstrations.dataset_part import DatasetPart, DatasetWriter, RecordedTexts
 from roboirg.demonstrations.export_plan import (
     ExportPlan,
     FormatName,
@@ -50,7 +49,7 @@ VIDEO_DATASET = "demonstration_videos"
 EXPORT_FILE = "meta/export.json"
 """What was exported, with its fingerprint; written when everything else is complete."""
 
-WRITERS: Mapping[FormatName, ModuleType] = {
+WRITERS: Mapping[FormatName, DatasetWriter] = {
     "lerobot-v3": lerobot_v3,
     "lerobot-v2.1": lerobot_v21,
     "robomme-hdf5": robomme_hdf5,

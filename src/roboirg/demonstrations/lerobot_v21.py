@@ -13,10 +13,8 @@ from roboirg.demonstrations.dataset_part import (
     CHUNK_SIZE,
     EPISODE_TABLE,
     DatasetPart,
-    RecordedTexts,
     all_texts,
     episode_row,
-    place_texts,
     read_episodes,
 )
 from roboirg.demonstrations.export_plan import ExportPlan
@@ -27,28 +25,21 @@ from roboirg.demonstrations.lerobot_v3 import (
     count_frames,
     episode_stats,
     frame_columns,
+    make_parts,
     own_columns,
     total_stats,
+    write_json,
 )
 from roboirg.demonstrations.parquet_tables import write_frames, write_rows
 from roboirg.demonstrations.picture_coding import FRAME_RATE
 from roboirg.demonstrations.trajectory import PictureFile, load_trajectory
 from roboirg.util.atomic_write import write_atomically
 
+__all__ = ["finish", "make_parts", "write_part"]
+
 _DATA = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"
 _VIDEO = "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4"
 _ARM_JOINTS = 7
-
-
-def make_parts(
-    plan: ExportPlan, root: Path, recorded: Sequence[RecordedTexts], *, is_video: bool = False
-) -> list[DatasetPart]:
-    """Return a part for each trajectory."""
-    columns = FrameColumns(plan, is_video)
-    return [
-        DatasetPart(number, root, columns, (episode,))
-        for number, episode in enumerate(place_texts(columns, recorded))
-    ]
 
 
 def write_part(part: DatasetPart) -> None:
@@ -64,7 +55,7 @@ def write_part(part: DatasetPart) -> None:
         own = own_columns(columns, trajectory, placed, length)
         order = [name for name in columns.features() if name in shared or name in own]
         path = part.root / _DATA.format(**_place(placed.episode_index))
-        write_frames(path, order, shared, [own], pictures)
+        write_frames(path, order, shared, [own], pictures, columns.features())
 
 
 def _write_videos(part: DatasetPart, episode_index: int) -> None:
@@ -100,9 +91,9 @@ def finish(plan: ExportPlan, root: Path, parts: Sequence[DatasetPart]) -> None:
     _write_lines(root / "meta/episodes.jsonl", episodes)
     _write_lines(root / "meta/episodes_stats.jsonl", stats)
     _write_lines(root / "meta/tasks.jsonl", tasks_lines)
-    _write_json(root / "meta/stats.json", total_stats(parts))
-    _write_json(root / "meta/modality.json", modality(columns))
-    _write_json(root / INFO, _info(columns, parts, len(texts)))
+    write_json(root / "meta/stats.json", total_stats(parts))
+    write_json(root / "meta/modality.json", modality(columns))
+    write_json(root / INFO, _info(columns, parts, len(texts)))
 
 
 def modality(columns: FrameColumns) -> dict[str, Any]:
@@ -144,8 +135,3 @@ def _info(columns: FrameColumns, parts: Sequence[DatasetPart], texts: int) -> di
 def _write_lines(path: Path, lines: Iterable[object]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     write_atomically(path, "".join(f"{json.dumps(one)}\n" for one in lines))
-
-
-def _write_json(path: Path, content: object) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(path, json.dumps(content, indent=2) + "\n")

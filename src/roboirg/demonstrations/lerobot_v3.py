@@ -121,8 +121,8 @@ def finish(plan: ExportPlan, root: Path, parts: Sequence[DatasetPart]) -> None:
     write_rows(root / "meta/episodes/chunk-000/file-000.parquet", episodes)
     _write_tasks(root / "meta/tasks.parquet", texts)
     write_rows(root / EPISODE_TABLE, facts)
-    _write_json(root / "meta/stats.json", stats.result())
-    _write_json(root / INFO, _info(columns, parts, texts))
+    write_json(root / "meta/stats.json", stats.result())
+    write_json(root / INFO, _info(columns, parts, texts))
 
 
 class _StatsCollector:
@@ -269,6 +269,7 @@ def count_frames(columns: FrameColumns, last: RecordedEpisode) -> tuple[int, int
     return placed.episode_index + 1, placed.first_index + length
 
 
-def _write_json(path: Path, content: object) -> None:
+def write_json(path: Path, content: object) -> None:
+    """Write JSON, atomically."""
     path.parent.mkdir(parents=True, exist_ok=True)
     write_atomically(path, json.dumps(content, indent=2) + "\n")

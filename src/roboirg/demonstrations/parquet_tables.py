@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -61,6 +62,7 @@ def write_frames(
     shared: Mapping[str, Any],
     own: Sequence[Mapping[str, Any]],
     pictures: Sequence[str],
+    features: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> None:
     """Write the frames of one trajectory, once for each of its instructions.
 
@@ -72,12 +74,17 @@ def write_frames(
         shared: columns that are the same for every instruction.
         own: for each instruction its other columns.
         pictures: names of the columns that hold pictures.
+        features: types of the columns, for readers that take them from the file.
     """
     import pyarrow as pa
     from pyarrow import parquet
 
     tables = [pa.table({name: {**shared, **one}[name] for name in order}) for one in own]
     table = pa.concat_tables(tables)
+    if features is not None:
+        types = {name: _hugging_face_type(features[name]) for name in order}
+        described = json.dumps({"info": {"features": types}})
+        table = table.replace_schema_metadata({"huggingface": described})
     repeated = [f"{name}.bytes" for name in pictures] if len(own) > 1 else []
     texts = [name for name in order if pa.types.is_string(table.schema.field(name).type)]
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -95,6 +102,15 @@ def write_frames(
             row_group_size=max(len(table), 1),
             write_statistics=[name for name in order if name not in pictures],
         )
+
+
+def _hugging_face_type(feature: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a column's type as Hugging Face's `datasets` stores it in a file."""
+    if feature["dtype"] == "image":
+        return {"_type": "Image"}
+    value = {"dtype": feature["dtype"], "_type": "Value"}
+    (size,) = feature["shape"]
+    return value if size == 1 else {"feature": value, "length": size, "_type": "Sequence"}
 
 
 def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
