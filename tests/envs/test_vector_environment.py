@@ -1,7 +1,11 @@
 """The vector environment: equal to single environments, in every autoreset mode."""
 
 import os
+import re
 import signal
+import subprocess
+import sys
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -219,6 +223,19 @@ def test_gymnasium_makes_it():
     pictures = vector.render()
     assert [picture.shape for picture in pictures] == [(256, 512, 3)] * 2
     vector.close()
+
+
+def test_the_example_in_the_documents_runs(tmp_path):
+    page = (Path(__file__).parents[2] / "docs" / "environment.md").read_text()
+    (example,) = [
+        block
+        for block in re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+        if "make_vec" in block
+    ]
+    script = tmp_path / "example.py"
+    script.write_text(example)
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "[False False False False] [16 16 16 16]", done.stderr
 
 
 def test_infos_have_a_fixed_shape():

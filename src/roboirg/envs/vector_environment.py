@@ -44,6 +44,8 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
     once. The options of a reset hold until the next one, and for the resets in between that happen
     by themselves; ``episode`` may be a list of n.
 
+    The workers end with the thread that makes it, so that thread must last.
+
     The arguments are those of `roboirg.make_vec`, which documents them and the errors.
     """
 
