@@ -89,6 +89,7 @@ def export_grounding(
     )
     from roboirg.language import FORMS
     from roboirg.language.export import check_export_support
+    from roboirg.language.generator import check_options
     from roboirg.language.wordings.wording_store import open_wordings
 
     tables = () if formats.strip().lower() == "none" else parse_names("format", formats)
@@ -96,6 +97,15 @@ def export_grounding(
     if "parquet" in kinds:
         check_export_support("parquet")
     identity = open_wordings(wordings)
+    options = InstructionOptions(
+        stages=parse_stages(stages),
+        distractor=distractor,
+        frame=frame,
+        wordings=identity,
+        rival=rival,
+        reasoning=reasoning,
+    )
+    check_options(options)
     request = ExportRequest(
         episodes=tuple(
             EpisodeName(task, one, index)
@@ -105,14 +115,7 @@ def export_grounding(
         ),
         settings=known_settings(settings),
         forms=tuple(known_name("form", one, FORMS) for one in parse_names("form", forms)),
-        options=InstructionOptions(
-            stages=parse_stages(stages),
-            distractor=distractor,
-            frame=frame,
-            wordings=identity,
-            rival=rival,
-            reasoning=reasoning,
-        ),
+        options=options,
         every_variant=variants,
         frames=frames,
         frames_every=frames_every,

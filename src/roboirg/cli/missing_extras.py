@@ -9,6 +9,8 @@ _MODULES: Mapping[str, tuple[str, ...]] = {
     "light": ("fast_simplification",),
     "report": ("jinja2", "markupsafe", "matplotlib", "sklearn", "scipy"),
     "export": ("pyarrow",),
+    "demonstrations": ("h5py",),
+    "learn": ("torch",),
     "ray": ("ray",),
     "remote": ("websockets", "msgpack", "httpx", "platformdirs"),
     "tokens": ("sentencepiece", "tokenizers"),
