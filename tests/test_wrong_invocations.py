@@ -21,7 +21,8 @@ NAMES = {
 
 
 TEXTS = {
-    "--out", "--trajectories", "--operator", "--policy", "--address", "--devices", "--host", "--allow-host",
+    "--out", "--trajectories", "--operator", "--policy", "--address", "--devices", "--host",
+    "--allow-host",
 }  # fmt: skip
 """Options that take any text; all others take numbers or names."""
 
