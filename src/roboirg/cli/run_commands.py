@@ -172,9 +172,10 @@ def export_records(
     out: Annotated[Path, typer.Option(help="Parquet file to write.")],
 ) -> None:
     """Export the records of a run as a Parquet table (columns: see docs/running.md)."""
-    from roboirg.records.parquet import check_parquet_support, write_parquet
+    from roboirg.records.parquet import write_parquet
     from roboirg.records.record_codec import read_index_entry
     from roboirg.records.store import StoredRun
+    from roboirg.util.parquet_support import check_parquet_support
 
     check_parquet_support()
     if out.is_dir() or not out.parent.is_dir():

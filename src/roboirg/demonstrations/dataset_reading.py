@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.demonstrations.dataset_part import EPISODE_TABLE
-from roboirg.demonstrations.parquet_tables import check_parquet_support, read_rows
+from roboirg.demonstrations.parquet_tables import read_rows
 from roboirg.demonstrations.robomme_hdf5 import SHARED_FOLDER, check_hdf5_support
+from roboirg.util.parquet_support import check_parquet_support
 
 _STATES, _ACTIONS = ("observation.state", "state"), ("action", "actions")
 _HDF5_NAME = re.compile(r"record_dataset_(\w+)\.h5")

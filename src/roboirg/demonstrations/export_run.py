@@ -30,7 +30,6 @@ from roboirg.demonstrations.export_plan import (
     TaskText,
     recording_jobs,
 )
-from roboirg.demonstrations.parquet_tables import check_parquet_support
 from roboirg.demonstrations.policy_choice import choose_policy
 from roboirg.demonstrations.robomme_hdf5 import check_hdf5_support
 from roboirg.demonstrations.trajectory import (
@@ -42,6 +41,7 @@ from roboirg.demonstrations.trajectory import (
 from roboirg.demonstrations.trajectory_recorder import record_trajectory
 from roboirg.util.atomic_write import write_atomically
 from roboirg.util.parallel_map import parallel_map
+from roboirg.util.parquet_support import check_parquet_support
 
 WORK_FOLDER = ".export"
 VIDEO_DATASET = "demonstration_videos"

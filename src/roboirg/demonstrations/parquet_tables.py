@@ -10,25 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.core.errors import MissingDependencyError
 from roboirg.util.atomic_write import replacing
 
 _DICTIONARY_LIMIT = 2**30
 """Bytes of pictures that a file stores once although several instructions refer to them."""
-
-
-def check_parquet_support() -> None:
-    """Check early that Parquet files can be written.
-
-    Raises:
-        MissingDependencyError: pyarrow is not installed.
-    """
-    try:
-        import pyarrow.parquet  # noqa: F401
-    except ImportError as error:
-        raise MissingDependencyError(
-            "LeRobot's formats need pyarrow: pip install 'roboirgbench[export]'."
-        ) from error
 
 
 def number_column(values: NDArray[Any]) -> Any:  # noqa: ANN401 - pyarrow ships no types

@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from roboirg.core.episode import Episode
-from roboirg.core.errors import MissingDependencyError
 from roboirg.language.instruction import Instruction
 from roboirg.language.token_counts import count_tokens
 from roboirg.tasks import get_task
 from roboirg.util.atomic_write import write_atomically
+from roboirg.util.parquet_support import check_parquet_support
 
 ExportFormat = Literal["jsonl", "parquet"]
 EXPORT_FORMATS: tuple[ExportFormat, ...] = get_args(ExportFormat)
@@ -123,15 +123,8 @@ def check_export_support(kind: ExportFormat) -> None:
     Raises:
         MissingDependencyError: the format is Parquet, and pyarrow is not installed.
     """
-    if kind != "parquet":
-        return
-    try:
-        import pyarrow.parquet  # noqa: F401
-    except ImportError as error:
-        raise MissingDependencyError(
-            "Parquet files need pyarrow: pip install 'roboirgbench[export]'; "
-            "or ask for another format."
-        ) from error
+    if kind == "parquet":
+        check_parquet_support()
 
 
 def _jsonl(rows: Iterable[ExportRow]) -> bytes:

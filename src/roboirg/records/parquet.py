@@ -8,9 +8,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from roboirg.core.errors import MissingDependencyError
 from roboirg.records.record import Record
 from roboirg.util.atomic_write import replacing
+from roboirg.util.parquet_support import check_parquet_support
 
 if TYPE_CHECKING:
     from pyarrow import Schema
@@ -69,20 +69,6 @@ _NUMBER_COLUMNS = [
 _JSON_COLUMNS = ("goal", "metadata", "policy_metadata", "usage", "timings")
 """Fields whose keys depend on the task or policy."""
 _BATCH_ROWS = 5_000
-
-
-def check_parquet_support() -> None:
-    """Check that Parquet can be written.
-
-    Raises:
-        MissingDependencyError: pyarrow is not installed.
-    """
-    try:
-        import pyarrow.parquet  # noqa: F401
-    except ImportError as error:
-        raise MissingDependencyError(
-            "Parquet files need pyarrow; run: pip install 'roboirgbench[export]'."
-        ) from error
 
 
 def write_parquet(records: Iterable[Record], path: Path) -> int:
