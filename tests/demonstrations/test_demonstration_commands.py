@@ -80,7 +80,7 @@ def test_a_replay_prints_what_deviates(roboirg, export, monkeypatch):
 
     monkeypatch.setattr(dataset_replay, "replay", replay)
     code, out, _ = roboirg("replay", root, "--workers", "0")
-    assert code == 1
+    assert code == 2
     assert "PickXtimes/train/2/0: failure after 3 of 6 steps (recorded: success)" in out
     assert "2 trajectories: 1 with the same verdict, 1 also with a final state" in out
 

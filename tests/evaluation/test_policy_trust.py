@@ -164,7 +164,7 @@ def test_the_memory_of_a_host_holds_no_goal_scene_or_seed() -> None:
 
 
 def test_a_name_with_lone_surrogates_is_refused() -> None:
-    with pytest.raises(InvalidValueError, match="lone surrogates"):
+    with pytest.raises(InvalidValueError, match="name of a policy"):
         make_plan(["x\ud800=random"], tasks="PickXtimes")
 
 

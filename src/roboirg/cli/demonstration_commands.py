@@ -79,7 +79,11 @@ def export_demonstrations(
     ] = "oracle",
     outcomes: Annotated[str, typer.Option(help="successes or all.")] = "successes",
     language_columns: Annotated[
-        bool, typer.Option(help="Add LeRobot's language columns; LeRobot 0.6 or later reads them.")
+        bool,
+        typer.Option(
+            "--language-columns",
+            help="Add LeRobot's language columns; LeRobot 0.6 or later reads them.",
+        ),
     ] = False,
     trajectories: Annotated[
         Path | None,

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
     from roboirg.simulation.expert.primitives import MotionPrimitives
 
+_StagedChunk = tuple[Stage | None, NDArray[np.float64]]
+"""A chunk of actions and the stage that it belongs to; None while the command is awaited."""
+
 HOVER = "hover"
 """A primitive that touches nothing."""
 LISTENING_STEPS = 5
@@ -46,7 +49,8 @@ class ScriptedPolicy(ABC):
     def __init__(self, seed: int = 0) -> None:
         self.seed = seed
         self._env: RoboIRGEnv | None = None
-        self._chunks: Iterator[NDArray[np.float64]] = iter(())
+        # No generator of a method: the cycle would keep the world until the next collection.
+        self._chunks: Iterator[_StagedChunk] = iter(())
         self._heard: list[str] = []
         self.stage: Stage | None = None
 
@@ -87,28 +91,15 @@ class ScriptedPolicy(ABC):
             self._chunks = iter(())
             return
         stages = get_task(env.episode.task).stages(env.episode.scene, goal)
-        self._chunks = self._execute(env, stages)
+        self._chunks = _execute(env, stages, self.make_primitives(env))
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:  # noqa: ARG002
         """Return the next chunk of the motion; without one, actions that hold still."""
-        chunk = next(self._chunks, None)
-        return chunk if chunk is not None else _hold_still(self._attached())
-
-    def _execute(self, env: RoboIRGEnv, stages: tuple[Stage, ...]) -> Iterator[NDArray[np.float64]]:
-        """Yield action chunks, stage by stage; a primitive that fails is retried."""
-        primitives, progress = self.make_primitives(env), _StageProgress(env, stages)
-        index, retries = 0, 0
-        while index < len(stages):
-            self.stage = stages[index]
-            primitive = self.stage.primitive
-            yield from primitives.execute(primitive)
-            if progress.completed() > index:
-                index += 1
-            elif retries < MAX_RETRIES:
-                retries += 1
-                index -= primitive.kind in UNDOES_PICK and index > 0
-            else:
-                return
+        staged = next(self._chunks, None)
+        if staged is None:
+            return _hold_still(self._attached())
+        self.stage, chunk = staged
+        return chunk
 
     def _attached(self) -> RoboIRGEnv:
         if self._env is None:
@@ -116,16 +107,36 @@ class ScriptedPolicy(ABC):
         return self._env
 
 
-def _get_ready(env: RoboIRGEnv) -> Iterator[NDArray[np.float64]]:
+def _execute(
+    env: RoboIRGEnv, stages: tuple[Stage, ...], primitives: MotionPrimitives
+) -> Iterator[_StagedChunk]:
+    """Yield action chunks, stage by stage; a primitive that fails is retried."""
+    progress = _StageProgress(env, stages)
+    index, retries = 0, 0
+    while index < len(stages):
+        stage = stages[index]
+        for chunk in primitives.execute(stage.primitive):
+            yield stage, chunk
+        if progress.completed() > index:
+            index += 1
+        elif retries < MAX_RETRIES:
+            retries += 1
+            index -= stage.primitive.kind in UNDOES_PICK and index > 0
+        else:
+            return
+
+
+def _get_ready(env: RoboIRGEnv) -> Iterator[_StagedChunk]:
     """Yield the hover with which every goal begins, if there is one, then short rests for ever."""
     from roboirg.simulation.expert.primitives import MotionPrimitives
 
     task, scene = get_task(env.episode.task), env.episode.scene
     first, *others = {task.stages(scene, goal)[0].primitive for goal in task.goals(scene)}
     if not others and first.kind == HOVER:
-        yield from MotionPrimitives(env.session.world).execute(first)
+        for chunk in MotionPrimitives(env.session.world).execute(first):
+            yield None, chunk
     while True:
-        yield _hold_still(env)[:LISTENING_STEPS]
+        yield None, _hold_still(env)[:LISTENING_STEPS]
 
 
 class _StageProgress:
