@@ -23,7 +23,7 @@ from roboirg.cli.options import (
     Wordings,
     Workers,
 )
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError
 from roboirg.util.plurals import counted
 
 if TYPE_CHECKING:
@@ -93,6 +93,7 @@ def export_demonstrations(
     dry_run: Annotated[bool, typer.Option(help="Estimate the size and record nothing.")] = False,
 ) -> None:
     """Export demonstrations for training, recorded once per episode, told in every setting."""
+    from roboirg.cli.language_commands import known_settings
     from roboirg.core.instruction_options import InstructionOptions
     from roboirg.demonstrations.export_plan import ExportPlan
     from roboirg.demonstrations.export_run import run_export
@@ -118,7 +119,7 @@ def export_demonstrations(
         tasks=tuple(find_tasks(parse_names("task", tasks))),
         split=split,
         episodes=_episodes(split, episodes),
-        settings=_settings(settings),
+        settings=known_settings(settings),
         forms=FORMS if means_all(forms) else parse_names("form", forms),
         options=options,
         format=cast("Any", format),
@@ -157,18 +158,6 @@ def _episodes(split: str, text: str) -> tuple[int, ...]:
             f"The split 'random' has {size:,} episodes; say how many with --episodes."
         )
     return tuple(range(size))
-
-
-def _settings(text: str) -> tuple[str, ...]:
-    """Return the names of settings."""
-    from roboirg.evaluation.plan_parsing import means_all, parse_names
-    from roboirg.language import setting_names
-
-    names = setting_names() if means_all(text) else parse_names("setting", text)
-    for name in names:
-        if name not in setting_names():
-            raise UnknownNameError("setting", name, setting_names())
-    return names
 
 
 def _default_video(format_name: str) -> str:

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from roboirg.cli.options import AnySplit, Tasks
-from roboirg.core.errors import InvalidValueError
+from roboirg.cli.options import AnySplit, Tasks, check_output_file
 from roboirg.util.plurals import counted
 
 
@@ -23,8 +22,7 @@ def export_episodes(
     from roboirg.evaluation.plan_parsing import parse_names, parse_splits
     from roboirg.tasks import find_tasks
 
-    if out.is_dir() or not out.parent.is_dir():
-        raise InvalidValueError(f"{str(out)!r} is not a file in an existing folder.")
+    check_output_file(out)
     names = find_tasks(parse_names("task", tasks))
     episodes = split_episodes(names, parse_splits(split))
     typer.echo(f"Wrote {counted(write_episodes(episodes, out), 'episode')} to {out}.")

@@ -20,6 +20,7 @@ from roboirg.cli.options import (
     Tasks,
     Wordings,
     Workers,
+    check_output_file,
 )
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.util.plurals import counted
@@ -76,8 +77,7 @@ def export_instructions(
 
     kind = known_name("format", format, EXPORT_FORMATS)
     check_export_support(kind)
-    if out.is_dir() or not out.parent.is_dir():
-        raise InvalidValueError(f"{str(out)!r} is not a file in an existing folder.")
+    check_output_file(out)
     identity = open_wordings(wordings)
     names, chosen = known_tasks(tasks, identity), known_settings(settings)
     spoken = [known_name("form", one, FORMS) for one in parse_names("form", forms)]

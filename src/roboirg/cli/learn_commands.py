@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from roboirg.cli.options import Settings, Tasks, Workers
-from roboirg.core.errors import InvalidValueError
+from roboirg.cli.options import Settings, Tasks, Workers, check_output_file
 from roboirg.util.plurals import counted
 
 # Heavy modules are imported inside the commands, so that --help is fast.
@@ -43,8 +42,7 @@ def learn_listener(
     from roboirg.policies.learned.learned_model import WITHOUTS, save_model
     from roboirg.policies.learned.listener_training import TrainingPlan, train_listener
 
-    if out.is_dir() or not out.parent.is_dir():
-        raise InvalidValueError(f"{str(out)!r} is not a file in an existing folder.")
+    check_output_file(out)
     plan = TrainingPlan(
         known_tasks(tasks),
         known_settings(settings),

@@ -1,10 +1,13 @@
-"""Options shared by several commands."""
+"""Options shared by several commands, and checks of their values."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from roboirg.core.errors import InvalidValueError
 
 Tasks = Annotated[
     str,
@@ -33,3 +36,13 @@ Workers = Annotated[
     int | None,
     typer.Option(help="Worker processes, one per core by default; 0 uses this process only."),
 ]
+
+
+def check_output_file(path: Path) -> None:
+    """Check early that a file can be written there.
+
+    Raises:
+        InvalidValueError: it is a folder, or its folder does not exist.
+    """
+    if path.is_dir() or not path.parent.is_dir():
+        raise InvalidValueError(f"{str(path)!r} is not a file in an existing folder.")

@@ -11,7 +11,7 @@ import typer
 
 from roboirg.cli import plan_options as options
 from roboirg.cli.import_path import add_working_directory
-from roboirg.cli.options import Workers
+from roboirg.cli.options import Workers, check_output_file
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.printable import printable
 from roboirg.util.plurals import counted
@@ -178,8 +178,7 @@ def export_records(
     from roboirg.util.parquet_support import check_parquet_support
 
     check_parquet_support()
-    if out.is_dir() or not out.parent.is_dir():
-        raise InvalidValueError(f"{str(out)!r} is not a file in an existing folder.")
+    check_output_file(out)
     stored = StoredRun(folder_of(run), read_index_entry)
     count = write_parquet(stored.records(stored.newest), out)
     typer.echo(f"{counted(count, 'record')}: {out}")

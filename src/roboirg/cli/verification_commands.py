@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from roboirg.cli.import_path import add_working_directory
-from roboirg.cli.options import Workers
+from roboirg.cli.options import Workers, check_output_file
 from roboirg.cli.progress_bar import progress_bar
 from roboirg.cli.run_commands import USAGE_ERROR, Folder, folder_of, report_problems
 from roboirg.core.errors import InvalidValueError
@@ -62,8 +62,7 @@ def pack(
     """Pack records, plan and actions of a run into one file for others to check."""
     from roboirg.records.packing import pack_run
 
-    if out.is_dir() or not out.parent.is_dir():
-        raise InvalidValueError(f"{str(out)!r} is not a file in an existing folder.")
+    check_output_file(out)
     manifest = pack_run(folder_of(run), out, videos=videos, logs=logs)
     size = out.stat().st_size / 1e6
     typer.echo(f"{counted(manifest.records, 'record')}, {size:.1f} MB: {out}")

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.cli.options import check_output_file
+from roboirg.core.errors import RoboIRGError
 from roboirg.util.plurals import counted
 
 # Heavy modules are imported inside the commands, so that --help is fast.
@@ -32,8 +33,7 @@ def import_robomme(
     from roboirg.language.wordings.robomme_import import summary
     from roboirg.util.atomic_write import write_atomically
 
-    if out.is_dir() or not out.parent.is_dir():
-        raise InvalidValueError(f"{str(out)!r} is not a file in an existing folder.")
+    check_output_file(out)
     found = make_wordings(path, name)
     for task, case, reason in found.refused:
         typer.echo(f"Refused {task} ({case}): {reason}", err=True)

@@ -16,6 +16,7 @@ from roboirg.evaluation.plan import read_plans
 from roboirg.records.packing import PACK_SUFFIX, opened_run
 from roboirg.records.store import read_results
 from roboirg.util.atomic_write import write_atomically
+from roboirg.util.page_templates import template_environment
 
 BOARD_FILE = "board.html"
 _TEMPLATE = "board.html.j2"
@@ -90,15 +91,7 @@ def render_board(runs: Sequence[PackedRun]) -> str:
         MissingDependencyError: Jinja is not installed.
     """
     check_report_support()
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("roboirg.analysis.board"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = template_environment("roboirg.analysis.board")
     rows = board_rows(runs)
     settings = sorted({name for row in rows for name in row.rates}, key=setting_sort_key)
     return environment.get_template(_TEMPLATE).render(

@@ -8,7 +8,7 @@ import json
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from roboirg.analysis.page.columns import Columns, Progress, make_columns
 from roboirg.analysis.page.entries import EpisodeEntries, Run, make_entries
@@ -25,9 +25,7 @@ from roboirg.records.episode_log import logged_slugs
 from roboirg.records.record import Job, Record
 from roboirg.records.store import read_summaries
 from roboirg.util.atomic_write import write_atomically
-
-if TYPE_CHECKING:
-    import jinja2
+from roboirg.util.page_templates import template_environment
 
 REPORT_FILE = "report.html"
 FILMING = VideoOptions()
@@ -139,7 +137,8 @@ def render_runs(
     Raises:
         MissingDependencyError: Jinja is not installed.
     """
-    template = _environment().get_template(TEMPLATE)
+    check_report_support()
+    template = template_environment("roboirg.analysis.page").get_template(TEMPLATE)
     entries = make_entries(runs)
     videos = EpisodeVideos.of(entries.all, embed=embed)
     columns = make_columns(entries, videos, progress)
@@ -214,19 +213,6 @@ def _json(value: object) -> str:
 def _safe(text: str) -> str:
     """Escape JSON for a script element: no text in it ends the element."""
     return text.replace("<", "\\u003c")
-
-
-def _environment() -> jinja2.Environment:
-    check_report_support()
-    import jinja2
-
-    return jinja2.Environment(
-        loader=jinja2.PackageLoader("roboirg.analysis.page"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
 
 
 def _run(folder: Path, planned: Sequence[Job], *, videos: bool, link: str = "") -> Run:

@@ -17,7 +17,7 @@ from roboirg.evaluation.policy_environment import EnvRequirements
 from roboirg.evaluation.rollout import play_with
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.records.action_log import ActionLog
-from roboirg.records.record import IDENTITY, Job, Record
+from roboirg.records.record import Job, Record
 
 
 class ReplayPolicy:
@@ -53,9 +53,14 @@ class ReplayPolicy:
         return answer
 
 
-def unknown_policy() -> RolloutResult:
-    """Return an empty result whose policy is not looked up: the name may be anyone's module."""
-    return RolloutResult(policy=PolicyDescription("unknown", is_privileged=False))
+def unplayed(record: Record) -> Record:
+    """Return the record of the same job before anything is played.
+
+    Raises:
+        InvalidValueError: there is no such episode, or the job's wording file is missing or has
+            changed.
+    """
+    return make_record(_job(record), _unknown_policy(), started_at=record.started_at)
 
 
 def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
@@ -67,8 +72,7 @@ def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
     Raises:
         InvalidValueError: the job's wording file is missing or has changed.
     """
-    job = Job(**{name: getattr(record, name) for name in (*IDENTITY, "wordings_file")})
-    policy, result = ReplayPolicy(log), unknown_policy()
+    job, policy, result = _job(record), ReplayPolicy(log), _unknown_policy()
     needs = EnvRequirements((), find_action_space(log.space))
     try:
         play_with(policy, job, needs, result, CallGuard(result, None))
@@ -79,3 +83,13 @@ def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
     played = result.action_log
     digest = None if played is None else played.digest
     return make_record(job, result, started_at=record.started_at, action_log=digest), played
+
+
+def _job(record: Record) -> Job:
+    """Return what was played, without the address of the policy."""
+    return record.identity.model_copy(update={"wordings_file": record.wordings_file})
+
+
+def _unknown_policy() -> RolloutResult:
+    """Return an empty result whose policy is not looked up: the name may be anyone's module."""
+    return RolloutResult(policy=PolicyDescription("unknown", is_privileged=False))

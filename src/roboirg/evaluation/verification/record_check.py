@@ -11,11 +11,10 @@ import numpy as np
 
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
-from roboirg.evaluation.rollout_result import make_record
-from roboirg.evaluation.verification.action_replay import replay, unknown_policy
+from roboirg.evaluation.verification.action_replay import replay, unplayed
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.records.action_log import ActionLog, read_actions
-from roboirg.records.record import IDENTITY, Job, Record
+from roboirg.records.record import Record
 from roboirg.records.record_codec import read_line
 from roboirg.records.store import RECORDS_FILE
 
@@ -98,8 +97,7 @@ def _check(record: Record, folder: Path, *, play: bool) -> RecordCheck:
     findings = [*_versions(record)]
     if findings:
         return RecordCheck(record.slug, tuple(findings))
-    job = Job(**{name: getattr(record, name) for name in (*IDENTITY, "wordings_file")})
-    told = make_record(job, unknown_policy(), started_at=record.started_at)
+    told = unplayed(record)
     findings += _differences(record, told, WORD_FIELDS)
     findings += _words(record, told)
     if record.action_log is None:

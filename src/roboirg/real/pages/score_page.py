@@ -15,6 +15,7 @@ from roboirg.real.study.study_plan import PlannedTrial
 from roboirg.real.study.trial_log import SUCCESS, VOID_CHOICE, TrialLog, trial_metadata
 from roboirg.real.study.trial_text import describe_positions, explicit_command, spoken_turns
 from roboirg.records.record import Record
+from roboirg.util.page_templates import template_environment
 
 if TYPE_CHECKING:
     import jinja2
@@ -148,19 +149,12 @@ def check_page_support() -> None:
 @functools.cache
 def _template() -> jinja2.Template:
     check_page_support()
-    import jinja2
     from markupsafe import Markup
 
     def svg(text: str) -> Markup:
         return Markup(text)  # noqa: S704 - drawn by this package, with the plan's names
 
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("roboirg.real.pages"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = template_environment("roboirg.real.pages")
     environment.filters["svg"] = svg
     return environment.get_template(TEMPLATE)
 
