@@ -421,6 +421,7 @@ def test_a_model_is_asked_once_the_command_was_heard():
     said = instruct(episode, "direct").turns
     with fake_vlm([answer_text(episode.goal, goal_schema("PickXtimes"))]) as server:
         policy = make_listener(server)
+        policy.make_primitives = lambda env: None  # there is no arm here
         policy.attach(stand_in(episode, "direct", unheard=1))
         policy.reset(said[0], {})
         assert policy.usage()["calls"] == 0

@@ -219,6 +219,7 @@ def test_a_spec_drives_a_listener_and_its_records_hold_no_key(monkeypatch):
     with fake_vlm(['{"visit": 3}']) as server:
         spec = f"vlm-listener:openai?base_url={server.url}/v1&model=m&api_key_env=MY_KEY"
         policy = make_policy(spec, 1)
+        policy.make_primitives = lambda env: None  # there is no arm here
         policy.attach(stand_in(get_episode("StopCube", "test", 0)))
         policy.reset("Stop it.", {})
         assert policy.metadata["understood"] == {"visit": 3}
