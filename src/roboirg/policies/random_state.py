@@ -21,7 +21,7 @@ class RandomState:
     """
 
     _active: ClassVar[RandomState | None] = None
-    """Whose numbers the generators give; None when they are nobody's."""
+    """Whose numbers the generators give; None between episodes."""
 
     def __init__(self, seed: int) -> None:
         self._seed = seed
