@@ -26,11 +26,13 @@ class LabeledView(NamedTuple):
         picture: uint8 (256, 256, 3).
         names: of the objects' classes, such as ``cube red``.
         centers: (n, 2), column and row of the mean of the visible pixels.
+        positions: (n, 2), x and y on the table, m.
     """
 
     picture: NDArray[np.uint8]
     names: tuple[str, ...]
     centers: NDArray[np.float32]
+    positions: NDArray[np.float32]
 
 
 def class_of(item: SceneObject) -> str:
@@ -54,11 +56,17 @@ def look(episode: Episode) -> tuple[LabeledView, ...]:
 def _view(session: EpisodeSession, objects: Sequence[SceneObject]) -> LabeledView:
     world = session.world
     segments = world.cameras.segmentation(FRONT)
-    names, centers = [], []
+    names, centers, positions = [], [], []
     for item in objects:
         rows, columns = np.nonzero(segments == world.bodies[item.name].segment)
         if len(rows) >= MIN_PIXELS:
             names.append(class_of(item))
             centers.append((columns.mean(), rows.mean()))
-    found = np.array(centers, dtype=np.float32).reshape(-1, 2)
-    return LabeledView(world.picture(FRONT), tuple(names), found)
+            positions.append(world.bodies[item.name].position[:2])
+    return LabeledView(
+        world.picture(FRONT), tuple(names), _points_of(centers), _points_of(positions)
+    )
+
+
+def _points_of(points: Sequence[Sequence[float]]) -> NDArray[np.float32]:
+    return np.array(points, dtype=np.float32).reshape(-1, 2)

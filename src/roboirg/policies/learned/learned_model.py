@@ -12,21 +12,20 @@ from numpy.typing import NDArray
 
 from roboirg.core.episode import Goal
 from roboirg.core.errors import InvalidValueError
-from roboirg.policies.learned.detector_net import DetectorNet, SeenObjects
+from roboirg.policies.learned.detector_net import DetectorNet
 from roboirg.policies.learned.labeled_views import LATER_STEP
-from roboirg.policies.learned.listener_net import (
-    ListenerInput,
-    ListenerNet,
-    Vocabulary,
-    no_objects,
-)
+from roboirg.policies.learned.listener_net import ListenerInput, ListenerNet, Vocabulary
+from roboirg.policies.learned.object_relations import SeenScene, TablePlane, nothing_of, relate
 from roboirg.policies.planning.goal_schema import goal_schema
 from roboirg.util.short_hash import short_hash
 
-FORMAT = "roboirg-listener-1"
-Without = Literal["none", "pictures", "words"]
+FORMAT = "roboirg-listener-2"
+Without = Literal["none", "pictures", "video", "words"]
 WITHOUTS: tuple[Without, ...] = get_args(Without)
-"""What a variant does not get; the words are then empty."""
+"""What a variant does not get; the words are then empty.
+
+Without the video, nothing is seen of a scene that has one.
+"""
 
 Pixels = NDArray[np.uint8]
 
@@ -37,6 +36,7 @@ class LearnedModel(NamedTuple):
     Attributes:
         vocabulary: what it can name.
         detector: finds objects.
+        plane: of the table in the picture.
         reader: scores goals.
         without: what it does not get.
         about: how it was trained, for records.
@@ -44,6 +44,7 @@ class LearnedModel(NamedTuple):
 
     vocabulary: Vocabulary
     detector: DetectorNet
+    plane: TablePlane
     reader: ListenerNet
     without: Without
     about: dict[str, Any]
@@ -64,14 +65,14 @@ class LearnedModel(NamedTuple):
                 f"This listener was not trained on {task}, but on "
                 f"{', '.join(self.vocabulary.tasks)}."
             )
-        views = self.see(pictures)
+        seen = self.see(pictures)
         with torch.no_grad():
-            (scores,) = self.reader([self.hide(ListenerInput(task, text, views))])
+            (scores,) = self.reader([self.hide(ListenerInput(task, text, seen))])
         return list(goal_schema(task).goals.values())[int(scores.argmax())]
 
-    def see(self, pictures: Sequence[Pixels]) -> tuple[SeenObjects, ...]:
+    def see(self, pictures: Sequence[Pixels]) -> SeenScene:
         """Return the objects of pictures."""
-        return tuple(self.detector.find(pictures))
+        return relate(self.detector.find(pictures), self.plane, self.vocabulary.classes)
 
     def hide(self, given: ListenerInput) -> ListenerInput:
         """Return an input without what this listener does not get."""
@@ -79,9 +80,9 @@ class LearnedModel(NamedTuple):
 
 
 def hide(given: ListenerInput, without: Without) -> ListenerInput:
-    """Return an input without pictures or without words."""
-    if without == "pictures":
-        return given._replace(views=tuple(no_objects() for _ in given.views))
+    """Return an input without pictures, video or words."""
+    if without == "pictures" or (without == "video" and given.seen.looks > 1):
+        return given._replace(seen=nothing_of(given.seen))
     return given._replace(text="") if without == "words" else given
 
 
@@ -110,6 +111,7 @@ def save_model(model: LearnedModel, path: Path) -> None:
         "format": FORMAT,
         "vocabulary": {name: list(value) for name, value in model.vocabulary._asdict().items()},
         "detector": model.detector.state_dict(),
+        "plane": {name: torch.from_numpy(one) for name, one in model.plane._asdict().items()},
         "reader": model.reader.state_dict(),
         "without": model.without,
         "about": model.about,
@@ -132,6 +134,7 @@ def load_model(path: Path) -> LearnedModel:
             raise InvalidValueError(f"its format is {content.get('format')!r}, not {FORMAT!r}")
         held = {name: tuple(value) for name, value in content["vocabulary"].items()}
         vocabulary = Vocabulary(**held)
+        plane = TablePlane(**{name: one.numpy() for name, one in content["plane"].items()})
         detector, reader = DetectorNet(len(vocabulary.classes)), ListenerNet(vocabulary)
         detector.load_state_dict(content["detector"])
         reader.load_state_dict(content["reader"])
@@ -140,7 +143,7 @@ def load_model(path: Path) -> LearnedModel:
         raise InvalidValueError(f"{str(path)!r} is no trained listener ({reason}).") from error
     detector.eval()
     reader.eval()
-    return LearnedModel(vocabulary, detector, reader, content["without"], content["about"])
+    return LearnedModel(vocabulary, detector, plane, reader, content["without"], content["about"])
 
 
 def file_version(path: Path) -> str:

@@ -8,19 +8,18 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-import numpy as np
 import torch
 from torch import Tensor, nn
 
-from roboirg.policies.learned.detector_net import MAX_OBJECTS, SeenObjects
+from roboirg.policies.learned.object_relations import VIEWS, SeenScene, relation_count
 from roboirg.policies.planning.goal_schema import goal_schema
 
 WIDTH, HEADS, LAYERS = 96, 4, 3
 MAX_WORDS = 96
-VIEWS = 2
-"""At the start of the video, or else of the policy's turn; and later in the video."""
 WAVES = 6
 """Frequencies of the sines that encode a place."""
+METERS = 0.5
+"""Of a place, which the longest wave spans about once."""
 PADDING, UNKNOWN = 0, 1
 _WORD = re.compile(r"[a-z']+|[.,]")
 
@@ -47,12 +46,12 @@ class ListenerInput(NamedTuple):
     Attributes:
         task: name of the task.
         text: everything that was said.
-        views: objects of one or two pictures.
+        seen: objects of one or two pictures.
     """
 
     task: str
     text: str
-    views: tuple[SeenObjects, ...]
+    seen: SeenScene
 
 
 def split_words(text: str) -> list[str]:
@@ -101,6 +100,7 @@ class ListenerNet(nn.Module):
         self.kinds = nn.Embedding(len(vocabulary.classes), WIDTH)
         self.views = nn.Embedding(VIEWS, WIDTH)
         self.places = nn.Linear(4 * WAVES + 2, WIDTH)
+        self.relations = nn.Linear(relation_count(len(vocabulary.classes)), WIDTH, bias=False)
         self.tasks = nn.Embedding(len(vocabulary.tasks), WIDTH)
         layer = nn.TransformerEncoderLayer(
             WIDTH, HEADS, 2 * WIDTH, dropout=0.1, batch_first=True, norm_first=True
@@ -134,19 +134,20 @@ class ListenerNet(nn.Module):
         return [self._numbers.get(word, UNKNOWN) for word in words]
 
     def _encode_objects(self, inputs: Sequence[ListenerInput]) -> tuple[Tensor, Tensor]:
-        """Return embeddings (n, VIEWS * MAX_OBJECTS, WIDTH), and which of them there are."""
-        kinds = torch.zeros(len(inputs), VIEWS, MAX_OBJECTS, dtype=torch.long)
-        places = torch.zeros(len(inputs), VIEWS, MAX_OBJECTS, 2)
-        there = torch.zeros(len(inputs), VIEWS, MAX_OBJECTS, dtype=torch.bool)
-        for number, one in enumerate(inputs):
-            for view, found in enumerate(one.views[:VIEWS]):
-                count = len(found.kinds)
-                kinds[number, view, :count] = torch.from_numpy(found.kinds)
-                places[number, view, :count] = torch.from_numpy(found.places)
-                there[number, view, :count] = True
-        views = self.views(torch.arange(VIEWS))[:, None]
-        encoded = self.kinds(kinds) + self.places(_waves(places)) + views
-        return encoded.flatten(1, 2), there.flatten(1)
+        """Return embeddings (n, most objects, WIDTH), and which of them there are."""
+        counts = [len(one.seen.kinds) for one in inputs]
+        shape = len(inputs), max(counts)
+        kinds, views = (torch.zeros(shape, dtype=torch.long) for _ in range(2))
+        places = torch.zeros(*shape, 2)
+        relations = torch.zeros(*shape, self.relations.in_features)
+        for number, (one, count) in enumerate(zip(inputs, counts, strict=True)):
+            kinds[number, :count] = torch.from_numpy(one.seen.kinds)
+            views[number, :count] = torch.from_numpy(one.seen.views)
+            places[number, :count] = torch.from_numpy(one.seen.positions) / METERS
+            relations[number, :count] = torch.from_numpy(one.seen.relations)
+        there = torch.arange(shape[1]) < torch.tensor(counts)[:, None]
+        encoded = self.kinds(kinds) + self.views(views) + self.places(_waves(places))
+        return encoded + self.relations(relations), there
 
 
 def _waves(places: Tensor) -> Tensor:
@@ -165,8 +166,3 @@ def _marked(parts: Iterable[str], numbers: dict[str, int]) -> Tensor:
     found = torch.zeros(len(numbers))
     found[[numbers[part] for part in parts]] = 1.0
     return found
-
-
-def no_objects() -> SeenObjects:
-    """Return the objects of a picture that is not looked at."""
-    return SeenObjects(np.zeros(0, np.int64), np.zeros((0, 2), np.float32))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Generic, NamedTuple, TypeVar
 
+import numpy as np
 import torch
 from torch import nn
 from torch.nn import functional
@@ -17,8 +18,15 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import PoolName
 from roboirg.episodes.splits import SIZES, get_episode
 from roboirg.language import FORMS, LANGUAGE_VERSION
+from roboirg.language.instruction import Instruction
+from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.variants import instructions
-from roboirg.policies.learned.detector_net import DetectorNet, SeenObjects, detector_loss
+from roboirg.policies.learned.detector_net import (
+    SIZE,
+    DetectorNet,
+    SeenObjects,
+    detector_loss,
+)
 from roboirg.policies.learned.labeled_views import LabeledView, look
 from roboirg.policies.learned.learned_model import LearnedModel, Without, hide
 from roboirg.policies.learned.listener_net import (
@@ -27,7 +35,14 @@ from roboirg.policies.learned.listener_net import (
     Vocabulary,
     make_vocabulary,
 )
+from roboirg.policies.learned.object_relations import (
+    SeenScene,
+    TablePlane,
+    fit_plane,
+    relate,
+)
 from roboirg.policies.planning.goal_schema import goal_schema
+from roboirg.tasks import get_task
 from roboirg.util.parallel_map import parallel_map
 
 TRAINING_SPLIT: Split = "train"
@@ -35,6 +50,9 @@ BATCH = 32
 RATE = 1e-3
 FORGOTTEN_WORDS = 0.05
 """Share of the words that are unknown in training, so that new ones do no harm."""
+
+RIVAL = "drawn"
+_NO_PICTURE = np.zeros((0, 0, 3), np.uint8)
 
 Progress = Callable[[str, int, int], None]
 One = TypeVar("One")
@@ -47,8 +65,9 @@ class TrainingPlan(NamedTuple):
         tasks: names of tasks.
         settings: names of settings whose instructions it hears.
         words: the pool of words.
+        rivals: whether it also hears instructions with a rival, where there are some.
         scenes: random scenes of each task beyond the train split.
-        detector_epochs: passes over all pictures.
+        detector_epochs: passes over all pictures of the train split.
         reader_epochs: passes over all instructions.
         without: what it does not get.
         seed: of initial weights and order.
@@ -57,11 +76,30 @@ class TrainingPlan(NamedTuple):
     tasks: tuple[str, ...]
     settings: tuple[str, ...]
     words: PoolName = "train"
-    scenes: int = 0
-    detector_epochs: int = 6
-    reader_epochs: int = 30
+    rivals: bool = False
+    scenes: int = 300
+    detector_epochs: int = 4
+    reader_epochs: int = 12
     without: Without = "none"
     seed: int = 0
+
+
+class SeenEpisodes(NamedTuple):
+    """Scenes with what a trained detector sees of them, for any number of listeners.
+
+    Attributes:
+        episodes: all of them.
+        seen: the objects, by the episode's key.
+        classes: of objects, in the order of their numbers.
+        detector: finds objects.
+        plane: of the table.
+    """
+
+    episodes: tuple[Episode, ...]
+    seen: Mapping[str, SeenScene]
+    classes: tuple[str, ...]
+    detector: DetectorNet
+    plane: TablePlane
 
 
 class _Lesson(NamedTuple):
@@ -72,7 +110,7 @@ class _Lesson(NamedTuple):
 
 
 def train_listener(plan: TrainingPlan, workers: int, progress: Progress) -> LearnedModel:
-    """Return a listener that has learned from the train split.
+    """Return a listener that has learned from the train split and random scenes.
 
     Args:
         plan: how.
@@ -82,47 +120,113 @@ def train_listener(plan: TrainingPlan, workers: int, progress: Progress) -> Lear
     Raises:
         InvalidValueError: no task has one of the settings.
     """
-    torch.manual_seed(plan.seed)
-    episodes = list(_episodes(plan))
-    options = InstructionOptions(wordings=plan.words)
-    told = [
-        (episode, instruction.text)
-        for episode, instruction in instructions(episodes, plan.settings, FORMS[:1], options)
-    ]
-    if not told:
+    check_settings(plan)
+    return teach(see_episodes(plan, workers, progress), plan, progress)
+
+
+def check_settings(plan: TrainingPlan) -> None:
+    """Raise unless some task has one of the settings.
+
+    Raises:
+        InvalidValueError: none has.
+    """
+    if not any(set(plan.settings) & set(settings_of(get_task(task))) for task in plan.tasks):
         raise InvalidValueError(f"None of these tasks has the setting {', '.join(plan.settings)}.")
-    views = _look_at(episodes, workers, progress)
-    shown = [view for own in views.values() for view in own]
-    names = (name for view in shown for name in view.names)
-    vocabulary = make_vocabulary((text for _, text in told), names, plan.tasks)
-    detector = _train_detector(shown, vocabulary, plan, progress)
-    seen = {key: tuple(detector.find([view.picture for view in own])) for key, own in views.items()}
-    lessons = [_lesson(episode, text, seen[episode.key], plan.without) for episode, text in told]
+
+
+def see_episodes(plan: TrainingPlan, workers: int, progress: Progress) -> SeenEpisodes:
+    """Train a detector on the pictures of the train split, and look at all episodes.
+
+    Of random scenes only the labels are kept: they stand for what the detector would find.
+
+    Args:
+        plan: which tasks, how many scenes and passes.
+        workers: processes that draw pictures; 0 uses this one.
+        progress: called with a stage, what is done of it, and all of it.
+    """
+    torch.manual_seed(plan.seed)
+    episodes = tuple(_episodes(plan))
+    views: dict[str, tuple[LabeledView, ...]] = {}
+    for episode, own in parallel_map(_look, episodes, workers):
+        views[episode.key] = own
+        progress("pictures", len(views), len(episodes))
+    every = [view for episode in episodes for view in views[episode.key]]
+    classes = tuple(sorted({name for view in every for name in view.names}))
+    plane = fit_plane(
+        np.concatenate([view.centers for view in every]) / SIZE,
+        np.concatenate([view.positions for view in every]),
+    )
+    detector = _train_detector([one for one in every if one.picture.size], classes, plan, progress)
+    seen = {
+        key: relate(_seen(own, detector, classes), plane, classes) for key, own in views.items()
+    }
+    return SeenEpisodes(episodes, seen, classes, detector, plane)
+
+
+def teach(scenes: SeenEpisodes, plan: TrainingPlan, progress: Progress) -> LearnedModel:
+    """Return a listener that has learned to read the instructions of scenes.
+
+    Args:
+        scenes: seen before.
+        plan: which settings and words, how many passes, and what it does not get.
+        progress: called with a stage, what is done of it, and all of it.
+    """
+    torch.manual_seed(plan.seed)
+    told = [(episode, instruction.text) for episode, instruction in _instructions(scenes, plan)]
+    vocabulary = make_vocabulary((text for _, text in told), scenes.classes, plan.tasks)
+    lessons = [
+        _lesson(ListenerInput(episode.task, text, scenes.seen[episode.key]), episode, plan)
+        for episode, text in told
+    ]
     reader = _train_reader(lessons, vocabulary, plan, progress)
     about: dict[str, Any] = {**plan._asdict(), "language_version": LANGUAGE_VERSION}
     about |= {"tasks": list(plan.tasks), "settings": list(plan.settings)}
-    return LearnedModel(vocabulary, detector, reader, plan.without, about)
+    return LearnedModel(vocabulary, scenes.detector, scenes.plane, reader, plan.without, about)
 
 
-def _look_at(
-    episodes: Sequence[Episode], workers: int, progress: Progress
-) -> dict[str, tuple[LabeledView, ...]]:
-    """Return the labeled pictures of episodes by key, in their order."""
-    found: dict[str, tuple[LabeledView, ...]] = {}
-    for episode, views in parallel_map(look, episodes, workers):
-        found[episode.key] = views
-        progress("pictures", len(found), len(episodes))
-    return {episode.key: found[episode.key] for episode in episodes}
+def _instructions(
+    scenes: SeenEpisodes, plan: TrainingPlan
+) -> Iterator[tuple[Episode, Instruction]]:
+    options = InstructionOptions(wordings=plan.words)
+    yield from instructions(scenes.episodes, plan.settings, FORMS[:1], options)
+    if plan.rivals:
+        with_rivals = [
+            name
+            for name in plan.settings
+            if any(other.get("rival") == RIVAL for other in all_settings()[name].variants)
+        ]
+        options = options._replace(rival=RIVAL)
+        yield from instructions(scenes.episodes, with_rivals, FORMS[:1], options)
+
+
+def _look(episode: Episode) -> tuple[LabeledView, ...]:
+    """Return the labeled pictures of an episode; of a random scene only the labels."""
+    views = look(episode)
+    if episode.split == TRAINING_SPLIT:
+        return views
+    return tuple(view._replace(picture=_NO_PICTURE) for view in views)
+
+
+def _seen(
+    views: Sequence[LabeledView], detector: DetectorNet, classes: Sequence[str]
+) -> list[SeenObjects]:
+    if all(view.picture.size for view in views):
+        return detector.find([view.picture for view in views])
+    numbers = {name: number for number, name in enumerate(classes)}
+    return [
+        SeenObjects(np.array([numbers[name] for name in view.names], np.int64), view.centers / SIZE)
+        for view in views
+    ]
 
 
 def _train_detector(
-    shown: Sequence[LabeledView], vocabulary: Vocabulary, plan: TrainingPlan, progress: Progress
+    shown: Sequence[LabeledView], classes: Sequence[str], plan: TrainingPlan, progress: Progress
 ) -> DetectorNet:
-    detector, rng = DetectorNet(len(vocabulary.classes)), random.Random(plan.seed)
-    epochs = 0 if plan.without == "pictures" else plan.detector_epochs
+    detector, rng = DetectorNet(len(classes)), random.Random(plan.seed)
+    epochs = plan.detector_epochs
     trainer = _Trainer[LabeledView](
         detector,
-        lambda batch: detector_loss(detector, batch, vocabulary.classes),
+        lambda batch: detector_loss(detector, batch, classes),
         epochs * _batch_count(shown),
     )
     for epoch in range(epochs):
@@ -142,7 +246,7 @@ def _train_reader(
         plan.reader_epochs * _batch_count(lessons),
     )
     for epoch in range(plan.reader_epochs):
-        trainer.run(_batches([_forget(one, rng) for one in lessons], rng))
+        trainer.run(_even_batches([_forget(one, rng) for one in lessons], rng))
         progress("reader", epoch + 1, plan.reader_epochs)
     reader.eval()
     return reader
@@ -156,12 +260,10 @@ def _episodes(plan: TrainingPlan) -> Iterator[Episode]:
         yield from (get_episode(task, "random", place) for place in range(plan.scenes))
 
 
-def _lesson(
-    episode: Episode, text: str, views: tuple[SeenObjects, ...], without: Without
-) -> _Lesson:
+def _lesson(given: ListenerInput, episode: Episode, plan: TrainingPlan) -> _Lesson:
     schema = goal_schema(episode.task)
     goal = list(schema.goals).index(schema.answers[episode.goal])
-    return _Lesson(hide(ListenerInput(episode.task, text, views), without), goal)
+    return _Lesson(hide(given, plan.without), goal)
 
 
 def _forget(lesson: _Lesson, rng: random.Random) -> _Lesson:
@@ -188,6 +290,17 @@ def _batches(lessons: Sequence[One], rng: random.Random) -> Iterator[list[One]]:
     order = rng.sample(range(len(lessons)), len(lessons))
     for start in range(0, len(order), BATCH):
         yield [lessons[place] for place in order[start : start + BATCH]]
+
+
+def _even_batches(lessons: Sequence[_Lesson], rng: random.Random) -> Iterator[list[_Lesson]]:
+    """Yield batches of lessons that are about equally long, which wastes no time on padding."""
+    mixed = sorted(rng.sample(lessons, len(lessons)), key=_length)
+    batches = [mixed[start : start + BATCH] for start in range(0, len(mixed), BATCH)]
+    yield from rng.sample(batches, len(batches))
+
+
+def _length(lesson: _Lesson) -> int:
+    return lesson.given.text.count(" ")
 
 
 class _Trainer(Generic[One]):

@@ -1,0 +1,141 @@
+"""Where the objects of pictures stand on the table, and how they rank among their kind.
+
+Words such as *the cube second closest to the button* name a rank. A network of this size finds it
+hard to count and compare places, so each object tells its ranks itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.episode import ROBOT_BASE
+from roboirg.policies.learned.detector_net import SeenObjects
+
+VIEWS = 2
+"""At the start of the video, or else of the policy's turn; and later in the video."""
+_RANKS = 3
+"""How many of the first and of the last are told."""
+_CODES = 2 * _RANKS
+_FIXED = 7
+"""To the robot's left, forward, distance from the robot, and distance from each corner."""
+
+Points = NDArray[np.float64]
+
+
+class TablePlane(NamedTuple):
+    """What a picture's places are on the table.
+
+    Attributes:
+        matrix: (3, 3), from column and row, as shares of the picture's size, to x and y, m.
+        corners: (4, 2) x and y of the corners of the area where objects stand, m.
+    """
+
+    matrix: Points
+    corners: Points
+
+    def find(self, places: NDArray[np.floating]) -> Points:
+        """Return x and y (n, 2) on the table, m, of places (n, 2) in a picture."""
+        mapped = np.column_stack([places, np.ones(len(places))]) @ self.matrix.T
+        return np.asarray(mapped[:, :2] / mapped[:, 2:], np.float64)
+
+
+class SeenScene(NamedTuple):
+    """All objects seen, of one or two pictures.
+
+    Attributes:
+        kinds: (n,) numbers of classes, from 0.
+        views: (n,) the picture of each, from 0.
+        positions: (n, 2) x and y on the table, m.
+        relations: (n, `relation_count`) 1 where an object has a rank, else 0.
+        looks: number of pictures.
+    """
+
+    kinds: NDArray[np.int64]
+    views: NDArray[np.int64]
+    positions: NDArray[np.float32]
+    relations: NDArray[np.uint8]
+    looks: int
+
+
+def fit_plane(places: NDArray[np.floating], positions: NDArray[np.floating]) -> TablePlane:
+    """Return the plane that fits places (n, 2) in a picture and positions (n, 2) on the table, m.
+
+    The least squares of the equations of a homography, whose last coefficient is 1.
+    """
+    columns, ones, zeros = places.T, np.ones(len(places)), np.zeros(len(places))
+    rows = []
+    for axis in range(2):
+        own = [*columns, ones]
+        other = [zeros] * 3
+        shared = [-column * positions[:, axis] for column in columns]
+        rows.append(np.column_stack([*(own + other if axis == 0 else other + own), *shared]))
+    found = np.linalg.lstsq(np.vstack(rows), positions.T.reshape(-1), rcond=None)[0]
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    corners = [(x, y) for x in (low[0], high[0]) for y in (low[1], high[1])]
+    return TablePlane(np.append(found, 1.0).reshape(3, 3), np.array(corners, np.float64))
+
+
+def relation_count(classes: int) -> int:
+    """Return the number of ranks that are told, of so many classes of objects."""
+    return (_FIXED + VIEWS * classes) * _CODES
+
+
+def relate(views: Sequence[SeenObjects], plane: TablePlane, classes: Sequence[str]) -> SeenScene:
+    """Return the objects of pictures with their ranks among their kind.
+
+    Args:
+        views: one or two.
+        plane: of the table.
+        classes: names of classes; the first word of each is its kind.
+    """
+    kinds = np.concatenate([view.kinds for view in views])
+    where = np.repeat(np.arange(len(views)), [len(view.kinds) for view in views])
+    positions = plane.find(np.concatenate([view.places for view in views]))
+    relations = np.zeros((len(kinds), relation_count(len(classes))), np.uint8)
+    names = np.array([name.split()[0] for name in classes])[kinds]
+    groups = {(view, name) for view, name in zip(where, names, strict=True)}
+    for view, name in groups:
+        members = np.flatnonzero((where == view) & (names == name))
+        for landmark, others, values in _orders(members, kinds, where, positions, plane, classes):
+            _note_ranks(relations, landmark, others, values)
+    return SeenScene(kinds, where, positions.astype(np.float32), relations, len(views))
+
+
+def nothing_of(seen: SeenScene) -> SeenScene:
+    """Return what is seen of a scene that is not looked at."""
+    return SeenScene(*(one[:0] for one in seen[:4]), looks=0)
+
+
+def _orders(
+    members: NDArray[np.int64],
+    kinds: NDArray[np.int64],
+    where: NDArray[np.int64],
+    positions: Points,
+    plane: TablePlane,
+    classes: Sequence[str],
+) -> Iterator[tuple[int, NDArray[np.int64], Points]]:
+    """Yield landmarks, with objects of a kind and the value by which the landmark orders them."""
+    own = positions[members]
+    points = np.vstack([np.array([ROBOT_BASE[:2]]), plane.corners])
+    far = np.linalg.norm(own[:, None] - points[None], axis=2)
+    for landmark, values in enumerate([-own[:, 1], own[:, 0], *far.T]):
+        yield landmark, members, values
+    for other, (kind, view) in enumerate(zip(kinds, where, strict=True)):
+        rest = members[members != other]
+        landmark = _FIXED + int(view) * len(classes) + int(kind)
+        yield landmark, rest, np.linalg.norm(positions[rest] - positions[other], axis=1)
+
+
+def _note_ranks(
+    relations: NDArray[np.uint8], landmark: int, others: NDArray[np.int64], values: Points
+) -> None:
+    order = others[np.argsort(values, kind="stable")]
+    first = landmark * _CODES
+    for rank, (near, far) in enumerate(zip(order, order[::-1], strict=True)):
+        if rank == _RANKS:
+            break
+        relations[near, first + rank] = relations[far, first + _RANKS + rank] = 1
