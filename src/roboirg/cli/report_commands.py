@@ -304,13 +304,11 @@ def _cells(runs: list[str]) -> Cells:
 
 def _runs(runs: list[str]) -> tuple[list[tuple[str, Sequence[AnyResult]]], list[Job]]:
     """Return the results of runs, each with its folder, and the jobs of their plans."""
-    from roboirg.evaluation.plan import read_plan
+    from roboirg.cli.run_commands import planned_jobs
     from roboirg.records.store import read_results
 
     folders = [Path(run) for run in runs]
-    planned = [
-        job for folder in folders if (plan := read_plan(folder)) is not None for job in plan.jobs()
-    ]
+    planned = [job for folder in folders for job in planned_jobs(folder)]
     results: list[tuple[str, Sequence[AnyResult]]] = [
         (str(folder), read_results(folder)) for folder in folders
     ]

@@ -65,7 +65,7 @@ def read_packs(
         if check is None or check.records:  # else it could not even be opened
             with opened_run(path) as run:
                 results = read_results(run)
-                planned = [job for plan in read_plans(run) for job in plan.jobs()]
+                planned = [job for plan in read_plans(run) for job in plan.drawable_jobs()]
             packs.append(PackedRun(_name(path), results, planned, check))
         else:
             packs.append(PackedRun(_name(path), (), (), check))
