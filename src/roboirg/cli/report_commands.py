@@ -173,6 +173,7 @@ def compare(
 
     from roboirg.analysis.stats.comparison import compare as compare_cells
     from roboirg.analysis.stats.comparison_text import sentences
+    from roboirg.analysis.stats.flips import read_flips
     from roboirg.analysis.stats.intervals import SEED
 
     ours, theirs = _one_policy(first), _one_policy(second)
@@ -186,7 +187,8 @@ def compare(
     console = Console()
     if not console.is_terminal:
         console.width = max(console.width, MINIMUM_WIDTH)
-    for sentence in sentences(found, *names):
+    flips = read_flips(Path(_split(first)[0])), read_flips(Path(_split(second)[0]))
+    for sentence in sentences(found, *names, flips):
         console.print(Text(sentence), highlight=False)
 
 

@@ -164,7 +164,7 @@ def repeat(
     workers: Workers = None,
 ) -> None:
     """Play a run's plan again with its policies, and print which verdicts changed."""
-    from roboirg.analysis.stats.flips import repeated_episodes
+    from roboirg.analysis.stats.flips import flips_by_cell, repeated_episodes, write_flips
     from roboirg.cli.run_commands import play
     from roboirg.evaluation.executors.executor import choose_executor
     from roboirg.evaluation.plan import read_plan
@@ -181,7 +181,10 @@ def repeat(
     summary = play(
         plan.checked(), target, choose_executor(workers, plan.episode_timeout_s), retry=True
     )
-    _print_flips(repeated_episodes(folder, target))
+    found = repeated_episodes(folder, target)
+    _print_flips(found)
+    for where in (folder, target):
+        write_flips(flips_by_cell(found), where)
     report_problems(summary, target)
 
 
@@ -208,5 +211,10 @@ def _print_flips(episodes: tuple[RepeatedEpisode, ...]) -> None:
             else f"; actions differ from number {changed.differs_at} on"
         )
         typer.echo(f"{changed.slug}: {' then '.join(changed.outcomes)}{where}")
+    for policy, (before, now) in dict.fromkeys((one.policy, one.arithmetic) for one in episodes):
+        if before != now:
+            typer.echo(printable(f"{policy}: first {before or 'untold'}; then {now or 'untold'}."))
+        elif now:
+            typer.echo(printable(f"{policy}: {now}, both times."))
     found = count_flips(episodes)
     typer.echo(f"{found.flips:,} of {counted(found.verdicts, 'verdict')} changed.")
