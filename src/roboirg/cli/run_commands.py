@@ -66,6 +66,7 @@ def run(
     settings: options.Settings = None,
     forms: options.Forms = None,
     split: options.Split = None,
+    salt: options.Salt = None,
     episodes: options.Episodes = None,
     policy_seeds: options.PolicySeeds = None,
     stages: options.Stages = None,
@@ -134,7 +135,7 @@ def run(
     # Absolute: a policy in this process may change the working directory.
     folder = folder_of(out).absolute()
     add_working_directory()
-    made = _plan(plan, typed)
+    made = _plan(plan, typed, salt)
     chosen = _executor(made, executor, address, workers)
     _check_run(made, folder)
     if dry_run:
@@ -241,11 +242,11 @@ def print_tables_of(folder: Path, planned: Sequence[Job]) -> None:
 
 
 def planned_jobs(folder: Path) -> tuple[Job, ...]:
-    """Return the jobs of a run's newest plan; none if the plan is missing or cannot be read."""
+    """Return the jobs of a run's newest plan; none if the plan or its episodes are not known."""
     from roboirg.evaluation.plan import read_plan
 
     plan = read_plan(folder)
-    return plan.jobs() if plan else ()
+    return plan.drawable_jobs() if plan else ()
 
 
 def report_problems(summary: RunSummary, folder: Path) -> None:
@@ -285,8 +286,9 @@ def _results(folder: Path) -> Any:  # noqa: ANN401 - imported where it is needed
     return read_results(folder)
 
 
-def _plan(name: str | None, typed: dict[str, Any]) -> Plan:
+def _plan(name: str | None, typed: dict[str, Any], salt: str | None) -> Plan:
     """Return the plan of a file, overridden by the options that were typed."""
+    from roboirg.episodes.private_splits import with_salt
     from roboirg.evaluation.plan_file import read_plan_file
     from roboirg.evaluation.plan_maker import make_plan
 
@@ -297,6 +299,7 @@ def _plan(name: str | None, typed: dict[str, Any]) -> Plan:
     frames = chosen.get("demonstration_frames")
     if isinstance(frames, str) and frames.isdigit():
         chosen["demonstration_frames"] = int(frames)
+    chosen["split"] = with_salt(str(chosen.get("split", "test")), salt)
     return make_plan(policies, **chosen)
 
 
