@@ -50,7 +50,9 @@ def draw_averages(content: FigureData, *, published: bool = False) -> Figure | N
     ghosts = _ghosts(shared) if published else []
     models = list(dict.fromkeys(model for model, _, _ in ghosts))
     settings = list(shared)
-    figure, axes = rates_figure(HEIGHT_INCHES, len(content.names) + len(models))
+    labels = [content.name(one) for one in content.names]
+    labels += [f"{model} (published)" for model in models]
+    figure, axes = rates_figure(HEIGHT_INCHES, labels)
     for number, policy_run in enumerate(content.names):
         label = content.name(policy_run)
         for place, setting in enumerate(settings):

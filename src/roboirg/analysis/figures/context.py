@@ -48,9 +48,9 @@ def draw_context(content: FigureData, *, published: bool = False) -> Figure | No
         if (average := row.average_over(tasks)) is not None
     }
     models = list(dict.fromkeys(model for model, _ in ghosts))
-    policy_runs = {key.policy_run for key in cells}
-    entries = len(policy_runs) + len(models)
-    figure, axes = rates_figure(HEIGHT_INCHES, entries)
+    labels = [content.name(one) for one in {key.policy_run for key in cells}]
+    labels += [f"{model} (published)" for model in models]
+    figure, axes = rates_figure(HEIGHT_INCHES, labels)
     _draw_policies(axes, content, cells, columns)
     for number, model in enumerate(models):
         _draw_model(axes, model, [ghosts.get((model, options)) for options in columns], number)
@@ -89,7 +89,7 @@ def _set_axes(
     axes.set_xticks(range(len(columns)), [",".join(map(str, one.stages)) for one in columns])
     axes.set_xlim(-0.4, len(columns) - 0.6)
     words = textwrap.fill(f"stages that are spoken; mean over {', '.join(tasks)}", LABEL_LETTERS)
-    axes.set_xlabel(f"{words}\n{note}".rstrip())
+    axes.set_xlabel(f"{words}\n{note}".rstrip(), fontsize=6)
 
 
 def _played(cells: Cells) -> dict[PolicyRun, set[InstructionOptions]]:
