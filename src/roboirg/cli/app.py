@@ -18,11 +18,11 @@ from roboirg.cli import (
     grounding_commands,
     import_commands,
     language_commands,
+    people_commands,
     policy_commands,
     report_commands,
     run_commands,
     verification_commands,
-    wording_commands,
 )
 from roboirg.cli.bench_commands import bench
 from roboirg.cli.learn_commands import learn_app
@@ -73,7 +73,8 @@ app.add_typer(language_commands.export_app, name="export")
 app.add_typer(grounding_commands.score_app, name="score")
 app.add_typer(learn_app, name="learn")
 app.add_typer(real_app, name="real")
-app.add_typer(wording_commands.wordings_app, name="wordings")
+app.add_typer(people_commands.listen_app, name="listen")
+app.add_typer(language_commands.wordings_app, name="wordings")
 app.command()(bench)
 
 

@@ -147,15 +147,16 @@ def export_demonstrations(
 
 def _episodes(split: str, text: str) -> tuple[int, ...]:
     """Return the positions of episodes in a split."""
-    from roboirg.episodes.splits import SIZES, check_split
+    from roboirg.core.episode import SPLITS
+    from roboirg.episodes.splits import split_size
     from roboirg.evaluation.plan_parsing import means_all, parse_episodes
 
-    size = SIZES[check_split(split)]
+    size = split_size(split)
     if not means_all(text):
         return parse_episodes(text, split)
-    if split == "random":
+    if split not in SPLITS:
         raise InvalidValueError(
-            f"The split 'random' has {size:,} episodes; say how many with --episodes."
+            f"The split {split!r} has {size:,} episodes; say how many with --episodes."
         )
     return tuple(range(size))
 

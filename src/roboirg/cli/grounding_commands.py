@@ -29,9 +29,6 @@ if TYPE_CHECKING:
 
 # Heavy modules are imported inside the commands, so that --help is fast.
 
-MINIMUM_WIDTH = 150
-"""Columns of output that is not a terminal."""
-
 score_app = typer.Typer(no_args_is_help=True, help="Score answers of models.")
 
 
@@ -182,8 +179,6 @@ def score_grounding(
             write_answers(write_floors / f"{name}.jsonl", found)
         scores += score_answers(items, found, name)
     console = Console()
-    if not console.is_terminal:
-        console.width = max(console.width, MINIMUM_WIDTH)
     console.print(renderable(score_table(scores), console))
     for sentence in compared:
         console.print(sentence, highlight=False, markup=False)

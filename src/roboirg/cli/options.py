@@ -32,6 +32,10 @@ Wordings = Annotated[
         "of that pool in every split."
     ),
 ]
+Salt = Annotated[
+    str | None,
+    typer.Option(help="Secret of a private split; not in the shell's history if in ROBOIRG_SALT."),
+]
 Workers = Annotated[
     int | None,
     typer.Option(help="Worker processes, one per core by default; 0 uses this process only."),

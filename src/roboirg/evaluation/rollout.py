@@ -20,8 +20,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from roboirg import policies
 from roboirg.core.actions import ActionSpace
 from roboirg.core.delivery import SpokenInstruction
@@ -46,6 +44,7 @@ from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.policies.base import Policy, PrivilegedPolicy, close_policy, tell_policy
 from roboirg.policies.loading import needs_host
 from roboirg.policies.prompt_length.declared_limit import prompt_limit
+from roboirg.policies.random_state import episode_policy_seed
 from roboirg.records.action_log import write_actions
 from roboirg.records.record import Job, Record
 
@@ -270,13 +269,8 @@ def _load_hosted(
 
 
 def _policy_seed(job: Job) -> int:
-    """Return the policy's seed: the same in every setting, another in every episode.
-
-    It is derived from the run's policy seed and the episode's seed.
-    """
     episode = get_episode(job.task, job.split, job.episode)
-    seeds = np.random.SeedSequence((job.policy_seed, episode.seed))
-    return int(seeds.generate_state(1)[0])
+    return episode_policy_seed(job.policy_seed, episode.seed)
 
 
 def _play_to_end(

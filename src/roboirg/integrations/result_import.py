@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 from pydantic import JsonValue, ValidationError
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.episodes.splits import SIZES, check_split
+from roboirg.episodes.splits import split_size
 from roboirg.evaluation.policy_descriptions import PolicyDescription
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.records.record import DEFAULT_MAX_STEPS, ErrorKind, Job, Record
@@ -106,7 +106,7 @@ def _read_lerobot(path: Path, options: ImportOptions) -> Iterator[Record]:
         for index, success in enumerate(entry["metrics"]["successes"]):
             job = _job(
                 options, task=task, setting=setting, split=split,
-                episode=(options.seed + index) % SIZES[check_split(split)],
+                episode=(options.seed + index) % split_size(split),
             )  # fmt: skip
             result = _verdict(bool(success), job)
             yield _record(job, result, "lerobot", path, lacks)

@@ -1,4 +1,4 @@
-"""Global random generators, one state for each episode that shares a process with others."""
+"""Seeds of policies, and global random generators for episodes that share a process."""
 
 from __future__ import annotations
 
@@ -8,6 +8,16 @@ from types import TracebackType
 from typing import Any, ClassVar
 
 import numpy as np
+
+
+def episode_policy_seed(policy_seed: int, episode_seed: int) -> int:
+    """Return a policy's seed in an episode: the same in every setting, another in every episode.
+
+    Args:
+        policy_seed: of the run.
+        episode_seed: of the episode's scene.
+    """
+    return int(np.random.SeedSequence((policy_seed, episode_seed)).generate_state(1)[0])
 
 
 class RandomState:

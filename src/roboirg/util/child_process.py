@@ -104,13 +104,14 @@ class ChildProcess:
         return cls(process, ours)
 
     @classmethod
-    def run_module(cls, module: str, variables: Mapping[str, str]) -> Self:
+    def run_module(cls, module: str, variables: Mapping[str, str | None]) -> Self:
         """Start ``main(connection)`` of a module in an interpreter that knows nothing of this one.
 
         The script and command line of this process are kept from it. It has the environment of this
-        process and `variables`.
+        process and `variables`; those that are None it has not.
         """
         ours, theirs = socket.socketpair()
+        wanted = {**os.environ, **variables}
         with theirs:
             number = theirs.fileno()
             arguments = (str(number), str(os.getpid()), module, json.dumps(sys.path))
@@ -120,7 +121,7 @@ class ChildProcess:
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
-                env={**os.environ, **variables},
+                env={name: value for name, value in wanted.items() if value is not None},
             )
         return cls(process, Connection(ours.detach()), process.stdout)
 
