@@ -2,17 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from roboirg.cli.options import Settings, Tasks, Workers, check_output_file
+from roboirg.core.errors import InvalidValueError
 from roboirg.util.plurals import counted
+
+if TYPE_CHECKING:
+    from roboirg.policies.learned.listener_training import TrainingPlan
 
 # Heavy modules are imported inside the commands, so that --help is fast.
 
 learn_app = typer.Typer(no_args_is_help=True, help="Train a listener, and let it answer.")
+
+_Words = Annotated[str, typer.Option(help="Pool of words: train or test.")]
+_Rivals = Annotated[bool, typer.Option("--rivals", help="Also hear instructions with a rival.")]
+_Scenes = Annotated[
+    int, typer.Option(min=0, help="Random scenes of each task beyond the train split.")
+]
+_DetectorEpochs = Annotated[int, typer.Option(min=1, help="Passes over the pictures.")]
+_ReaderEpochs = Annotated[int, typer.Option(min=1, help="Passes over the instructions.")]
+_Without = Annotated[
+    str, typer.Option(help="What it does not get: none, pictures, video or words.")
+]
+_Seed = Annotated[int, typer.Option(help="Of initial weights and order.")]
 
 
 @learn_app.command("listener")
@@ -20,50 +37,75 @@ def learn_listener(
     out: Annotated[Path, typer.Option(help="File for what it has learned.")],
     tasks: Tasks = "all",
     settings: Settings = "all",
-    words: Annotated[str, typer.Option(help="Pool of words: train or test.")] = "train",
-    scenes: Annotated[
-        int, typer.Option(min=0, help="Random scenes of each task beyond the train split.")
-    ] = 0,
-    detector_epochs: Annotated[int, typer.Option(min=1, help="Passes over the pictures.")] = 6,
-    reader_epochs: Annotated[int, typer.Option(min=1, help="Passes over the instructions.")] = 30,
-    without: Annotated[
-        str, typer.Option(help="What it does not get: none, pictures or words.")
-    ] = "none",
-    seed: Annotated[int, typer.Option(help="Of initial weights and order.")] = 0,
+    words: _Words = "train",
+    rivals: _Rivals = False,
+    scenes: _Scenes = 300,
+    detector_epochs: _DetectorEpochs = 6,
+    reader_epochs: _ReaderEpochs = 12,
+    without: _Without = "none",
+    seed: _Seed = 0,
     workers: Workers = None,
 ) -> None:
     """Train a listener on the train split: pictures with free labels, then instructions."""
-    from roboirg.cli.language_commands import known_name, known_settings, known_tasks
-    from roboirg.core.word_pools import POOLS
     from roboirg.evaluation.executors.executor import core_count
     from roboirg.policies.learned.learned_listener import check_learn_support
 
     check_learn_support()
-    from roboirg.policies.learned.learned_model import WITHOUTS, save_model
-    from roboirg.policies.learned.listener_training import TrainingPlan, train_listener
+    from roboirg.policies.learned.learned_model import save_model
+    from roboirg.policies.learned.listener_training import train_listener
 
     check_output_file(out)
-    plan = TrainingPlan(
-        known_tasks(tasks),
-        known_settings(settings),
-        known_name("pool of words", words, POOLS),
-        scenes,
-        detector_epochs,
-        reader_epochs,
-        known_name("variant", without, WITHOUTS),
-        seed,
+    plan = _plan(tasks, settings, words, without)._replace(
+        rivals=rivals,
+        scenes=scenes,
+        detector_epochs=detector_epochs,
+        reader_epochs=reader_epochs,
+        seed=seed,
     )
     count = core_count() if workers is None else workers
-    shown: dict[str, int] = {}
-
-    def progress(stage: str, done: int, total: int) -> None:
-        tenth = 10 * done // total
-        if shown.get(stage) != tenth:
-            shown[stage] = tenth
-            typer.echo(f"{stage}: {done} of {total}", err=True)
-
-    save_model(train_listener(plan, count, progress), out)
+    save_model(train_listener(plan, count, _print_tenths()), out)
     typer.echo(f"{out}, {out.stat().st_size / 2**20:.1f} MiB")
+
+
+@learn_app.command("study")
+def learn_study(
+    out: Annotated[Path, typer.Option(help="Folder for listeners, tables and figure.")],
+    tasks: Tasks = "all",
+    words: _Words = "train",
+    scenes: _Scenes = 300,
+    detector_epochs: _DetectorEpochs = 6,
+    reader_epochs: _ReaderEpochs = 12,
+    seed: _Seed = 0,
+    workers: Workers = None,
+) -> None:
+    """Train listeners on all settings, on explicit words only, without video …, and compare."""
+    from roboirg.evaluation.executors.executor import core_count
+    from roboirg.policies.learned.learned_listener import check_learn_support
+
+    check_learn_support()
+    from roboirg.analysis.grounding_scores.study_report import (
+        save_study_figure,
+        study_cells,
+        study_text,
+    )
+    from roboirg.evaluation.learning.listener_study import run_study
+
+    if out.exists() and not out.is_dir():
+        raise InvalidValueError(f"{str(out)!r} is a file; --out needs a folder.")
+    out.mkdir(parents=True, exist_ok=True)
+    training = {
+        "scenes": scenes,
+        "detector_epochs": detector_epochs,
+        "reader_epochs": reader_epochs,
+        "seed": seed,
+    }
+    plan = _plan(tasks, "all", words, "none")._replace(**training)
+    count = core_count() if workers is None else workers
+    cells = study_cells(run_study(plan, out, count, _print_tenths()))
+    page = out / "study.md"
+    page.write_text(study_text(cells, {"words": words, **training}), encoding="utf-8")
+    save_study_figure(cells, out)
+    typer.echo(str(page))
 
 
 @learn_app.command("answers")
@@ -84,3 +126,32 @@ def learned_answers(
     items, learned = read_items(data), load_model(model)
     write_answers(out, answers_of(learned, items, data))
     typer.echo(f"{counted(len(items), 'answer')}: {out}")
+
+
+def _plan(tasks: str, settings: str, words: str, without: str) -> TrainingPlan:
+    from roboirg.cli.language_commands import known_name, known_settings, known_tasks
+    from roboirg.core.word_pools import POOLS
+    from roboirg.policies.learned.learned_model import WITHOUTS
+    from roboirg.policies.learned.listener_training import TrainingPlan, check_settings
+
+    plan = TrainingPlan(
+        known_tasks(tasks),
+        known_settings(settings),
+        words=known_name("pool of words", words, POOLS),
+        without=known_name("variant", without, WITHOUTS),
+    )
+    check_settings(plan)
+    return plan
+
+
+def _print_tenths() -> Callable[[str, int, int], None]:
+    """Return a function that prints progress whenever another tenth is done."""
+    shown: dict[str, int] = {}
+
+    def progress(stage: str, done: int, total: int) -> None:
+        tenth = 10 * done // total
+        if shown.get(stage) != tenth:
+            shown[stage] = tenth
+            typer.echo(f"{stage}: {done} of {total}", err=True)
+
+    return progress

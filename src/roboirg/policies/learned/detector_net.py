@@ -20,8 +20,8 @@ GRID = SIZE // CELL
 CHANNELS = (16, 32, 64, 64)
 MAX_OBJECTS = 20
 MIN_SCORE = 0.3
-BACKGROUND_WEIGHT = 0.05
-"""Of a cell without an object in the loss: there are a hundred times as many."""
+BACKGROUND_WEIGHT = 0.02
+"""Of a cell without an object in the loss: there are two hundred times as many."""
 
 
 class SeenObjects(NamedTuple):
@@ -47,14 +47,10 @@ class DetectorNet(nn.Module):
         super().__init__()
         first, second, third, fourth = CHANNELS
         self.features = nn.Sequential(
-            nn.Conv2d(3, first, 5, stride=2, padding=2),
-            nn.ReLU(),
-            nn.Conv2d(first, second, 3, stride=2, padding=1),
-            nn.ReLU(),
-            nn.Conv2d(second, third, 3, stride=2, padding=1),
-            nn.ReLU(),
-            nn.Conv2d(third, fourth, 3, padding=1),
-            nn.ReLU(),
+            *_block(3, first, size=5, stride=2),
+            *_block(first, second, stride=2),
+            *_block(second, third, stride=2),
+            *_block(third, fourth),
         )
         self.kinds = nn.Conv2d(fourth, classes + 1, 1)
         self.offsets = nn.Conv2d(fourth, 2, 1)
@@ -87,6 +83,11 @@ class DetectorNet(nn.Module):
                 SeenObjects(kinds[place, rows, columns].numpy(), centers.numpy().astype(np.float32))
             )
         return found
+
+
+def _block(inputs: int, outputs: int, size: int = 3, stride: int = 1) -> tuple[nn.Module, ...]:
+    convolution = nn.Conv2d(inputs, outputs, size, stride=stride, padding=size // 2, bias=False)
+    return convolution, nn.BatchNorm2d(outputs), nn.ReLU()
 
 
 def detector_loss(net: DetectorNet, views: Sequence[LabeledView], classes: Sequence[str]) -> Tensor:

@@ -60,12 +60,19 @@ class LearnedModel(NamedTuple):
         Raises:
             InvalidValueError: it was not trained on the task.
         """
+        return self.understand_seen(task, text, self.see(pictures))
+
+    def understand_seen(self, task: str, text: str, seen: SeenScene) -> Goal:
+        """Return the best goal of a task for an instruction, of a scene that has been seen.
+
+        Raises:
+            InvalidValueError: it was not trained on the task.
+        """
         if task not in self.vocabulary.tasks:
             raise InvalidValueError(
                 f"This listener was not trained on {task}, but on "
                 f"{', '.join(self.vocabulary.tasks)}."
             )
-        seen = self.see(pictures)
         with torch.no_grad():
             (scores,) = self.reader([self.hide(ListenerInput(task, text, seen))])
         return list(goal_schema(task).goals.values())[int(scores.argmax())]

@@ -47,7 +47,7 @@ from roboirg.util.parallel_map import parallel_map
 
 TRAINING_SPLIT: Split = "train"
 BATCH = 32
-RATE = 1e-3
+DETECTOR_RATE, READER_RATE = 1e-2, 1e-3
 FORGOTTEN_WORDS = 0.05
 """Share of the words that are unknown in training, so that new ones do no harm."""
 
@@ -78,7 +78,7 @@ class TrainingPlan(NamedTuple):
     words: PoolName = "train"
     rivals: bool = False
     scenes: int = 300
-    detector_epochs: int = 4
+    detector_epochs: int = 6
     reader_epochs: int = 12
     without: Without = "none"
     seed: int = 0
@@ -227,6 +227,7 @@ def _train_detector(
     trainer = _Trainer[LabeledView](
         detector,
         lambda batch: detector_loss(detector, batch, classes),
+        DETECTOR_RATE,
         epochs * _batch_count(shown),
     )
     for epoch in range(epochs):
@@ -243,6 +244,7 @@ def _train_reader(
     trainer = _Trainer[_Lesson](
         reader,
         lambda batch: _reader_loss(reader, batch),
+        READER_RATE,
         plan.reader_epochs * _batch_count(lessons),
     )
     for epoch in range(plan.reader_epochs):
@@ -307,12 +309,16 @@ class _Trainer(Generic[One]):
     """Trains a network with AdamW; the rate falls to zero along a cosine."""
 
     def __init__(
-        self, net: nn.Module, loss_of: Callable[[Sequence[One]], torch.Tensor], steps: int
+        self,
+        net: nn.Module,
+        loss_of: Callable[[Sequence[One]], torch.Tensor],
+        rate: float,
+        steps: int,
     ) -> None:
         self._net, self._loss_of = net, loss_of
-        self._optimizer = torch.optim.AdamW(net.parameters(), lr=RATE, weight_decay=0.01)
+        self._optimizer = torch.optim.AdamW(net.parameters(), lr=rate, weight_decay=0.01)
         self._schedule = torch.optim.lr_scheduler.OneCycleLR(
-            self._optimizer, RATE, total_steps=max(steps, 1), pct_start=0.1
+            self._optimizer, rate, total_steps=max(steps, 1), pct_start=0.1
         )
 
     def run(self, batches: Iterable[Sequence[One]]) -> None:

@@ -1,0 +1,1 @@
+"""Listeners that learn, compared: what words, settings, pictures and video bring."""

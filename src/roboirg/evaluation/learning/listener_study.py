@@ -1,0 +1,154 @@
+"""Train several listeners on the same scenes, and let each understand the test split."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from roboirg.core.episode import Episode, Split
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.observations import FRONT
+from roboirg.core.word_pools import POOLS
+from roboirg.envs.environment import RoboIRGEnv
+from roboirg.episodes.splits import SIZES, get_episode
+from roboirg.language import FORMS
+from roboirg.language.settings import all_settings
+from roboirg.language.variants import instructions
+from roboirg.policies.learned.learned_listener import FRAMES_EVERY
+from roboirg.util.parallel_map import parallel_map
+
+if TYPE_CHECKING:
+    from roboirg.policies.learned.learned_model import LearnedModel, Pixels
+    from roboirg.policies.learned.listener_training import Progress, TrainingPlan
+
+TEST: Split = "test"
+RIVAL = "drawn"
+
+
+class StudyVariant(NamedTuple):
+    """One listener of the study.
+
+    Attributes:
+        name: of its file and its row.
+        changes: of the common plan.
+    """
+
+    name: str
+    changes: Mapping[str, Any]
+
+
+VARIANTS = (
+    StudyVariant("all", {}),
+    StudyVariant("explicit", {"settings": ("explicit",)}),
+    StudyVariant("rivals", {"rivals": True}),
+    StudyVariant("no-video", {"without": "video"}),
+    StudyVariant("no-pictures", {"without": "pictures"}),
+    StudyVariant("no-words", {"without": "words"}),
+)
+"""Trained on all settings; on explicit words only; on rivals too; without parts of the input."""
+
+
+class StudyAnswer(NamedTuple):
+    """What one listener made of one instruction of the test split.
+
+    Attributes:
+        listener: name of the variant.
+        task: of the episode.
+        episode: its place in the split.
+        options: of the instruction; `wordings` is the pool of words.
+        is_right: whether it understood the goal.
+    """
+
+    listener: str
+    task: str
+    episode: int
+    options: InstructionOptions
+    is_right: bool
+
+
+def run_study(
+    plan: TrainingPlan, folder: Path, workers: int, progress: Progress
+) -> Iterator[StudyAnswer]:
+    """Train every listener of the study, write its file, and yield what it understands.
+
+    The scenes are drawn once, and all listeners have the same detector.
+
+    Args:
+        plan: of the first listener; the others differ as `VARIANTS` says.
+        folder: for the files, ``NAME.pt``.
+        workers: processes that draw pictures; 0 uses this one.
+        progress: called with a stage, what is done of it, and all of it.
+    """
+    from roboirg.policies.learned.learned_model import save_model
+    from roboirg.policies.learned.listener_training import see_episodes, teach
+
+    scenes = see_episodes(plan, workers, progress)
+    shown = list(_show_all(plan.tasks, workers, progress))
+    for variant in VARIANTS:
+
+        def follow(stage: str, done: int, total: int, name: str = variant.name) -> None:
+            progress(f"{name}: {stage}", done, total)
+
+        model = teach(scenes, plan._replace(**variant.changes), follow)
+        save_model(model, folder / f"{variant.name}.pt")
+        yield from _answers(model, variant.name, shown)
+
+
+def _show_all(
+    tasks: Sequence[str], workers: int, progress: Progress
+) -> Iterator[tuple[Episode, Sequence[Pixels]]]:
+    """Yield the episodes of the test split with the pictures that a listener looks at."""
+    episodes = [get_episode(task, TEST, place) for task in tasks for place in range(SIZES[TEST])]
+    found = {}
+    for episode, pictures in parallel_map(pictures_of, episodes, workers):
+        found[episode.key] = pictures
+        progress("test pictures", len(found), len(episodes))
+    yield from ((episode, found[episode.key]) for episode in episodes)
+
+
+def pictures_of(episode: Episode) -> list[Pixels]:
+    """Return the pictures that a learned listener looks at when it plays an episode."""
+    from roboirg.policies.learned.learned_model import pictures_to_see
+
+    env = RoboIRGEnv(episode, cameras=(FRONT,), demonstration_frames=FRAMES_EVERY)
+    try:
+        observation, info = env.reset()
+        video = info["demonstration"]
+        frames = video["front_rgb"] if video.length else ()
+        return pictures_to_see(observation["front_rgb"], frames, FRAMES_EVERY)
+    finally:
+        env.close()
+
+
+def _answers(
+    model: LearnedModel, name: str, shown: Sequence[tuple[Episode, Sequence[Pixels]]]
+) -> Iterator[StudyAnswer]:
+    understand = _reader_of(model, shown)
+    episodes = [episode for episode, _ in shown]
+    for options in told_options():
+        told = instructions(episodes, (options.setting,), FORMS[:1], options)
+        for episode, instruction in told:
+            is_right = understand(episode, instruction.text)
+            yield StudyAnswer(name, episode.task, episode.index, options, is_right)
+
+
+def told_options() -> Iterator[InstructionOptions]:
+    """Yield how the test split is told: in words of both pools, and with rivals."""
+    for setting, details in all_settings().items():
+        for pool in POOLS:
+            yield InstructionOptions(setting, wordings=pool)
+        if any(other.get("rival") == RIVAL for other in details.variants):
+            yield InstructionOptions(setting, wordings=TEST, rival=RIVAL)
+
+
+def _reader_of(
+    model: LearnedModel, shown: Sequence[tuple[Episode, Sequence[Pixels]]]
+) -> Callable[[Episode, str], bool]:
+    # Every scene is told many times, and looked at once.
+    seen = {episode.key: model.see(pictures) for episode, pictures in shown}
+
+    def understand(episode: Episode, text: str) -> bool:
+        return model.understand_seen(episode.task, text, seen[episode.key]) == episode.goal
+
+    return understand
