@@ -7,6 +7,7 @@ Exit codes: 0 success; 2 invalid usage, or episodes ended in errors (one sentenc
 from __future__ import annotations
 
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -146,6 +147,18 @@ def doctor() -> None:
     from roboirg.doctor import run_doctor
 
     raise typer.Exit(run_doctor())
+
+
+@app.command("fetch-models")
+def fetch_models(
+    wheel: Annotated[
+        str | None, typer.Option(help="ManiSkill's wheel on this machine; downloaded by default.")
+    ] = None,
+) -> None:
+    """Put the model files of the robot and the table in place, if they are not; print where."""
+    from roboirg.simulation.model_fetch import fetch_model_files
+
+    typer.echo(fetch_model_files(Path(wheel) if wheel else None, partial(typer.echo, err=True)))
 
 
 @app.command("tasks")

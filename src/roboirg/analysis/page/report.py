@@ -18,7 +18,7 @@ from roboirg.analysis.page.run_warnings import comparisons, facts_of, run_warnin
 from roboirg.analysis.stats.breakdowns import BREAKDOWNS, label_instructions
 from roboirg.analysis.tables.breakdown_table import make_breakdown_table
 from roboirg.analysis.tables.table import Table
-from roboirg.core.errors import MissingDependencyError
+from roboirg.core.extras import extra_needed
 from roboirg.evaluation.video_writer import LAST_FRAME_REPEATS, VideoOptions
 from roboirg.language.settings import EXPLICIT, all_settings
 from roboirg.records.episode_log import logged_slugs
@@ -163,13 +163,8 @@ def check_report_support() -> None:
     Raises:
         MissingDependencyError: Jinja is not installed.
     """
-    try:
+    with extra_needed("The report needs Jinja", "report"):
         import jinja2  # noqa: F401 - an extra
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"The report needs Jinja, which is not installed ({error}); run: "
-            "pip install 'roboirgbench[report]'"
-        ) from error
 
 
 def _data(entries: EpisodeEntries, columns: Columns) -> dict[str, Any]:

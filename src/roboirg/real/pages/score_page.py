@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 from urllib.parse import urlencode
 
-from roboirg.core.errors import MissingDependencyError
+from roboirg.core.extras import extra_needed
 from roboirg.real.pages.arrangement_svg import draw_svg
 from roboirg.real.study.failure_choices import failure_choices
 from roboirg.real.study.study_plan import PlannedTrial
@@ -137,13 +137,8 @@ def check_page_support() -> None:
     Raises:
         MissingDependencyError: Jinja is not installed.
     """
-    try:
+    with extra_needed("The page needs Jinja", "report"):
         import jinja2  # noqa: F401 - an extra
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"The page needs Jinja, which is not installed ({error}); run: "
-            "pip install 'roboirgbench[report]'"
-        ) from error
 
 
 @functools.cache
