@@ -82,5 +82,5 @@ def test_every_command_is_walked():
 
 def test_the_modules_of_every_extra_are_known():
     extras = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]
-    assert set(_MODULES) | {"dev"} == set(extras["optional-dependencies"])
+    assert set(_MODULES) | {"dev", "docs"} == set(extras["optional-dependencies"])
     assert describe_missing(ModuleNotFoundError("", name="numpyy")) is None

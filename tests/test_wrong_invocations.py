@@ -47,7 +47,7 @@ def wrong_words(command, words):
 
 
 RIGHT = {
-    "fetch-models": [],
+    "fetch-models": ["--wheel", "nowhere"],
     "wordings import-robomme": ["nowhere", "--out", "words.toml"],
     "verify": ["nowhere"],
     "replay": ["nowhere"],
