@@ -63,7 +63,6 @@ app = typer.Typer(
     name="roboirg",
     help="RoboIRGBench: test whether robot policies understand implicit references.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
