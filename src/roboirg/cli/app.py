@@ -7,6 +7,7 @@ Exit codes: 0 success; 2 invalid usage, or episodes ended in errors (one sentenc
 from __future__ import annotations
 
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -63,7 +64,6 @@ app = typer.Typer(
     name="roboirg",
     help="RoboIRGBench: test whether robot policies understand implicit references.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -111,6 +111,7 @@ app.command()(report_commands.tables)
 app.command()(report_commands.figures)
 app.command()(report_commands.compare)
 app.command()(import_commands.import_results)
+app.command()(people_commands.drive)
 app.command(cls=policy_commands.ProtocolHelpCommand)(policy_commands.serve)
 app.command("check-policy", cls=policy_commands.ProtocolHelpCommand)(policy_commands.check_policy)
 language_commands.export_app.command("grounding")(grounding_commands.export_grounding)
@@ -150,6 +151,18 @@ def doctor() -> None:
     raise typer.Exit(run_doctor())
 
 
+@app.command("fetch-models")
+def fetch_models(
+    wheel: Annotated[
+        str | None, typer.Option(help="ManiSkill's wheel on this machine; downloaded by default.")
+    ] = None,
+) -> None:
+    """Put the model files of the robot and the table in place, if they are not; print where."""
+    from roboirg.simulation.model_fetch import fetch_model_files
+
+    typer.echo(fetch_model_files(Path(wheel) if wheel else None, partial(typer.echo, err=True)))
+
+
 @app.command("tasks")
 def list_tasks() -> None:
     """List the tasks with their suites and settings."""
@@ -173,13 +186,13 @@ def build_splits(
     from roboirg.episodes import splits
     from roboirg.evaluation.executors.executor import core_count
     from roboirg.evaluation.plan_parsing import parse_names, parse_splits
-    from roboirg.evaluation.seed_selection import (
+    from roboirg.evaluation.seed_search.seed_selection import (
         check_kept_splits,
         episode_slots,
         find_seeds,
         merge_splits,
     )
-    from roboirg.evaluation.seed_summary import follow_progress, print_summary
+    from roboirg.evaluation.seed_search.seed_summary import follow_progress, print_summary
     from roboirg.tasks import find_tasks
     from roboirg.util.atomic_write import write_atomically
 

@@ -202,3 +202,57 @@ def _read_text(path: Path) -> str:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InvalidValueError(f"The text {str(path)!r} cannot be read ({error}).") from error
+
+
+def drive(
+    task: Annotated[str, typer.Argument(help="Name of the task.")],
+    episode: Annotated[int, typer.Argument(help="Position in the split, from 0.")],
+    setting: Annotated[str, typer.Option(help="Setting of the words.")] = "explicit",
+    form: Annotated[str, typer.Option(help="implicit or resolved.")] = "implicit",
+    split: Split = "test",
+    delivery: Delivery = "prompt",
+    stages: Stages = "1-5",
+    distractor: Distractor = "neutral",
+    frame: Frame = "robot",
+    rival: Rival = "none",
+    reasoning: Reasoning = "plain",
+    wordings: Wordings = None,
+    max_steps: Annotated[int, typer.Option(help="Limit in control steps, 20 per second.")] = 1300,
+    out: run_commands.Out = "runs/driven",
+    name: Annotated[str, typer.Option(help="Name of the policy in the records.")] = "person",
+    host: Host = "127.0.0.1",
+    port: Port = 0,
+    allow_host: AllowHost = None,
+) -> None:
+    """Drive an episode in the browser, by mouse, touch or keyboard; stores its record."""
+    from roboirg.envs.factory import check_simulator
+    from roboirg.evaluation.people.drive_server import DriveServer
+    from roboirg.evaluation.people.driving_run import DRIVER
+    from roboirg.evaluation.plan_maker import make_plan
+
+    # The plan checks the words as those of a run; a person is no policy that can be loaded.
+    made = make_plan(
+        [f"{DRIVER}=oracle"],
+        tasks=task,
+        settings=setting,
+        forms=form,
+        split=split,
+        episodes=f"{episode},",
+        delivery=delivery,
+        stages=stages,
+        distractor=distractor,
+        frame=frame,
+        rival=rival,
+        reasoning=reasoning,
+        wordings=wordings,
+        max_steps=max_steps,
+    )
+    check_simulator()
+    jobs = made.jobs()
+    if len(jobs) != 1:
+        raise InvalidValueError(
+            f"One task, one setting and one form are driven at a time; these are {len(jobs)} jobs."
+        )
+    job = jobs[0].model_copy(update={"policy": name, "spec": None})
+    server = DriveServer(job, run_commands.folder_of(out), host, port, allow_host or ())
+    _serve(server, f"Press Ctrl-C to stop; the records of episodes that ended are in {out}.")

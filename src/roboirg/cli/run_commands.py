@@ -339,6 +339,7 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
 
     from roboirg.evaluation.estimate import cell_sizes, estimate, estimate_text
     from roboirg.evaluation.executors.executor import core_count
+    from roboirg.evaluation.world_speed import ASSUMED, measure_world
     from roboirg.records.record_codec import identity_key
     from roboirg.records.store import read_index
     from roboirg.util.console_width import widen
@@ -361,7 +362,11 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
     played = read_index(folder)
     todo = [job for job in jobs if identity_key(job) not in played]
     count = core_count() if workers is None else max(workers, 1)  # 0 is this process
-    for line in estimate_text(estimate(todo, played.values(), count), len(jobs), count):
+    known = {(one.policy, one.task) for one in played.values()}
+    new = [job for job in todo if (job.policy, job.task) not in known]
+    speed = measure_world(new) if new else ASSUMED
+    found = estimate(todo, played.values(), min(count, core_count()), speed)
+    for line in estimate_text(found, len(jobs), count, speed):
         console.print(line, highlight=False)
 
 

@@ -39,7 +39,7 @@ from roboirg.evaluation.policy_descriptions import PolicyDescription, describe_h
 from roboirg.evaluation.policy_environment import EnvRequirements, env_requirements, make_env
 from roboirg.evaluation.prompt_shares import audit_job, too_long_text
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
-from roboirg.evaluation.video_writer import VideoOptions, VideoWriter
+from roboirg.evaluation.video_writer import FrameSink, VideoOptions, VideoWriter
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.policies.base import Policy, PrivilegedPolicy, close_policy, tell_policy
 from roboirg.policies.loading import needs_host
@@ -157,7 +157,7 @@ class EpisodeRunner:
 
 def play_episode(
     job: Job,
-    writer: VideoWriter | None = None,
+    writer: FrameSink | None = None,
     policy_timeout_s: float | None = None,
     hosts: HostAddress | None = None,
     *,
@@ -214,7 +214,7 @@ def play_with(
     needs: EnvRequirements,
     result: RolloutResult,
     guard: CallGuard,
-    writer: VideoWriter | None = None,
+    writer: FrameSink | None = None,
 ) -> None:
     """Play one job with a loaded policy, which is not closed.
 
@@ -278,7 +278,7 @@ def _play_to_end(
     policy: Policy,
     actions: ActionSpace,
     job: Job,
-    writer: VideoWriter | None,
+    writer: FrameSink | None,
     result: RolloutResult,
     guard: CallGuard,
 ) -> None:
@@ -325,7 +325,7 @@ def _play_to_end(
 def _tell(
     policy: Policy,
     utterances: Sequence[Mapping[str, Any]],
-    writer: VideoWriter | None,
+    writer: FrameSink | None,
     result: RolloutResult,
     guard: CallGuard,
 ) -> None:

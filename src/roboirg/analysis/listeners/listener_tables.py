@@ -27,8 +27,8 @@ from roboirg.records.listener_answers import (
 
 ALL = "all"
 _SETTING_NOTE = (
-    "Asked twice: questions that two people or more have answered. Agreement: the share of pairs "
-    "of their answers that are equal, in percent; alpha: Krippendorff's, nominal, of each task and "
+    "Asked twice: questions that several people have answered. Agreement: the share of pairs of "
+    "their answers that are equal, in percent; alpha: Krippendorff's, nominal, of each task and "
     "setting, then averaged. Seconds: median from the first words to the answer. Practice and "
     "attention checks are left out."
 )

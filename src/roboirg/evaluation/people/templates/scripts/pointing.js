@@ -4,6 +4,14 @@ const SVG = "http://www.w3.org/2000/svg";
 const SIDE = 256;
 const REACH = 14; // pixels of the picture by which a finger may miss a thing
 
+const ORDINALS = ["1st", "2nd", "3rd"];
+
+/** Where the sign of a thing stands: above it, so that it hides nothing of it. */
+const above = (thing) => {
+  const rows = thing.outlines.flatMap((outline) => outline.split(" ").map((point) => Number(point.split(",")[1])));
+  return Math.max(8, Math.min(...rows) - 8);
+};
+
 const svg = (name, attributes, ...children) => {
   const element = document.createElementNS(SVG, name);
   for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
@@ -41,8 +49,8 @@ const makePointing = ({ picture, points, least, things }, changed) => {
   const shapes = things.map((thing, place) => {
     const same = things.filter((one) => one.noun === thing.noun);
     const label = `${thing.noun}, ${same.indexOf(thing) + 1} of ${same.length} from the left`;
-    const badge = svg("g", { class: "badge", "aria-hidden": "true", transform: `translate(${thing.x} ${thing.y})` },
-      svg("circle", { r: 6.5 }), svg("text", { y: 3.2, "text-anchor": "middle" }));
+    const badge = svg("g", { class: "badge", "aria-hidden": "true", transform: `translate(${thing.x} ${above(thing)})` },
+      svg("rect", { x: -9, y: -6.5, width: 18, height: 13, rx: 6.5 }), svg("text", { y: 3, "text-anchor": "middle" }));
     const shape = svg("g", { class: "thing", role: "button", tabindex: 0, "data-place": place },
       ...thing.outlines.map((outline) => svg("polygon", { points: outline })), badge);
     shape.addEventListener("keydown", (event) => {
@@ -60,7 +68,7 @@ const makePointing = ({ picture, points, least, things }, changed) => {
       shape.setAttribute("aria-pressed", String(slot >= 0));
       const order = slot >= 0 && points.length > 1 ? `, pointed at as number ${slot + 1}` : "";
       shape.setAttribute("aria-label", label + order);
-      badge.lastChild.textContent = slot >= 0 ? (points.length > 1 ? slot + 1 : "✓") : place + 1;
+      badge.lastChild.textContent = slot >= 0 ? (points.length > 1 ? ORDINALS[slot] : "✓") : place + 1;
     });
   };
   const layer = svg("svg", { viewBox: `0 0 ${SIDE} ${SIDE}`, role: "group", "aria-label": "Things in the picture" },
