@@ -7,6 +7,7 @@ from typer.testing import CliRunner
 from roboirg.cli.app import app
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.episodes.splits import get_episode
+from roboirg.evaluation.learning.listener_study import VARIANTS
 from roboirg.policies.learned.labeled_views import LATER_STEP, class_of, look
 from roboirg.policies.loading import is_privileged, make_policy
 from roboirg.policies.planning.goal_schema import goal_schema
@@ -41,6 +42,10 @@ def test_labels_are_what_is_visible_and_where():
     for view in (first, later):
         assert view.picture.shape == (256, 256, 3)
         assert view.centers.shape == (len(view.names), 2)
+    for view in (first, later):
+        there = {item.name: item.position[:2] for item in episode.scene.objects}
+        for name, place in zip(view.names, view.positions, strict=True):
+            assert min(np.linalg.norm(place - one) for one in there.values()) < 0.01, name
     for name, (column, row) in zip(first.names, first.centers, strict=True):
         if name in cubes:
             pixel = first.picture[round(float(row)), round(float(column))].astype(int)
@@ -79,6 +84,21 @@ def test_of_a_video_the_first_frame_and_a_later_one_are_seen():
     assert [one.max() for one in pictures_to_see(now, [], 8)] == [99]
     assert [one.max() for one in pictures_to_see(now, frames, 8)] == [0, LATER_STEP // 8]
     assert [one.max() for one in pictures_to_see(now, frames[:2], 8)] == [0, 1]
+
+
+def scene_of(*views):
+    """What is seen of a scene with containers and red cubes."""
+    from roboirg.policies.learned.object_relations import SeenObjects, TablePlane, relate
+
+    classes = ("container", "cube red")
+    seen = [
+        SeenObjects(
+            np.array([classes.index(one[0]) for one in view], np.int64),
+            np.array([one[1:] for one in view], np.float32),
+        )
+        for view in views
+    ]
+    return relate(seen, TablePlane(np.eye(3), np.zeros((4, 2))), classes)
 
 
 def plan_of(**changes):
@@ -164,12 +184,43 @@ def test_files_that_are_no_listener_are_one_sentence(torch, tmp_path, content):
 
 
 def test_what_a_variant_does_not_get_changes_nothing(torch):
-    from roboirg.policies.learned.detector_net import SeenObjects
     from roboirg.policies.learned.learned_model import hide
     from roboirg.policies.learned.listener_net import ListenerInput
 
-    seen = SeenObjects(np.zeros(1, np.int64), np.zeros((1, 2), np.float32))
-    given = ListenerInput("StopCube", "Stop it.", (seen,))
+    seen = scene_of([("cube red", 0.0, 0.1)], [("container", 0.0, 0.1)])
+    given = ListenerInput("StopCube", "Stop it.", seen)
     assert hide(given, "none") is given
     assert hide(given, "words").text == ""
-    assert len(hide(given, "pictures").views[0].kinds) == 0
+    assert len(hide(given, "pictures").seen.kinds) == 0
+    assert len(hide(given, "video").seen.kinds) == 0
+    without_video = given._replace(seen=scene_of([("cube red", 0.0, 0.1)]))
+    assert hide(without_video, "video") is without_video
+
+
+@pytest.mark.sim
+def test_the_study_writes_every_listener_a_table_and_a_figure(torch, tmp_path):
+    done = CliRunner().invoke(
+        app,
+        [
+            "learn",
+            "study",
+            "--tasks",
+            "StopCube",
+            "--scenes",
+            "0",
+            "--detector-epochs",
+            "1",
+            "--reader-epochs",
+            "2",
+            "--workers",
+            "0",
+            "--out",
+            str(tmp_path),
+        ],
+    )
+    assert done.exit_code == 0, done.output
+    names = {one.name for one in tmp_path.glob("*.pt")}
+    assert names == {f"{variant.name}.pt" for variant in VARIANTS}
+    text = (tmp_path / "study.md").read_text()
+    assert text.count("## ") == 3
+    assert (tmp_path / "study.png").stat().st_size > 5000

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -12,6 +11,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from roboirg.policies.learned.labeled_views import LabeledView
+from roboirg.policies.learned.object_relations import SeenObjects
 
 CELL = 8
 """Pixels of a cell of the grid in which objects are found."""
@@ -22,18 +22,6 @@ MAX_OBJECTS = 20
 MIN_SCORE = 0.3
 BACKGROUND_WEIGHT = 0.02
 """Of a cell without an object in the loss: there are two hundred times as many."""
-
-
-class SeenObjects(NamedTuple):
-    """The objects found in a picture, the surest first.
-
-    Attributes:
-        kinds: (n,) numbers of classes, from 0.
-        places: (n, 2) column and row, as shares of the picture's size.
-    """
-
-    kinds: NDArray[np.int64]
-    places: NDArray[np.float32]
 
 
 class DetectorNet(nn.Module):

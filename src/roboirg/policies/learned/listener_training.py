@@ -21,12 +21,7 @@ from roboirg.language import FORMS, LANGUAGE_VERSION
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.variants import instructions
-from roboirg.policies.learned.detector_net import (
-    SIZE,
-    DetectorNet,
-    SeenObjects,
-    detector_loss,
-)
+from roboirg.policies.learned.detector_net import SIZE, DetectorNet, detector_loss
 from roboirg.policies.learned.labeled_views import LabeledView, look
 from roboirg.policies.learned.learned_model import LearnedModel, Without, hide
 from roboirg.policies.learned.listener_net import (
@@ -36,6 +31,7 @@ from roboirg.policies.learned.listener_net import (
     make_vocabulary,
 )
 from roboirg.policies.learned.object_relations import (
+    SeenObjects,
     SeenScene,
     TablePlane,
     fit_plane,

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.episode import ROBOT_BASE
-from roboirg.policies.learned.detector_net import SeenObjects
 
 VIEWS = 2
 """At the start of the video, or else of the policy's turn; and later in the video."""
@@ -24,6 +23,18 @@ _FIXED = 7
 """To the robot's left, forward, distance from the robot, and distance from each corner."""
 
 Points = NDArray[np.float64]
+
+
+class SeenObjects(NamedTuple):
+    """The objects found in a picture, the surest first.
+
+    Attributes:
+        kinds: (n,) numbers of classes, from 0.
+        places: (n, 2) column and row, as shares of the picture's size.
+    """
+
+    kinds: NDArray[np.int64]
+    places: NDArray[np.float32]
 
 
 class TablePlane(NamedTuple):
