@@ -260,22 +260,6 @@ def read_index(folder: Path) -> dict[RecordKey, RecordIndexEntry]:
     }
 
 
-def check_writable(folder: Path) -> None:
-    """Check that a run's folder can be written, or made; nothing is.
-
-    Raises:
-        StoreError: it cannot.
-    """
-    place = next(one for one in (folder, *folder.absolute().parents) if one.exists())
-    records = folder / RECORDS_FILE
-    if not place.is_dir():
-        raise StoreError(f"Cannot write to {folder}: {place} is not a folder.")
-    if not os.access(place, os.W_OK | os.X_OK) or (
-        records.exists() and not os.access(records, os.W_OK)
-    ):
-        raise StoreError(f"Cannot write to {folder}: Permission denied.")
-
-
 class LinePlace(NamedTuple):
     """Where a line is: its number from 1, its first byte, and its bytes without the newline."""
 
