@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
 # Heavy modules are imported inside the commands, so that --help answers at once.
 
-MINIMUM_WIDTH = 120
-"""Columns to use if the output is not a terminal."""
 _ALL = "all"
 
 By = Annotated[
@@ -175,6 +173,7 @@ def compare(
     from roboirg.analysis.stats.comparison_text import sentences
     from roboirg.analysis.stats.flips import read_flips
     from roboirg.analysis.stats.intervals import SEED
+    from roboirg.util.console_width import widen
 
     ours, theirs = _one_policy(first), _one_policy(second)
     breakdowns = _breakdowns(by)
@@ -185,8 +184,7 @@ def compare(
     if names[0] == names[1]:
         names = [f"{names[0]} ({first})", f"{names[1]} ({second})"]
     console = Console()
-    if not console.is_terminal:
-        console.width = max(console.width, MINIMUM_WIDTH)
+    widen(console)
     flips = read_flips(Path(_split(first)[0])), read_flips(Path(_split(second)[0]))
     for sentence in sentences(found, *names, flips):
         console.print(Text(sentence), highlight=False)
@@ -277,8 +275,6 @@ def _print(found: list[Table]) -> None:
     from roboirg.analysis.tables.rendering.terminal import renderable
 
     console = Console()
-    if not console.is_terminal:
-        console.width = max(console.width, MINIMUM_WIDTH)
     for table in found:
         console.print(renderable(table, console), highlight=False)
 

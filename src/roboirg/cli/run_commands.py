@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 USAGE_ERROR, INTERRUPTED, TERMINATED = 2, 130, 143
 EXECUTORS = ("local", "ray")
-_MINIMUM_WIDTH = 100
 
 Policies = Annotated[
     list[str] | None,
@@ -340,12 +339,12 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
 
     from roboirg.evaluation.estimate import cell_sizes, estimate, estimate_text
     from roboirg.evaluation.executors.executor import core_count
+    from roboirg.evaluation.world_speed import ASSUMED, measure_world
     from roboirg.records.record_codec import identity_key
     from roboirg.records.store import read_index
+    from roboirg.util.console_width import widen
 
     jobs, console = plan.jobs(), Console()
-    if not console.is_terminal:
-        console.width = max(console.width, _MINIMUM_WIDTH)
     table = Table(title=f"plan {plan.fingerprint}", title_justify="left")
     sizes = cell_sizes(jobs)
     settings = tuple(dict.fromkeys(setting for cells in sizes.values() for setting in cells))
@@ -357,12 +356,17 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
         counts = (" + ".join(map(str, cells.get(one, {}).values())) or "–" for one in settings)
         table.add_row(policy, task, *counts)
     table.caption = "episodes: implicit" + (" + resolved" if "resolved" in plan.forms else "")
+    widen(console, table)
     console.print(table)
     _print_prompt_shares(jobs, settings, console)
     played = read_index(folder)
     todo = [job for job in jobs if identity_key(job) not in played]
     count = core_count() if workers is None else max(workers, 1)  # 0 is this process
-    for line in estimate_text(estimate(todo, played.values(), count), len(jobs), count):
+    known = {(one.policy, one.task) for one in played.values()}
+    new = [job for job in todo if (job.policy, job.task) not in known]
+    speed = measure_world(new) if new else ASSUMED
+    found = estimate(todo, played.values(), min(count, core_count()), speed)
+    for line in estimate_text(found, len(jobs), count, speed):
         console.print(line, highlight=False)
 
 
@@ -374,6 +378,7 @@ def _print_prompt_shares(
 
     from roboirg.evaluation.prompt_shares import prompt_shares, share_text
     from roboirg.policies.policy_classes import BUILTIN
+    from roboirg.util.console_width import widen
 
     shares = prompt_shares(jobs)
     table = Table(title="instructions that are cut", title_justify="left")
@@ -385,6 +390,7 @@ def _print_prompt_shares(
             row = ("–" if count is None else share_text(count) for count in counts)
             table.add_row(one.policy, f"{one.limit.tokens} tokens", *row)
     if table.row_count:
+        widen(console, table)
         console.print(table)
     undeclared = [one.policy for one in shares if one.limit is None and one.policy not in BUILTIN]
     if undeclared:

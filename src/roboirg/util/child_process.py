@@ -20,6 +20,8 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import IO, Any, NamedTuple, Self, cast
 
+from roboirg.util.freed_memory import keep_freed_memory
+
 GRACE_S = 2.0
 """How long a child may take to exit once its channel is closed."""
 
@@ -202,7 +204,7 @@ def _run_main() -> None:
 
 
 def _begin(parent: int) -> None:
-    """Put this process under the supervision of its parent."""
+    """Put this process under the supervision of its parent, and prepare it for its work."""
     # Ctrl-C is for the parent, which decides what to do.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -212,3 +214,4 @@ def _begin(parent: int) -> None:
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(1)  # the parent died before the line above
+    keep_freed_memory()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
 from roboirg.analysis.stats.comparison import Comparison, ComparisonResult
@@ -94,7 +95,18 @@ def _figures(result: ComparisonResult) -> str:
         low, high = (points(end, 1) for end in gap.interval)
         words += f" (95 % interval {low} to {high})"
     tasks = "" if len(result.tasks) == 1 else f" of {len(result.tasks)} tasks"
-    return f"{words}, {p_text(result.p_holm)}, {counted(gap.episodes, 'episode')}{tasks}"
+    p_value = p_text(result.p_holm)
+    if _is_surprising(result):
+        p_value += f" (uncorrected {p_text(gap.p_value).removeprefix('p ').removeprefix('= ')})"
+    return f"{words}, {p_value}, {counted(gap.episodes, 'episode')}{tasks}"
+
+
+def _is_surprising(result: ComparisonResult) -> bool:
+    """Return whether the interval excludes no difference, and the corrected test does not."""
+    interval = result.gap.interval
+    return (
+        result.verdict == "open" and interval is not None and not interval.low <= 0 <= interval.high
+    )
 
 
 def _outlook(result: ComparisonResult) -> str:
@@ -120,6 +132,12 @@ def _caveats(comparison: Comparison) -> Iterator[str]:
         if several
         else " over the settings."
     )
+    shown = (*comparison.averages, *itertools.chain.from_iterable(comparison.parts.values()))
+    if any(map(_is_surprising, shown)):
+        yield (
+            "An interval is of one gap alone, so it may exclude 0 although p is above 0.05: p is "
+            "corrected for all gaps that are tested together, and it decides."
+        )
     if comparison.parts:
         yield "A break-down is corrected by itself, over all its rows."
     if unpaired:

@@ -23,7 +23,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple, Protocol, Self, cast, runtime_checkable
 
-from roboirg.core.errors import InvalidValueError, MissingDependencyError, RoboIRGError
+from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.core.extras import extra_needed
 from roboirg.episodes.private_splits import known_salt, use_salt
 from roboirg.evaluation.episode_errors import format_cause
 from roboirg.evaluation.executors.executor import NO_TIMEOUT_S
@@ -117,13 +118,8 @@ def import_ray() -> ModuleType:
     """
     # Ray would send usage statistics to its developers.
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
-    try:
+    with extra_needed("--executor ray needs Ray", "ray"):
         import ray
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"Ray is not installed ({error}); run: pip install 'roboirgbench[ray]', or play with "
-            "--executor local."
-        ) from error
     return ray
 
 
