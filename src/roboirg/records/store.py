@@ -12,7 +12,6 @@ that lines are in the order of the plan (they are in the order in which episodes
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Generic, NamedTuple, Self, TypeVar
