@@ -58,7 +58,7 @@ class DrivingSession:
 
     def add_frame(self, source: PictureSource, is_demonstration: bool = False) -> None:
         """Make the current pictures those of the page; the video is shown apart."""
-        self.env = source  # type: ignore[assignment] - the only source of frames there is
+        self.env = source  # type: ignore[assignment]  # the only source of frames
         if is_demonstration:
             return
         self.show_pictures({one: source.picture(one) for one in CAMERAS})
