@@ -94,8 +94,8 @@ def test_commands_become_way_points():
 def test_commands_that_are_none_move_nothing():
     wrong = (
         {}, {"jump": 1}, {"move": [0, 0]}, {"move": [0, 0, 9]}, {"move": ["a", 0, 0]},
-        {"turn": None}, {"turn": float("nan")}, {"grip": "squeeze"}, {"wait": 1e9}, {"point": [0, 1000]},
-        {"point": [True, 0]}, {"height": -1},
+        {"turn": None}, {"turn": float("nan")}, {"grip": "squeeze"}, {"wait": 1e9},
+        {"point": [0, 1000]}, {"point": [True, 0]}, {"height": -1},
     )  # fmt: skip
     assert all(str(one).startswith("Nothing moved: ") for one in commanded(*wrong))
 

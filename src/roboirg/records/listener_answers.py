@@ -139,6 +139,11 @@ class AnswerLog:
         self.close()
 
 
+def person_name(number: int) -> str:
+    """Return the name under which a person appears in records and tables."""
+    return f"p{number:02}"
+
+
 def standing_answers(events: Iterable[ListenerEvent]) -> Iterator[PersonAnswered]:
     """Yield the answers that were not undone, by person in the order of their questions."""
     kept: dict[tuple[int, int], PersonAnswered] = {}

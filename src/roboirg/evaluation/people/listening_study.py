@@ -91,7 +91,13 @@ class ListeningStudy(BaseModel):
             InvalidValueError: a number is out of range, or a person would be asked about an
                 episode twice.
         """
-        for name, least in (("people", 1), ("practice", 0), ("checks", 0), ("frames_every", 1)):
+        for name, least in (
+            ("people", 1),
+            ("practice", 0),
+            ("checks", 0),
+            ("frames_every", 1),
+            ("seed", 0),
+        ):
             if getattr(self, name) < least:
                 raise InvalidValueError(
                     f"{name} is {getattr(self, name)}; it must be at least {least}."
