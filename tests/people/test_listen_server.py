@@ -115,6 +115,8 @@ def test_only_browsers_with_the_key_are_answered(served, study):
     assert {status for status, _, _ in refused} == {403}
     assert not any(served.key in f"{headers}{text}" for _, headers, text in refused)
     assert read_events(study) == []
+    assert Client(served, Origin=f"http://127.0.0.1:{port}").ask("/join", {})[0] == 400
+    assert Client(served, Origin=f"https://127.0.0.1:{port}").ask("/join", {})[0] == 400
     _, headers, _ = me.ask("/")
     assert "connect-src 'self'" in headers["Content-Security-Policy"]
     assert headers["Cache-Control"] == "no-store"

@@ -42,8 +42,8 @@ robot. You say what is meant: you point at things in the picture and choose numb
 Taking part is voluntary. You may stop at any time by closing the page, and you need give no
 reason.
 
-What is stored: your answers, how long each of them took, how often you watched a video, and the
-time of day. No name, no address and nothing about your browser or computer is stored.
+What is stored: your answers, how long each of them took, how often you watched a video, and date
+and time. No name, no address and nothing about your browser or computer is stored.
 """
 """Text that a person agrees to, unless the study has one of its own."""
 
