@@ -166,8 +166,9 @@ def read_events(folder: Path) -> list[ListenerEvent]:
 
 def _read_event(line: bytes, path: Path, number: int) -> ListenerEvent:
     try:
-        return _decoder.decode(line)
+        event: ListenerEvent = _decoder.decode(line)
     except msgspec.ValidationError as error:
         raise StoreError(f"{path}, line {number}: not an answer of a study ({error}).") from error
     except msgspec.DecodeError as error:
         raise DamagedLineError(str(error)) from error
+    return event
