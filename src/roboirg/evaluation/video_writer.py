@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.errors import MissingDependencyError, RenderDeviceError
+from roboirg.core.extras import extra_needed
 from roboirg.util.text_overlay import draw_text, wrap_text
 
 if TYPE_CHECKING:
@@ -86,13 +87,8 @@ def check_video_support() -> None:
     Raises:
         MissingDependencyError: PyAV is not installed.
     """
-    try:
+    with extra_needed("All but --video off needs PyAV", "sim"):
         import av  # noqa: F401 - an extra, and slow to import
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"Videos need PyAV, which is not installed ({error}); run: "
-            "pip install 'roboirgbench[sim]', or play with --video off."
-        ) from error
 
 
 def compose_frame(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from roboirg.core.errors import MissingDependencyError
+from roboirg.core.extras import extra_needed
 
 if TYPE_CHECKING:
     import jinja2
@@ -37,10 +37,5 @@ def check_page_support(page: str) -> None:
     Raises:
         MissingDependencyError: Jinja is not installed.
     """
-    try:
+    with extra_needed(f"{page} needs Jinja", "report"):
         import jinja2  # noqa: F401 - an extra
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"{page} needs Jinja, which is not installed ({error}); run: "
-            "pip install 'roboirgbench[report]'"
-        ) from error
