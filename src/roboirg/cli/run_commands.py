@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
     from roboirg.evaluation.executors.executor import Executor
     from roboirg.evaluation.plan import Plan
+    from roboirg.evaluation.progress import Reporter
     from roboirg.evaluation.runner import RunSummary
     from roboirg.records.record import Job
 
@@ -54,6 +56,12 @@ RetryErrors = Annotated[
         help="Play episodes again if their newest record is an error.",
         rich_help_panel=options.ERRORS,
     ),
+]
+
+
+OnRecord = Annotated[
+    str | None,
+    typer.Option(help="Command that gets each stored record as a line of JSON on its input."),
 ]
 
 
@@ -93,6 +101,7 @@ def run(
     executor: Annotated[str, typer.Option(help="Where to play: local or ray.")] = "local",
     address: Annotated[str | None, typer.Option(help="Address of the Ray cluster.")] = None,
     retry_errors: RetryErrors = True,
+    on_record: OnRecord = None,
     dry_run: Annotated[
         bool,
         typer.Option("--dry-run", help="Only check, count the episodes and estimate the time."),
@@ -130,17 +139,21 @@ def run(
         tries=tries,
         retry_on=retry_on,
     )
+    from roboirg.evaluation.record_hook import split_command
+
     # Absolute: a policy in this process may change the working directory.
     folder = folder_of(out).absolute()
     add_working_directory()
     made = _plan(plan, typed)
+    if on_record is not None:
+        split_command(on_record)
     chosen = _executor(made, executor, address, workers)
     _check_run(made, folder)
     if dry_run:
         _print_estimate(made, folder, workers)
         return
     _warn_of_cut_prompts(made)
-    summary = play(made, folder, chosen, retry=retry_errors)
+    summary = play(made, folder, chosen, retry=retry_errors, on_record=on_record)
     print_tables_of(folder, planned_jobs(folder))
     report_problems(summary, folder)
 
@@ -194,27 +207,22 @@ def folder_of(text: str) -> Path:
     return Path(text)
 
 
-def play(plan: Plan, out: Path, executor: Executor, *, retry: bool) -> RunSummary:
+def play(
+    plan: Plan, out: Path, executor: Executor, *, retry: bool, on_record: str | None = None
+) -> RunSummary:
     """Play a plan with a progress bar; exits the process when it is interrupted."""
     from rich.console import Console
 
     from roboirg.evaluation.progress import ConsoleReporter
-    from roboirg.evaluation.rollout import EpisodeRunner
-    from roboirg.evaluation.runner import Terminated, run_plan
-    from roboirg.evaluation.video_writer import check_video_support
+    from roboirg.evaluation.record_hook import CommandHook, HookedReporter
+    from roboirg.evaluation.runner import Terminated, episode_runner, run_plan
 
-    if plan.video != "off":
-        check_video_support()
-    play_job = EpisodeRunner(
-        out,
-        plan.video,
-        policy_timeout_s=plan.policy_timeout_s,
-        plan=plan.fingerprint,
-        hosting=plan.hosting,
-        refuse_long=plan.long_prompts == "refuse",
-    )
+    play_job = episode_runner(plan, out)
     try:
-        with ConsoleReporter(Console()) as reporter:
+        with ConsoleReporter(Console()) as shown, contextlib.ExitStack() as stack:
+            reporter: Reporter = shown
+            if on_record is not None:
+                reporter = stack.enter_context(HookedReporter(shown, CommandHook(on_record)))
             return run_plan(plan, out, play_job, executor, retry_errors=retry, reporter=reporter)
     except KeyboardInterrupt as interrupt:
         typer.echo(
