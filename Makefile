@@ -3,7 +3,7 @@
 PYTHON := .venv/bin/python
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test integrations lint demo card clean
+.PHONY: help setup test integrations lint docs demo card clean
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
@@ -22,6 +22,9 @@ test: lint ## lint, then every test
 
 integrations: ## the plug-ins in the real LeRobot, vla-eval and Inspect, in environments of their own
 	@scripts/test-integrations
+
+docs: setup ## the documentation site, in build/site; a warning or dead link is an error
+	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict
 
 demo: setup ## the main job: three policies, every task and setting; ends with a table and a page
 	.venv/bin/roboirg demo --out runs/demo

@@ -60,3 +60,7 @@ def test_readme_s_policy_is_a_policy_in_fifteen_lines():
 def test_readme_s_environment_plays(capsys):
     exec(python_blocks(README)[-1], {})  # noqa: S102 - it is our own README
     assert capsys.readouterr().out.strip().endswith(".")
+
+
+def test_the_citation_has_the_version():
+    assert f"\nversion: {roboirg.__version__}\n" in (ROOT / "CITATION.cff").read_text()

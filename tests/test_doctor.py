@@ -49,7 +49,7 @@ def test_an_unknown_render_device_is_named_with_the_known_ones() -> None:
 
 
 def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    versions = {"roboirgbench": "0.1.0", "av": "9.2", "mani-skill": "3.0.1"}
+    versions = {"roboirgbench": "0.1.0", "av": "9.2", "sapien": "3.0.3"}
 
     def version(name: str) -> str:
         if name not in versions:
@@ -58,8 +58,8 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
 
     requirements = [
         "numpy>=1.26",
-        "av>=12; extra == 'world'",
-        "mani-skill==3.0.1; extra == 'sim'",
+        "av>=12; extra == 'sim'",
+        "sapien==3.0.3; extra == 'sim'",
         "ruff>=0.6; extra == 'dev'",
     ]
     monkeypatch.setattr(metadata, "version", version)
@@ -68,18 +68,16 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         Check("roboirgbench", True, "0.1.0"),
         Check("numpy", False, "not installed; needs >=1.26", "pip install 'numpy>=1.26'"),
         Check("av", False, "9.2; needs >=12", "pip install 'av>=12'"),
-        Check("mani-skill", True, "3.0.1"),
+        Check("sapien", True, "3.0.3"),
     ]
 
 
 def test_missing_model_files_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    package = tmp_path / "mani_skill"
-    package.mkdir()
-    (package / "__init__.py").write_text("raise RuntimeError('must not be imported')\n")
-    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setenv("ROBOIRG_MODEL_FILES", str(tmp_path))
     check = doctor._check_model_files()
     assert not check.ok
-    assert "panda_v3.urdf" in check.found
+    assert str(tmp_path) in check.found
+    assert check.remedy.startswith("run: roboirg fetch-models")
 
 
 def test_a_crash_of_the_driver_is_a_failed_check(monkeypatch: pytest.MonkeyPatch) -> None:

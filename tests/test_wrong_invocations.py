@@ -47,6 +47,7 @@ def wrong_words(command, words):
 
 
 RIGHT = {
+    "fetch-models": ["--wheel", "nowhere"],
     "wordings import-robomme": ["nowhere", "--out", "words.toml"],
     "verify": ["nowhere"],
     "replay": ["nowhere"],

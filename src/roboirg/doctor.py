@@ -22,15 +22,15 @@ from importlib import metadata
 from pathlib import Path
 
 from roboirg.core.errors import MissingDependencyError, RenderDeviceError, RoboIRGError
+from roboirg.core.extras import DISTRIBUTION, install_command
 from roboirg.simulation.model_files import look_for_model_files
 from roboirg.simulation.rendering.render_device import DEVICE_VARIABLE
 
-DISTRIBUTION = "roboirgbench"
 FRAME_TIMEOUT = 120.0
 """Time limit for the test frame, s."""
 
 OLDEST_PYTHON = (3, 11)
-_EXTRAS = ("world", "sim", "report")
+_EXTRAS = ("sim", "report")
 _GIB = 1024**3
 _MIN_MEMORY = 2 * _GIB
 _RENDER_REMEDY = (
@@ -108,7 +108,7 @@ def _check_packages() -> Iterator[Check]:
     try:
         requirements = metadata.requires(DISTRIBUTION) or []
     except metadata.PackageNotFoundError:
-        remedy = f"run `make setup`, or: pip install '{DISTRIBUTION}[sim]'"
+        remedy = f"run `make setup`, or: {install_command('sim')}"
         yield Check(DISTRIBUTION, False, "not installed", remedy)
         return
     yield Check(DISTRIBUTION, True, metadata.version(DISTRIBUTION))
@@ -122,9 +122,7 @@ def _check_packages() -> Iterator[Check]:
 
 
 def _check_package(name: str, specifier: str) -> Check:
-    # --no-deps for ManiSkill: only its model files are read, and its dependencies are large.
-    option = "--no-deps " if _normal(name) == "mani-skill" else ""
-    remedy = f"pip install {option}'{name}{specifier}'"
+    remedy = f"pip install '{name}{specifier}'"
     try:
         version = metadata.version(name)
     except metadata.PackageNotFoundError:
@@ -160,17 +158,13 @@ def _numbers(version: str) -> tuple[int, ...]:
     return tuple(map(int, leading.group().split("."))) if leading else ()
 
 
-def _normal(name: str) -> str:
-    return re.sub(r"[-_.]+", "-", name).lower()
-
-
 def _check_model_files() -> Check:
-    name, remedy = "ManiSkill model files", "pip install --no-deps 'mani_skill==3.0.1'"
+    name = "model files"
     try:
-        robot = look_for_model_files().robot
+        return Check(name, True, str(look_for_model_files().root))
     except MissingDependencyError as error:
-        return Check(name, False, str(error), remedy)
-    return Check(name, True, str(robot.parent))
+        problem, _, remedy = str(error).partition("; ")
+        return Check(name, False, problem, remedy)
 
 
 def _check_opencv() -> Check:

@@ -54,6 +54,7 @@ def words_of(folder, run):
         "check-policy": ["random"],
         "demo": ["--out", f"{folder}/demo"],
         "doctor": [],
+        "fetch-models": ["--help"],
         "tasks": [],
         "build-splits": ["--tasks", "PickXtimes", "--split", "val", "--workers", "0"],
         "show": ["PickXtimes", "0", "--out", f"{folder}/sheet.png"],

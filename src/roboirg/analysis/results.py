@@ -174,7 +174,7 @@ class Results:
     @functools.cached_property
     def _planned(self) -> Sequence[Job]:
         plan = read_plan(self.folder)
-        return () if plan is None else plan.jobs()
+        return () if plan is None else plan.drawable_jobs()
 
     def _cells_of(self, policy: str) -> Cells:
         names = list(dict.fromkeys(key.policy_run.policy for key in self.cells))

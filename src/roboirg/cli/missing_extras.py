@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from roboirg.core.extras import install_command
+
 _MODULES: Mapping[str, tuple[str, ...]] = {
-    "sim": ("sapien", "gymnasium", "toppra", "av", "cv2", "zstandard", "mani_skill"),
+    "sim": ("sapien", "gymnasium", "toppra", "av", "cv2", "zstandard"),
     "light": ("fast_simplification",),
     "report": ("jinja2", "markupsafe", "matplotlib", "sklearn", "scipy"),
     "export": ("pyarrow",),
     "demonstrations": ("h5py",),
     "learn": ("torch",),
     "ray": ("ray",),
-    "remote": ("websockets", "msgpack", "httpx", "platformdirs"),
+    "remote": ("websockets", "msgpack", "httpx"),
     "tokens": ("sentencepiece", "tokenizers"),
     "vlm": ("openai", "google"),
 }
@@ -25,7 +27,7 @@ def describe_missing(error: ModuleNotFoundError) -> str | None:
     for extra, modules in _MODULES.items():
         if module in modules:
             return (
-                f"This command needs the package {module!r}; "
-                f"run: pip install 'roboirgbench[{extra}]' (in a checkout: make setup)."
+                f"This command needs the package {module!r}, which is not installed; "
+                f"run: {install_command(extra)}"
             )
     return None

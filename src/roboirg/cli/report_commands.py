@@ -171,6 +171,7 @@ def compare(
 
     from roboirg.analysis.stats.comparison import compare as compare_cells
     from roboirg.analysis.stats.comparison_text import sentences
+    from roboirg.analysis.stats.flips import read_flips
     from roboirg.analysis.stats.intervals import SEED
     from roboirg.util.console_width import widen
 
@@ -184,7 +185,8 @@ def compare(
         names = [f"{names[0]} ({first})", f"{names[1]} ({second})"]
     console = Console()
     widen(console)
-    for sentence in sentences(found, *names):
+    flips = read_flips(Path(_split(first)[0])), read_flips(Path(_split(second)[0]))
+    for sentence in sentences(found, *names, flips):
         console.print(Text(sentence), highlight=False)
 
 
@@ -300,13 +302,11 @@ def _cells(runs: list[str]) -> Cells:
 
 def _runs(runs: list[str]) -> tuple[list[tuple[str, Sequence[AnyResult]]], list[Job]]:
     """Return the results of runs, each with its folder, and the jobs of their plans."""
-    from roboirg.evaluation.plan import read_plan
+    from roboirg.cli.run_commands import planned_jobs
     from roboirg.records.store import read_results
 
     folders = [Path(run) for run in runs]
-    planned = [
-        job for folder in folders if (plan := read_plan(folder)) is not None for job in plan.jobs()
-    ]
+    planned = [job for folder in folders for job in planned_jobs(folder)]
     results: list[tuple[str, Sequence[AnyResult]]] = [
         (str(folder), read_results(folder)) for folder in folders
     ]

@@ -12,7 +12,7 @@ import typer
 
 from roboirg.cli import plan_options as options
 from roboirg.cli.import_path import add_working_directory
-from roboirg.cli.options import Workers, check_output_file
+from roboirg.cli.options import Workers, check_output_file, spread
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.printable import printable
 from roboirg.util.plurals import counted
@@ -31,14 +31,6 @@ if TYPE_CHECKING:
 USAGE_ERROR, INTERRUPTED, TERMINATED = 2, 130, 143
 EXECUTORS = ("local", "ray")
 
-Policies = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--policy",
-        help="Built-in name, package.module:Class or address, or NAME=one of these; repeatable.",
-        rich_help_panel=options.POLICIES,
-    ),
-]
 PlanName = Annotated[
     str | None,
     typer.Option(
@@ -65,38 +57,12 @@ OnRecord = Annotated[
 ]
 
 
+@spread
 def run(
     out: Out,
-    policy: Policies = None,
+    choices: options.PlanChoices = options.NO_CHOICES,
     plan: PlanName = None,
-    tasks: options.Tasks = None,
-    settings: options.Settings = None,
-    forms: options.Forms = None,
-    split: options.Split = None,
-    episodes: options.Episodes = None,
-    policy_seeds: options.PolicySeeds = None,
-    stages: options.Stages = None,
-    distractor: options.Distractor = None,
-    distractors: options.Distractors = None,
-    frame: options.Frame = None,
-    delivery: options.Delivery = None,
-    rival: options.Rival = None,
-    reasoning: options.Reasoning = None,
-    wordings: options.Wordings = None,
-    max_steps: options.MaxSteps = None,
-    actions: options.Actions = None,
-    demonstration_frames: options.DemonstrationFrames = None,
-    observe_every: options.ObserveEvery = None,
-    meshes: options.Meshes = None,
-    video: options.Video = None,
-    policy_process: options.PolicyProcessOption = None,
-    batch: options.Batch = None,
-    devices: options.Devices = None,
-    long_prompts: options.LongPrompts = None,
-    policy_timeout_s: options.PolicyTimeout = None,
-    episode_timeout_s: options.EpisodeTimeout = None,
-    tries: options.Tries = None,
-    retry_on: options.RetryOn = None,
+    salt: options.Salt = None,
     workers: Workers = None,
     executor: Annotated[str, typer.Option(help="Where to play: local or ray.")] = "local",
     address: Annotated[str | None, typer.Option(help="Address of the Ray cluster.")] = None,
@@ -108,43 +74,12 @@ def run(
     ] = False,
 ) -> None:
     """Play episodes and store a record of each in OUT/records.jsonl; resumes where it stopped."""
-    typed = _typed_options(
-        policies=policy,
-        tasks=tasks,
-        settings=settings,
-        forms=forms,
-        split=split,
-        episodes=episodes,
-        policy_seeds=policy_seeds,
-        stages=stages,
-        distractor=distractor,
-        distractors=distractors,
-        frame=frame,
-        delivery=delivery,
-        rival=rival,
-        reasoning=reasoning,
-        wordings=wordings,
-        max_steps=max_steps,
-        actions=actions,
-        demonstration_frames=demonstration_frames,
-        observe_every=observe_every,
-        meshes=meshes,
-        video=video,
-        policy_process=policy_process,
-        batch=batch,
-        devices=devices,
-        long_prompts=long_prompts,
-        policy_timeout_s=policy_timeout_s,
-        episode_timeout_s=episode_timeout_s,
-        tries=tries,
-        retry_on=retry_on,
-    )
     from roboirg.evaluation.record_hook import split_command
 
     # Absolute: a policy in this process may change the working directory.
     folder = folder_of(out).absolute()
     add_working_directory()
-    made = _plan(plan, typed)
+    made = _plan(plan, choices.typed(), salt)
     if on_record is not None:
         split_command(on_record)
     chosen = _executor(made, executor, address, workers)
@@ -248,11 +183,11 @@ def print_tables_of(folder: Path, planned: Sequence[Job]) -> None:
 
 
 def planned_jobs(folder: Path) -> tuple[Job, ...]:
-    """Return the jobs of a run's newest plan; none if the plan is missing or cannot be read."""
+    """Return the jobs of a run's newest plan; none if the plan or its episodes are not known."""
     from roboirg.evaluation.plan import read_plan
 
     plan = read_plan(folder)
-    return plan.jobs() if plan else ()
+    return plan.drawable_jobs() if plan else ()
 
 
 def report_problems(summary: RunSummary, folder: Path) -> None:
@@ -281,19 +216,15 @@ def report_problems(summary: RunSummary, folder: Path) -> None:
         sys.exit(USAGE_ERROR)
 
 
-def _typed_options(**options: object) -> dict[str, Any]:
-    """Return the options that were typed."""
-    return {name: value for name, value in options.items() if value not in (None, [])}
-
-
 def _results(folder: Path) -> Any:  # noqa: ANN401 - imported where it is needed
     from roboirg.records.store import read_results
 
     return read_results(folder)
 
 
-def _plan(name: str | None, typed: dict[str, Any]) -> Plan:
+def _plan(name: str | None, typed: dict[str, Any], salt: str | None) -> Plan:
     """Return the plan of a file, overridden by the options that were typed."""
+    from roboirg.episodes.private_splits import with_salt
     from roboirg.evaluation.plan_file import read_plan_file
     from roboirg.evaluation.plan_maker import make_plan
 
@@ -304,6 +235,7 @@ def _plan(name: str | None, typed: dict[str, Any]) -> Plan:
     frames = chosen.get("demonstration_frames")
     if isinstance(frames, str) and frames.isdigit():
         chosen["demonstration_frames"] = int(frames)
+    chosen["split"] = with_salt(str(chosen.get("split", "test")), salt)
     return make_plan(policies, **chosen)
 
 

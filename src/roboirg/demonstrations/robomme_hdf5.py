@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from roboirg.core.errors import MissingDependencyError
+from roboirg.core.extras import extra_needed
 from roboirg.core.observations import CAMERAS
 from roboirg.demonstrations.dataset_part import (
     EPISODE_TABLE,
@@ -44,12 +44,8 @@ def check_hdf5_support() -> None:
     Raises:
         MissingDependencyError: h5py is not installed.
     """
-    try:
+    with extra_needed("RoboMME's format needs h5py", "demonstrations"):
         import h5py  # noqa: F401
-    except ImportError as error:
-        raise MissingDependencyError(
-            "RoboMME's format needs h5py: pip install 'roboirgbench[demonstrations]'."
-        ) from error
 
 
 def file_name(task: str) -> str:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import importlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict, Unpack
 
-from roboirg.core.errors import MissingDependencyError
+from roboirg.core.extras import extra_needed
 
 if TYPE_CHECKING:
     # Not at run time: these load NumPy and SAPIEN, which `import roboirg` must not.
@@ -90,7 +89,7 @@ def make(task: str | Episode, **options: Unpack[EnvOptions]) -> RoboIRGEnv:
         InvalidValueError: the split has no such episode, or the combination is not defined; or
             the wording file cannot be read or lacks a command for the episode.
     """
-    with _simulator_needed():
+    with extra_needed("Playing episodes needs the simulator", "sim"):
         from roboirg.envs.environment import RoboIRGEnv
     return RoboIRGEnv(task, **options)
 
@@ -120,7 +119,7 @@ def make_vec(
         UnknownNameError: a task, an option's value or the autoreset mode does not exist.
         InvalidValueError: a number is out of range, or the combination is not defined.
     """
-    with _simulator_needed():
+    with extra_needed("Playing episodes needs the simulator", "sim"):
         from roboirg.envs.vector_environment import RoboIRGVectorEnv
     return RoboIRGVectorEnv(
         task, num_envs, autoreset_mode=autoreset_mode, workers=workers, lazy=lazy, **options
@@ -133,17 +132,5 @@ def check_simulator() -> None:
     Raises:
         MissingDependencyError: it is not.
     """
-    with _simulator_needed():
+    with extra_needed("Playing episodes needs the simulator", "sim"):
         importlib.import_module("roboirg.envs.environment")
-
-
-@contextlib.contextmanager
-def _simulator_needed() -> Iterator[None]:
-    """Tell how to install a package that is missing."""
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        raise MissingDependencyError(
-            f"Playing episodes needs the package {error.name!r}; "
-            "run: pip install 'roboirgbench[sim]' (in a checkout: make setup)"
-        ) from error

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.errors import MissingDependencyError, RenderDeviceError
+from roboirg.core.extras import extra_needed
 from roboirg.util.text_overlay import draw_text, wrap_text
 
 if TYPE_CHECKING:
@@ -63,19 +64,31 @@ class PictureSource(Protocol):
         """Return the camera's current picture, uint8 (256, 256, 3)."""
 
 
+class FrameSink(Protocol):
+    """Takes the frames of an episode while it is played.
+
+    Attributes:
+        options: tell how often there is a frame.
+        caption: what was said so far.
+        longest_caption: everything that will have been said.
+    """
+
+    options: VideoOptions
+    caption: str
+    longest_caption: str
+
+    def add_frame(self, source: PictureSource, is_demonstration: bool = False) -> None:
+        """Take the current pictures."""
+
+
 def check_video_support() -> None:
     """Check that videos can be written.
 
     Raises:
         MissingDependencyError: PyAV is not installed.
     """
-    try:
+    with extra_needed("All but --video off needs PyAV", "sim"):
         import av  # noqa: F401 - an extra, and slow to import
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"Videos need PyAV, which is not installed ({error}); run: "
-            "pip install 'roboirgbench[sim]', or play with --video off."
-        ) from error
 
 
 def compose_frame(

@@ -38,7 +38,7 @@ class WorldSpeed(NamedTuple):
     is_measured: bool = True
 
     def seconds(self, job: Job, steps: int) -> float:
-        """Return the seconds of an episode in which the policy acts for so many steps."""
+        """Return the seconds of an episode in which the policy acts for `steps` steps."""
         return self.reset_s[has_video(job)] + self.step_s * min(steps, job.max_steps)
 
 

@@ -1,7 +1,8 @@
-"""Model files of the Panda and the table, read from the installed ManiSkill.
+"""Model files of the Panda and the table, which are ManiSkill's.
 
-ManiSkill is located without importing it, and a hash verifies the files: other files would change
-pictures and dynamics.
+They are looked for in the folder that ``ROBOIRG_MODEL_FILES`` names and nowhere else if it is set,
+then where ``roboirg fetch-models`` puts them, then in an installed ManiSkill, which is located
+without importing it. A hash verifies them: other files would change pictures and dynamics.
 """
 
 from __future__ import annotations
@@ -9,17 +10,20 @@ from __future__ import annotations
 import functools
 import hashlib
 import importlib.util
+import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from roboirg.core.errors import MissingDependencyError
 
-REMEDY = "install them with: pip install --no-deps mani_skill==3.0.1"
+FOLDER_VARIABLE = "ROBOIRG_MODEL_FILES"
+REMEDY = "run: roboirg fetch-models (in a checkout: make setup)"
 
 _ROBOT = "assets/robots/panda"
 _MESHES = f"{_ROBOT}/franka_description/meshes"
 _LINKS = tuple(f"link{number}" for number in range(8))
-_FILES = (
+MODEL_FILES = (
     f"{_ROBOT}/panda_v3.urdf",
     f"{_ROBOT}/panda_v3.srdf",
     f"{_ROBOT}/realsense2_description/meshes/d415.stl",
@@ -28,6 +32,7 @@ _FILES = (
     "utils/scene_builder/table/assets/table.glb",
     "utils/building/assets/grid_texture.png",
 )
+"""Their names in ManiSkill's package, which are kept."""
 _SHA256 = "9f361fea8bcea5593b0632f053d5798e5412a7532de7987230f0a72b15cca236"
 
 
@@ -36,12 +41,14 @@ class ModelFiles:
     """Paths of the model files.
 
     Attributes:
+        root: folder of them all.
         robot: URDF of the Panda with a wrist camera.
         wrist_camera: mesh of the wrist camera, binary STL.
         table: mesh of the table.
         ground_texture: grid texture of the floor.
     """
 
+    root: Path
     robot: Path
     wrist_camera: Path
     table: Path
@@ -50,10 +57,10 @@ class ModelFiles:
 
 @functools.cache
 def find_model_files() -> ModelFiles:
-    """Return the model files of ManiSkill 3.0.1, located and verified once per process.
+    """Return the model files, located and verified once per process.
 
     Raises:
-        MissingDependencyError: ManiSkill is not installed, or its files are not those of 3.0.1.
+        MissingDependencyError: they are nowhere, or are not those of ManiSkill 3.0.1.
     """
     return look_for_model_files()
 
@@ -62,36 +69,65 @@ def look_for_model_files() -> ModelFiles:
     """Locate and verify the model files without caching.
 
     Raises:
-        MissingDependencyError: ManiSkill is not installed, or its files are not those of 3.0.1.
+        MissingDependencyError: they are nowhere, or are not those of ManiSkill 3.0.1.
     """
-    root = _package_folder()
-    missing = [name for name in _FILES if not (root / name).is_file()]
+    problems = []
+    for root in _folders():
+        problem = _problem_of(root)
+        if problem is None:
+            return ModelFiles(
+                root=root,
+                robot=root / MODEL_FILES[0],
+                wrist_camera=root / MODEL_FILES[2],
+                table=root / MODEL_FILES[-2],
+                ground_texture=root / MODEL_FILES[-1],
+            )
+        problems.append(problem)
+    raise MissingDependencyError(f"{problems[0]}; {REMEDY}")
+
+
+def fetched_folder() -> Path:
+    """Return the folder to which the model files are fetched, which may not exist.
+
+    Raises:
+        MissingDependencyError: platformdirs is not installed.
+    """
+    if chosen := os.environ.get(FOLDER_VARIABLE):
+        return Path(chosen).expanduser()
+    try:
+        import platformdirs  # here, because the doctor must run without it
+    except ImportError as error:
+        raise MissingDependencyError(f"platformdirs is not installed ({error})") from error
+    return platformdirs.user_data_path("roboirgbench") / "mani_skill-3.0.1"
+
+
+def _folders() -> Iterator[Path]:
+    yield fetched_folder()
+    if not os.environ.get(FOLDER_VARIABLE):
+        spec = importlib.util.find_spec("mani_skill")
+        if spec is not None and spec.submodule_search_locations:
+            yield Path(spec.submodule_search_locations[0])
+
+
+def _problem_of(root: Path) -> str | None:
+    """Return what is wrong with the model files in a folder."""
+    missing = [name for name in MODEL_FILES if not (root / name).is_file()]
+    if len(missing) == len(MODEL_FILES):
+        return f"The model files of the robot and the table are not in {root}"
     if missing:
-        raise MissingDependencyError(f"ManiSkill's model file {missing[0]} is missing; {REMEDY}")
+        return f"The model file {missing[0]} is missing in {root}"
     digest = _digest(root)
     if digest != _SHA256:
-        raise MissingDependencyError(
-            f"ManiSkill's model files (SHA-256 {digest[:12]}...) are not those of version 3.0.1 "
-            f"({_SHA256[:12]}...); {REMEDY}"
+        return (
+            f"The model files in {root} (SHA-256 {digest[:12]}...) are not those of "
+            f"ManiSkill 3.0.1 ({_SHA256[:12]}...)"
         )
-    return ModelFiles(
-        robot=root / _FILES[0],
-        wrist_camera=root / _FILES[2],
-        table=root / _FILES[-2],
-        ground_texture=root / _FILES[-1],
-    )
-
-
-def _package_folder() -> Path:
-    spec = importlib.util.find_spec("mani_skill")
-    if spec is None or not spec.submodule_search_locations:
-        raise MissingDependencyError(f"ManiSkill's model files are not installed; {REMEDY}")
-    return Path(spec.submodule_search_locations[0])
+    return None
 
 
 def _digest(root: Path) -> str:
     digest = hashlib.sha256()
-    for name in _FILES:
+    for name in MODEL_FILES:
         digest.update(name.encode())
         with (root / name).open("rb") as file:
             digest.update(hashlib.file_digest(file, "sha256").digest())

@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.extras import extra_needed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,13 +30,8 @@ def check_figure_support() -> None:
     Raises:
         MissingDependencyError: matplotlib is not installed.
     """
-    try:
+    with extra_needed("Figures need matplotlib", "report"):
         import matplotlib as mpl  # noqa: F401
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"Figures need matplotlib, which is not installed ({error}); run: "
-            "pip install 'roboirgbench[report]'"
-        ) from error
 
 
 def save_figure(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from roboirg.core.errors import MissingDependencyError
+from roboirg.core.extras import extra_needed
 
 
 def check_parquet_support() -> None:
@@ -11,9 +11,5 @@ def check_parquet_support() -> None:
     Raises:
         MissingDependencyError: pyarrow is not installed.
     """
-    try:
+    with extra_needed("Parquet files need pyarrow", "export"):
         import pyarrow.parquet  # noqa: F401 - an extra
-    except ImportError as error:
-        raise MissingDependencyError(
-            "Parquet files need pyarrow; run: pip install 'roboirgbench[export]'."
-        ) from error

@@ -66,7 +66,7 @@ def clear_axes(axes: Axes, *, grid: str) -> None:
 
 
 def folded(name: str, letters: int) -> str:
-    """Return a name in lines of at most so many letters."""
+    """Return a name in lines of at most `letters` letters."""
     return textwrap.fill(name, letters, break_on_hyphens=False)
 
 

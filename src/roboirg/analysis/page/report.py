@@ -19,14 +19,13 @@ from roboirg.analysis.stats.breakdowns import BREAKDOWNS, label_instructions
 from roboirg.analysis.stats.cells import Cells, PolicyRun
 from roboirg.analysis.tables.breakdown_table import make_breakdown_table
 from roboirg.analysis.tables.table import Table
-from roboirg.core.errors import MissingDependencyError
 from roboirg.evaluation.video_writer import LAST_FRAME_REPEATS, VideoOptions
 from roboirg.language.settings import EXPLICIT, all_settings
 from roboirg.records.episode_log import logged_slugs
 from roboirg.records.record import Job, Record
 from roboirg.records.store import read_summaries
 from roboirg.util.atomic_write import write_atomically
-from roboirg.util.page_templates import template_environment
+from roboirg.util.page_templates import check_page_support, template_environment
 
 REPORT_FILE = "report.html"
 FILMING = VideoOptions()
@@ -164,13 +163,7 @@ def check_report_support() -> None:
     Raises:
         MissingDependencyError: Jinja is not installed.
     """
-    try:
-        import jinja2  # noqa: F401 - an extra
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"The report needs Jinja, which is not installed ({error}); run: "
-            "pip install 'roboirgbench[report]'"
-        ) from error
+    check_page_support("The report")
 
 
 def _data(entries: EpisodeEntries, columns: Columns) -> dict[str, Any]:

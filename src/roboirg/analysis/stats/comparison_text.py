@@ -6,25 +6,30 @@ import itertools
 from collections.abc import Iterator
 
 from roboirg.analysis.stats.comparison import Comparison, ComparisonResult
+from roboirg.analysis.stats.flips import Flips
 from roboirg.analysis.stats.option_labels import options_label
 from roboirg.analysis.stats.power import MAX_EPISODES, POWER
 from roboirg.analysis.stats.rates import p_text, points
 from roboirg.util.plurals import counted
 
 
-def sentences(comparison: Comparison, first: str, second: str) -> Iterator[str]:
+def sentences(
+    comparison: Comparison, first: str, second: str, flips: tuple[Flips, Flips] | None = None
+) -> Iterator[str]:
     """Yield the results, a sentence each; empty ones separate paragraphs.
 
     Args:
         comparison: of two policies.
         first: label of the first.
         second: label of the second.
+        flips: how often the verdicts of each policy change by themselves, as far as that is known;
+            None says nothing about it.
     """
     names = (first, second)
     yield f"{first} against {second}, on the same episodes."
     yield ""
     for result in comparison.averages:
-        yield _sentence(result, names)
+        yield _sentence(result, names) + _own_flips(comparison, result, names, flips)
     decided = [result for result in comparison.cells if result.verdict != "open"]
     if any(len(result.tasks) > 1 for result in comparison.averages):
         yield ""
@@ -43,12 +48,34 @@ def sentences(comparison: Comparison, first: str, second: str) -> Iterator[str]:
             yield f"  {_sentence(result, names)}"
     yield ""
     yield from _caveats(comparison)
+    if flips is not None and not all(flips):
+        yield (
+            "How much a policy differs from itself is not known of "
+            f"{' and '.join(name for name, own in zip(names, flips, strict=True) if not own)}: "
+            "`roboirg repeat RUN --out AGAIN` measures it."
+        )
 
 
 def _sentence(result: ComparisonResult, names: tuple[str, str]) -> str:
     if result.verdict == "open":
         return f"{_subject(result)}: no clear difference, {_figures(result)}.{_outlook(result)}"
     return f"{_subject(result)}: {_better(result, names)}, {_figures(result)}."
+
+
+def _own_flips(
+    comparison: Comparison,
+    result: ComparisonResult,
+    names: tuple[str, str],
+    flips: tuple[Flips, Flips] | None,
+) -> str:
+    """Return which share of the policies' verdicts changed when the same was played again."""
+    runs = (comparison.first, comparison.second)
+    found = [
+        f"{name} {own[run.policy, result.key.options]}"
+        for name, run, own in zip(names, runs, flips or ({}, {}), strict=True)
+        if (run.policy, result.key.options) in own
+    ]
+    return f" Verdicts that change by themselves: {', '.join(found)}." if found else ""
 
 
 def _subject(result: ComparisonResult) -> str:

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
-from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.extras import extra_needed
 from roboirg.language.shortcuts.goal_vocabulary import (
     Value,
     goal_vocabulary,
@@ -31,13 +32,8 @@ def check_learning_support() -> None:
     Raises:
         MissingDependencyError: scikit-learn is not installed.
     """
-    try:
+    with extra_needed("The learned floor needs scikit-learn", "report"):
         import sklearn.linear_model  # noqa: F401
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"The learned floor needs scikit-learn, which is not installed ({error}); run: "
-            "pip install 'roboirgbench[report]'"
-        ) from error
 
 
 class LearnedFloor:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from roboirg.core.episode import Goal
-from roboirg.core.errors import MissingDependencyError
+from roboirg.core.extras import extra_needed
 from roboirg.core.observations import FRONT, Demonstration
 from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.tasks import get_task
@@ -73,10 +73,5 @@ def check_learn_support() -> None:
     Raises:
         MissingDependencyError: it is not installed.
     """
-    try:
+    with extra_needed("A listener that learns needs PyTorch", "learn"):
         import torch  # noqa: F401 - an extra, and slow to import
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"A listener that learns needs PyTorch, which is not installed ({error}); run: "
-            "pip install 'roboirgbench[learn]'."
-        ) from error

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.core.errors import MissingDependencyError
+from roboirg.core.extras import extra_needed
 
 Pixels = NDArray[np.uint8]
 
@@ -122,10 +122,5 @@ def encode_mp4(clip: Clip) -> bytes:
 
 
 def _check_pyav() -> None:
-    try:
+    with extra_needed("Pictures for a model need PyAV", "sim"):
         import av  # noqa: F401 - an extra, and slow to import
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"Pictures for a model need PyAV, which is not installed ({error}); run: "
-            "pip install 'roboirgbench[sim]'."
-        ) from error

@@ -7,7 +7,8 @@ import os
 from pathlib import Path
 from typing import Any
 
-from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.extras import extra_needed
 from roboirg.policies.prompt_length.prompt_audit import LINE_BREAK_TOKENS, Tokenize, Tokens
 
 JSON = ".json"
@@ -36,12 +37,8 @@ def _read(path: str) -> Tokenize:
 
 
 def _read_sentencepiece(path: str) -> Tokenize:
-    try:
+    with extra_needed(f"The tokenizer {path!r} needs sentencepiece", "tokens"):
         import sentencepiece
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"The tokenizer {path!r} needs sentencepiece; install roboirgbench[tokens]."
-        ) from error
     try:
         model: Any = sentencepiece.SentencePieceProcessor(model_file=path)
     except (OSError, RuntimeError, ValueError) as error:
@@ -62,12 +59,8 @@ def _read_sentencepiece(path: str) -> Tokenize:
 
 
 def _read_json(path: str) -> Tokenize:
-    try:
+    with extra_needed(f"The tokenizer {path!r} needs tokenizers", "tokens"):
         import tokenizers
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"The tokenizer {path!r} needs tokenizers; install roboirgbench[tokens]."
-        ) from error
     try:
         model: Any = tokenizers.Tokenizer.from_file(path)
     except Exception as error:  # the library raises nothing narrower

@@ -6,15 +6,11 @@ import contextlib
 from collections.abc import Iterator
 from typing import Any
 
-from roboirg.core.errors import MissingDependencyError
+from roboirg.core.extras import extra_needed
 from roboirg.policies.remote.socket_deadline import SocketDeadline
 
-try:
+with extra_needed("Policies over HTTP need httpx", "remote"):
     import httpx
-except ImportError as error:
-    raise MissingDependencyError(
-        "Policies over HTTP need httpx; install roboirgbench[remote]."
-    ) from error
 
 _PLAIN = "identity"
 

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from roboirg.core.errors import (
-    MissingDependencyError,
     PolicyConnectionError,
     PolicyReplyError,
     PolicyTimeoutError,
 )
+from roboirg.core.extras import extra_needed
 from roboirg.policies.remote.bounded_transport import (
     BoundedTransport,
     RequestTimeoutError,
@@ -25,12 +25,8 @@ from roboirg.policies.remote.connections import (
 )
 from roboirg.policies.remote.message_codec import pack
 
-try:
+with extra_needed("Policies over HTTP need httpx", "remote"):
     import httpx
-except ImportError as error:
-    raise MissingDependencyError(
-        "Policies over HTTP need httpx; install roboirgbench[remote]."
-    ) from error
 
 MSGPACK = "application/msgpack"
 _OK, _SERVER_ERROR = 200, 500

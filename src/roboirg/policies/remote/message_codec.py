@@ -14,15 +14,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from roboirg.core.errors import MissingDependencyError
+from roboirg.core.extras import extra_needed
 from roboirg.policies.remote.message_size import MessageSizeError, check_size
 
-try:
+with extra_needed("Remote policies need msgpack", "remote"):
     import msgpack
-except ImportError as error:
-    raise MissingDependencyError(
-        "Remote policies need msgpack; install roboirgbench[remote]."
-    ) from error
 
 _UNSUPPORTED = "VOc"
 """Kinds of dtype that are not sent: structures, Python objects, complex numbers."""

@@ -17,7 +17,9 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from roboirg.core.errors import MissingDependencyError, PolicyConnectionError, PolicyTimeoutError
+import platformdirs
+
+from roboirg.core.errors import PolicyConnectionError, PolicyTimeoutError
 from roboirg.core.waiting import waiting
 from roboirg.policies.remote.endpoints import Endpoint
 
@@ -115,16 +117,7 @@ def lock_folder() -> Path:
     """Return the folder of this user's lock files, which exists.
 
     It is the same for all of a user's processes, so it is not the folder of a login session.
-
-    Raises:
-        MissingDependencyError: platformdirs is not installed.
     """
-    try:
-        import platformdirs
-    except ImportError as error:
-        raise MissingDependencyError(
-            "Remote policies need platformdirs; install roboirgbench[remote]."
-        ) from error
     folder = platformdirs.user_cache_path("roboirgbench") / "servers"
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)

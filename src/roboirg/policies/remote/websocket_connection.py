@@ -12,12 +12,12 @@ from collections.abc import Mapping
 from typing import Any, NoReturn
 
 from roboirg.core.errors import (
-    MissingDependencyError,
     PolicyConnectionError,
     PolicyReplyError,
     PolicyTimeoutError,
     RoboIRGError,
 )
+from roboirg.core.extras import extra_needed
 from roboirg.policies.remote.connections import (
     ConnectionSpec,
     RetryableError,
@@ -28,7 +28,7 @@ from roboirg.policies.remote.connections import (
 from roboirg.policies.remote.message_codec import pack
 from roboirg.policies.remote.socket_deadline import SocketDeadline
 
-try:
+with extra_needed("Remote policies need websockets 17.4 or newer", "remote"):
     from websockets.exceptions import (
         ConnectionClosed,
         InvalidStatus,
@@ -37,10 +37,6 @@ try:
     )
     from websockets.protocol import State
     from websockets.sync.client import ClientConnection, connect
-except ImportError as error:
-    raise MissingDependencyError(
-        "Remote policies need websockets 17.4 or newer; install roboirgbench[remote]."
-    ) from error
 
 CLOSE_TIMEOUT = 2.0
 """Seconds to wait for a server's closing frame."""

@@ -8,7 +8,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from roboirg.core.errors import MissingDependencyError
+from roboirg.core.extras import extra_needed
 from roboirg.real.study.arrangement_shapes import (
     FARTHEST,
     HALF_WIDTH,
@@ -50,12 +50,8 @@ def check_sheet_support() -> None:
     Raises:
         MissingDependencyError: matplotlib is not installed.
     """
-    try:
+    with extra_needed("The sheet needs matplotlib", "report"):
         import matplotlib as mpl  # noqa: F401
-    except ImportError as error:
-        raise MissingDependencyError(
-            "The sheet needs matplotlib: pip install 'roboirgbench[report]'."
-        ) from error
 
 
 def write_sheet(plan: StudyPlan, path: Path) -> int:

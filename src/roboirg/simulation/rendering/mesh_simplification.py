@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.core.errors import MissingDependencyError
+from roboirg.core.extras import extra_needed
 
 LINK_SHARE = 0.1
 CAMERA_SHARE = 0.05
@@ -29,13 +29,8 @@ def simplify(
     Raises:
         MissingDependencyError: fast-simplification is not installed.
     """
-    try:
+    with extra_needed("Light meshes need fast-simplification", "light"):
         import fast_simplification
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"Light meshes need fast-simplification ({error}); "
-            "run: pip install 'roboirgbench[light]'"
-        ) from error
     points, faces = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
     points, faces = fast_simplification.simplify(
         points, faces.reshape(-1, 3).astype(np.int32), target_reduction=1.0 - share

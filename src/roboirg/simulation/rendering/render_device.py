@@ -15,7 +15,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from roboirg.core.errors import MissingDependencyError, RenderDeviceError
+from roboirg.core.errors import RenderDeviceError
+from roboirg.core.extras import extra_needed
 
 if TYPE_CHECKING:
     import sapien
@@ -126,14 +127,9 @@ def _new_system(device: sapien.Device) -> sapien.render.RenderSystem:
 
 @functools.cache
 def _sapien() -> ModuleType:
-    try:
+    with extra_needed("Playing episodes needs the simulator", "sim"):
         # By name, so that this module loads without SAPIEN.
         sapien = importlib.import_module("sapien")
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"The simulator is not installed ({error}); "
-            "run: pip install 'roboirgbench[sim]' (in a checkout: make setup)"
-        ) from error
     # Below "error", SAPIEN reports missing extensions that only its viewer window needs.
     sapien.set_log_level("error")
     sapien.render.set_log_level("error")

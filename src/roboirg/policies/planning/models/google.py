@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from roboirg.core.errors import (
-    MissingDependencyError,
     PolicyConnectionError,
     PolicyReplyError,
     RoboIRGError,
 )
+from roboirg.core.extras import extra_needed
 from roboirg.policies.planning.model_content import Part, Picture, encode_png
 from roboirg.policies.planning.models.bounded_wait import call_with_timeout, timeout_error
 from roboirg.policies.planning.models.model import ModelOptions, ModelQuery, ModelReply
@@ -30,14 +30,9 @@ class GoogleModel:
     """
 
     def __init__(self, options: ModelOptions) -> None:
-        try:
+        with extra_needed("Models of provider 'google' need the library google-genai", "vlm"):
             from google import genai
             from google.genai import errors, types
-        except ImportError as error:
-            raise MissingDependencyError(
-                f"Models of provider 'google' need the library google-genai ({error}); run: "
-                "pip install 'roboirgbench[vlm]'."
-            ) from error
         self._options = options
         self._key = options.key()
         self._errors = errors

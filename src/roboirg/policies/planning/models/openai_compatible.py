@@ -8,11 +8,11 @@ from collections.abc import Iterator
 from typing import Any
 
 from roboirg.core.errors import (
-    MissingDependencyError,
     PolicyConnectionError,
     PolicyReplyError,
     RoboIRGError,
 )
+from roboirg.core.extras import extra_needed
 from roboirg.policies.planning.model_content import (
     ChatTurn,
     Clip,
@@ -35,13 +35,8 @@ class OpenAIModel:
     """Sends queries through the ``openai`` library's chat completions."""
 
     def __init__(self, options: ModelOptions) -> None:
-        try:
+        with extra_needed("Models of provider 'openai' need its client library", "vlm"):
             import openai
-        except ImportError as error:
-            raise MissingDependencyError(
-                f"Models of provider 'openai' need its client library ({error}); run: "
-                "pip install 'roboirgbench[vlm]'."
-            ) from error
         self._openai = openai
         self._options = options
         self._key = options.key()

@@ -11,7 +11,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from roboirg.core.episode import DIFFICULTIES
-from roboirg.evaluation.seed_selection import REASONS, EpisodeSlot, SelectedSeed
+from roboirg.evaluation.seed_search.seed_selection import REASONS, EpisodeSlot, SelectedSeed
 from roboirg.util.console_width import widen
 
 _LINE_EVERY = 50

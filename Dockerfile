@@ -1,0 +1,47 @@
+# Plays episodes and writes pages. Two variants:
+#
+#   docker build -t roboirg .                                    the processor renders
+#   docker build -t roboirg:gpu --build-arg VARIANT=gpu .        an NVIDIA GPU renders
+#   docker run --rm -v "$PWD/runs:/runs" roboirg demo --out /runs/demo
+#   docker run --rm --gpus all -v "$PWD/runs:/runs" roboirg:gpu doctor
+ARG VARIANT=cpu
+
+FROM python:3.12-slim-bookworm AS wheel
+WORKDIR /source
+COPY pyproject.toml README.md LICENSE NOTICE ./
+COPY src src
+RUN pip wheel --no-cache-dir --no-deps --wheel-dir /wheels .
+
+FROM python:3.12-slim-trixie AS base
+# OpenCV's wheel links these libraries, even for use without a window.
+# hadolint ignore=DL3008
+RUN apt-get update \
+    && apt-get install --yes --no-install-recommends libgl1 libglib2.0-0t64 libvulkan1 libegl1 \
+    && rm -rf /var/lib/apt/lists/*
+
+FROM base AS cpu
+# Lavapipe renders on the processor.
+# hadolint ignore=DL3008
+RUN apt-get update \
+    && apt-get install --yes --no-install-recommends mesa-vulkan-drivers \
+    && rm -rf /var/lib/apt/lists/*
+
+FROM base AS gpu
+# The driver comes from the host; it needs to be asked for its graphics part, and told to Vulkan.
+ENV NVIDIA_DRIVER_CAPABILITIES=all NVIDIA_VISIBLE_DEVICES=all
+RUN mkdir -p /etc/vulkan/icd.d \
+    && printf '{"file_format_version": "1.0.0", "ICD": {"library_path": "libGLX_nvidia.so.0", "api_version": "1.3.0"}}\n' \
+        > /etc/vulkan/icd.d/nvidia_icd.json
+
+# hadolint ignore=DL3006
+FROM ${VARIANT}
+ENV ROBOIRG_MODEL_FILES=/opt/roboirg/models
+RUN --mount=from=wheel,source=/wheels,target=/wheels \
+    pip install --no-cache-dir "$(echo /wheels/*.whl)[sim,report,remote]" \
+    && roboirg fetch-models \
+    && useradd --create-home player \
+    && install -d -o player /runs
+USER player
+WORKDIR /runs
+ENTRYPOINT ["roboirg"]
+CMD ["doctor"]

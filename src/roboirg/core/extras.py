@@ -1,0 +1,74 @@
+"""What to run where a library of an extra is not installed."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import shlex
+import shutil
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from roboirg.core.errors import MissingDependencyError
+
+DISTRIBUTION = "roboirgbench"
+_CHECKOUT = Path(__file__).parents[3]
+
+
+@contextlib.contextmanager
+def extra_needed(sentence: str, extra: str) -> Iterator[None]:
+    """Turn a failed import in the block into one sentence that says what to run.
+
+    Args:
+        sentence: what needs the library, for example ``"Figures need matplotlib"``.
+        extra: the extra that brings the library.
+
+    Raises:
+        MissingDependencyError: the import failed.
+    """
+    try:
+        yield
+    except ImportError as error:
+        if isinstance(error, MissingDependencyError):
+            raise
+        missing = isinstance(error, ModuleNotFoundError)
+        raise MissingDependencyError(
+            f"{sentence}, which {'is not installed' if missing else 'cannot be loaded'} ({error}); "
+            f"run: {install_command(extra)}{'' if missing else ', then roboirg doctor'}"
+        ) from error
+
+
+def install_command(extra: str) -> str:
+    """Return the command that adds an extra to this installation of the package.
+
+    It names what the package was installed from: a checkout, a file, a repository, or an index.
+    """
+    if (_CHECKOUT / "pyproject.toml").is_file():
+        folder = "." if Path.cwd() == _CHECKOUT else _CHECKOUT
+        return f"{_pip()} install -e '{folder}[{extra}]'"
+    origin = _origin()
+    return f"{_pip()} install '{DISTRIBUTION}[{extra}]{f' @ {origin}' if origin else ''}'"
+
+
+def _pip() -> str:
+    """Return ``pip`` if the shell's belongs to this Python, otherwise the long form."""
+    found = shutil.which("pip")
+    if found and Path(found).parent == Path(sys.executable).parent:
+        return "pip"
+    return f"{shlex.quote(sys.executable)} -m pip"
+
+
+def _origin() -> str | None:
+    """Return the address that pip noted when it did not install from an index (PEP 610)."""
+    # Imported here, because it takes longer than all of `roboirg.core`.
+    from importlib import metadata
+
+    try:
+        noted = json.loads(metadata.distribution(DISTRIBUTION).read_text("direct_url.json") or "{}")
+    except metadata.PackageNotFoundError:
+        return None
+    url: str | None = noted.get("url")
+    if vcs := noted.get("vcs_info"):
+        return f"{vcs['vcs']}+{url}@{vcs['commit_id']}"
+    return url

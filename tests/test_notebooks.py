@@ -1,0 +1,48 @@
+"""The notebooks of the documentation run; what they keep is small and names no machine's paths."""
+
+import base64
+import os
+import sys
+from pathlib import Path
+
+import nbclient
+import nbformat
+import pytest
+
+NOTEBOOKS = sorted((Path(__file__).parents[1] / "docs" / "notebooks").glob("*.ipynb"))
+MAX_SIZE = 100_000
+"""Bytes of a notebook, outputs included."""
+
+
+@pytest.fixture(params=NOTEBOOKS, ids=lambda path: path.stem)
+def notebook(request):
+    return nbformat.read(request.param, as_version=4)
+
+
+@pytest.mark.sim
+def test_a_notebook_runs(notebook, tmp_path, monkeypatch):
+    # Shell lines call `roboirg`, which lies beside this Python.
+    monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
+    kept = [kinds(cell) for cell in notebook.cells]
+    nbclient.NotebookClient(
+        notebook, timeout=None, resources={"metadata": {"path": str(tmp_path)}}
+    ).execute()
+    assert [kinds(cell) for cell in notebook.cells] == kept, "its outputs are old: execute it"
+
+
+def kinds(cell):
+    return {(one.output_type, one.get("name")) for one in cell.get("outputs", ())}
+
+
+def test_a_notebook_is_small_and_shows_its_outputs(notebook):
+    nbformat.validate(notebook)
+    text = nbformat.writes(notebook)
+    assert len(text.encode()) < MAX_SIZE
+    assert "/work/" not in text
+    assert any(cell.get("outputs") for cell in notebook.cells)
+    for cell in notebook.cells:
+        for one in cell.get("outputs", ()):
+            assert one.output_type != "error"
+            if "image/png" in one.get("data", {}):
+                assert len(base64.b64decode(one.data["image/png"])) < MAX_SIZE
