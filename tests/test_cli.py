@@ -260,7 +260,7 @@ def test_splits_are_built_anew_for_what_is_named(
     roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from roboirg.episodes.splits import shipped_splits, splits_text
-    from roboirg.evaluation import seed_selection
+    from roboirg.evaluation.seed_search import seed_selection
 
     def find(slots, workers):
         assert workers == 0

@@ -1,15 +1,10 @@
-"""Made-up results, without simulator, language or files; a browser; and the time limit of waits."""
+"""Made-up results, without simulator, language or files."""
 
 from __future__ import annotations
 
-import os
-import shutil
 import socket
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager, contextmanager
 from fractions import Fraction
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -19,11 +14,6 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.records.record import Result
 
 MakeResult = Callable[..., Result]
-OpenPage = Callable[..., AbstractContextManager[Any]]
-
-WAIT_S = 300.0
-"""Time limit of every wait for a browser, a server or a process, long enough for a busy machine."""
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
 def make_result(outcome: str = "success", episode: int = 0, **fields: object) -> Result:
@@ -102,55 +92,9 @@ def cell_of() -> Callable[..., Iterable[Result]]:
     return with_rate
 
 
-@pytest.fixture(scope="session")
-def wait_s() -> float:
-    return WAIT_S
-
-
 @pytest.fixture(scope="module")
-def patient_sockets() -> Iterator[None]:
+def patient_sockets(wait_s: float) -> Iterator[None]:
     before = socket.getdefaulttimeout()
-    socket.setdefaulttimeout(WAIT_S)
+    socket.setdefaulttimeout(wait_s)
     yield
     socket.setdefaulttimeout(before)
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    reason = "no browser: pip install playwright, and a Chromium (Debian's package chromium)"
-    playwright = pytest.importorskip("playwright.sync_api", reason=reason)
-    path = next(filter(None, map(shutil.which, BROWSERS)), None)
-    with playwright.sync_playwright() as driver:
-        if path is None and not Path(driver.chromium.executable_path).exists():
-            pytest.skip(reason)
-        # Chromium refuses its sandbox to root, the user of most containers.
-        arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
-        chromium = driver.chromium.launch(
-            executable_path=path, args=arguments, timeout=1000 * WAIT_S
-        )
-        yield chromium
-        chromium.close()
-
-
-@pytest.fixture
-def open_page(browser: Any) -> OpenPage:
-    """Open a page that must log no error or warning and load nothing from elsewhere."""
-
-    @contextmanager
-    def open_address(address: str, **options: Any) -> Iterator[Any]:
-        context = browser.new_context(viewport={"width": 1280, "height": 900}, **options)
-        page = context.new_page()
-        page.set_default_timeout(1000 * WAIT_S)
-        wrong: list[str] = []
-        page.on("pageerror", lambda error: wrong.append(str(error)))
-        page.on(
-            "console", lambda entry: entry.type in ("error", "warning") and wrong.append(entry.text)
-        )
-        page.on("request", lambda asked: asked.url.startswith(("file:", "data:", "http://127.0.0.1"))
-                or wrong.append(asked.url))  # fmt: skip
-        page.goto(address)
-        yield page
-        context.close()
-        assert wrong == []
-
-    return open_address

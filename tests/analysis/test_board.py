@@ -13,6 +13,7 @@ from roboirg.analysis.board.board_rows import BoardRow, PackedRun, board_rows
 from roboirg.analysis.board.pack_checks import CHECKS_FILE, PackCheck, check_pack
 from roboirg.analysis.published import published_rows
 from roboirg.core.errors import InvalidValueError
+from roboirg.episodes.private_splits import SALT_VARIABLE, use_salt
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.language.settings import EXPLICIT
 from roboirg.records.packing import pack_run
@@ -23,15 +24,23 @@ from roboirg.tasks import ALL, find_tasks
 HOLDS = PackCheck("0" * 64, "now", 10, 10)
 
 
-def record(policy: str, task: str, episode: int, *, won: bool, privileged: bool = False) -> Record:
+def record(
+    policy: str,
+    task: str,
+    episode: int,
+    *,
+    won: bool,
+    privileged: bool = False,
+    split: str = "test",
+) -> Record:
     result = RolloutResult(outcome="success" if won else "failure")
     result.cause = None if won else "it failed"
-    job = Job(policy=policy, task=task, split="test", episode=episode, setting=EXPLICIT)
+    job = Job(policy=policy, task=task, split=split, episode=episode, setting=EXPLICIT)
     made = make_record(job, result, started_at="")
     return made.model_copy(update={"privileged": privileged, "attribution": None})
 
 
-def run_of(policy: str, successes: int, *, episodes: int = 8, **marks: bool) -> PackedRun:
+def run_of(policy: str, successes: int, *, episodes: int = 8, **marks: Any) -> PackedRun:
     """Return a run with the first so many episodes of every task won."""
     results = [
         record(policy, task, episode, won=episode < successes, **marks)
@@ -70,6 +79,65 @@ def test_part_of_the_tasks_is_no_top() -> None:
     rows = own(board_rows([whole, part]))
     assert [row.rates[EXPLICIT].tasks for row in rows] == [1, 11]
     assert not any(row.rates[EXPLICIT].is_top for row in rows)
+
+
+@pytest.fixture
+def private(monkeypatch: pytest.MonkeyPatch) -> str:
+    """The name of a private split whose salt this process knows."""
+    monkeypatch.setenv(SALT_VARIABLE, "")
+    return use_salt("salt of the board's tests")
+
+
+def test_private_results_stand_beside_public_ones(private: str) -> None:
+    runs = [run_of("a", 6), run_of("b", 6), run_of("a", 5, split=private)]
+    runs += [run_of("b", 1, split=private), run_of("only", 3, split=private)]
+    runs[3] = runs[3]._replace(name="b-private", check=None)
+    rows = {row.policy: row for row in own(board_rows(runs))}
+    assert len(rows) == 3
+    public = {name: row.rates[EXPLICIT] for name, row in rows.items() if row.rates}
+    assert {name: rate.is_top for name, rate in public.items()} == {"a": True, "b": True}
+    hidden = {name: row.private.rates[EXPLICIT] for name, row in rows.items() if row.private}
+    assert {name: rate.percent for name, rate in hidden.items()} == {
+        "a": 62.5,
+        "b": 12.5,
+        "only": 37.5,
+    }
+    # Private results are compared among themselves.
+    assert {name: rate.is_top for name, rate in hidden.items()} == {
+        "a": True,
+        "b": False,
+        "only": False,
+    }
+    assert {name: row.status for name, row in rows.items()} == {
+        "a": "verified",
+        "b": "unchecked",  # worth what the worse of the two is
+        "only": "verified",
+    }
+    assert "salt" in rows["b"].status_text
+    assert render_board(runs).count("<small>private</small>") == 1
+    assert "<small>private</small>" not in render_board(runs[:2])
+
+
+def test_private_results_of_another_version_have_a_row_of_their_own(private: str) -> None:
+    changed = run_of("a", 5, split=private)
+    results = [one.model_copy(update={"policy_version": "2"}) for one in changed.results]
+    rows = own(board_rows([run_of("a", 6), changed._replace(results=results)]))
+    assert [bool(row.rates) for row in rows] == [True, False]
+    assert [row.private is None for row in rows] == [True, False]
+
+
+def test_packs_of_private_episodes_are_checked_with_their_salt(
+    private: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = record("p", "StopCube", 0, won=True, split=private)
+    pack_run(store(tmp_path / "run", [made]), tmp_path / "p.roboirg.zip")
+    monkeypatch.setenv(SALT_VARIABLE, "")
+    (found,) = read_packs(tmp_path, sample=0.0)
+    assert found.check is None
+    assert not (tmp_path / CHECKS_FILE).exists()
+    use_salt("salt of the board's tests")
+    (found,) = read_packs(tmp_path, sample=0.0)
+    assert found.check is not None
 
 
 def test_published_rows_come_last_and_are_not_verified() -> None:

@@ -125,3 +125,19 @@ def test_a_side_is_one_policy_of_one_version(result) -> None:
         compared([*one, *play(result, GOOD, "--1", policy_version="2")], one)
     with pytest.raises(InvalidValueError, match="no results"):
         compared([], one)
+
+
+def test_an_interval_that_excludes_0_beside_a_large_p_is_explained(result) -> None:
+    """6 of 20 episodes differ, all to one side: p = 0.031 alone, 0.125 among four settings."""
+    first, second = [], []
+    for setting in ("explicit", "direct", "reasoning", "contextual"):
+        worse = "1" * 14 + "0" * 6 if setting == "direct" else "1" * 20
+        first += play(result, GOOD, "1" * 20, setting=setting)
+        second += play(result, POOR, worse, setting=setting)
+    words = text(first, second)
+    assert re.search(
+        r"^direct: no clear difference, .*p = 0\.125 \(uncorrected 0\.031\)", words, re.M
+    )
+    assert words.count("uncorrected") == 1
+    assert "An interval is of one gap alone" in words
+    assert "An interval is of one gap alone" not in text(first, first)

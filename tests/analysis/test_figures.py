@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,7 +11,10 @@ import typer
 from typer.testing import CliRunner
 
 from roboirg.analysis.figures import FIGURES, FigureData, write_figures
+from roboirg.analysis.figures.averages import draw_averages
+from roboirg.analysis.figures.context import draw_context
 from roboirg.analysis.figures.failures import COLORS, UNKNOWN, draw_failures
+from roboirg.analysis.figures.figure_style import STYLE
 from roboirg.analysis.figures.forms import PARTS, draw_forms
 from roboirg.analysis.published import published_rows
 from roboirg.analysis.stats.run_summary import ALL
@@ -25,8 +29,12 @@ from roboirg.records.store import RecordStore
 
 pytest.importorskip("matplotlib")
 
+import matplotlib as mpl
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from matplotlib.text import Text
 
 PLAN = Plan(
     policies=("listener", "forgetful"),
@@ -155,6 +163,89 @@ def test_the_context_is_compared_on_the_same_tasks(
     only = content([one for one in found if one.stages == (1, 5)])
     with pytest.raises(InvalidValueError, match="nothing to draw for context"):
         write_figures(only, tmp_path, ["context"])
+
+
+def test_published_means_are_over_the_tasks_that_all_policies_played(
+    published_like: Callable[..., list[Result]],
+) -> None:
+    found = [
+        one.model_copy(update={"policy": policy})
+        for one in published_like("main", "MemER")
+        for policy, tasks in (
+            ("wide", ("BinFill", "PickXtimes", "StopCube")),
+            ("narrow", ("BinFill", "PickXtimes")),
+        )
+        if one.task in tasks
+    ]
+    drawn = draw_averages(content(found), published=True)
+    assert drawn is not None
+    (axes,) = drawn.axes
+    assert {label.get_text().split("\n")[1] for label in axes.get_xticklabels()} == {"(2 tasks)"}
+    heights = {
+        line.get_label(): line.get_ydata()[0]  # type: ignore[index]
+        for line in axes.lines
+        if 0 <= line.get_xdata()[0] < 0.5  # type: ignore[index]
+    }
+    explicit = next(
+        row for row in published_rows("main")
+        if row.model == "MemER" and row.options.setting == "explicit"
+    )  # fmt: skip
+    both = explicit.average_over(("BinFill", "PickXtimes"))
+    assert heights["MemER (published)"] == float(both) == 62.0
+    everything = [task for task, rate in explicit.rates.items() if rate is not None]
+    assert explicit.average_over(everything) == explicit.average
+    assert explicit.average_over(["BinFill", "MyTask"]) is explicit.average_over([]) is None
+
+
+def test_published_values_need_shared_tasks(published_like: Callable[..., list[Result]]) -> None:
+    """Policies without a common task have no figure; tasks outside the paper no published mean."""
+    found = [
+        one.model_copy(update={"policy": one.task})
+        for one in published_like("main", "MemER")
+        if one.task in ("BinFill", "StopCube")
+    ]
+    assert {label for label in found if label.setting == "spatial"}
+    shared = draw_averages(content(found), published=True)
+    assert shared is not None  # spatial has one of the two tasks only
+    assert [label.get_text() for label in shared.axes[0].get_xticklabels()] == ["spatial\n(1 task)"]
+    real = draw_averages(content(published_like("real")), published=True)
+    assert real is not None
+    assert not any("published" in str(line.get_label()) for line in real.axes[0].lines)
+
+
+def test_scenes_are_counted_in_whole_numbers(tmp_path: Path) -> None:
+    write_figures(content(), tmp_path, ["expressions"])
+    drawn = texts(tmp_path / "expressions.svg")
+    assert "<!-- 6 -->" in drawn
+    assert not re.search(r"<!-- \d+\.\d+ -->", drawn)
+
+
+@pytest.mark.parametrize("draw", [draw_averages, draw_context, draw_failures, draw_forms])
+def test_no_name_leaves_the_figure(
+    draw: Callable[[FigureData], Figure | None], published_like: Callable[..., list[Result]]
+) -> None:
+    long = "my_package.policies:NetWithAVeryLongName, frames of the video none"
+    found = [
+        one.model_copy(update={"policy": long if one.policy == "forgetful" else "a" * 90})
+        for one in (published_like("context") if draw is draw_context else results())
+    ]
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+        drawn = draw(content(found))
+        assert drawn is not None
+        FigureCanvasAgg(drawn).draw()
+    edges = drawn.bbox
+    names = [
+        text
+        for text in drawn.findobj(Text)
+        if "NetWith" in text.get_text() or "aaaa" in text.get_text()
+    ]
+    assert names
+    for text in names:
+        box = text.get_window_extent()
+        assert edges.x0 <= box.x0
+        assert box.x1 <= edges.x1
+        assert edges.y0 <= box.y0
+        assert box.y1 <= edges.y1
 
 
 def test_what_is_incomplete_is_called_so(tmp_path: Path) -> None:

@@ -7,12 +7,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from roboirg.analysis.stats.flips import count_flips, flips_by_cell, repeated_episodes
+from roboirg.analysis.stats.cells import gather
+from roboirg.analysis.stats.comparison import compare
+from roboirg.analysis.stats.comparison_text import sentences
+from roboirg.analysis.stats.flips import (
+    FLIPS_FILE,
+    count_flips,
+    flips_by_cell,
+    read_flips,
+    repeated_episodes,
+    told_arithmetic,
+    write_flips,
+)
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.records.action_log import ActionLog, write_actions
 from roboirg.records.record import Job
-from roboirg.records.store import RecordStore
+from roboirg.records.record_codec import StoreError
+from roboirg.records.store import RecordStore, read_results
 
 
 def write_run(folder: Path, outcomes: str, rows: dict[int, np.ndarray] | None = None) -> Path:
@@ -63,3 +75,33 @@ def test_runs_without_a_shared_episode_are_refused(tmp_path: Path) -> None:
         store.append(make_record(job, RolloutResult(), started_at=""))
     with pytest.raises(InvalidValueError, match="no episode in common"):
         repeated_episodes(one, two)
+
+
+def test_a_comparison_tells_how_much_a_policy_differs_from_itself(tmp_path: Path) -> None:
+    one = write_run(tmp_path / "one", "ssffss")
+    two = write_run(tmp_path / "two", "sfsfss")
+    counted = flips_by_cell(repeated_episodes(one, two))
+    write_flips(counted, one)
+    assert read_flips(one) == counted
+    assert read_flips(two) == {}
+    cells = gather([("one", read_results(one))])
+    found = compare(cells, cells, np.random.default_rng(0))
+    known, unknown = read_flips(one), read_flips(two)
+    text = "\n".join(sentences(found, "p", "q", (known, unknown)))
+    assert "explicit: no clear difference" in text
+    assert "Verdicts that change by themselves: p 33.3 % (1 of 3)." in text
+    assert "not known of q" in text
+    text = "\n".join(sentences(found, "p", "q", (known, known)))
+    assert "p 33.3 % (1 of 3), q 33.3 % (1 of 3)" in text
+    assert "not known" not in text
+    assert "by themselves" not in "\n".join(sentences(found, "p", "q"))
+    (one / FLIPS_FILE).write_text("{")
+    with pytest.raises(StoreError, match="damaged"):
+        read_flips(one)
+
+
+def test_what_a_server_tells_of_its_arithmetic() -> None:
+    told = {"server": "here:8000", "device": "GPU", "driver": "570.1", "flags": "XLA_FLAGS=-x"}
+    assert told_arithmetic(told) == "device GPU, driver 570.1, flags XLA_FLAGS=-x"
+    assert told_arithmetic({"planner": {}, "policy": told}) == told_arithmetic(told)
+    assert told_arithmetic({"server": "here:8000", "policy": "random"}) == ""

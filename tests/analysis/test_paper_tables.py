@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from decimal import Decimal
 from fractions import Fraction
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -19,6 +21,9 @@ from roboirg.analysis.tables.rendering import FORMATS, get_format
 from roboirg.analysis.tables.rendering.terminal import renderable
 from roboirg.analysis.tables.table import Entry
 from roboirg.core.errors import UnknownNameError
+from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.records.record import Job, Record
+from roboirg.records.record_codec import read_summary
 from roboirg.tasks import all_tasks
 
 
@@ -208,12 +213,30 @@ def test_the_floors_stand_below_the_chance_level(result) -> None:
 def test_a_wide_table_is_drawn_in_parts(result, width: int, parts: int) -> None:
     """And every rate is there, whatever the width."""
     table = make_table("main", gather([("run", whole(result))]))
-    console = Console(file=io.StringIO(), width=width)
+    console = Console(file=io.StringIO(), width=width, force_terminal=True, color_system=None)
     console.print(renderable(table, console))
     text = console.file.getvalue()
     assert text.count("Success by task and setting") == parts
     assert text.count("50.00") == 2 * len(table.columns)
     assert all(f" {column.name} " in text for column in table.columns)
+
+
+@pytest.mark.parametrize("width", [60, 80, 200])
+def test_names_are_never_cut(result, width: int) -> None:
+    """In files lines are as long as names need; in terminals names are folded."""
+    name = "a_package.with_a_long_name.policies:" + "Net" * 40
+    table = make_table("main", gather([("run", whole(result, name))]))
+    for terminal in (False, True):
+        console = Console(
+            file=io.StringIO(), width=width, force_terminal=terminal, color_system=None
+        )
+        console.print(renderable(table, console))
+        text = console.file.getvalue()
+        assert name in (
+            text if not terminal else re.sub(r"\d+\.\d+|[^\w.:]|explicit|direct", "", text)
+        )
+        assert "…" not in text
+    assert name in FORMATS["terminal"].draw(table)
 
 
 def test_csv_has_every_entry_with_its_counts(result) -> None:
@@ -239,8 +262,10 @@ def test_latex_is_balanced_and_markdown_rectangular(result) -> None:
     rows = [
         line for line in latex.splitlines() if line.endswith(r"\\") and "multicolumn" not in line
     ]
-    assert {line.replace(r"\&", "").count("&") for line in rows} == {len(table.columns) + 1}
-    assert r"my\_pkg:Net \& 50\% \#1|\{x\}\textbackslash{}*" in latex
+    # A table for each suite; the last one has the average over all tasks, too.
+    assert {line.replace(r"\&", "").count("&") for line in rows} == {5}
+    folded = latex.replace(r"\allowbreak{}", "")
+    assert r"my\_pkg:Net \& 50\% \#1$|$\{x\}\textbackslash{}*" in folded
     unescaped = latex.replace(r"\{", "").replace(r"\}", "")
     assert unescaped.count("{") == unescaped.count("}")
     assert r"\textbf{93.33}" in latex
@@ -273,3 +298,27 @@ def test_tasks_outside_the_paper_have_a_table_of_their_own(result) -> None:
     assert is_informative("other", cells)
     assert not is_informative("other", gather([("run", ours)]))
     assert make_table("main", cells).rows == make_table("main", gather([("run", ours)])).rows
+
+
+def test_results_of_the_twin_are_marked_and_kept_apart_from_a_robots(result) -> None:
+    def trial(robot: object) -> dict:
+        return {"real_trial": {"robot": robot}}
+
+    def played(robot: object, outcome: str) -> Record:
+        job = Job(policy="listener", task="PutInBox", split="test", episode=0, setting="explicit")
+        course = RolloutResult(outcome, cause=None if outcome == "success" else "missed")
+        course.policy_metadata = trial(robot)
+        return make_record(job, course, started_at="now")
+
+    records = [played("twin", "success"), played("lerobot", "failure")]
+    stored = [read_summary(one.model_dump_json().encode(), Path("r"), 1) for one in records]
+    for results in (records, stored):
+        table = make_table("real", gather([("run", results)]), published=True)
+        ours = {row.name: row.entries[0].text for row in table.rows if row.source == "ours"}
+        assert ours == {
+            "listener (privileged) (twin)": "100.00",
+            "listener, on lerobot (privileged)": "0.00",
+        }
+        assert "(twin): the study's twin, in simulation" in notes(table)
+    odd = played("twin", "success").model_copy(update={"policy_metadata": {"real_trial": 3}})
+    assert read_summary(odd.model_dump_json().encode(), Path("r"), 1).robot is odd.robot is None

@@ -19,6 +19,7 @@ from roboirg.analysis.page.entries import Run
 from roboirg.analysis.page.report import make_view, render, render_runs, write_report
 from roboirg.cli.report_commands import report
 from roboirg.core.episode import ENVIRONMENT_VERSION
+from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.plan import Plan, write_plan
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.records.episode_log import EpisodeLog, log_path
@@ -456,3 +457,45 @@ def test_the_page_is_written_whole_and_the_same_again(tmp_path: Path) -> None:
 def test_no_records_is_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="There are no records"):
         write_report(tmp_path)
+
+
+def test_the_first_pair_has_something_to_show() -> None:
+    plan = PLAN.model_copy(update={"policies": ("oracle", "listener", "forgetful")})
+    won = [
+        make_record(job, RolloutResult("success", cause=None), started_at="now")
+        for job in plan.jobs()
+    ]
+    even = Page(render(won))
+    assert (even.data["sides"], even.data["change"]) == ([0, 1], "all")
+    lost = {"outcome": "failure", "cause": "fell"}
+    some = [*won[:-1], won[-1].model_copy(update=lost)]
+    page = Page(render(some))
+    assert (page.data["sides"], page.data["change"]) == ([0, 2], "changed")
+    alone = Page(render(won[:3]))
+    assert (alone.data["sides"], alone.data["change"]) == ([0, 0], "all")
+
+
+def test_events_are_acts_and_objects_have_words() -> None:
+    scene = get_episode("PickXtimes", "test", 0).scene
+    cube = next(one for one in scene.objects if one.kind == "cube")
+    record = records()[0].model_copy(
+        update={
+            "events": tuple(
+                EventRecord(step=step, kind=kind, subject=cube.name, place=place, holds=holds)
+                for step, kind, place, holds in (
+                    (1, "picked", None, True), (2, "picked", None, False),
+                    (3, "placed", "target", True), (4, "placed", "target", False),
+                )
+            )
+        }
+    )  # fmt: skip
+    page = Page(render([record]))
+    assert [page.string(place) for _, place, _ in page.details[0]["events"]] == [
+        f"picked up the {cube.color} cube", f"lowered the {cube.color} cube or let it go",
+        f"placed the {cube.color} cube on the target", f"took the {cube.color} cube off the target",
+    ]  # fmt: skip
+    strange = record.model_copy(update={"task": "MyTask"})
+    page = Page(render([strange]))
+    assert (
+        page.string(page.details[0]["events"][0][1]) == f"picked up {cube.name.replace('_', ' ')}"
+    )

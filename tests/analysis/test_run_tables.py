@@ -235,3 +235,21 @@ def test_without_any_success_there_is_no_gap() -> None:
     assert "0 (–)" in text
     assert "explicit has no success either" in text
     assert "n = 1 episode per cell, 2 for all tasks" in text
+
+
+def test_wide_tables_are_drawn_in_parts_and_names_are_whole() -> None:
+    task = "VideoUnmaskSwap"
+    records = [
+        record("success", setting=setting, form=form, task=name)
+        for setting in ("explicit", "direct", "reasoning", "contextual", "spatial")
+        for form in ("implicit", "resolved")
+        for name in (task, "PickXtimes")
+    ]
+    for width in (10, 80, 400):
+        console = Console(file=io.StringIO(), width=width)
+        print_run_tables(make_run_tables(records), console)
+        text = console.file.getvalue()
+        assert text.count(task) == (1 if width == 400 else 2)
+        assert "spatial (resolved)" in text
+        assert "…" not in text
+        assert text.count("listener (privileged)") == 1

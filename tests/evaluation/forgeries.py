@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import random
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from roboirg.records.action_log import ActionLog, action_path, read_actions, write_actions
+from roboirg.records.action_log import (
+    ACTION_FOLDER,
+    ActionLog,
+    action_path,
+    read_actions,
+    write_actions,
+)
 from roboirg.records.plan_files import PLAN_FILE
 from roboirg.records.store import RECORDS_FILE
 
@@ -20,11 +27,16 @@ def forge(folder: Path, forgery: Forgery, rng: random.Random) -> bool:
     """Change a run in place; return whether the forgery applies to it."""
     path = folder / RECORDS_FILE
     lines = [json.loads(line) for line in path.read_text().splitlines()]
+    before = copy.deepcopy(lines), _action_files(folder)
     forged = forgery(lines, folder, rng)
-    if forged is None:
+    if forged is None or (forged, _action_files(folder)) == before:
         return False
     path.write_text("".join(json.dumps(line) + "\n" for line in forged))
     return True
+
+
+def _action_files(folder: Path) -> list[str]:
+    return sorted(path.name for path in (folder / ACTION_FOLDER).rglob("*.npz"))
 
 
 def _changes(**changes: Any) -> Forgery:

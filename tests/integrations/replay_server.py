@@ -1,6 +1,6 @@
 """The replaying policy as a model server of vla-eval; writes down all that it is told.
 
-Usage: ``python replay_server.py TABLE PORT LOG``.
+Usage: ``python replay_server.py TABLE PORT LOG BATCH``.
 """
 
 import json
@@ -15,21 +15,22 @@ from vla_eval.specs import IMAGE_RGB, LANGUAGE, DimSpec
 class ReplayServer(PredictModelServer):
     """Repeats the recording of each episode."""
 
-    def __init__(self, table, log):
-        super().__init__()
-        self.replay, self.log, self.rows = Replay(table), log, {}
+    def __init__(self, table, log, batch):
+        super().__init__(max_batch_size=batch)
+        self.replay, self.log, self.players = Replay(table), log, {}
 
-    def predict(self, obs, ctx):
-        if ctx.session_id not in self.rows:
-            begun = self.replay.begin(obs["images"]["agentview"], obs["task_description"])
-            self.rows[ctx.session_id] = [begun, None]
-        entry = self.rows[ctx.session_id]
-        entry[1] = self.replay.next_row(*entry)
+    def predict_batch(self, obs_batch, ctx_batch):
+        return [self.answer(*one) for one in zip(obs_batch, ctx_batch, strict=True)]
+
+    def answer(self, obs, ctx):
+        if ctx.session_id not in self.players:
+            picture, words = obs["images"]["agentview"], obs["task_description"]
+            self.players[ctx.session_id] = self.replay.play(picture, words)
         self.tell("observation", sorted(obs))
-        return {"actions": entry[1]}
+        return {"actions": next(self.players[ctx.session_id])}
 
     async def on_episode_start(self, config, ctx):
-        self.rows.pop(ctx.session_id, None)
+        self.players.pop(ctx.session_id, None)
         self.tell("start", config)
         await super().on_episode_start(config, ctx)
 
@@ -49,4 +50,5 @@ class ReplayServer(PredictModelServer):
 
 
 if __name__ == "__main__":
-    serve(ReplayServer(sys.argv[1], sys.argv[3]), host="127.0.0.1", port=int(sys.argv[2]))
+    table, port, log, batch = sys.argv[1:]
+    serve(ReplayServer(table, log, int(batch)), host="127.0.0.1", port=int(port))

@@ -1,136 +1,104 @@
-"""One policy, the same outcomes: in our runner, vector environment, and LeRobot's batches."""
+"""One policy, the same outcomes: in our runner, `gymnasium.make_vec`, and LeRobot's batches."""
 
-import itertools
 import os
-from pathlib import Path
 
 import numpy as np
 import pytest
-from replay_table import MAX_STEPS, MESHES, SETTING, TASK, Replay, key_of, record_table
+from page_commands import blocks, replaced, run_page
+from replay_table import (
+    MANY,
+    MAX_STEPS,
+    MESHES,
+    SETTING,
+    Replay,
+    own_outcomes,
+    record_table,
+    tasks_of,
+)
 
-import roboirg
-from roboirg.evaluation.rollout import play_episode
 from roboirg.integrations.lerobot.vector import make_batch
-from roboirg.records.record import Job
+from roboirg.records.store import read_records
 
 pytestmark = pytest.mark.sim
 
-HERE = Path(__file__).parent
-EPISODES = int(os.environ.get("ROBOIRG_EQUALITY_EPISODES", "3"))
-BATCHES = [(2, True)]
-if EPISODES >= 40:
-    BATCHES = [(n, in_processes) for n in (1, 2, 8) for in_processes in (False, True)]
+EPISODES = int(os.environ.get("ROBOIRG_EQUALITY_EPISODES", "4"))
+MODES = {
+    "ours": "lazy=True, workers={workers}",
+    "sync": "vectorization_mode='sync', episode=None",
+    "async": "vectorization_mode='async', episode=None, vector_kwargs={{'context': 'spawn'}}",
+}
+BATCHES = [(2, "ours", 2)]
+if EPISODES >= MANY:
+    BATCHES = [
+        (1, "ours", 1), (2, "ours", 1), (2, "ours", 2), (8, "ours", 1), (8, "ours", 8),
+        (1, "sync", 0), (2, "sync", 0), (2, "async", 0), (8, "sync", 0), (8, "async", 0),
+    ]  # fmt: skip
 
+MY_POLICY = """
+import os
+import numpy as np
+from replay_table import Replay
 
-HOLD = np.zeros((1, 8))
+class MyPolicy:
+    def reset(self, instructions, demonstration):
+        self.instructions, self.players = instructions, None
 
-
-class ReplayPolicy:
-    """The replaying policy for our own runner; acts in chunks of 16."""
-
-    cameras = ("front",)
-    demonstration_frames = "none"
-    table = None
-
-    def __init__(self, seed=0):
-        self.replay, self.rows = Replay(self.table), None
-
-    def reset(self, instruction, demonstration):
-        self.rows = None
-
-    def act(self, observation):
-        if self.rows is None:
-            words = observation["instruction"]
-            self.rows = chunks(self.replay, observation["front_rgb"], words)
-        return next(self.rows)
-
-
-def chunks(replay, picture, words):
-    """Yield the recording of an episode in chunks of 16 rows; the last row for ever."""
-    rows = replay.table[key_of(picture, words)]
-    for first in range(0, len(rows), 16):
-        yield rows[first : first + 16]
-    while True:
-        yield np.repeat(rows[-1:], 16, axis=0)
+    def act(self, observations):
+        if self.players is None:
+            replay = Replay(os.environ["REPLAY_TABLE"])
+            seen = zip(observations["front_rgb"], self.instructions, strict=True)
+            self.players = [replay.play(*one) for one in seen]
+        return np.stack([next(player) for player in self.players])
+"""
 
 
 @pytest.fixture(scope="module")
-def replay(tmp_path_factory):
+def table(tmp_path_factory):
     path = tmp_path_factory.mktemp("replay") / "table.npz"
     record_table(path, EPISODES)
-    ReplayPolicy.table = path
-    return Replay(path)
+    return path
 
 
 @pytest.fixture(scope="module")
-def ours(replay):
-    job = Job(
-        policy="replay", spec="test_equal_outcomes:ReplayPolicy", task=TASK, split="test",
-        episode=0, setting=SETTING, max_steps=MAX_STEPS, meshes=MESHES,
-    )  # fmt: skip
+def ours(table):
     with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(HERE))
-        import test_equal_outcomes as module
-
-        module.ReplayPolicy.table = ReplayPolicy.table
-        played = [
-            play_episode(job.model_copy(update={"episode": episode})) for episode in range(EPISODES)
-        ]
-    assert {one.outcome for one in played} == {"success", "failure"}, played
-    return [(one.outcome == "success", one.steps) for one in played]
+        patch.setenv("REPLAY_TABLE", str(table))
+        return own_outcomes("replay_table:ReplayPolicy", EPISODES)
 
 
-@pytest.mark.parametrize(("count", "in_processes"), BATCHES)
-def test_in_our_vector_environment(replay, ours, count, in_processes):
-    vector = roboirg.make_vec(
-        TASK, count, autoreset_mode="Disabled", workers=count if in_processes else 1, lazy=True,
-        setting=SETTING, cameras=("front",), meshes=MESHES, max_steps=MAX_STEPS,
-        demonstration_frames="none",
-    )  # fmt: skip
-    found = []
-    for start in range(0, EPISODES, count):
-        batch, infos = vector.reset(seed=start)
-        players = [
-            chunks(replay, *seen) if start + index < EPISODES else None
-            for index, seen in enumerate(zip(batch["front_rgb"], batch["instruction"], strict=True))
-        ]
-        over = np.array([player is None for player in players])
-        verdicts = [None] * count
-        while not over.all():
-            # What is over gets another episode, which does not count.
-            for index in np.flatnonzero(over):
-                players[index] = itertools.repeat(np.repeat(HOLD, 16, axis=0))
-            rows = [next(player) for player in players]
-            _, _, terminated, truncated, infos = vector.step_chunk(rows)
-            for index in np.flatnonzero((terminated | truncated) & ~over):
-                verdicts[index] = bool(infos["is_success"][index]), int(infos["steps"][index])
-            ended = terminated | truncated
-            over |= ended
-            if ended.any() and not over.all():
-                vector.reset(options={"reset_mask": ended})
-        found += verdicts[: EPISODES - start]
-    vector.close()
-    assert found == ours
+@pytest.mark.parametrize(("count", "mode", "workers"), BATCHES)
+def test_the_page_s_program_has_the_outcomes_of_our_runner(
+    table, ours, tmp_path, count, mode, workers
+):
+    tasks = list(tasks_of(EPISODES))
+    numbers = f"{count}, {EPISODES // len(tasks)}"
+    values = {
+        '["PickXtimes", "VideoUnmask"], "contextual", 8, 50': f"{tasks}, {SETTING!r}, {numbers}",
+        "lazy=True": f"cameras=('front',), meshes={MESHES!r}, max_steps={MAX_STEPS}, "
+        f"demonstration_frames='none', {MODES[mode].format(workers=workers)}",
+    }
+    (program,) = blocks("Gymnasium", "python")
+    (tmp_path / "play.py").write_text(replaced(program, values))
+    (tmp_path / "my_policy.py").write_text(MY_POLICY)
+    shown = run_page("Gymnasium", tmp_path, {}, REPLAY_TABLE=str(table))
+    assert "mine" in shown
+    records = read_records(tmp_path / "runs" / "mine")
+    assert [one.identity.setting for one in records] == [SETTING] * EPISODES
+    found = [(one.task, one.episode, one.outcome == "success", one.steps) for one in records]
+    assert sorted(found) == sorted(ours)
 
 
-@pytest.mark.parametrize(("count", "in_processes"), BATCHES)
-def test_in_lerobot_s_batches(replay, ours, count, in_processes):
+def test_lerobot_s_batches_have_them_too(table, ours):
+    count, replay, found = 2, Replay(table), []
     options = {
         "setting": SETTING, "cameras": ("front",), "meshes": MESHES, "max_steps": MAX_STEPS,
     }  # fmt: skip
-    env = make_batch(TASK, count, in_processes, options)
-    found = []
-    for start in range(0, EPISODES, count):
+    env = make_batch(tasks_of(1)[0], count, True, options)
+    for start in range(0, 4, count):
         seeds = [1000 + start + index for index in range(count)]
         observation, _ = env.reset(seed=seeds, options={"lerobot_new_rollout": True})
-        words = env.call("task_description")
-        pictures = observation["pixels"]["front"]
-        players = [
-            rows_of(replay, picture, text)
-            if start + index < EPISODES
-            else itertools.repeat(HOLD[0])
-            for index, (picture, text) in enumerate(zip(pictures, words, strict=True))
-        ]
+        seen = zip(observation["pixels"]["front"], env.call("task_description"), strict=True)
+        players = [replay.play(*one) for one in seen]
         done, success, steps = (np.zeros(count, kind) for kind in (bool, bool, int))
         while not done.all():
             actions = np.stack([next(player) for player in players]).astype(np.float32)
@@ -138,11 +106,6 @@ def test_in_lerobot_s_batches(replay, ours, count, in_processes):
             steps += ~done
             success |= infos["is_success"] & ~done
             done |= terminated | truncated
-        found += list(zip(success.tolist(), steps.tolist(), strict=True))[: EPISODES - start]
+        found += list(zip(success.tolist(), steps.tolist(), strict=True))
     env.close()
-    assert found == ours
-
-
-def rows_of(replay, picture, words):
-    for chunk in chunks(replay, picture, words):
-        yield from chunk
+    assert found == [(success, steps) for _, _, success, steps in ours[:4]]

@@ -103,6 +103,26 @@ def test_inspect_s_logs_hold_whole_records(tmp_path):
     assert lost.cause == "environment: the model is busy"
 
 
+def test_lines_of_one_s_own_become_records(tmp_path):
+    path = tmp_path / "verdicts.jsonl"
+    first = {"task": "PickXtimes", "episode": 3, "success": True, "steps": 7, "setting": "direct"}
+    path.write_text(json.dumps(first) + '\n{"task": "StopCube", "episode": 0, "success": false}\n')
+    import_results("jsonl", path, tmp_path / "run", OPTIONS)
+    one, other = read_records(tmp_path / "run")
+    assert (one.setting, one.episode, one.outcome, one.steps) == ("direct", 3, "success", 7)
+    assert (other.setting, other.split, other.outcome) == ("explicit", "test", "failure")
+    assert "steps" in other.policy_metadata["imported"]["lacks"]
+    path.write_text('{"task": "StopCube", "episode": 0, "success": 1}')
+    with pytest.raises(InvalidValueError, match=r"line 1: success is 1; it must be true or false"):
+        import_results("jsonl", path, tmp_path / "other", OPTIONS)
+    path.write_text('{"task": "StopCube", "success": true}')
+    with pytest.raises(InvalidValueError, match="episode: Field required"):
+        import_results("jsonl", path, tmp_path / "other", OPTIONS)
+    path.write_text('{"task": "StopCube", "episode": 0, "success": true, "colour": 1}')
+    with pytest.raises(InvalidValueError, match="colour"):
+        import_results("jsonl", path, tmp_path / "other", OPTIONS)
+
+
 def test_tables_read_imported_records(tmp_path):
     path, run = lerobot_file(tmp_path), tmp_path / "run"
     runner = CliRunner()

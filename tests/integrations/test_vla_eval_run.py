@@ -8,45 +8,31 @@ import sqlite3
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 
 pytest.importorskip("vla_eval", reason="vla-eval is not installed here; run `make integrations`")
 
 import yaml
-from replay_table import MAX_STEPS, MESHES, SETTING, TASK, Replay, record_table
+from page_commands import HERE, ROOT, check_versions, run_page
+from replay_table import (
+    MANY,
+    MAX_STEPS,
+    MESHES,
+    SETTING,
+    own_outcomes,
+    record_table,
+    tasks_of,
+)
 
-from roboirg.evaluation.rollout import play_episode
-from roboirg.integrations.result_import import ImportOptions, import_results
 from roboirg.integrations.vla_eval.step_benchmark import RoboIRGBenchmark
-from roboirg.records.record import Job
 from roboirg.records.store import read_records
 
 pytestmark = pytest.mark.sim
 
-HERE = Path(__file__).parent
-ROOT = HERE.parents[1]
 EPISODES = int(os.environ.get("ROBOIRG_EQUALITY_EPISODES", "6"))
-
-
-class ReplayPolicy:
-    """The replaying policy for our own runner."""
-
-    cameras = ("front",)
-    demonstration_frames = "none"
-
-    def __init__(self, seed=0):
-        self.replay, self.rows, self.last = Replay(os.environ["REPLAY_TABLE"]), None, None
-
-    def reset(self, instruction, demonstration):
-        self.rows = None
-
-    def act(self, observation):
-        if self.rows is None:
-            self.rows = self.replay.begin(observation["front_rgb"], observation["instruction"])
-        self.last = self.replay.next_row(self.rows, self.last)
-        return self.last[None]
+BATCHES = [1] if EPISODES < MANY else [1, 2, 8]
+SHARD = "--shard-id 0 --num-shards 1"
 
 
 @pytest.fixture(scope="session")
@@ -56,14 +42,23 @@ def table(tmp_path_factory):
     return path
 
 
+@pytest.fixture(scope="session")
+def ours(table):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("REPLAY_TABLE", str(table))
+        return own_outcomes("replay_table:ReplayPolicy", EPISODES)
+
+
 @contextlib.contextmanager
-def serving(table, log):
-    """Serve the replaying policy; yields its port."""
+def serving(table, log, batch):
+    """Serve the replaying policy in batches; yields its port."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    command = [sys.executable, str(HERE / "replay_server.py"), str(table), str(port), str(log)]
-    server = subprocess.Popen(command, env={**os.environ, "PYTHONPATH": f"{ROOT / 'src'}:{HERE}"})
+    command = [
+        sys.executable, str(HERE / "replay_server.py"), str(table), str(port), str(log), str(batch),
+    ]  # fmt: skip
+    server = subprocess.Popen(command, env={**os.environ, "PYTHONPATH": str(HERE)})
     try:
         while True:
             with contextlib.suppress(ConnectionRefusedError):
@@ -77,62 +72,63 @@ def serving(table, log):
         server.wait()
 
 
-def test_a_run_has_the_outcomes_of_our_runner_and_tells_nothing(table, tmp_path, monkeypatch):
-    monkeypatch.setenv("REPLAY_TABLE", str(table))
-    monkeypatch.syspath_prepend(str(HERE))
-    ours = [
-        play_episode(
-            Job(
-                policy="test_vla_eval_run:ReplayPolicy", task=TASK, split="test", setting=SETTING,
-                episode=episode, max_steps=MAX_STEPS, meshes=MESHES,
-            )
-        )
-        for episode in range(EPISODES)
-    ]  # fmt: skip
-    assert {one.outcome for one in ours} == {"success", "failure"}, ours
-    log, out = tmp_path / "told.jsonl", tmp_path / "results"
-    entry = yaml.safe_load((ROOT / "integrations/vla_eval/roboirg.yaml").read_text())
-    (first,) = [one for one in entry["benchmarks"] if one["params"]["setting"] == SETTING]
-    params = {"setting": SETTING, "tasks": [TASK], "max_steps": MAX_STEPS, "meshes": MESHES}
-    entry["benchmarks"] = [{**first, "params": params, "episodes_per_task": EPISODES}]
-    with serving(table, log) as port:
-        entry |= {"server": {"url": f"ws://127.0.0.1:{port}"}, "output_dir": str(out)}
-        (tmp_path / "run.yaml").write_text(yaml.safe_dump(entry))
-        done = subprocess.run(
-            [
-                str(Path(sys.executable).with_name("vla-eval")), "run", "--no-docker",
-                "-c", str(tmp_path / "run.yaml"), "--eval-id", "first",
-                "--shard-id", "0", "--num-shards", "1",
-            ],
-            capture_output=True, text=True, check=False,
-            env={**os.environ, "PYTHONPATH": str(ROOT / "src")},
-        )  # fmt: skip
-    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
-    with contextlib.closing(sqlite3.connect(out / "recording-first.sqlite")) as database:
-        rows = database.execute(
-            "SELECT task_name, status, steps FROM episode_results ORDER BY episode_id"
-        ).fetchall()
-    expected = [
-        (TASK, "success" if one.outcome == "success" else "fail", one.steps) for one in ours
-    ]
-    assert rows == expected
-    recording = out / "recording-first.sqlite"
-    import_results("vla-eval", recording, tmp_path / "run", ImportOptions("replay"))
-    imported = [(one.episode, one.outcome, one.setting) for one in read_records(tmp_path / "run")]
-    assert imported == [(index, one.outcome, SETTING) for index, one in enumerate(ours)]
+def write_configuration(path, port):
+    """Write our configuration with one of its entries and fewer episodes."""
+    content = yaml.safe_load((ROOT / "integrations/vla_eval/roboirg.yaml").read_text())
+    (entry,) = [one for one in content["benchmarks"] if one["params"]["setting"] == SETTING]
+    tasks = list(tasks_of(EPISODES))
+    entry["params"] |= {"tasks": tasks, "max_steps": MAX_STEPS, "meshes": MESHES}
+    entry["episodes_per_task"] = EPISODES // len(tasks)
+    content |= {"server": {"url": f"ws://127.0.0.1:{port}"}, "benchmarks": [entry]}
+    path.write_text(yaml.safe_dump(content))
+
+
+def in_shards(count):
+    """Return what to say on the page instead of one shard: as many at a time."""
+    if count == 1:
+        return {}
+    shell = "& shards+=($!); done; for shard in ${shards[@]}; do wait $shard; done"
+    return {
+        "vla-eval run": f"for i in $(seq 0 {count - 1}); do vla-eval run",
+        SHARD: f"--shard-id $i --num-shards {count} {shell}",
+    }
+
+
+@pytest.mark.parametrize("batch", BATCHES)
+def test_the_page_s_commands_have_the_outcomes_of_our_runner(table, ours, tmp_path, batch):
+    log = tmp_path / "told.jsonl"
+    with serving(table, log, batch) as port:
+        write_configuration(tmp_path / "run.yaml", port)
+        values = {"integrations/vla_eval/roboirg.yaml": "run.yaml", **in_shards(batch)}
+        shown = run_page("vla-eval", tmp_path, values)
+    assert "pi05" in shown
+    recording = tmp_path / "runs" / "vla-eval" / "recording-first.sqlite"
+    with contextlib.closing(sqlite3.connect(recording)) as database:
+        assert database.execute("SELECT count(*) FROM episode_results").fetchone() == (EPISODES,)
+    records = read_records(tmp_path / "runs" / "pi05")
+    assert {one.setting for one in records} == {SETTING}
+    found = [(one.task, one.episode, one.outcome == "success", one.steps) for one in records]
+    assert sorted(found) == sorted(ours)
+    check_that_nothing_is_told(log)
+
+
+def check_that_nothing_is_told(log):
     told = [json.loads(line) for line in log.read_text().splitlines()]
     starts = [content for kind, content in told if kind == "start"]
     assert len(starts) == EPISODES
     assert all(one["task"] == {"name": "RoboIRGBench"} for one in starts)
     words = json.dumps([content for kind, content in told if kind != "observation"])
-    for secret in (SETTING, TASK, "goal", "seed", "episode_idx"):
+    for secret in (SETTING, *tasks_of(EPISODES), "goal", "seed", "episode_idx"):
         assert secret not in words
+    later = ["images", "states", "task_description"]
+    first = ["episode_restart", *later, "video_history", "wrist_video_history"]
     shown = [content for kind, content in told if kind == "observation"]
-    assert shown[0] == [
-        "episode_restart", "images", "states", "task_description", "video_history",
-        "wrist_video_history",
-    ]  # fmt: skip
-    assert shown[1] == ["images", "states", "task_description"]
+    assert first in shown
+    assert all(one in (first, later) for one in shown)
+
+
+def test_the_page_names_the_version_that_is_played():
+    check_versions("vla-eval")
 
 
 def test_the_class_declares_what_it_does():

@@ -114,7 +114,9 @@ def test_a_kind_from_outside_is_judged_and_described(toppled: FactTraits) -> Non
     assert judge.cause == "knocked the red pillar over; expected: leave the pillar alone"
     assert fact_words(TOPPLED) == "pillar knocked over"
     event = EventRecord(step=3, kind="toppled", subject="pillar", place=None, holds=True)
-    assert event_text(event) == "pillar knocked over"
+    assert event_text(event, {"pillar": "the red pillar"}) == "knocked the red pillar over"
+    over = event.model_copy(update={"holds": False})
+    assert event_text(over, {}) == "knocked pillar over; that is over"
     picked = Fact("picked", "cube")
     plan = [stage(picked), stage(TOPPLED)]
     assert classify_grounding_error(TOPPLED, plan, 0) == "wrong_count"

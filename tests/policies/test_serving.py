@@ -86,7 +86,8 @@ SEEN = {
 
 
 @pytest.mark.parametrize("protocol", SERVED)
-def test_a_served_policy_gets_what_the_client_was_given(protocol):
+def test_a_served_policy_gets_what_the_client_was_given(protocol, monkeypatch):
+    monkeypatch.setenv("XLA_FLAGS", "--xla_gpu_autotune_level=0")
     first, later = moment(3, history=()), moment(5, history=(moment(4), moment(5)))
     with served(HERE, protocol, seed=7) as url:
         for length in (3, 2):
@@ -97,6 +98,8 @@ def test_a_served_policy_gets_what_the_client_was_given(protocol):
             client.close()
             assert client.metadata["policy"] == HERE
             assert client.metadata["protocol"] == protocol
+            assert client.metadata["device"]
+            assert client.metadata["flags"] == "XLA_FLAGS=--xla_gpu_autotune_level=0"
     one, two = Recorder.episodes
     assert (one.seed, two.seed) == (7, 7)
     for policy in (one, two):

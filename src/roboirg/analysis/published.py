@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import csv
 import functools
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from decimal import Decimal
 from importlib import resources
 from typing import Literal, NamedTuple, get_args
 
 from roboirg.analysis.stats.option_labels import options_label, staged_options
-from roboirg.analysis.stats.rates import DIGITS
+from roboirg.analysis.stats.rates import DIGITS, mean_percent
 from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 
@@ -50,6 +50,14 @@ class PublishedRow(NamedTuple):
     options: InstructionOptions
     rates: Mapping[str, Decimal | None]
     average: Decimal
+
+    def average_over(self, tasks: Collection[str]) -> Decimal | None:
+        """Return the mean over some tasks; None without any, or if one of them has no rate."""
+        rates = [rate for task in tasks if (rate := self.rates.get(task)) is not None]
+        if not rates or len(rates) < len(tasks):
+            return None
+        defined = {task for task, rate in self.rates.items() if rate is not None}
+        return self.average if defined == set(tasks) else mean_percent(rates)
 
 
 class CoverageRow(NamedTuple):

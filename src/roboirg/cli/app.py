@@ -19,11 +19,11 @@ from roboirg.cli import (
     grounding_commands,
     import_commands,
     language_commands,
+    people_commands,
     policy_commands,
     report_commands,
     run_commands,
     verification_commands,
-    wording_commands,
 )
 from roboirg.cli.bench_commands import bench
 from roboirg.cli.learn_commands import learn_app
@@ -45,6 +45,7 @@ from roboirg.cli.run_commands import INTERRUPTED, USAGE_ERROR, Out
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.printable import printable
 from roboirg.core.version import __version__
+from roboirg.util.freed_memory import keep_freed_memory
 from roboirg.util.plurals import counted
 
 # Heavy modules are imported inside the commands, so that --help is fast.
@@ -72,7 +73,8 @@ app.add_typer(language_commands.export_app, name="export")
 app.add_typer(grounding_commands.score_app, name="score")
 app.add_typer(learn_app, name="learn")
 app.add_typer(real_app, name="real")
-app.add_typer(wording_commands.wordings_app, name="wordings")
+app.add_typer(people_commands.listen_app, name="listen")
+app.add_typer(language_commands.wordings_app, name="wordings")
 app.command()(bench)
 
 
@@ -109,6 +111,7 @@ app.command()(report_commands.tables)
 app.command()(report_commands.figures)
 app.command()(report_commands.compare)
 app.command()(import_commands.import_results)
+app.command()(people_commands.drive)
 app.command(cls=policy_commands.ProtocolHelpCommand)(policy_commands.serve)
 app.command("check-policy", cls=policy_commands.ProtocolHelpCommand)(policy_commands.check_policy)
 language_commands.export_app.command("grounding")(grounding_commands.export_grounding)
@@ -183,13 +186,13 @@ def build_splits(
     from roboirg.episodes import splits
     from roboirg.evaluation.executors.executor import core_count
     from roboirg.evaluation.plan_parsing import parse_names, parse_splits
-    from roboirg.evaluation.seed_selection import (
+    from roboirg.evaluation.seed_search.seed_selection import (
         check_kept_splits,
         episode_slots,
         find_seeds,
         merge_splits,
     )
-    from roboirg.evaluation.seed_summary import follow_progress, print_summary
+    from roboirg.evaluation.seed_search.seed_summary import follow_progress, print_summary
     from roboirg.tasks import find_tasks
     from roboirg.util.atomic_write import write_atomically
 
@@ -288,6 +291,7 @@ def instruct(
 
 def main() -> None:
     """Run the command; errors are one sentence on stderr, never a traceback."""
+    keep_freed_memory()
     try:
         code = app(prog_name="roboirg", standalone_mode=False)
     except RoboIRGError as error:

@@ -7,9 +7,6 @@ from typing import Annotated
 
 import typer
 
-MINIMUM_WIDTH = 110
-"""Columns of output that is not a terminal."""
-
 
 def bench(
     rounds: Annotated[int, typer.Option(help="Number of repetitions.")] = 5,
@@ -20,11 +17,11 @@ def bench(
 
     from roboirg.perf.bench_runner import results_table, run_measures, write_results
     from roboirg.perf.measures import measures
+    from roboirg.util.console_width import widen
 
-    console = Console()
-    if not console.is_terminal:
-        console.width = max(console.width, MINIMUM_WIDTH)
     figures = run_measures(measures(), rounds, lambda words: typer.echo(words, err=True))
-    console.print(results_table(figures))
+    console, table = Console(), results_table(figures)
+    widen(console, table)
+    console.print(table)
     if out is not None:
         write_results(figures, out)

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
 from roboirg.cli.options import (
-    Distractor,
+    DEFAULT_WORDS,
     Forms,
-    Frame,
-    Reasoning,
-    Rival,
     Settings,
     Split,
-    Stages,
     Tasks,
-    Wordings,
+    WordChoices,
     Workers,
+    spread,
 )
 from roboirg.core.errors import InvalidValueError
 from roboirg.util.plurals import counted
@@ -29,10 +23,8 @@ from roboirg.util.plurals import counted
 if TYPE_CHECKING:
     from roboirg.demonstrations.export_plan import ExportPlan
 
-_LINE_EVERY = 10.0
-"""Seconds between two lines of progress where the output is no terminal."""
 
-
+@spread
 def export_demonstrations(
     out: Annotated[Path, typer.Option(help="Folder of the data set.")],
     format: Annotated[  # noqa: A002
@@ -45,12 +37,7 @@ def export_demonstrations(
     ] = "all",
     settings: Settings = "all",
     forms: Forms = "implicit",
-    stages: Stages = "1-5",
-    distractor: Distractor = "neutral",
-    frame: Frame = "robot",
-    rival: Rival = "none",
-    reasoning: Reasoning = "plain",
-    wordings: Wordings = None,
+    words: WordChoices = DEFAULT_WORDS,
     delivery: Annotated[
         str, typer.Option(help="prompt, or turns: in language columns and the table of episodes.")
     ] = "prompt",
@@ -94,26 +81,17 @@ def export_demonstrations(
 ) -> None:
     """Export demonstrations for training, recorded once per episode, told in every setting."""
     from roboirg.cli.language_commands import known_settings
-    from roboirg.core.instruction_options import InstructionOptions
+    from roboirg.cli.progress_bar import progress_bars
     from roboirg.demonstrations.export_plan import ExportPlan
     from roboirg.demonstrations.export_run import run_export
     from roboirg.demonstrations.size_estimate import size_text
     from roboirg.evaluation.executors.executor import core_count
-    from roboirg.evaluation.plan_parsing import means_all, parse_names, parse_stages
-    from roboirg.language import FORMS, open_wordings
+    from roboirg.evaluation.plan_parsing import means_all, parse_names
+    from roboirg.language import FORMS
     from roboirg.policies import load_policy_class
     from roboirg.tasks import find_tasks
 
     load_policy_class(policy)
-    options = InstructionOptions(
-        stages=parse_stages(stages),
-        distractor=distractor,
-        frame=frame,
-        wordings=open_wordings(wordings),
-        delivery=delivery,
-        rival=rival,
-        reasoning=reasoning,
-    )
     # `validated` checks the names that are cast.
     plan = ExportPlan(
         tasks=tuple(find_tasks(parse_names("task", tasks))),
@@ -121,7 +99,7 @@ def export_demonstrations(
         episodes=_episodes(split, episodes),
         settings=known_settings(settings),
         forms=FORMS if means_all(forms) else parse_names("form", forms),
-        options=options,
+        options=words.instruction_options(delivery),
         format=cast("Any", format),
         pictures=cast("Any", pictures),
         video=cast("Any", video or _default_video(format)),
@@ -136,7 +114,11 @@ def export_demonstrations(
     if dry_run:
         return
     count = core_count() if workers is None else workers
-    with _progress() as report:
+    with progress_bars() as show:
+
+        def report(stage: str, done: int, total: int, size: int) -> None:
+            show(stage, done, total, size_text(size) if size else "")
+
         summary = run_export(plan, out, count, report, trajectories)
     ends = ", ".join(f"{number} {status}" for status, number in summary.statuses.items())
     typer.echo(
@@ -147,15 +129,16 @@ def export_demonstrations(
 
 def _episodes(split: str, text: str) -> tuple[int, ...]:
     """Return the positions of episodes in a split."""
-    from roboirg.episodes.splits import SIZES, check_split
+    from roboirg.core.episode import SPLITS
+    from roboirg.episodes.splits import split_size
     from roboirg.evaluation.plan_parsing import means_all, parse_episodes
 
-    size = SIZES[check_split(split)]
+    size = split_size(split)
     if not means_all(text):
         return parse_episodes(text, split)
-    if split == "random":
+    if split not in SPLITS:
         raise InvalidValueError(
-            f"The split 'random' has {size:,} episodes; say how many with --episodes."
+            f"The split {split!r} has {size:,} episodes; say how many with --episodes."
         )
     return tuple(range(size))
 
@@ -180,59 +163,6 @@ def _print_estimate(plan: ExportPlan) -> None:
         f"{size_text(estimate.size)}",
         err=True,
     )
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str, int, int, int], None]]:
-    """Show what is done, the time left and the size: a bar on a terminal, else a line at times."""
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeRemainingColumn,
-    )
-
-    from roboirg.demonstrations.size_estimate import size_text
-
-    console = Console(stderr=True)
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[size]}"),
-    )
-    started: dict[str, tuple[float, int]] = {}
-    last_line = 0.0
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as bar:
-        bars = {}
-
-        def report(kind: str, done: int, total: int, size: int) -> None:
-            nonlocal last_line
-            if kind not in bars:
-                bars[kind] = bar.add_task(kind, total=total, size="")
-                started[kind] = time.monotonic(), done
-            amount = size_text(size) if size else ""
-            bar.update(bars[kind], completed=done, total=total, size=amount)
-            now = time.monotonic()
-            if not console.is_terminal and (now - last_line > _LINE_EVERY or done == total):
-                last_line = now
-                left = _time_left(now, *started[kind], done, total)
-                console.print(f"{kind} {done}/{total} {left} {amount}".rstrip(), highlight=False)
-
-        yield report
-
-
-def _time_left(now: float, start: float, first: int, done: int, total: int) -> str:
-    """Return the time left at the rate so far, in words."""
-    if done in (total, first):
-        return ""
-    seconds = (now - start) / (done - first) * (total - done)
-    return f"{seconds / 60:.0f} min left" if seconds >= 60 else f"{seconds:.0f} s left"  # noqa: PLR2004
 
 
 def replay(

@@ -9,17 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from roboirg.cli.options import (
+    DEFAULT_WORDS,
     AnySplit,
-    Distractor,
     Forms,
-    Frame,
-    Reasoning,
-    Rival,
     Settings,
-    Stages,
     Tasks,
-    Wordings,
+    WordChoices,
     Workers,
+    spread,
 )
 from roboirg.core.errors import InvalidValueError
 from roboirg.util.plurals import counted
@@ -28,9 +25,6 @@ if TYPE_CHECKING:
     from roboirg.analysis.grounding_scores.answer_scores import GroundingScore
 
 # Heavy modules are imported inside the commands, so that --help is fast.
-
-MINIMUM_WIDTH = 150
-"""Columns of output that is not a terminal."""
 
 score_app = typer.Typer(no_args_is_help=True, help="Score answers of models.")
 
@@ -41,6 +35,7 @@ def _score() -> None:
     pass
 
 
+@spread
 def export_grounding(
     out: Annotated[Path, typer.Option(help="Folder for the dataset; continued if interrupted.")],
     split: AnySplit = "test",
@@ -54,12 +49,7 @@ def export_grounding(
     variants: Annotated[
         bool, typer.Option(help="Add every combination of the options below.")
     ] = False,
-    stages: Stages = "1-5",
-    distractor: Distractor = "neutral",
-    frame: Frame = "robot",
-    rival: Rival = "none",
-    reasoning: Reasoning = "plain",
-    wordings: Wordings = None,
+    words: WordChoices = DEFAULT_WORDS,
     frames: Annotated[int, typer.Option(min=1, help="Most frames of a video as pictures.")] = 16,
     frames_every: Annotated[
         int, typer.Option(min=1, help="Control steps between two frames of a video.")
@@ -72,7 +62,6 @@ def export_grounding(
     """Export questions of grounding with pictures: Parquet, JSON lines, VLMEvalKit's TSV."""
     from roboirg.cli.language_commands import known_name, known_settings, known_tasks
     from roboirg.cli.progress_bar import progress_bar
-    from roboirg.core.instruction_options import InstructionOptions
     from roboirg.episodes.splits import SIZES
     from roboirg.evaluation.executors.executor import core_count
     from roboirg.evaluation.grounding_set.dataset_export import (
@@ -81,35 +70,21 @@ def export_grounding(
         ExportRequest,
         export_grounding,
     )
-    from roboirg.evaluation.plan_parsing import (
-        parse_episodes,
-        parse_names,
-        parse_splits,
-        parse_stages,
-    )
+    from roboirg.evaluation.plan_parsing import parse_episodes, parse_names, parse_splits
     from roboirg.language import FORMS
     from roboirg.language.export import check_export_support
     from roboirg.language.generator import check_options
-    from roboirg.language.wordings.wording_store import open_wordings
 
     tables = () if formats.strip().lower() == "none" else parse_names("format", formats)
     kinds = tuple(known_name("format", one, TABLE_FORMATS) for one in tables)
     if "parquet" in kinds:
         check_export_support("parquet")
-    identity = open_wordings(wordings)
-    options = InstructionOptions(
-        stages=parse_stages(stages),
-        distractor=distractor,
-        frame=frame,
-        wordings=identity,
-        rival=rival,
-        reasoning=reasoning,
-    )
+    options = words.instruction_options()
     check_options(options)
     request = ExportRequest(
         episodes=tuple(
             EpisodeName(task, one, index)
-            for task in known_tasks(tasks, identity)
+            for task in known_tasks(tasks, options.wordings)
             for one in parse_splits(split)
             for index in (range(SIZES[one]) if episodes is None else parse_episodes(episodes, one))
         ),
@@ -119,7 +94,7 @@ def export_grounding(
         every_variant=variants,
         frames=frames,
         frames_every=frames_every,
-        wordings=wordings,
+        wordings=words.wordings,
         formats=kinds,
     )
     count = core_count() if workers is None else workers
@@ -182,8 +157,6 @@ def score_grounding(
             write_answers(write_floors / f"{name}.jsonl", found)
         scores += score_answers(items, found, name)
     console = Console()
-    if not console.is_terminal:
-        console.width = max(console.width, MINIMUM_WIDTH)
     console.print(renderable(score_table(scores), console))
     for sentence in compared:
         console.print(sentence, highlight=False, markup=False)

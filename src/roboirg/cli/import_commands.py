@@ -12,9 +12,12 @@ from roboirg.util.plurals import counted
 
 
 def import_results(
-    harness: Annotated[str, typer.Argument(help="lerobot, vla-eval or inspect.")],
+    harness: Annotated[str, typer.Argument(help="lerobot, vla-eval, inspect or jsonl.")],
     file: Annotated[
-        Path, typer.Argument(help="eval_info.json, recording-ID.sqlite, or a log as JSON.")
+        Path,
+        typer.Argument(
+            help="eval_info.json, recording-ID.sqlite, a log as JSON, or an episode per line."
+        ),
     ],
     out: Annotated[Path, typer.Option(help="Folder for the records.")],
     policy: Annotated[str, typer.Option(help="Name of the policy in tables.")],

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_type_hints
 
 import typer
 
 from roboirg.core.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from roboirg.core.instruction_options import InstructionOptions
 
 Tasks = Annotated[
     str,
@@ -32,10 +38,69 @@ Wordings = Annotated[
         "of that pool in every split."
     ),
 ]
+Salt = Annotated[
+    str | None,
+    typer.Option(help="Secret of a private split; not in the shell's history if in ROBOIRG_SALT."),
+]
 Workers = Annotated[
     int | None,
     typer.Option(help="Worker processes, one per core by default; 0 uses this process only."),
 ]
+
+
+class WordChoices(NamedTuple):
+    """Options that choose the words of instructions; a parameter of commands, see `spread`."""
+
+    stages: Stages = "1-5"
+    distractor: Distractor = "neutral"
+    frame: Frame = "robot"
+    rival: Rival = "none"
+    reasoning: Reasoning = "plain"
+    wordings: Wordings = None
+
+    def instruction_options(self, delivery: str = "prompt") -> InstructionOptions:
+        """Return them checked one by one; `check_options` checks whether they go together.
+
+        Raises:
+            InvalidValueError: there is no such stage, or the wording file cannot be read.
+        """
+        from roboirg.core.instruction_options import InstructionOptions
+        from roboirg.evaluation.plan_parsing import parse_stages
+        from roboirg.language.wordings.wording_store import open_wordings
+
+        chosen = self._asdict() | {
+            "stages": parse_stages(self.stages),
+            "wordings": open_wordings(self.wordings),
+        }
+        return InstructionOptions(**chosen, delivery=delivery)
+
+
+DEFAULT_WORDS = WordChoices()
+
+
+def spread(command: Callable[..., None]) -> Callable[..., None]:
+    """Let the parameter `words: WordChoices` of a command be given as an option for each field."""
+    types = get_type_hints(command, include_extras=True)
+    of_words = get_type_hints(WordChoices, include_extras=True)
+    parameters: list[inspect.Parameter] = []
+    for one in inspect.signature(command).parameters.values():
+        if one.name != "words":
+            parameters.append(one.replace(annotation=types[one.name]))
+            continue
+        parameters += [
+            one.replace(name=name, annotation=of_words[name], default=default)
+            for name, default in DEFAULT_WORDS._asdict().items()
+        ]
+
+    @functools.wraps(command)
+    def spread_command(**given: Any) -> None:  # noqa: ANN401 - whatever the command takes
+        words = WordChoices(*(given.pop(name) for name in WordChoices._fields))
+        command(**given, words=words)
+
+    # Typer reads both.
+    spread_command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    spread_command.__annotations__ = {one.name: one.annotation for one in parameters}
+    return spread_command
 
 
 def check_output_file(path: Path) -> None:

@@ -34,6 +34,12 @@ Forms = Annotated[
     str | None, _episodes(help="implicit, resolved, or both separated by a comma.  (implicit)")
 ]
 Split = Annotated[str | None, _episodes(help="train, val, test or random.  (test)")]
+Salt = Annotated[
+    str | None,
+    _episodes(
+        help="Secret that draws private episodes of --split random.  (ROBOIRG_SALT, or none)"
+    ),
+]
 Episodes = Annotated[
     str | None, _episodes(help="4 for the first four, or a list such as 0,3,5-9.  (4)")
 ]

@@ -1,11 +1,15 @@
-"""A progress bar for commands that make something of many records."""
+"""Progress of long commands: bars on a terminal, else a line at times."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 # Rich is imported where it is used, so that --help is fast.
+
+LINE_EVERY_S = 10.0
+"""Seconds between two lines of progress where stderr is no terminal."""
 
 
 @contextmanager
@@ -14,6 +18,20 @@ def progress_bar(words: str) -> Iterator[Callable[[int, int], None]]:
 
     Yields:
         A function to tell how many are done, and how many there are.
+    """
+    with progress_bars(has_lines=False) as report:
+        yield lambda done, total: report(words, done, total, "")
+
+
+@contextmanager
+def progress_bars(*, has_lines: bool = True) -> Iterator[Callable[[str, int, int, str], None]]:
+    """Show a bar for each stage of the work while the block runs.
+
+    Args:
+        has_lines: whether lines tell the progress and the time left if stderr is no terminal.
+
+    Yields:
+        A function to tell a stage, how many of it are done, how many there are, and a remark.
     """
     from rich.console import Console
     from rich.progress import (
@@ -25,9 +43,40 @@ def progress_bar(words: str) -> Iterator[Callable[[int, int], None]]:
     )
 
     console = Console(stderr=True)
-    columns = (TextColumn(words), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[remark]}"),
+    )
+    started: dict[str, tuple[float, int]] = {}
+    last_line = 0.0
     with Progress(
         *columns, console=console, transient=True, disable=not console.is_terminal
     ) as bar:
-        task = bar.add_task("", total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+        bars = {}
+
+        def report(stage: str, done: int, total: int, remark: str) -> None:
+            nonlocal last_line
+            if stage not in bars:
+                bars[stage] = bar.add_task(stage, total=total, remark="")
+                started[stage] = time.monotonic(), done
+            bar.update(bars[stage], completed=done, total=total, remark=remark)
+            now = time.monotonic()
+            if console.is_terminal or not has_lines:
+                return
+            if now - last_line > LINE_EVERY_S or done == total:
+                last_line = now
+                left = _time_left(now, *started[stage], done, total)
+                console.print(f"{stage} {done}/{total} {left} {remark}".rstrip(), highlight=False)
+
+        yield report
+
+
+def _time_left(now: float, start: float, first: int, done: int, total: int) -> str:
+    """Return the time left at the rate so far, in words."""
+    if done in (total, first):
+        return ""
+    seconds = (now - start) / (done - first) * (total - done)
+    return f"{seconds / 60:.0f} min left" if seconds >= 60 else f"{seconds:.0f} s left"  # noqa: PLR2004

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
 # Heavy modules are imported inside the commands, so that --help answers at once.
 
-MINIMUM_WIDTH = 120
-"""Columns to use if the output is not a terminal."""
 _ALL = "all"
 
 By = Annotated[
@@ -173,7 +171,9 @@ def compare(
 
     from roboirg.analysis.stats.comparison import compare as compare_cells
     from roboirg.analysis.stats.comparison_text import sentences
+    from roboirg.analysis.stats.flips import read_flips
     from roboirg.analysis.stats.intervals import SEED
+    from roboirg.util.console_width import widen
 
     ours, theirs = _one_policy(first), _one_policy(second)
     breakdowns = _breakdowns(by)
@@ -184,9 +184,9 @@ def compare(
     if names[0] == names[1]:
         names = [f"{names[0]} ({first})", f"{names[1]} ({second})"]
     console = Console()
-    if not console.is_terminal:
-        console.width = max(console.width, MINIMUM_WIDTH)
-    for sentence in sentences(found, *names):
+    widen(console)
+    flips = read_flips(Path(_split(first)[0])), read_flips(Path(_split(second)[0]))
+    for sentence in sentences(found, *names, flips):
         console.print(Text(sentence), highlight=False)
 
 
@@ -275,8 +275,6 @@ def _print(found: list[Table]) -> None:
     from roboirg.analysis.tables.rendering.terminal import renderable
 
     console = Console()
-    if not console.is_terminal:
-        console.width = max(console.width, MINIMUM_WIDTH)
     for table in found:
         console.print(renderable(table, console), highlight=False)
 
@@ -304,13 +302,11 @@ def _cells(runs: list[str]) -> Cells:
 
 def _runs(runs: list[str]) -> tuple[list[tuple[str, Sequence[AnyResult]]], list[Job]]:
     """Return the results of runs, each with its folder, and the jobs of their plans."""
-    from roboirg.evaluation.plan import read_plan
+    from roboirg.cli.run_commands import planned_jobs
     from roboirg.records.store import read_results
 
     folders = [Path(run) for run in runs]
-    planned = [
-        job for folder in folders if (plan := read_plan(folder)) is not None for job in plan.jobs()
-    ]
+    planned = [job for folder in folders for job in planned_jobs(folder)]
     results: list[tuple[str, Sequence[AnyResult]]] = [
         (str(folder), read_results(folder)) for folder in folders
     ]

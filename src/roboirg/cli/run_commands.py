@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 USAGE_ERROR, INTERRUPTED, TERMINATED = 2, 130, 143
 EXECUTORS = ("local", "ray")
-_MINIMUM_WIDTH = 100
 
 Policies = Annotated[
     list[str] | None,
@@ -66,6 +65,7 @@ def run(
     settings: options.Settings = None,
     forms: options.Forms = None,
     split: options.Split = None,
+    salt: options.Salt = None,
     episodes: options.Episodes = None,
     policy_seeds: options.PolicySeeds = None,
     stages: options.Stages = None,
@@ -134,7 +134,7 @@ def run(
     # Absolute: a policy in this process may change the working directory.
     folder = folder_of(out).absolute()
     add_working_directory()
-    made = _plan(plan, typed)
+    made = _plan(plan, typed, salt)
     chosen = _executor(made, executor, address, workers)
     _check_run(made, folder)
     if dry_run:
@@ -241,11 +241,11 @@ def print_tables_of(folder: Path, planned: Sequence[Job]) -> None:
 
 
 def planned_jobs(folder: Path) -> tuple[Job, ...]:
-    """Return the jobs of a run's newest plan; none if the plan is missing or cannot be read."""
+    """Return the jobs of a run's newest plan; none if the plan or its episodes are not known."""
     from roboirg.evaluation.plan import read_plan
 
     plan = read_plan(folder)
-    return plan.jobs() if plan else ()
+    return plan.drawable_jobs() if plan else ()
 
 
 def report_problems(summary: RunSummary, folder: Path) -> None:
@@ -285,8 +285,9 @@ def _results(folder: Path) -> Any:  # noqa: ANN401 - imported where it is needed
     return read_results(folder)
 
 
-def _plan(name: str | None, typed: dict[str, Any]) -> Plan:
+def _plan(name: str | None, typed: dict[str, Any], salt: str | None) -> Plan:
     """Return the plan of a file, overridden by the options that were typed."""
+    from roboirg.episodes.private_splits import with_salt
     from roboirg.evaluation.plan_file import read_plan_file
     from roboirg.evaluation.plan_maker import make_plan
 
@@ -297,6 +298,7 @@ def _plan(name: str | None, typed: dict[str, Any]) -> Plan:
     frames = chosen.get("demonstration_frames")
     if isinstance(frames, str) and frames.isdigit():
         chosen["demonstration_frames"] = int(frames)
+    chosen["split"] = with_salt(str(chosen.get("split", "test")), salt)
     return make_plan(policies, **chosen)
 
 
@@ -337,12 +339,12 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
 
     from roboirg.evaluation.estimate import cell_sizes, estimate, estimate_text
     from roboirg.evaluation.executors.executor import core_count
+    from roboirg.evaluation.world_speed import ASSUMED, measure_world
     from roboirg.records.record_codec import identity_key
     from roboirg.records.store import read_index
+    from roboirg.util.console_width import widen
 
     jobs, console = plan.jobs(), Console()
-    if not console.is_terminal:
-        console.width = max(console.width, _MINIMUM_WIDTH)
     table = Table(title=f"plan {plan.fingerprint}", title_justify="left")
     sizes = cell_sizes(jobs)
     settings = tuple(dict.fromkeys(setting for cells in sizes.values() for setting in cells))
@@ -354,12 +356,17 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
         counts = (" + ".join(map(str, cells.get(one, {}).values())) or "–" for one in settings)
         table.add_row(policy, task, *counts)
     table.caption = "episodes: implicit" + (" + resolved" if "resolved" in plan.forms else "")
+    widen(console, table)
     console.print(table)
     _print_prompt_shares(jobs, settings, console)
     played = read_index(folder)
     todo = [job for job in jobs if identity_key(job) not in played]
     count = core_count() if workers is None else max(workers, 1)  # 0 is this process
-    for line in estimate_text(estimate(todo, played.values(), count), len(jobs), count):
+    known = {(one.policy, one.task) for one in played.values()}
+    new = [job for job in todo if (job.policy, job.task) not in known]
+    speed = measure_world(new) if new else ASSUMED
+    found = estimate(todo, played.values(), min(count, core_count()), speed)
+    for line in estimate_text(found, len(jobs), count, speed):
         console.print(line, highlight=False)
 
 
@@ -371,6 +378,7 @@ def _print_prompt_shares(
 
     from roboirg.evaluation.prompt_shares import prompt_shares, share_text
     from roboirg.policies.policy_classes import BUILTIN
+    from roboirg.util.console_width import widen
 
     shares = prompt_shares(jobs)
     table = Table(title="instructions that are cut", title_justify="left")
@@ -382,6 +390,7 @@ def _print_prompt_shares(
             row = ("–" if count is None else share_text(count) for count in counts)
             table.add_row(one.policy, f"{one.limit.tokens} tokens", *row)
     if table.row_count:
+        widen(console, table)
         console.print(table)
     undeclared = [one.policy for one in shares if one.limit is None and one.policy not in BUILTIN]
     if undeclared:

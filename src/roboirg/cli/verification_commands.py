@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from roboirg.cli.import_path import add_working_directory
-from roboirg.cli.options import Workers, check_output_file
+from roboirg.cli.options import Salt, Workers, check_output_file
 from roboirg.cli.progress_bar import progress_bar
 from roboirg.cli.run_commands import USAGE_ERROR, Folder, folder_of, report_problems
 from roboirg.core.errors import InvalidValueError
@@ -33,6 +33,7 @@ def verify(
     run: RunOrPack,
     sample: SampleShare = "100%",
     sample_seed: SampleSeed = None,
+    salt: Salt = None,
     workers: Workers = None,
 ) -> None:
     """Play the actions of a run again and check its records; exit code 2 if one does not hold."""
@@ -40,6 +41,7 @@ def verify(
     from roboirg.evaluation.verification.run_verification import verify_run
     from roboirg.records.packing import opened_run
 
+    _take_salt(salt)
     with opened_run(folder_of(run)) as folder, progress_bar("records") as show:
         found = verify_run(
             folder,
@@ -77,6 +79,7 @@ def board(
             "--verify", help="Share of the episodes to play again where not done yet, such as 5%."
         ),
     ] = None,
+    salt: Salt = None,
     workers: Workers = None,
 ) -> None:
     """Make a leaderboard page of packed runs: verified, privileged, comparable or not."""
@@ -85,6 +88,7 @@ def board(
     from roboirg.evaluation.executors.executor import core_count
 
     check_report_support()
+    _take_salt(salt)
     path = folder_of(folder)
     with progress_bar("packed runs") as show:
         packs = read_packs(
@@ -96,6 +100,13 @@ def board(
     page = out or path / BOARD_FILE
     write_board(packs, page)
     typer.echo(f"{counted(len(packs), 'packed run')}: {page}")
+
+
+def _take_salt(salt: str | None) -> None:
+    from roboirg.episodes.private_splits import use_salt
+
+    if salt is not None:
+        use_salt(salt)
 
 
 def _share(text: str) -> float:
@@ -153,7 +164,7 @@ def repeat(
     workers: Workers = None,
 ) -> None:
     """Play a run's plan again with its policies, and print which verdicts changed."""
-    from roboirg.analysis.stats.flips import repeated_episodes
+    from roboirg.analysis.stats.flips import flips_by_cell, repeated_episodes, write_flips
     from roboirg.cli.run_commands import play
     from roboirg.evaluation.executors.executor import choose_executor
     from roboirg.evaluation.plan import read_plan
@@ -170,7 +181,10 @@ def repeat(
     summary = play(
         plan.checked(), target, choose_executor(workers, plan.episode_timeout_s), retry=True
     )
-    _print_flips(repeated_episodes(folder, target))
+    found = repeated_episodes(folder, target)
+    _print_flips(found)
+    for where in (folder, target):
+        write_flips(flips_by_cell(found), where)
     report_problems(summary, target)
 
 
@@ -197,5 +211,10 @@ def _print_flips(episodes: tuple[RepeatedEpisode, ...]) -> None:
             else f"; actions differ from number {changed.differs_at} on"
         )
         typer.echo(f"{changed.slug}: {' then '.join(changed.outcomes)}{where}")
+    for policy, (before, now) in dict.fromkeys((one.policy, one.arithmetic) for one in episodes):
+        if before != now:
+            typer.echo(printable(f"{policy}: first {before or 'untold'}; then {now or 'untold'}."))
+        elif now:
+            typer.echo(printable(f"{policy}: {now}, both times."))
     found = count_flips(episodes)
     typer.echo(f"{found.flips:,} of {counted(found.verdicts, 'verdict')} changed.")

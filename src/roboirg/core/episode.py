@@ -20,7 +20,8 @@ from roboirg.core.motions import Motion, Point
 
 Color = Literal["red", "green", "blue", "yellow", "gray", "purple"]
 Difficulty = Literal["easy", "medium", "hard"]
-Split = Literal["train", "val", "test", "random"]
+Split = str
+"""One of `SPLITS`, ``random``, or a private split such as ``random@1a2b3c4d5e6f``."""
 Suite = str
 """One of `SUITES`, or the suite of another package's tasks."""
 ObjectKind = str

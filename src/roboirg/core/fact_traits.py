@@ -60,6 +60,7 @@ class FactTraits:
         holds_while: its definition.
         past: the act in the past tense, for causes: ``"placed {subject} on {place}"``.
         state: words between subject and place, for lists of facts: ``"placed on"``.
+        ceased: what happened when it no longer holds, in the past tense; empty if no list shows it.
         lasts: whether it never ceases to hold.
         undone_by_release: whether letting the object go takes the act back. Looking under a
             container cannot be taken back.
@@ -74,6 +75,7 @@ class FactTraits:
     past: str
     state: str
     places: tuple[str, ...] = ()
+    ceased: str = ""
     lasts: bool = False
     undone_by_release: bool = True
     timeline: Literal["nothing", "start", "both"] = "start"
@@ -100,6 +102,7 @@ _TRAITS: dict[FactKind, FactTraits] = {
         holds_while="it is above z 0.05 and grasped",
         past="picked up {subject}",
         state="picked",
+        ceased="lowered {subject} or let it go",
         timeline="both",
     ),
     "lying": FactTraits(
@@ -117,6 +120,7 @@ _TRAITS: dict[FactKind, FactTraits] = {
         holds_while="it lies released within 0.05 (xy) of the place",
         past="placed {subject} on {place}",
         state="placed on",
+        ceased="took {subject} off {place}",
         timeline="both",
     ),
     "over": FactTraits(
@@ -143,6 +147,7 @@ _TRAITS: dict[FactKind, FactTraits] = {
         holds_while="its origin is above z 0.15",
         past="lifted {subject}",
         state="lifted",
+        ceased="lowered {subject}",
         undone_by_release=False,
         timeline="both",
     ),

@@ -21,7 +21,7 @@ from roboirg.core.instruction_options import (
     InstructionOptions,
 )
 from roboirg.core.observations import CAMERAS, DemonstrationFrames
-from roboirg.episodes.splits import SIZES, check_split, get_episode
+from roboirg.episodes.splits import get_episode, split_size
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.simulation.observation_builder import ObservationSpec
 from roboirg.simulation.rendering.render_settings import find_render_settings
@@ -79,7 +79,7 @@ class EnvSettings:
         Raises:
             UnknownNameError: there is no such split.
         """
-        return SIZES[check_split(self.split)]
+        return split_size(self.split)
 
     def instruction_options(self) -> InstructionOptions:
         """Return the options of the instruction; opens the wording file.

@@ -1,6 +1,6 @@
 """Registers every task's environment with Gymnasium when imported.
 
-``gymnasium.make("roboirg.envs.registration:RoboIRG/PickXtimes-v0", setting="spatial")`` imports
+``gymnasium.make("roboirg.envs.registration:RoboIRG/PickXtimes-v1", setting="spatial")`` imports
 this module.
 """
 

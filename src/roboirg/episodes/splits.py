@@ -2,12 +2,12 @@
 
 The episodes of the benchmark's train, val and test splits are RoboMME's (`published_episodes`).
 Sampled are the six that RoboMME's data lacks, the tasks of the suite ``real`` or of another
-package, and the split ``random``. The seed of a sampled episode is ``base + 100 * index +
-rejected``; its difficulties repeat easy, easy, medium, hard. The base depends on split and task;
-`rejected` is the number of seeds passed over: those without a valid scene and, in the first three
-splits, those with a setting that cannot be expressed and those that the oracle does not solve.
-``splits.json`` holds these numbers, with a fingerprint of the episodes of each task that detects
-changes of scenes; ``roboirg build-splits`` writes it.
+package, the split ``random`` and private splits. The seed of a sampled episode is ``base + 100 *
+index + rejected``, in a private split a keyed hash; its difficulties repeat easy, easy, medium,
+hard. The base depends on split and task; `rejected` is the number of seeds passed over: those
+without a valid scene and, in the first three splits, those with a setting that cannot be expressed
+and those that the oracle does not solve. ``splits.json`` holds these numbers, with a fingerprint of
+the episodes of each task that detects changes of scenes; ``roboirg build-splits`` writes it.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ import numpy as np
 from roboirg.core.episode import SPLITS, Difficulty, Episode, Goal, Scene, Split
 from roboirg.core.errors import InvalidValueError, SceneRejectedError, UnknownNameError
 from roboirg.episodes.fingerprint import fingerprint
+from roboirg.episodes.private_splits import RANDOM, check_salt, is_private, private_seed
 from roboirg.episodes.published_episodes import published_episode
 from roboirg.episodes.recordings import is_recorded
 from roboirg.tasks import Task, get_task
@@ -75,12 +76,25 @@ def slot_key(split: Split, index: int) -> str:
 
 
 def check_split(split: str) -> Split:
-    """Return the name as a split.
+    """Return the name as a split whose episodes this process can draw.
 
     Raises:
         UnknownNameError: there is no such split.
+        MissingSaltError: it is private, and its salt is not known.
     """
-    return _known_split(split, tuple(SIZES))
+    check_salt(split)
+    return split if is_private(split) else _known_split(split, tuple(SIZES))
+
+
+def split_size(split: str) -> int:
+    """Return the number of episodes in a split.
+
+    Raises:
+        UnknownNameError: there is no such split.
+        MissingSaltError: it is private, and its salt is not known.
+    """
+    checked = check_split(split)
+    return SIZES[RANDOM if is_private(checked) else checked]
 
 
 def check_fixed_split(split: str) -> Split:
@@ -153,6 +167,7 @@ def get_episode(task_name: str, split: str, index: SupportsIndex) -> Episode:
 
     Raises:
         UnknownNameError: there is no such task or split.
+        MissingSaltError: the split is private, and its salt is not known.
         InvalidValueError: the split has no episode of that number.
         SceneRejectedError: no seed of the episode gives a scene.
     """
@@ -163,7 +178,7 @@ def get_episode(task_name: str, split: str, index: SupportsIndex) -> Episode:
 def split_episodes(tasks: Iterable[str], splits: Iterable[Split]) -> Iterator[Episode]:
     """Yield all episodes of tasks in splits."""
     for task, split in itertools.product(tasks, splits):
-        for index in range(SIZES[split]):
+        for index in range(split_size(split)):
             yield get_episode(task, split, index)
 
 
@@ -189,7 +204,7 @@ def _known_split(split: str, splits: tuple[Split, ...]) -> Split:
 
 
 def _check_index(split: Split, index: SupportsIndex) -> int:
-    size = SIZES[split]
+    size = split_size(split)
     number = -1
     if not isinstance(index, bool):
         with contextlib.suppress(TypeError):
@@ -224,5 +239,8 @@ def _published(task: str, split: Split, index: int) -> Episode | None:
 
 
 def _sampled(task: str, split: Split, index: int, passed_over: int) -> Episode:
-    seed = slot_seed(get_task(task), split, index) + passed_over
+    if is_private(split):
+        seed = private_seed(task, split, index, passed_over)
+    else:
+        seed = slot_seed(get_task(task), split, index) + passed_over
     return make_episode(task, seed, slot_difficulty(index), split, index)

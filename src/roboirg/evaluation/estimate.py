@@ -7,32 +7,31 @@ from collections.abc import Iterable, Mapping
 from statistics import fmean
 from typing import NamedTuple
 
+from roboirg.evaluation.world_speed import WorldSpeed
 from roboirg.records.record import Job
 from roboirg.records.record_codec import RecordIndexEntry
 from roboirg.util.plurals import counted
 
-ASSUMED_STEPS = 450
-"""Assumed control steps of an episode: the oracle's mean over the test split, 236, about doubled,
-because policies are slower and some use up their limit."""
-STEP_S = 0.002
-"""Seconds per control step on one laptop core, with two pictures every 16 steps
-(docs/performance.md); the policy's own time is unknown."""
+ORACLE_STEPS = 236
+"""Mean control steps of the oracle over the test split."""
 
 
 class Estimate(NamedTuple):
-    """Estimated time of a plan.
+    """Estimated time of a plan, wall-clock seconds with all workers in parallel.
 
     Attributes:
         episodes: number of episodes to play.
-        seconds: wall-clock time with all workers in parallel.
-        max_steps: control steps if every episode uses up its limit.
-        is_measured: whether it is based on stored episodes; otherwise policies take no time in it.
+        least: if policies need as many steps as the oracle.
+        most: if they use up their limit in every episode.
+        max_steps: control steps in that case.
+        unknown: episodes of policies that have not been played here, whose own time is not in it.
     """
 
     episodes: int
-    seconds: float
+    least: float
+    most: float
     max_steps: int
-    is_measured: bool
+    unknown: int
 
 
 def cell_sizes(jobs: Iterable[Job]) -> Mapping[tuple[str, str], Mapping[str, Counter[str]]]:
@@ -44,38 +43,53 @@ def cell_sizes(jobs: Iterable[Job]) -> Mapping[tuple[str, str], Mapping[str, Cou
     return sizes
 
 
-def estimate(jobs: Iterable[Job], played: Iterable[RecordIndexEntry], workers: int) -> Estimate:
+def estimate(
+    jobs: Iterable[Job], played: Iterable[RecordIndexEntry], workers: int, speed: WorldSpeed
+) -> Estimate:
     """Estimate how long jobs take.
 
     Args:
         jobs: jobs to play.
         played: episodes with known durations; those of the same policy and task are preferred.
-        workers: number of processes.
+        workers: number of processes that have a core each.
+        speed: of the world.
     """
     durations = _MeanDurations(played)
-    total, known, steps, count = 0.0, True, 0, 0
+    least, most, steps, count, unknown = 0.0, 0.0, 0, 0, 0
     for job in jobs:
         duration = durations.mean(job)
-        known = known and duration is not None
-        total += _assumed_duration(job) if duration is None else duration
+        if duration is None:
+            least += speed.seconds(job, ORACLE_STEPS)
+            most += speed.seconds(job, job.max_steps)
+            unknown += 1
+        else:
+            least, most = least + duration, most + duration
         steps += job.max_steps
         count += 1
-    return Estimate(count, total / max(workers, 1), steps, known and count > 0)
+    return Estimate(count, least / max(workers, 1), most / max(workers, 1), steps, unknown)
 
 
-def estimate_text(found: Estimate, planned: int, workers: int) -> tuple[str, ...]:
+def estimate_text(
+    found: Estimate, planned: int, workers: int, speed: WorldSpeed
+) -> tuple[str, ...]:
     """Return an estimate as lines of text."""
     lines = [f"{counted(planned, 'episode')}, {planned - found.episodes:,} already stored."]
-    if found.episodes:
-        basis = (
-            "based on the stored episodes"
-            if found.is_measured
-            else f"assuming {ASSUMED_STEPS} steps per episode and no time for the policy"
-        )
-        lines.append(
-            f"The other {found.episodes:,} take about {_format_duration(found.seconds)} on "
-            f"{counted(workers, 'worker')}, {basis}; at most {found.max_steps:,} control steps."
-        )
+    if not found.episodes:
+        return tuple(lines)
+    times = [_format_duration(seconds) for seconds in (found.least, found.most)]
+    where = f"on {counted(workers, 'worker')}"
+    others = f"The other {found.episodes:,} take about"
+    if not found.unknown:
+        return (*lines, f"{others} {times[0]} {where}, as long as the stored ones.")
+    basis = "measured just now" if speed.is_measured else "assumed, as nothing can be played here"
+    lines.append(
+        f"{others} {times[0]} {where} if policies need as many steps as the oracle, "
+        f"{times[1]} if they use up their limit ({found.max_steps:,} control steps in all)."
+    )
+    lines.append(
+        f"A control step of the world takes {1000 * speed.step_s:.1f} ms ({basis}); the time of "
+        "the policies themselves, and of videos, comes on top."
+    )
     return tuple(lines)
 
 
@@ -102,7 +116,3 @@ class _MeanDurations:
             if key in self._known:
                 return fmean(self._known[key])
         return None
-
-
-def _assumed_duration(job: Job) -> float:
-    return STEP_S * min(job.max_steps, ASSUMED_STEPS)

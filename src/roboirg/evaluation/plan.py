@@ -29,6 +29,7 @@ from roboirg.core.observations import (
 )
 from roboirg.core.word_pools import POOLS
 from roboirg.episodes import splits
+from roboirg.episodes.private_splits import MissingSaltError, is_private
 from roboirg.evaluation.hosting.host_pool import DEFAULT_BATCH, HostSettings
 from roboirg.evaluation.plan_parsing import check_names, name_and_spec
 from roboirg.evaluation.policy_descriptions import describe_policy
@@ -68,7 +69,7 @@ class Plan(BaseModel):
         tasks: names of tasks.
         settings: names, or ``"all"`` for every setting that can express the episode.
         forms: implicit, resolved or both.
-        split: train, val, test or random.
+        split: train, val, test, random, or the name of a private split.
         episodes: 0-based positions in the split.
         policy_seeds: every seed plays every episode.
         stages: sets of stages for settings that read them; every set is played.
@@ -196,6 +197,11 @@ class Plan(BaseModel):
             else:
                 policies.load_policy_class(spec)
         self._check_options()
+        if is_private(self.split) and self.policy_process == "shared":
+            raise InvalidValueError(
+                "policy_process is 'shared', so policies would know the salt of private episodes; "
+                "it must be 'own'."
+            )
         for task in self.tasks:
             for index in (min(self.episodes), max(self.episodes)):
                 splits.get_episode(task, self.split, index)
@@ -224,6 +230,14 @@ class Plan(BaseModel):
             for where, expressible in settings.items()
             for job in self._jobs_of(policy, *where, expressible, seeds=self.policy_seeds)
         )
+
+    def drawable_jobs(self) -> tuple[Job, ...]:
+        """Return every job; none if the episodes are private and their salt is not known."""
+        try:
+            splits.check_split(self.split)
+        except MissingSaltError:
+            return ()
+        return self.jobs()
 
     def settings_of(self, task: str, episode: int) -> tuple[str, ...]:
         """Return the settings in which an episode is played."""

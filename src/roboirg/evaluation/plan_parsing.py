@@ -89,7 +89,7 @@ def parse_episodes(text: str, split: str = "test") -> tuple[int, ...]:
         UnknownNameError: there is no such split.
         InvalidValueError: the text is neither a number nor a list, or the split has fewer episodes.
     """
-    size = splits.SIZES[splits.check_split(split)]
+    size = splits.split_size(split)
     found = re.fullmatch(r"\s*(-?)(\d+)\s*", text)
     if found is None:
         ranges = _parse_ranges("episode", text, _NUMBERS_HINT)

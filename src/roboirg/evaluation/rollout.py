@@ -20,8 +20,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from roboirg import policies
 from roboirg.core.actions import ActionSpace
 from roboirg.core.delivery import SpokenInstruction
@@ -41,11 +39,12 @@ from roboirg.evaluation.policy_descriptions import PolicyDescription, describe_h
 from roboirg.evaluation.policy_environment import EnvRequirements, env_requirements, make_env
 from roboirg.evaluation.prompt_shares import audit_job, too_long_text
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
-from roboirg.evaluation.video_writer import VideoOptions, VideoWriter
+from roboirg.evaluation.video_writer import FrameSink, VideoOptions, VideoWriter
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.policies.base import Policy, PrivilegedPolicy, close_policy, tell_policy
 from roboirg.policies.loading import needs_host
 from roboirg.policies.prompt_length.declared_limit import prompt_limit
+from roboirg.policies.random_state import episode_policy_seed
 from roboirg.records.action_log import write_actions
 from roboirg.records.record import Job, Record
 
@@ -158,7 +157,7 @@ class EpisodeRunner:
 
 def play_episode(
     job: Job,
-    writer: VideoWriter | None = None,
+    writer: FrameSink | None = None,
     policy_timeout_s: float | None = None,
     hosts: HostAddress | None = None,
     *,
@@ -215,7 +214,7 @@ def play_with(
     needs: EnvRequirements,
     result: RolloutResult,
     guard: CallGuard,
-    writer: VideoWriter | None = None,
+    writer: FrameSink | None = None,
 ) -> None:
     """Play one job with a loaded policy, which is not closed.
 
@@ -270,13 +269,8 @@ def _load_hosted(
 
 
 def _policy_seed(job: Job) -> int:
-    """Return the policy's seed: the same in every setting, another in every episode.
-
-    It is derived from the run's policy seed and the episode's seed.
-    """
     episode = get_episode(job.task, job.split, job.episode)
-    seeds = np.random.SeedSequence((job.policy_seed, episode.seed))
-    return int(seeds.generate_state(1)[0])
+    return episode_policy_seed(job.policy_seed, episode.seed)
 
 
 def _play_to_end(
@@ -284,7 +278,7 @@ def _play_to_end(
     policy: Policy,
     actions: ActionSpace,
     job: Job,
-    writer: VideoWriter | None,
+    writer: FrameSink | None,
     result: RolloutResult,
     guard: CallGuard,
 ) -> None:
@@ -331,7 +325,7 @@ def _play_to_end(
 def _tell(
     policy: Policy,
     utterances: Sequence[Mapping[str, Any]],
-    writer: VideoWriter | None,
+    writer: FrameSink | None,
     result: RolloutResult,
     guard: CallGuard,
 ) -> None:

@@ -64,6 +64,23 @@ class PictureSource(Protocol):
         """Return the camera's current picture, uint8 (256, 256, 3)."""
 
 
+class FrameSink(Protocol):
+    """Takes the frames of an episode while it is played.
+
+    Attributes:
+        options: tell how often there is a frame.
+        caption: what was said so far.
+        longest_caption: everything that will have been said.
+    """
+
+    options: VideoOptions
+    caption: str
+    longest_caption: str
+
+    def add_frame(self, source: PictureSource, is_demonstration: bool = False) -> None:
+        """Take the current pictures."""
+
+
 def check_video_support() -> None:
     """Check that videos can be written.
 

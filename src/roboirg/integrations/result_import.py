@@ -5,6 +5,7 @@
 | lerobot | ``eval_info.json`` of lerobot-eval | steps, causes, events, errors, times |
 | vla-eval | ``recording-ID.sqlite`` | causes, events |
 | inspect | a log as JSON (``inspect log convert --to json``) | nothing; errors: events |
+| jsonl | lines ``{"task": ..., "episode": ..., "success": ...}`` | causes, events, errors, times |
 
 What a harness does not tell is named in ``policy_metadata["imported"]``, with the harness and the
 file. Versions of words and environment are those of this package: import with the version that was
@@ -24,7 +25,7 @@ from typing import Any, NamedTuple
 from pydantic import JsonValue, ValidationError
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.episodes.splits import SIZES, check_split
+from roboirg.episodes.splits import split_size
 from roboirg.evaluation.policy_descriptions import PolicyDescription
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.records.record import DEFAULT_MAX_STEPS, ErrorKind, Job, Record
@@ -63,7 +64,7 @@ def import_results(harness: str, path: Path, out: Path, options: ImportOptions) 
     """Write the results of a harness as records into a run's folder; return their number.
 
     Args:
-        harness: lerobot, vla-eval or inspect.
+        harness: lerobot, vla-eval, inspect or jsonl, a file of one's own.
         path: its file of results.
         out: folder of the records; it may already hold some.
         options: what the file does not say.
@@ -106,7 +107,7 @@ def _read_lerobot(path: Path, options: ImportOptions) -> Iterator[Record]:
         for index, success in enumerate(entry["metrics"]["successes"]):
             job = _job(
                 options, task=task, setting=setting, split=split,
-                episode=(options.seed + index) % SIZES[check_split(split)],
+                episode=(options.seed + index) % split_size(split),
             )  # fmt: skip
             result = _verdict(bool(success), job)
             yield _record(job, result, "lerobot", path, lacks)
@@ -164,6 +165,22 @@ def _read_inspect(path: Path, options: ImportOptions) -> Iterator[Record]:
         yield _record(job, result, "inspect", path, ("steps", "events", "timings"))
 
 
+def _read_lines(path: Path, options: ImportOptions) -> Iterator[Record]:
+    """Yield a record for each line; what it has besides the verdict are fields of the job."""
+    lacks = ("cause", "events", "errors", "timings", "started_at")
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        told = json.loads(line)
+        success, steps = told.pop("success"), told.pop("steps", None)
+        if not isinstance(success, bool):
+            raise InvalidValueError(
+                f"{path}, line {number}: success is {success!r}; it must be true or false."
+            )
+        job = _job(options, **{"setting": "explicit", "split": "test", **told})
+        result = _verdict(success, job)
+        result.steps = int(steps or 0)
+        yield _record(job, result, "jsonl", path, lacks if steps else ("steps", *lacks))
+
+
 def _job(options: ImportOptions, **fields: Any) -> Job:  # noqa: ANN401 - values of JSON
     named = {"policy": options.policy, "max_steps": DEFAULT_MAX_STEPS, **fields}
     return Job.model_validate({**named, **options.fields})
@@ -209,5 +226,6 @@ _READERS: Mapping[str, Callable[[Path, ImportOptions], Iterator[Record]]] = {
     "lerobot": _read_lerobot,
     "vla-eval": _read_vla_eval,
     "inspect": _read_inspect,
+    "jsonl": _read_lines,
 }
 HARNESSES = tuple(_READERS)

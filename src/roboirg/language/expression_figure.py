@@ -55,6 +55,7 @@ def _draw(instructions: Sequence[Instruction], title: str) -> Figure:
     # Without pyplot, which keeps every figure and looks for a display.
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
+    from matplotlib.ticker import MaxNLocator
 
     counts, scenes = expression_counts(instructions), scene_counts(instructions)
     settings = [setting for setting in all_settings() if setting in counts]
@@ -74,6 +75,7 @@ def _draw(instructions: Sequence[Instruction], title: str) -> Figure:
             panel.set_title(f"{setting} ({scenes[setting]} scenes)", fontsize=10)
         most = max(number for one in counts.values() for number in one.values())
         panels[0].set_xlim(0, PANEL_RANGE * most)
+        panels[0].xaxis.set_major_locator(MaxNLocator(nbins=5, integer=True))  # shared by all
         panels[0].invert_yaxis()
         figure.supxlabel("scenes in which the expression occurs", fontsize=9)
     return figure

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import importlib.util
 import json
 import os
@@ -130,7 +131,7 @@ def results_table(results: Sequence[MeasureResult]) -> Table:
 
 
 def write_results(results: Sequence[MeasureResult], path: Path) -> None:
-    """Write all rounds of all results, and the machine, as JSON.
+    """Write all rounds of all results, the machine, and the processes that it had to run, as JSON.
 
     Raises:
         InvalidValueError: the file cannot be written.
@@ -139,13 +140,26 @@ def write_results(results: Sequence[MeasureResult], path: Path) -> None:
         "roboirg": __version__,
         "python": platform.python_version(),
         "machine": platform.platform(),
+        "processor": _processor(),
         "cores": os.cpu_count(),
+        "load": round(os.getloadavg()[1], 1),
+        "date": dt.datetime.now(dt.UTC).date().isoformat(),
         "figures": [asdict(result) for result in results],
     }
     try:
         path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
     except OSError as error:
         raise InvalidValueError(f"{str(path)!r} cannot be written: {error}") from error
+
+
+def _processor() -> str:
+    """Return the model of the processor; empty where the system does not tell."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(names, platform.processor())
 
 
 def _format_value(value: float, unit: str) -> str:

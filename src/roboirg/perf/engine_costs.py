@@ -9,13 +9,14 @@ import tempfile
 import time
 from pathlib import Path
 
-from roboirg.evaluation.executors.executor import LocalProcesses
+from roboirg.evaluation.executors.executor import InProcess, LocalProcesses
 from roboirg.evaluation.plan import Plan
 from roboirg.evaluation.plan_maker import make_plan
 from roboirg.evaluation.progress import SilentReporter
 from roboirg.evaluation.rollout import EpisodeRunner
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.runner import run_plan
+from roboirg.evaluation.verification.run_verification import verify_run
 from roboirg.records.record import EventRecord, Job, Record
 from roboirg.records.store import RECORDS_FILE, RecordStore
 
@@ -56,6 +57,16 @@ def resume_time() -> float:
     return time.perf_counter() - start
 
 
+def verify_time() -> float:
+    """Return seconds of processor time to verify an episode, the mean over policies and tasks."""
+    folder, count = _played_run()
+    start = time.process_time()
+    found = verify_run(folder)
+    if not found.holds or found.records != count:
+        raise AssertionError(f"{found.records} records of {count} were checked: {found.checks}")
+    return (time.process_time() - start) / count
+
+
 class _RecordClock(SilentReporter):
     """Notes the time of each record."""
 
@@ -75,6 +86,21 @@ def _unplayed_record(job: Job) -> Record:
 
 
 @functools.cache
+def _played_run() -> tuple[Path, int]:
+    """Return a run of the oracle, and of a policy that mostly plays to the limit, on all tasks."""
+    plan = make_plan(["oracle", "random"], settings="explicit", episodes="1")
+    folder = _temporary_folder()
+    summary = run_plan(plan, folder, EpisodeRunner(folder, plan=plan.fingerprint), InProcess())
+    return folder, summary.total
+
+
+def _temporary_folder() -> Path:
+    folder = Path(tempfile.mkdtemp(prefix="roboirg-bench-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+@functools.cache
 def _many_records() -> tuple[Plan, Path]:
     """Return a plan of 100,000 jobs and a folder with all their records."""
     plan = make_plan(
@@ -84,8 +110,7 @@ def _many_records() -> tuple[Plan, Path]:
         episodes="50",
         policy_seeds=f"0-{MANY_RECORDS // 100 - 1}",
     )
-    folder = Path(tempfile.mkdtemp(prefix="roboirg-bench-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    folder = _temporary_folder()
     lines: dict[tuple[int, str], bytes] = {}
     with (folder / RECORDS_FILE).open("wb") as file:
         for job in plan.jobs():

@@ -147,6 +147,7 @@ def _process_measures() -> tuple[Measure, ...]:
             50,
         ),
         Measure("resuming with 100,000 records", engine_costs.resume_time, None, "", 3, "s"),
+        Measure("verifying an episode", engine_costs.verify_time, None, "", 0.7, "s"),
         Measure("memory of a process", process_costs.process_memory, None, "", 0.5, "GiB"),
     )
 

@@ -81,15 +81,12 @@ def steps_per_second(policy: Policy) -> float:
 @functools.cache
 def _server() -> str:
     """Start a server that lives as long as this process; returns its address."""
-    command = (
-        "from roboirg.policies.serving.policy_server import open_server; "
-        f"server = open_server('{__name__}:WavingPolicy', 'openpi'); "
-        "print(server.url, flush=True); server.listening.serve_forever()"
-    )
-    child = subprocess.Popen(  # noqa: S603 - our own module
-        [sys.executable, "-c", command], stdout=subprocess.PIPE, text=True
+    command = (sys.executable, "-m", "roboirg", "serve", f"{__name__}:WavingPolicy")
+    child = subprocess.Popen(  # noqa: S603 - our own command
+        [*command, "--protocol", "openpi", "--port", "0"], stdout=subprocess.PIPE, text=True
     )
     atexit.register(child.kill)
     if child.stdout is None:
         raise AssertionError("stdout is a pipe")
-    return f"{child.stdout.readline().strip()}?execute={CHUNK}"
+    address = child.stdout.readline().partition(" at ")[2].partition(";")[0]
+    return f"{address}?execute={CHUNK}"

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
-from multiprocessing.synchronize import Barrier
+from multiprocessing.connection import Connection
 from typing import Any
 
 import numpy as np
 from gymnasium.vector import AsyncVectorEnv
 from numpy.typing import NDArray
 
+from roboirg.core.errors import RoboIRGError
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.envs.factory import make, make_vec
 from roboirg.perf.step_times import CHUNK
 from roboirg.perf.workloads import STEPS, Workload, over_the_table
+from roboirg.util.child_process import ChildProcess
 
 _ROUNDS = 5
 """How often the stretch is repeated."""
@@ -64,30 +65,39 @@ def async_rate() -> float:
 
 def separate_rate() -> float:
     """Return that of as many processes with an environment each, a picture pair for each chunk."""
-    context = multiprocessing.get_context("spawn")
-    barrier = context.Barrier(cores() + 1)
     workload = over_the_table()
-    processes = [context.Process(target=_work, args=(barrier, workload)) for _ in range(cores())]
-    for process in processes:
-        process.start()
-    barrier.wait()
-    start = time.perf_counter()
-    barrier.wait()
-    seconds = time.perf_counter() - start
-    for process in processes:
-        process.join()
+    children = [ChildProcess.spawn(_work, workload) for _ in range(cores())]
+    try:
+        _expect(children, "ready")
+        start = time.perf_counter()
+        for child in children:
+            child.send("go")
+        _expect(children, "done")
+        seconds = time.perf_counter() - start
+    finally:
+        for child in children:
+            child.close()
     return cores() * _ROUNDS * STEPS / seconds
 
 
-def _work(barrier: Barrier, workload: Workload) -> None:
+def _expect(children: Sequence[ChildProcess], word: str) -> None:
+    """Wait for a word from each child."""
+    for child in children:
+        said = child.receive()
+        if said != word:
+            raise RoboIRGError(f"A process that was to be measured was lost: {said}.")
+
+
+def _work(connection: Connection, workload: Workload) -> None:
     env: RoboIRGEnv = make(workload.episode.task, episode=workload.episode.index)
     env.reset()
     env.step_chunk(workload.before)
-    barrier.wait()
+    connection.send("ready")
+    connection.recv()
     for _ in range(_ROUNDS):
         for chunk in _chunks(workload):
             env.step_chunk(chunk)
-    barrier.wait()
+    connection.send("done")
 
 
 def _chunks(workload: Workload) -> list[NDArray[Any]]:

@@ -264,6 +264,18 @@ class PromptAudit(_RecordModel):
         return min(self.needed[0], self.limit), min(self.needed[1], self.limit)
 
 
+REAL_TRIAL = "real_trial"
+"""Key of a study's trial in a record's ``policy_metadata``."""
+TWIN = "twin"
+"""Name of the robot of a study that is played in simulation."""
+
+
+def real_robot(trial: object) -> str | None:
+    """Return the robot of a trial's metadata; None if there is none or it is the twin."""
+    robot = trial.get("robot") if isinstance(trial, dict) else None
+    return None if robot in (None, TWIN) else str(robot)
+
+
 class Result(Job):
     """Verdict on a job, without instruction and events: everything that rates are computed from.
 
@@ -324,6 +336,11 @@ class Result(Job):
         """The job of this result, without the policy's spec."""
         return Job(**{name: getattr(self, name) for name in IDENTITY})
 
+    @property
+    def robot(self) -> str | None:
+        """The real robot that played it; None in simulation, a study's twin included."""
+        return None
+
 
 class Record(Result):
     """Everything that is stored of an episode.
@@ -374,3 +391,8 @@ class Record(Result):
     render_device: str | None = None
     started_at: str
     duration_s: float
+
+    @property
+    def robot(self) -> str | None:
+        """The real robot that played it; None in simulation, a study's twin included."""
+        return real_robot(self.policy_metadata.get(REAL_TRIAL))

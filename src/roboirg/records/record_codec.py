@@ -34,6 +34,7 @@ from roboirg.records.record import (
     Record,
     Result,
     options_of,
+    real_robot,
     slug_of,
 )
 
@@ -111,6 +112,15 @@ class StoredAttribution(msgspec.Struct, frozen=True, gc=False):
     step: int | None = None
 
 
+class StoredPolicyMetadata(msgspec.Struct, frozen=True, gc=False):
+    """What says where a record was played; the rest is not decoded.
+
+    It may be anything, because policies report metadata.
+    """
+
+    real_trial: Any = None
+
+
 class EpisodeSummary(RecordIndexEntry, frozen=True, kw_only=True):
     """All attributes of a `Result`, and what the head of a page shows."""
 
@@ -132,6 +142,12 @@ class EpisodeSummary(RecordIndexEntry, frozen=True, kw_only=True):
     started_at: str
     render_device: str | None = None
     video: str | None = None
+    policy_metadata: StoredPolicyMetadata = StoredPolicyMetadata()
+
+    @property
+    def robot(self) -> str | None:
+        """The real robot, as of its `Record`."""
+        return real_robot(self.policy_metadata.real_trial)
 
 
 AnyResult = Result | EpisodeSummary

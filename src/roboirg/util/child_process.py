@@ -20,6 +20,8 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import IO, Any, NamedTuple, Self, cast
 
+from roboirg.util.freed_memory import keep_freed_memory
+
 GRACE_S = 2.0
 """How long a child may take to exit once its channel is closed."""
 
@@ -102,13 +104,14 @@ class ChildProcess:
         return cls(process, ours)
 
     @classmethod
-    def run_module(cls, module: str, variables: Mapping[str, str]) -> Self:
+    def run_module(cls, module: str, variables: Mapping[str, str | None]) -> Self:
         """Start ``main(connection)`` of a module in an interpreter that knows nothing of this one.
 
         The script and command line of this process are kept from it. It has the environment of this
-        process and `variables`.
+        process and `variables`; those that are None it has not.
         """
         ours, theirs = socket.socketpair()
+        wanted = {**os.environ, **variables}
         with theirs:
             number = theirs.fileno()
             arguments = (str(number), str(os.getpid()), module, json.dumps(sys.path))
@@ -118,7 +121,7 @@ class ChildProcess:
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
-                env={**os.environ, **variables},
+                env={name: value for name, value in wanted.items() if value is not None},
             )
         return cls(process, Connection(ours.detach()), process.stdout)
 
@@ -201,7 +204,7 @@ def _run_main() -> None:
 
 
 def _begin(parent: int) -> None:
-    """Put this process under the supervision of its parent."""
+    """Put this process under the supervision of its parent, and prepare it for its work."""
     # Ctrl-C is for the parent, which decides what to do.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -211,3 +214,4 @@ def _begin(parent: int) -> None:
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(1)  # the parent died before the line above
+    keep_freed_memory()

@@ -107,29 +107,39 @@ def _shut_down(connection: socket.socket) -> None:
         connection.shutdown(socket.SHUT_RDWR)
 
 
-class LoopbackServer(HTTPServerBase):
-    """A server for browsers on this machine only.
+class BrowserServer(HTTPServerBase):
+    """A server for browsers.
 
     Args:
+        host: address to listen at.
         port: 0 for any free port.
         handler: class of the request handler.
 
     Raises:
-        InvalidValueError: the port is not available.
+        InvalidValueError: the port is not available, or the address is not this machine's.
     """
 
-    def __init__(self, port: int, handler: type[LoopbackRequestHandler]) -> None:
+    def __init__(self, host: str, port: int, handler: type[RequestHandler]) -> None:
         try:
-            super().__init__((LOOPBACK, port), handler)
+            super().__init__((host, port), handler)
         except (OSError, OverflowError) as error:
+            place = "" if host == LOOPBACK else f" of {host!r}"
             raise InvalidValueError(
-                f"Port {port} is not available ({error}); choose another, or 0 for any free port."
+                f"Port {port}{place} is not available ({error}); choose another, or 0 for any "
+                "free port."
             ) from error
 
     @property
     def port(self) -> int:
         """The port on which the server listens."""
         return int(self.server_address[1])
+
+
+class LoopbackServer(BrowserServer):
+    """A server for browsers on this machine only; arguments and errors as for `BrowserServer`."""
+
+    def __init__(self, port: int, handler: type[LoopbackRequestHandler]) -> None:
+        super().__init__(LOOPBACK, port, handler)
 
 
 class RequestHandler(BaseHTTPRequestHandler):

@@ -24,17 +24,15 @@ class ReplayPolicy(PreTrainedPolicy):
         self.reset()
 
     def reset(self):
-        self.rows = {}
+        self.players = {}
 
     def select_action(self, batch, **kwargs):
         actions = []
         for index, text in enumerate(batch["task"]):
-            if index not in self.rows:
+            if index not in self.players:
                 picture = (batch[FRONT][index] * 255).round().byte().permute(1, 2, 0).numpy()
-                self.rows[index] = [self.replay.begin(picture, text), None]
-            entry = self.rows[index]
-            entry[1] = self.replay.next_row(*entry)
-            actions.append(entry[1])
+                self.players[index] = self.replay.play(picture, text)
+            actions.append(next(self.players[index]))
         return torch.from_numpy(np.stack(actions))
 
     def predict_action_chunk(self, batch, **kwargs):

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from roboirg.analysis.board.board_rows import BoardRate, PackedRun, board_rows
+from roboirg.analysis.board.board_rows import BoardRate, BoardRow, PackedRun, board_rows
 from roboirg.analysis.board.pack_checks import check_pack, read_check
 from roboirg.analysis.page.report import check_report_support
 from roboirg.analysis.stats.option_labels import setting_sort_key
@@ -65,7 +65,7 @@ def read_packs(
         if check is None or check.records:  # else it could not even be opened
             with opened_run(path) as run:
                 results = read_results(run)
-                planned = [job for plan in read_plans(run) for job in plan.jobs()]
+                planned = [job for plan in read_plans(run) for job in plan.drawable_jobs()]
             packs.append(PackedRun(_name(path), results, planned, check))
         else:
             packs.append(PackedRun(_name(path), (), (), check))
@@ -93,14 +93,21 @@ def render_board(runs: Sequence[PackedRun]) -> str:
     check_report_support()
     environment = template_environment("roboirg.analysis.board")
     rows = board_rows(runs)
-    settings = sorted({name for row in rows for name in row.rates}, key=setting_sort_key)
+    public = {(name, False) for row in rows for name in row.rates}
+    private = {(name, True) for row in rows if row.private for name in row.private.rates}
+    columns = sorted(public | private, key=lambda one: (setting_sort_key(one[0]), one[1]))
     return environment.get_template(_TEMPLATE).render(
         version=__version__,
-        settings=settings,
-        rows=[(row, [_cell(row.rates.get(name)) for name in settings]) for row in rows],
+        columns=columns,
+        rows=[(row, [_cell(_rate(row, *column)) for column in columns]) for row in rows],
         conditions=sorted({row.conditions for row in rows}),
         unreadable=[run for run in runs if not run.results],
     )
+
+
+def _rate(row: BoardRow, setting: str, is_private: bool) -> BoardRate | None:
+    shown = row.private if is_private else row
+    return None if shown is None else shown.rates.get(setting)
 
 
 def _cell(rate: BoardRate | None) -> _Cell:

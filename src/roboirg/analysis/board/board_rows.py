@@ -5,27 +5,32 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
 from roboirg.analysis.board.pack_checks import PackCheck
 from roboirg.analysis.published import MAX_STEPS, published_rows
-from roboirg.analysis.stats.cells import CellResults, Cells, PolicyRun, clustered_interval, gather
+from roboirg.analysis.stats.cells import Cells, PolicyRun, clustered_interval, gather
 from roboirg.analysis.stats.intervals import SEED
 from roboirg.analysis.stats.multiple_testing import holm
-from roboirg.analysis.stats.option_labels import default_settings, has_default_options, words_label
+from roboirg.analysis.stats.option_labels import (
+    has_default_options,
+    setting_sort_key,
+    words_label,
+)
 from roboirg.analysis.stats.paired_tests import Pairs, measure_gap
+from roboirg.analysis.stats.run_summary import ALL as ALL_SCOPE
+from roboirg.analysis.stats.run_summary import ScopeResults, group_by_scope
+from roboirg.episodes.private_splits import is_private
 from roboirg.language.settings import settings_of
 from roboirg.records.record import Job
 from roboirg.records.record_codec import AnyResult
 from roboirg.tasks import ALL, find_tasks, get_task
 
-Status = Literal["verified", "refuted", "unchecked", "published"]
+Status = Literal["verified", "unchecked", "refuted", "published"]
+STATUSES: tuple[Status, ...] = get_args(Status)
 SIGNIFICANT = 0.05
-
-Tasks = Mapping[str, CellResults]
-"""Results in one setting, by task."""
 
 
 class BoardRate(NamedTuple):
@@ -78,8 +83,10 @@ class BoardRow:
         episodes: number of trials with a verdict.
         seeds: number of policy seeds.
         heard: share of the trials whose words the policy's model read whole; None if unknown.
-        rates: by setting.
-        cells: by setting and task; empty for published rows.
+        rates: by setting; empty if only private episodes were played.
+        results: by setting; empty for published rows.
+        policy_run: whose results these are; None for published rows.
+        private: the same policy's results on private episodes, if there are some.
     """
 
     policy: str
@@ -92,7 +99,9 @@ class BoardRow:
     seeds: int
     heard: float | None
     rates: Mapping[str, BoardRate]
-    cells: Mapping[str, Tasks] = field(default_factory=dict, repr=False)
+    results: Mapping[str, ScopeResults] = field(default_factory=dict, repr=False)
+    policy_run: PolicyRun | None = None
+    private: BoardRow | None = None
 
 
 def board_rows(runs: Iterable[PackedRun]) -> tuple[BoardRow, ...]:
@@ -101,7 +110,8 @@ def board_rows(runs: Iterable[PackedRun]) -> tuple[BoardRow, ...]:
     Of each run only the default options of the settings count. A row is at the top of a setting if
     it has a verdict on every task of it and the best comparable row that also has is not
     significantly better: an exact paired test on the same episodes, corrected by Holm over the
-    rows of the setting. Privileged rows are compared with none.
+    rows of the setting. Privileged rows are compared with none. A policy's private results stand in
+    the row of its public ones if all but the split is equal.
     """
     rows = [row for run in runs for row in _rows_of(run)]
     groups: dict[str, list[int]] = defaultdict(list)
@@ -113,21 +123,60 @@ def board_rows(runs: Iterable[PackedRun]) -> tuple[BoardRow, ...]:
             for index in _top(rows, members, setting):
                 rate = rows[index].rates[setting]._replace(is_top=True)
                 rows[index] = replace(rows[index], rates={**rows[index].rates, setting: rate})
-    return (*sorted(rows, key=_rank), *_published())
+    return (*sorted(_with_private(rows), key=_rank), *_published())
 
 
 def _rank(row: BoardRow) -> tuple[object, ...]:
-    rates = [rate.percent for rate in row.rates.values()]
+    shown = row.rates or (row.private.rates if row.private else {})
+    rates = [rate.percent for rate in shown.values()]
     return (row.is_privileged, -sum(rates) / len(rates) if rates else 0.0, row.policy, row.source)
+
+
+def _with_private(rows: Sequence[BoardRow]) -> list[BoardRow]:
+    """Return one row for the public and the private results of each policy run."""
+    found: dict[object, list[BoardRow]] = defaultdict(list)
+    for row in sorted(rows, key=_is_private):  # public ones first
+        kin = found[_without_split(row.policy_run)]
+        if not _is_private(row):
+            kin.append(row)
+            continue
+        alone = [index for index, one in enumerate(kin) if one.private is None]
+        if alone:
+            kin[alone[0]] = _joined(kin[alone[0]], row)
+        else:
+            kin.append(replace(row, rates={}, private=row))
+    return [row for kin in found.values() for row in kin]
+
+
+def _joined(public: BoardRow, private: BoardRow) -> BoardRow:
+    """Return a public row with private results; it is worth what the worse of the two is."""
+    if public.source == private.source:
+        return replace(public, private=private)
+    status = max(public.status, private.status, key=STATUSES.index)
+    text = f"{public.status_text}; {private.source}: {private.status_text}"
+    source = f"{public.source}, {private.source}"
+    return replace(public, status=status, status_text=text, source=source, private=private)
+
+
+def _is_private(row: BoardRow) -> bool:
+    return row.policy_run is not None and is_private(row.policy_run.conditions.split)
+
+
+def _without_split(policy_run: PolicyRun | None) -> PolicyRun | None:
+    if policy_run is None:
+        return None
+    conditions = policy_run.conditions._replace(split="")
+    return policy_run._replace(conditions=conditions, run="")
 
 
 def _rows_of(run: PackedRun) -> Iterable[BoardRow]:
     cells = gather([(run.name, run.results)], run.planned)
     rng = np.random.default_rng(SEED)
-    status, text = _status(run.check)
-    for policy_run in sorted({key.policy_run for key in cells}, key=repr):
-        by_setting = _by_setting(cells, policy_run)
-        results = [one for one in run.results if PolicyRun.of(one) == policy_run]
+    by_policy_run = _by_policy_run(cells)
+    for policy_run in sorted(by_policy_run, key=repr):
+        by_setting = by_policy_run[policy_run]
+        status, text = _status(run.check, needs_salt=is_private(policy_run.conditions.split))
+        played = [one for one in run.results if PolicyRun.of(one) == policy_run]
         yield BoardRow(
             policy=policy_run.policy,
             source=run.name,
@@ -135,32 +184,32 @@ def _rows_of(run: PackedRun) -> Iterable[BoardRow]:
             status_text=text,
             is_privileged=policy_run.is_privileged,
             conditions=_conditions(policy_run),
-            episodes=sum(cell.trials for tasks in by_setting.values() for cell in tasks.values()),
-            seeds=len({one.policy_seed for one in results}),
-            heard=_heard(results),
+            episodes=sum(one.trials for one in by_setting.values()),
+            seeds=len({one.policy_seed for one in played}),
+            heard=_heard(played),
             rates={
                 setting: rate
-                for setting, tasks in by_setting.items()
-                if (rate := _rate(setting, tasks, rng)) is not None
+                for setting, results in by_setting.items()
+                if (rate := _rate(results, rng)) is not None
             },
-            cells=by_setting,
+            results=by_setting,
+            policy_run=policy_run,
         )
 
 
-def _by_setting(cells: Cells, policy_run: PolicyRun) -> dict[str, dict[str, CellResults]]:
-    found: dict[str, dict[str, CellResults]] = defaultdict(dict)
-    own = {key: cell for key, cell in cells.items() if key.policy_run == policy_run}
-    order = default_settings(key.options for key in own)
-    for setting in order:
-        for key, cell in own.items():
-            if key.options.setting == setting and has_default_options(key.options):
-                found[setting][key.task] = cell
-    return dict(found)
+def _by_policy_run(cells: Cells) -> dict[PolicyRun, dict[str, ScopeResults]]:
+    """Return the results over all tasks of each policy run, by setting with default options."""
+    found: dict[PolicyRun, dict[str, ScopeResults]] = {key.policy_run: {} for key in cells}
+    groups = [one for one in group_by_scope(cells) if one.scope == ALL_SCOPE]
+    for one in sorted(groups, key=lambda one: setting_sort_key(one.options.setting)):
+        if has_default_options(one.options):
+            found[one.policy_run][one.options.setting] = one
+    return found
 
 
-def _status(check: PackCheck | None) -> tuple[Status, str]:
+def _status(check: PackCheck | None, *, needs_salt: bool) -> tuple[Status, str]:
     if check is None:
-        return "unchecked", "not checked"
+        return "unchecked", "not checked" + ("; its salt is needed" if needs_salt else "")
     if check.problem:
         return "refuted", f"does not hold: {check.problem}"
     if not check.played:
@@ -185,17 +234,17 @@ def _heard(results: Sequence[AnyResult]) -> float | None:
     return known.count("heard") / len(known) if known else None
 
 
-def _rate(setting: str, tasks: Tasks, rng: np.random.Generator) -> BoardRate | None:
-    judged = [cell for cell in tasks.values() if cell.trials]
-    if not judged:
+def _rate(results: ScopeResults, rng: np.random.Generator) -> BoardRate | None:
+    if results.rate is None:
         return None
-    drawn = clustered_interval(judged, rng)
+    drawn = clustered_interval([results.cells[task] for task in results.tasks], rng)
+    setting = results.options.setting
     return BoardRate(
-        percent=100 * float(np.mean([float(cell.rate or 0) for cell in judged])),
+        percent=100 * float(results.rate),
         interval=None if drawn is None else (100 * drawn.low, 100 * drawn.high),
-        tasks=len(judged),
+        tasks=len(results.tasks),
         of=sum(setting in settings_of(get_task(name)) for name in find_tasks([ALL])),
-        is_complete=all(cell.is_complete for cell in tasks.values()),
+        is_complete=results.is_complete,
     )
 
 
@@ -216,7 +265,7 @@ def _top(rows: Sequence[BoardRow], members: Sequence[int], setting: str) -> list
 
 
 def _p_value(best: BoardRow, other: BoardRow, setting: str) -> float:
-    ours, theirs = best.cells[setting], other.cells[setting]
+    ours, theirs = best.results[setting].cells, other.results[setting].cells
     pairs = [Pairs.of(cell, theirs[task]) for task, cell in ours.items() if task in theirs]
     gap = measure_gap(pairs, np.random.default_rng(SEED))
     return 1.0 if gap is None else gap.p_value

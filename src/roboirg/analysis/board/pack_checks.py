@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
+from roboirg.episodes.private_splits import MissingSaltError
 from roboirg.evaluation.verification.record_check import ReplayVerdict
 from roboirg.evaluation.verification.run_verification import Verification, verify_run
 from roboirg.language import LANGUAGE_VERSION
@@ -39,8 +40,10 @@ class PackCheck(NamedTuple):
     problem: str = ""
 
 
-def check_pack(path: Path, *, sample: float, workers: int) -> PackCheck:
+def check_pack(path: Path, *, sample: float, workers: int) -> PackCheck | None:
     """Verify a packed run, unless an equal or larger sample of the same file was checked before.
+
+    None if it has private episodes whose salt is not known.
 
     Args:
         path: of the file; the result is kept in `CHECKS_FILE` beside it.
@@ -54,6 +57,8 @@ def check_pack(path: Path, *, sample: float, workers: int) -> PackCheck:
     try:
         with opened_run(path) as folder:
             found = _summary(digest, verify_run(folder, sample=sample, workers=workers))
+    except MissingSaltError:
+        return None
     except RoboIRGError as error:
         found = PackCheck(digest, _versions(), 0, 0, str(error))
     _remember(path, found)

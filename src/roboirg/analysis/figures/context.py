@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import TYPE_CHECKING
 
 from roboirg.analysis.figures.figure_data import FigureData, summaries_by_key
 from roboirg.analysis.figures.figure_style import (
     COLORS,
     GHOST,
+    PUBLISHED_NOTE,
     draw_ghost,
     draw_point,
     legend_below,
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
 
 HEIGHT_INCHES = 2.4
 SHIFT = 0.08
+LABEL_LETTERS = 62
+"""Letters of a line below the axes."""
 
 
 def draw_context(content: FigureData, *, published: bool = False) -> Figure | None:
@@ -38,16 +42,19 @@ def draw_context(content: FigureData, *, published: bool = False) -> Figure | No
     cells, tasks = _shared(content.cells, list(played), columns)
     if not tasks:
         return None
-    ghosts = published_rows("context") if published else ()
-    models = list(dict.fromkeys(row.model for row in ghosts))
-    policy_runs = {key.policy_run for key in cells}
-    entries = len(policy_runs) + len(models)
-    figure, axes = rates_figure(HEIGHT_INCHES, entries)
+    ghosts = {
+        (row.model, row.options): float(average)
+        for row in (published_rows("context") if published else ())
+        if (average := row.average_over(tasks)) is not None
+    }
+    models = list(dict.fromkeys(model for model, _ in ghosts))
+    labels = [content.name(one) for one in {key.policy_run for key in cells}]
+    labels += [f"{model} (published)" for model in models]
+    figure, axes = rates_figure(HEIGHT_INCHES, labels)
     _draw_policies(axes, content, cells, columns)
     for number, model in enumerate(models):
-        rates = {row.options: float(row.average) for row in ghosts if row.model == model}
-        _draw_model(axes, model, [rates.get(options) for options in columns], number)
-    _set_axes(axes, columns, tasks)
+        _draw_model(axes, model, [ghosts.get((model, options)) for options in columns], number)
+    _set_axes(axes, columns, tasks, note=PUBLISHED_NOTE if ghosts else "")
     legend_below(figure, axes)
     return figure
 
@@ -76,10 +83,13 @@ def _draw_model(axes: Axes, model: str, rates: list[float | None], number: int) 
     axes.plot(*zip(*line, strict=True), color=GHOST, linewidth=0.6, linestyle=":", zorder=1)
 
 
-def _set_axes(axes: Axes, columns: list[InstructionOptions], tasks: list[str]) -> None:
+def _set_axes(
+    axes: Axes, columns: list[InstructionOptions], tasks: list[str], *, note: str
+) -> None:
     axes.set_xticks(range(len(columns)), [",".join(map(str, one.stages)) for one in columns])
     axes.set_xlim(-0.4, len(columns) - 0.6)
-    axes.set_xlabel(f"stages that are spoken; mean over {', '.join(tasks)}", wrap=True)
+    words = textwrap.fill(f"stages that are spoken; mean over {', '.join(tasks)}", LABEL_LETTERS)
+    axes.set_xlabel(f"{words}\n{note}".rstrip(), fontsize=6)
 
 
 def _played(cells: Cells) -> dict[PolicyRun, set[InstructionOptions]]:

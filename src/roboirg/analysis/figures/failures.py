@@ -11,7 +11,9 @@ from roboirg.analysis.figures.figure_style import (
     COLUMN_INCHES,
     LEGEND_LINE_INCHES,
     PAGE_INCHES,
+    TITLE_LETTERS,
     clear_axes,
+    folded,
     new_figure,
 )
 from roboirg.analysis.stats.cells import PolicyRun
@@ -74,7 +76,8 @@ def draw_failures(content: FigureData) -> Figure | None:
         for place, options in enumerate(bars):
             key = (policy_run, options)
             _draw_bar(panel, place, counts.get(key), played[key])
-        panel.set_title(content.name(policy_run), fontsize=8.5, loc="left", fontweight="bold")
+        title = folded(content.name(policy_run), TITLE_LETTERS)
+        panel.set_title(title, fontsize=8.5, loc="left", fontweight="bold")
         panel.set_xlabel("share of the episodes with a verdict, %")
         panel.set_xlim(0, 100)
         panel.set_xticks(range(0, 101, 25))

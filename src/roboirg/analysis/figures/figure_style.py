@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import textwrap
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,8 +17,11 @@ if TYPE_CHECKING:
 FORMATS = ("png", "svg", "pdf")
 COLUMN_INCHES, PAGE_INCHES = 3.4, 7.0
 """Widths of a column and of a page; figures are drawn at final size."""
-LEGEND_COLUMNS, LEGEND_LINE_INCHES = 2, 0.16
-"""Of a figure of one column."""
+LEGEND_LINE_INCHES = 0.16
+LEGEND_LETTERS, MOST_COLUMNS, SIGN_LETTERS = 50, 2, 3
+"""Letters of a legend's line in a figure of one column, its columns, and what a sign takes."""
+TITLE_LETTERS = 34
+"""Letters of a line above a panel."""
 DOTS_PER_INCH = 300
 STYLE = {
     "font.size": 7.5,
@@ -28,6 +32,7 @@ STYLE = {
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
 """Okabe and Ito's colors, safe for color-blind readers; signs differ as well."""
 SIGNS = ("o", "s", "^", "D", "v", "P")
+PUBLISHED_NOTE = "published: the same tasks, the paper's instructions and simulator"
 GHOST, GHOST_SIGNS = "#8a8a8a", ("d", "X", "p", "<", ">", "h", "8", "*")
 
 
@@ -44,7 +49,9 @@ def new_figure(width: float, height: float) -> Figure:
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    return Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.03, h_pad=0.03))
+    return Figure(
+        figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.03, h_pad=0.03, wspace=0.04)
+    )
 
 
 def clear_axes(axes: Axes, *, grid: str) -> None:
@@ -58,14 +65,20 @@ def clear_axes(axes: Axes, *, grid: str) -> None:
         spine.set_color("#999999")
 
 
-def rates_figure(height: float, entries: int) -> tuple[Figure, Axes]:
+def folded(name: str, letters: int) -> str:
+    """Return a name in lines of at most `letters` letters."""
+    return textwrap.fill(name, letters, break_on_hyphens=False)
+
+
+def rates_figure(height: float, labels: Sequence[str]) -> tuple[Figure, Axes]:
     """Return an empty one-column figure for success in percent, with room for a legend below.
 
     Args:
         height: in inches, without the legend.
-        entries: number of entries of the legend.
+        labels: of the legend.
     """
-    lines = -(-entries // LEGEND_COLUMNS)
+    lines = sum(folded(one, LEGEND_LETTERS).count("\n") + 1 for one in labels)
+    lines = -(-lines // _legend_columns(labels))
     figure = new_figure(COLUMN_INCHES, height + LEGEND_LINE_INCHES * lines)
     axes = figure.subplots()
     clear_axes(axes, grid="y")
@@ -113,7 +126,14 @@ def legend_below(figure: Figure, axes: Axes) -> None:
     """Add a legend below the axes with every label once."""
     handles, names = axes.get_legend_handles_labels()
     found = dict(zip(names, handles, strict=True))
+    labels = [folded(name, LEGEND_LETTERS) for name in found]
     figure.legend(
-        found.values(), found.keys(), loc="outside lower center", ncols=LEGEND_COLUMNS,
+        found.values(), labels, loc="outside lower center", ncols=_legend_columns(labels),
         columnspacing=1.2, handletextpad=0.3,
     )  # fmt: skip
+
+
+def _legend_columns(labels: Sequence[str]) -> int:
+    """Return in how many columns the labels fit beside each other."""
+    longest = max(map(len, labels), default=0) + SIGN_LETTERS
+    return max(1, min(MOST_COLUMNS, LEGEND_LETTERS // longest))

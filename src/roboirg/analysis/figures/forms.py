@@ -5,7 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from roboirg.analysis.figures.figure_data import FigureData
-from roboirg.analysis.figures.figure_style import COLUMN_INCHES, PAGE_INCHES, clear_axes, new_figure
+from roboirg.analysis.figures.figure_style import (
+    COLUMN_INCHES,
+    PAGE_INCHES,
+    TITLE_LETTERS,
+    clear_axes,
+    folded,
+    new_figure,
+)
 from roboirg.analysis.stats.cells import PolicyRun
 from roboirg.analysis.stats.option_labels import default_settings
 from roboirg.analysis.stats.paired_tests import Gap
@@ -55,7 +62,8 @@ def draw_forms(content: FigureData) -> Figure | None:
     axes = figure.subplots(down, across, squeeze=False).ravel()
     for panel, (policy_run, rows) in zip(axes, panels.items(), strict=False):
         _draw_panel(panel, rows)
-        panel.set_title(content.name(policy_run), fontsize=8.5, loc="left", fontweight="bold")
+        title = folded(content.name(policy_run), TITLE_LETTERS)
+        panel.set_title(title, fontsize=8.5, loc="left", fontweight="bold")
     for panel in axes[len(panels) :]:
         panel.set_visible(False)
     handles = _handles()

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from roboirg.analysis.page.episode_videos import EpisodeVideo
-from roboirg.analysis.page.reconstruction import stages_of
+from roboirg.analysis.page.reconstruction import names_of, stages_of
 from roboirg.analysis.stats.option_labels import words_label
 from roboirg.core.fact_traits import fact_traits
 from roboirg.language.settings import EXPLICIT
@@ -65,6 +65,7 @@ def details_of(
         embeds: whether the video is part of the page.
     """
     index, optional_index = strings.index, strings.optional_index
+    names = names_of(record)
     found: Details = {
         "turns": [[index(turn.stage), index(turn.text)] for turn in record.instruction],
         "reached": _reached(record),
@@ -77,7 +78,8 @@ def details_of(
         "attribution": _attribution(record, strings),
         "shown": record.demonstration_steps or None,
         "events": [
-            [one.step, index(event_text(one)), int(one.holds)] for one in _shown_events(record)
+            [one.step, index(event_text(one, names)), int(one.holds)]
+            for one in _shown_events(record)
         ],
         "stages": [[index(mark.subgoal), mark.step] for mark in stages_of(record)],
         "traceback": optional_index(record.details),
@@ -90,11 +92,21 @@ def details_of(
     return {name: value for name, value in found.items() if value is not None and value != []}
 
 
-def event_text(event: EventRecord) -> str:
-    """Return an event in words."""
-    names = (event.subject, fact_traits(event.kind).state, event.place)
-    text = " ".join(name.replace("_", " ") for name in names if name)
-    return text if event.holds else f"{text}: no longer"
+def event_text(event: EventRecord, names: Mapping[str, str]) -> str:
+    """Return an event as what was done, in the past tense.
+
+    Args:
+        event: of a record.
+        names: words for the objects; others are called by their names.
+    """
+    traits = fact_traits(event.kind)
+    subject, place = (
+        names.get(name, name.replace("_", " ")) for name in (event.subject, event.place or "")
+    )
+    if not event.holds and not traits.ceased:
+        return f"{traits.past.format(subject=subject, place=place)}; that is over"
+    words = traits.past if event.holds else traits.ceased
+    return words.format(subject=subject, place=place)
 
 
 def _mentions(record: Record, strings: Strings) -> list[list[int]]:

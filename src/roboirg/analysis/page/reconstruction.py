@@ -6,6 +6,10 @@ omits them for others.
 
 from __future__ import annotations
 
+import functools
+from collections import Counter
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 from roboirg import language
@@ -16,8 +20,12 @@ from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.plan import instruct_job
 from roboirg.judging import Event
 from roboirg.judging.episode_replay import completed_stages
+from roboirg.judging.judge import describe_object
 from roboirg.language.settings import EXPLICIT
 from roboirg.records.record import Record
+
+_KINDS = {"shuttle": "the moving cube", "site": "the spot on the table"}
+"""Words for objects that causes do not name."""
 
 
 class StageMark(NamedTuple):
@@ -62,6 +70,32 @@ def stages_of(record: Record) -> tuple[StageMark, ...]:
     return tuple(
         StageMark(stage.subgoal.replace(" {at}", ""), done[index] - turn if index in done else None)
         for index, stage in enumerate(episode.stages)
+    )
+
+
+def names_of(record: Record) -> Mapping[str, str]:
+    """Return words for the objects of an episode; none for another environment version."""
+    if not _has_this_environment(record):
+        return {}
+    try:
+        return _object_names(record.task, record.split, record.episode)
+    except RoboIRGError:
+        return {}  # a task that is no longer installed
+
+
+@functools.lru_cache(maxsize=1024)
+def _object_names(task: str, split: str, episode: int) -> Mapping[str, str]:
+    """Return words for each object; the end of its name tells those apart that sound alike."""
+    scene = get_episode(task, split, episode).scene
+    words = {
+        one.name: _KINDS.get(one.kind) or describe_object(one.name, scene) for one in scene.objects
+    }
+    counts = Counter(words.values())
+    return MappingProxyType(
+        {
+            name: text if counts[text] == 1 else f"{text} ({name.rpartition('_')[2]})"
+            for name, text in words.items()
+        }
     )
 
 

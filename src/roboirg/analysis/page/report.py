@@ -16,16 +16,16 @@ from roboirg.analysis.page.episode_videos import EpisodeVideos
 from roboirg.analysis.page.matrix import make_matrix
 from roboirg.analysis.page.run_warnings import comparisons, facts_of, run_warnings
 from roboirg.analysis.stats.breakdowns import BREAKDOWNS, label_instructions
+from roboirg.analysis.stats.cells import Cells, PolicyRun
 from roboirg.analysis.tables.breakdown_table import make_breakdown_table
 from roboirg.analysis.tables.table import Table
-from roboirg.core.extras import extra_needed
 from roboirg.evaluation.video_writer import LAST_FRAME_REPEATS, VideoOptions
 from roboirg.language.settings import EXPLICIT, all_settings
 from roboirg.records.episode_log import logged_slugs
 from roboirg.records.record import Job, Record
 from roboirg.records.store import read_summaries
 from roboirg.util.atomic_write import write_atomically
-from roboirg.util.page_templates import template_environment
+from roboirg.util.page_templates import check_page_support, template_environment
 
 REPORT_FILE = "report.html"
 FILMING = VideoOptions()
@@ -163,11 +163,11 @@ def check_report_support() -> None:
     Raises:
         MissingDependencyError: Jinja is not installed.
     """
-    with extra_needed("The report needs Jinja", "report"):
-        import jinja2  # noqa: F401 - an extra
+    check_page_support("The report")
 
 
 def _data(entries: EpisodeEntries, columns: Columns) -> dict[str, Any]:
+    sides, change = _sides(entries)
     return {
         "choices": [choice._asdict() for choice in columns.choices],
         "columns": columns.columns,
@@ -175,7 +175,8 @@ def _data(entries: EpisodeEntries, columns: Columns) -> dict[str, Any]:
         "words": columns.words,
         "matrix": make_matrix(entries),
         "comparisons": comparisons(entries),
-        "sides": _sides(entries),
+        "sides": sides,
+        "change": change,
         "reference": EXPLICIT,
         "framed": [name for name, one in all_settings().items() if "frame" in one.reads],
         "film": {"every": FILMING.every, "rate": FILMING.rate, "repeats": LAST_FRAME_REPEATS},
@@ -194,11 +195,29 @@ def _breakdown_tables(runs: Sequence[Run], entries: EpisodeEntries) -> list[Tabl
     return [table for table in tables if table.rows]
 
 
-def _sides(entries: EpisodeEntries) -> list[int]:
-    """Return the policies to compare first: a policy and itself in the other run, or the next."""
+def _sides(entries: EpisodeEntries) -> tuple[list[int], str]:
+    """Return the policies to compare first, and which of their episodes to show.
+
+    That is a policy and itself in the other run, or else the first two whose verdicts differ.
+    """
     names = list(entries.names)
     twins = [place for place, one in enumerate(names) if place and one.policy == names[0].policy]
-    return [0, twins[0] if twins else min(1, len(names) - 1)]
+    pairs = [(0, twins[0])] if twins else [*itertools.combinations(range(len(names)), 2)]
+    for one, other in pairs:
+        if _differ(entries.cells, names[one], names[other]):
+            return [one, other], "changed"
+    return [*pairs[0]] if pairs else [0, 0], "all"
+
+
+def _differ(cells: Cells, first: PolicyRun, second: PolicyRun) -> bool:
+    """Return whether one of two policies succeeded in an episode in which the other failed."""
+    for key, cell in cells.items():
+        other = cells.get(key._replace(policy_run=second))
+        if key.policy_run == first and other is not None:
+            theirs = other.verdicts
+            if any(theirs.get(trial, won) != won for trial, won in cell.verdicts.items()):
+                return True
+    return False
 
 
 def _json(value: object) -> str:

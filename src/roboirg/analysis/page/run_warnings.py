@@ -16,6 +16,7 @@ from roboirg.analysis.stats.comparison_text import sentences
 from roboirg.analysis.stats.heard_rates import count_heard, heard_notes
 from roboirg.analysis.stats.intervals import SEED
 from roboirg.core.errors import InvalidValueError
+from roboirg.episodes.private_splits import SALT_VARIABLE, MissingSaltError, check_salt
 from roboirg.language.settings import EXPLICIT
 from roboirg.util.plurals import counted
 
@@ -37,6 +38,7 @@ def run_warnings(entries: EpisodeEntries) -> list[RunWarning]:
         *(RunWarning("warning", text) for text in _mixed(entries)),
         *(RunWarning("warning", text) for text in _cut(entries)),
         *(RunWarning("note", text) for text in _without_reference(entries)),
+        *(RunWarning("note", text) for text in _private(entries)),
     ]
 
 
@@ -168,6 +170,17 @@ def _without_reference(entries: EpisodeEntries) -> Iterable[str]:
         )
     if all(key.options.setting != EXPLICIT for key in entries.cells):
         yield "Explicit was not played, so there is no gap to it."
+
+
+def _private(entries: EpisodeEntries) -> Iterable[str]:
+    for split in sorted({entry.record.split for entry in entries.all}):
+        try:
+            check_salt(split)
+        except MissingSaltError:
+            yield (
+                f"The episodes of {split} are private: without their salt ({SALT_VARIABLE}) this "
+                "page cannot say which are missing, and lacks stages and resolved words."
+            )
 
 
 def _text(value: object) -> str:

@@ -107,6 +107,7 @@ class PolicyRun(NamedTuple):
         versions: None before it has played.
         run: name of the run if several runs hold the same episodes, else empty.
         is_privileged: whether the policy read the simulator's state.
+        robot: the real robot of a study; None in simulation.
     """
 
     policy: str
@@ -114,12 +115,19 @@ class PolicyRun(NamedTuple):
     versions: Versions | None
     run: str = ""
     is_privileged: bool = False
+    robot: str | None = None
 
     @classmethod
     def of(cls, result: AnyResult, run: str = "") -> PolicyRun:
         """Return the policy run of a result."""
-        versions = Versions.of(result)
-        return cls(result.policy, EvalConditions.of(result), versions, run, result.privileged)
+        return cls(
+            result.policy,
+            EvalConditions.of(result),
+            Versions.of(result),
+            run,
+            result.privileged,
+            result.robot,
+        )
 
     @property
     def marked_policy(self) -> str:
@@ -265,7 +273,8 @@ def policy_order(
     def place(one: PolicyRun) -> tuple[object, ...]:
         rank = policies.index(one.policy) if one.policy in policies else len(policies)
         run = runs.index(one.run) if one.run in runs else 0
-        return (run, rank, one.policy, one.run, repr(one.conditions), repr(one.versions))
+        versions = repr(one.versions)
+        return (run, rank, one.policy, one.run, repr(one.conditions), versions, one.robot or "")
 
     return sorted({key.policy_run for key in cells}, key=place)
 
@@ -312,6 +321,8 @@ def _label(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> str:
         if len({getattr(other.conditions, name) for other in policy_runs}) > 1
     ]
     parts += _version_labels(policy_run, policy_runs)
+    if policy_run.robot is not None:
+        parts.append(f"on {policy_run.robot}")
     if policy_run.run:
         parts.append(policy_run.run)
     return ", ".join(parts)

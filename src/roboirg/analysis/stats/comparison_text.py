@@ -2,28 +2,34 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
 from roboirg.analysis.stats.comparison import Comparison, ComparisonResult
+from roboirg.analysis.stats.flips import Flips
 from roboirg.analysis.stats.option_labels import options_label
 from roboirg.analysis.stats.power import MAX_EPISODES, POWER
 from roboirg.analysis.stats.rates import p_text, points
 from roboirg.util.plurals import counted
 
 
-def sentences(comparison: Comparison, first: str, second: str) -> Iterator[str]:
+def sentences(
+    comparison: Comparison, first: str, second: str, flips: tuple[Flips, Flips] | None = None
+) -> Iterator[str]:
     """Yield the results, a sentence each; empty ones separate paragraphs.
 
     Args:
         comparison: of two policies.
         first: label of the first.
         second: label of the second.
+        flips: how often the verdicts of each policy change by themselves, as far as that is known;
+            None says nothing about it.
     """
     names = (first, second)
     yield f"{first} against {second}, on the same episodes."
     yield ""
     for result in comparison.averages:
-        yield _sentence(result, names)
+        yield _sentence(result, names) + _own_flips(comparison, result, names, flips)
     decided = [result for result in comparison.cells if result.verdict != "open"]
     if any(len(result.tasks) > 1 for result in comparison.averages):
         yield ""
@@ -42,12 +48,34 @@ def sentences(comparison: Comparison, first: str, second: str) -> Iterator[str]:
             yield f"  {_sentence(result, names)}"
     yield ""
     yield from _caveats(comparison)
+    if flips is not None and not all(flips):
+        yield (
+            "How much a policy differs from itself is not known of "
+            f"{' and '.join(name for name, own in zip(names, flips, strict=True) if not own)}: "
+            "`roboirg repeat RUN --out AGAIN` measures it."
+        )
 
 
 def _sentence(result: ComparisonResult, names: tuple[str, str]) -> str:
     if result.verdict == "open":
         return f"{_subject(result)}: no clear difference, {_figures(result)}.{_outlook(result)}"
     return f"{_subject(result)}: {_better(result, names)}, {_figures(result)}."
+
+
+def _own_flips(
+    comparison: Comparison,
+    result: ComparisonResult,
+    names: tuple[str, str],
+    flips: tuple[Flips, Flips] | None,
+) -> str:
+    """Return which share of the policies' verdicts changed when the same was played again."""
+    runs = (comparison.first, comparison.second)
+    found = [
+        f"{name} {own[run.policy, result.key.options]}"
+        for name, run, own in zip(names, runs, flips or ({}, {}), strict=True)
+        if (run.policy, result.key.options) in own
+    ]
+    return f" Verdicts that change by themselves: {', '.join(found)}." if found else ""
 
 
 def _subject(result: ComparisonResult) -> str:
@@ -67,7 +95,18 @@ def _figures(result: ComparisonResult) -> str:
         low, high = (points(end, 1) for end in gap.interval)
         words += f" (95 % interval {low} to {high})"
     tasks = "" if len(result.tasks) == 1 else f" of {len(result.tasks)} tasks"
-    return f"{words}, {p_text(result.p_holm)}, {counted(gap.episodes, 'episode')}{tasks}"
+    p_value = p_text(result.p_holm)
+    if _is_surprising(result):
+        p_value += f" (uncorrected {p_text(gap.p_value).removeprefix('p ').removeprefix('= ')})"
+    return f"{words}, {p_value}, {counted(gap.episodes, 'episode')}{tasks}"
+
+
+def _is_surprising(result: ComparisonResult) -> bool:
+    """Return whether the interval excludes no difference, and the corrected test does not."""
+    interval = result.gap.interval
+    return (
+        result.verdict == "open" and interval is not None and not interval.low <= 0 <= interval.high
+    )
 
 
 def _outlook(result: ComparisonResult) -> str:
@@ -93,6 +132,12 @@ def _caveats(comparison: Comparison) -> Iterator[str]:
         if several
         else " over the settings."
     )
+    shown = (*comparison.averages, *itertools.chain.from_iterable(comparison.parts.values()))
+    if any(map(_is_surprising, shown)):
+        yield (
+            "An interval is of one gap alone, so it may exclude 0 although p is above 0.05: p is "
+            "corrected for all gaps that are tested together, and it decides."
+        )
     if comparison.parts:
         yield "A break-down is corrected by itself, over all its rows."
     if unpaired:

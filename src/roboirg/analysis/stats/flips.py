@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,8 +15,12 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.records.action_log import ActionLog, read_actions
 from roboirg.records.record import Record
-from roboirg.records.record_codec import identity_key, read_index_entry
+from roboirg.records.record_codec import StoreError, identity_key, read_index_entry
 from roboirg.records.store import StoredRun
+from roboirg.util.atomic_write import write_atomically
+
+FLIPS_FILE = "flips.json"
+_ARITHMETIC = ("device", "driver", "flags")
 
 
 class RepeatedEpisode(NamedTuple):
@@ -27,6 +32,8 @@ class RepeatedEpisode(NamedTuple):
         slug: of the job.
         outcomes: success, failure or error, first and second.
         differs_at: index of the first action that differs; None if all are equal, or were not kept.
+        arithmetic: device, driver and flags that the policy's server told, first and second; empty
+            texts if it told none.
     """
 
     policy: str
@@ -34,6 +41,7 @@ class RepeatedEpisode(NamedTuple):
     slug: str
     outcomes: tuple[str, str]
     differs_at: int | None
+    arithmetic: tuple[str, str] = ("", "")
 
     @property
     def is_flip(self) -> bool:
@@ -71,6 +79,16 @@ class FlipCounts:
         """Number of episodes whose verdict changed."""
         return self.lost + self.gained
 
+    def __str__(self) -> str:
+        """Return the share of verdicts that changed, in words."""
+        if not self.verdicts:
+            return "no verdict twice"
+        return f"{100 * self.flips / self.verdicts:.1f} % ({self.flips:,} of {self.verdicts:,})"
+
+
+Flips = Mapping[tuple[str, InstructionOptions], FlipCounts]
+"""Counts by policy and kind of instruction."""
+
 
 def repeated_episodes(first: Path, second: Path) -> tuple[RepeatedEpisode, ...]:
     """Return the episodes that are in two runs, in the order of the first.
@@ -106,9 +124,7 @@ def count_flips(episodes: Iterable[RepeatedEpisode]) -> FlipCounts:
     )
 
 
-def flips_by_cell(
-    episodes: Sequence[RepeatedEpisode],
-) -> Mapping[tuple[str, InstructionOptions], FlipCounts]:
+def flips_by_cell(episodes: Sequence[RepeatedEpisode]) -> Flips:
     """Count outcomes for each policy and kind of instruction."""
     cells: dict[tuple[str, InstructionOptions], list[RepeatedEpisode]] = defaultdict(list)
     for one in episodes:
@@ -116,13 +132,61 @@ def flips_by_cell(
     return {key: count_flips(found) for key, found in cells.items()}
 
 
+def write_flips(found: Flips, folder: Path) -> None:
+    """Keep in the folder of a run how often its policies' verdicts change.
+
+    Raises:
+        InvalidValueError: the file cannot be written.
+    """
+    rows = [
+        {"policy": policy, "options": options._asdict(), "counts": asdict(counts)}
+        for (policy, options), counts in found.items()
+    ]
+    write_atomically(folder / FLIPS_FILE, json.dumps(rows, indent=1) + "\n")
+
+
+def read_flips(folder: Path) -> Flips:
+    """Return what `write_flips` kept in the folder of a run; empty if it was never repeated.
+
+    Raises:
+        StoreError: the file is damaged.
+    """
+    path = folder / FLIPS_FILE
+    try:
+        rows = json.loads(path.read_text(encoding="utf-8"))
+        return {
+            (row["policy"], _options(row["options"])): FlipCounts(**row["counts"]) for row in rows
+        }
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError, TypeError, KeyError) as error:
+        raise StoreError(f"{path} is damaged; `roboirg repeat` writes it again.") from error
+
+
+def told_arithmetic(metadata: Mapping[str, Any]) -> str:
+    """Return device, driver and flags among a policy's metadata, in words; empty without any."""
+    inner = metadata.get("policy")
+    told = {**(inner if isinstance(inner, Mapping) else {}), **metadata}
+    return ", ".join(f"{name} {told[name]}" for name in _ARITHMETIC if told.get(name))
+
+
+def _options(fields: Mapping[str, Any]) -> InstructionOptions:
+    return InstructionOptions(**{**fields, "stages": tuple(fields["stages"])})
+
+
 def _compared(one: Record, other: Record, first: Path, second: Path) -> RepeatedEpisode:
     differs_at = None
     if one.action_log != other.action_log and one.action_log and other.action_log:
         logs = read_actions(first, one.action_log), read_actions(second, other.action_log)
         differs_at = _first_difference(*logs)
-    outcomes = one.outcome, other.outcome
-    return RepeatedEpisode(one.policy, one.options, one.slug, outcomes, differs_at)
+    return RepeatedEpisode(
+        policy=one.policy,
+        options=one.options,
+        slug=one.slug,
+        outcomes=(one.outcome, other.outcome),
+        differs_at=differs_at,
+        arithmetic=(told_arithmetic(one.policy_metadata), told_arithmetic(other.policy_metadata)),
+    )
 
 
 def _first_difference(one: ActionLog, other: ActionLog) -> int | None:

@@ -41,7 +41,7 @@ from roboirg.analysis.tables.table import (
     with_best,
     with_changes,
 )
-from roboirg.analysis.tables.table_notes import is_shown, notes_of
+from roboirg.analysis.tables.table_notes import TWIN_MARK, is_shown, notes_of
 from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.settings import EXPLICIT, all_settings, settings_of
@@ -173,9 +173,10 @@ def _positions(which: RateTable, cells: Cells) -> Iterator[tuple[PolicyRun, Posi
     played = {(key.policy_run, key.options) for key in cells if key.task in tasks}
     shown = _shown_options(which, (options for _, options in played))
     for policy_run, label in labels(cells).items():
+        mark = TWIN_MARK if which == "real" and policy_run.robot is None else ""
         for options in shown:
             if (policy_run, options) in played:
-                yield policy_run, _position(which, label, options)
+                yield policy_run, _position(which, label + mark, options)
 
 
 def _shown_options(

@@ -35,16 +35,15 @@ from roboirg.analysis.stats.run_summary import (
     ScopeResults,
     group_by_scope,
 )
+from roboirg.analysis.tables.rendering.column_parts import BORDERS, split_columns
 from roboirg.analysis.tables.table import ERROR_MARK, MISSING_MARK
 from roboirg.analysis.tables.table_notes import where_played
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.printable import printable
 from roboirg.records.record import Job
 from roboirg.records.record_codec import AnyResult
+from roboirg.util.console_width import line_width, widen
 from roboirg.util.plurals import counted
-
-MINIMUM_WIDTH = 100
-"""Columns to use if the output is not a terminal."""
 
 NO_GAP = "–"
 
@@ -103,10 +102,11 @@ def make_run_tables(records: Sequence[AnyResult], planned: Sequence[Job] = ()) -
 
 def print_run_tables(tables: Sequence[RunTable], console: Console) -> None:
     """Print every table and, below, what the signs mean."""
-    if not console.is_terminal:
-        console.width = max(console.width, MINIMUM_WIDTH)
     for table in tables:
-        console.print(_grid(table))
+        grids = _grids(table, line_width(console))
+        widen(console, *grids)
+        for grid in grids:
+            console.print(grid)
         # Not the grid's caption, which would be as narrow as the grid.
         console.print(Text(_caption(table)), style="dim", highlight=False)
     console.print("; ".join(_legend(tables)), style="dim", highlight=False)
@@ -188,29 +188,46 @@ def _explicit_differences(policy_run: PolicyRun, cells: Cells) -> AllDifferences
     }
 
 
-def _grid(table: RunTable) -> Grid:
-    """Draw tasks × settings: the success rate and, in brackets, the gap to explicit."""
-    grid = Grid(
-        title=table.label,
-        title_justify="left",
-        title_style="bold",
-    )
-    grid.add_column("task")
+def _grids(table: RunTable, width: int) -> list[Grid]:
+    """Draw tasks × settings: the success rate and, in brackets, the gap to explicit.
+
+    A table that is wider than a line is drawn in parts; in each the task comes first.
+    """
     signs = _explicit_signs(table)
     common = next(iter(signs.values())) if len(set(signs.values())) == 1 else ""
-    for options in table.columns:
-        sign = common if options == REFERENCE else ""
-        grid.add_column(f"{options_label(options)} {sign}".rstrip(), justify="right")
     rows = [(task, Scope(task=task)) for task in table.tasks]
     if len(table.tasks) > 1:
         rows.append((ALL_TASKS, ALL))
-    for name, scope in rows:
+    columns = []
+    for options in table.columns:
+        head = f"{options_label(options)} {common if options == REFERENCE else ''}".rstrip()
+        cells = [_text(table.cells.get((scope, options))) for _, scope in rows]
+        if options == REFERENCE and not common:
+            for (name, _), cell in zip(rows, cells, strict=True):
+                cell.append(f" {signs[name]}" if name in signs else "", "dim")
+        columns.append((head, cells))
+    widths = [max(len(head), *(len(cell) for cell in cells)) + BORDERS for head, cells in columns]
+    names = max(len(name) for name, _ in rows) + BORDERS + 1
+    settings = [options.setting for options in table.columns]
+    parts = split_columns(settings, widths, width - names)
+    return [
+        _grid(rows, [columns[index] for index in part], "" if number else table.label)
+        for number, part in enumerate(parts)
+    ]
+
+
+def _grid(
+    rows: Sequence[tuple[str, Scope]], columns: Sequence[tuple[str, list[Text]]], title: str
+) -> Grid:
+    grid = Grid(title=Text(title) if title else None, title_justify="left", title_style="bold")
+    grid.add_column("task")
+    for head, _ in columns:
+        grid.add_column(head, justify="right")
+    for place, (name, scope) in enumerate(rows):
         if scope == ALL:
             grid.add_section()
-        cells = [_text(table.cells.get((scope, options))) for options in table.columns]
-        if REFERENCE in table.columns and not common and name in signs:
-            cells[table.columns.index(REFERENCE)].append(f" {signs[name]}", "dim")
-        grid.add_row(Text(name, "bold" if scope == ALL else ""), *cells)
+        style = "bold" if scope == ALL else ""
+        grid.add_row(Text(name, style), *(cells[place] for _, cells in columns))
     return grid
 
 

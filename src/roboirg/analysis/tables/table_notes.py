@@ -34,6 +34,7 @@ from roboirg.util.plurals import counted
 RATES_NOTE = (
     "Success rate in percent, the mean over policy seeds; averages are unweighted means over tasks."
 )
+TWIN_MARK = " (twin)"
 ARROWS = {"up": "↑", "down": "↓", "same": "→"}
 
 
@@ -60,6 +61,7 @@ def notes_of(
         *_incomplete_notes(shown.values(), entries),
         *_version_notes(policy_runs),
         *_omission_notes(which, cells, tasks),
+        *_twin_notes(rows),
         *_published_notes(which, rows),
         *comparison_notes(
             {key: one for key, one in differences.items() if key in shown}, labels(cells)
@@ -197,6 +199,12 @@ def _omission_notes(which: RateTable, cells: Cells, tasks: Sequence[str]) -> lis
     if other_options:
         notes.append(f"Not in this table: {'; '.join(map(options_label, other_options))}.")
     return notes
+
+
+def _twin_notes(rows: Iterable[Row]) -> list[str]:
+    if any(row.name.endswith(TWIN_MARK) for row in rows):
+        return [f"{TWIN_MARK.strip()}: the study's twin, in simulation, not on a robot."]
+    return []
 
 
 def _published_notes(which: RateTable, rows: Iterable[Row]) -> list[str]:

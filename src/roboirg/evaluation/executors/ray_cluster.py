@@ -25,6 +25,7 @@ from typing import Any, NamedTuple, Protocol, Self, cast, runtime_checkable
 
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.extras import extra_needed
+from roboirg.episodes.private_splits import known_salt, use_salt
 from roboirg.evaluation.episode_errors import format_cause
 from roboirg.evaluation.executors.executor import NO_TIMEOUT_S
 from roboirg.evaluation.executors.workers import MAX_FAILED_STARTS, WorkerSlot
@@ -184,7 +185,9 @@ class _MachineHosts:
 class _RemoteWorker:
     """Actor that runs on a machine of the cluster and returns videos as bytes."""
 
-    def __init__(self, play: PlayJob, episode_timeout_s: float) -> None:
+    def __init__(self, play: PlayJob, episode_timeout_s: float, salt: str | None) -> None:
+        if salt is not None:
+            use_salt(salt)
         self._folder = Path(tempfile.mkdtemp(prefix="roboirg-"))
         recorder = _video_recorder(play)
         self._play = play if recorder is None else recorder.in_folder(self._folder)
@@ -269,7 +272,7 @@ class _WorkerPool:
             self._ray.kill(hosts)
 
     def _start_worker(self) -> None:
-        worker = self._actor.remote(self._play, self._episode_timeout_s)
+        worker = self._actor.remote(self._play, self._episode_timeout_s, known_salt())
         self._pending[worker.machine.remote()] = (worker, None, None)
 
     def _hosts_at(self, machine: str) -> Any:  # noqa: ANN401 - a reference

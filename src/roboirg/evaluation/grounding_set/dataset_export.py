@@ -185,13 +185,23 @@ def _make_episode(folder: Path, request: ExportRequest, name: EpisodeName) -> li
     )
     if not wanted:
         return []
-    part = folder / PARTS / f"{name.task}-{name.split}-{name.number}.json"
-    if part.exists():
-        media = msgspec.json.decode(part.read_bytes(), type=EpisodeMedia)
-    else:
+    media = read_media(folder, name)
+    if media is None:
         media = store_media(folder, episode, request.frames_every, request.frames)
-        write_atomically(part, msgspec.json.encode(media))
+        write_atomically(_part(folder, name), msgspec.json.encode(media))
     return make_items(episode, media, wanted)
+
+
+def read_media(folder: Path, name: EpisodeName) -> EpisodeMedia | None:
+    """Return what a dataset has stored of an episode; None if there is nothing yet."""
+    part = _part(folder, name)
+    if not part.exists():
+        return None
+    return msgspec.json.decode(part.read_bytes(), type=EpisodeMedia)
+
+
+def _part(folder: Path, name: EpisodeName) -> Path:
+    return folder / PARTS / f"{name.task}-{name.split}-{name.number}.json"
 
 
 def _size(folder: Path) -> int:

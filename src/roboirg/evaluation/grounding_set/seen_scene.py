@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ from roboirg.core.errors import RoboIRGError
 from roboirg.core.observations import FRONT
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.evaluation.grounding_set.grounding_item import Mask, PointTarget, encode_mask
-from roboirg.evaluation.grounding_set.referents import Referent, find_referents
+from roboirg.evaluation.grounding_set.referents import find_candidates, find_referents
 
 FIRST = "first"
 """Name of the picture at the start of the policy's turn."""
@@ -29,6 +30,7 @@ class SeenScene(NamedTuple):
         steps: control steps of the video.
         points: where the things that are meant are seen.
         meters: distance of the first of them from the camera.
+        objects: where every object is seen that could be meant, by its name.
     """
 
     picture: Pixels
@@ -36,6 +38,7 @@ class SeenScene(NamedTuple):
     steps: int
     points: tuple[PointTarget, ...]
     meters: float
+    objects: Mapping[str, PointTarget]
 
 
 def look_at_episode(episode: Episode, every: int) -> SeenScene:
@@ -57,10 +60,16 @@ def look_at_episode(episode: Episode, every: int) -> SeenScene:
     finally:
         env.close()
     video = info["demonstration"]
-    found = [
-        _target(episode, referent, np.isin(segments, [numbers[name] for name in referent.objects]))
-        for referent in find_referents(episode)
-    ]
+    found = []
+    for referent in find_referents(episode):
+        mask = np.isin(segments, [numbers[name] for name in referent.objects])
+        if not mask.any():
+            raise RoboIRGError(
+                f"{episode.key}: {' and '.join(referent.objects)} cannot be seen in the first "
+                "picture."
+            )
+        found.append(_target(referent.kind, mask))
+    masks = {one: segments == numbers[one.name] for one in find_candidates(episode)}
     first = found[0]
     return SeenScene(
         picture=observation["front_rgb"],
@@ -68,18 +77,15 @@ def look_at_episode(episode: Episode, every: int) -> SeenScene:
         steps=video.length,
         points=tuple(found),
         meters=round(float(observation["front_depth"][first.y, first.x, 0]) / 1000, 3),
+        objects={one.name: _target(one.kind, mask) for one, mask in masks.items() if mask.any()},
     )
 
 
-def _target(episode: Episode, referent: Referent, mask: Mask) -> PointTarget:
-    if not mask.any():
-        raise RoboIRGError(
-            f"{episode.key}: {' and '.join(referent.objects)} cannot be seen in the first picture."
-        )
+def _target(kind: str, mask: Mask) -> PointTarget:
     y, x = nearest_to_center(mask)
     height, width = mask.shape
     return PointTarget(
-        kind=referent.kind,
+        kind=kind,
         picture=FIRST,
         x=x,
         y=y,

@@ -23,6 +23,7 @@ from roboirg.evaluation.hosting.hosted_episode import HostedEpisode
 from roboirg.evaluation.hosting.payload import Message, decode, encode
 from roboirg.policies.loading import is_privileged, load_policy_class, policy_version
 from roboirg.policies.prompt_length.declared_limit import prompt_needs_of
+from roboirg.policies.random_state import RandomState
 
 MISSING = "missing"
 """Instead of a kind of error: a package is not installed."""
@@ -103,6 +104,7 @@ class HostProcess:
                 one.observation(call) for one, call in zip(episodes, calls, strict=True)
             ]
             first: Any = episodes[0].policy
+            RandomState.set_aside()
             chunks = first.act_together([one.policy for one in episodes], observations)
             return [
                 {"value": one.actions(rows)} for one, rows in zip(episodes, chunks, strict=True)

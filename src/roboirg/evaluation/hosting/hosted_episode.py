@@ -149,10 +149,9 @@ class HostedEpisode:
 
     def _read(self, message: Message) -> Any:  # noqa: ANN401 - whatever the world has packed
         """Return the value of a message; what does not fit into shared memory comes in parts."""
-        data, room = bytearray(message["size"]), self._block.size
-        for start in range(0, len(data), room):
-            if start:
-                self._ask({"want_from": start})
-            stop = min(start + room, len(data))
-            data[start:stop] = buffer_of(self._block)[: stop - start]
+        size, shared = message["size"], buffer_of(self._block)
+        data = bytearray(shared[:size])
+        while len(data) < size:
+            self._ask({"want_from": len(data)})
+            data += shared[: size - len(data)]
         return unpack_payload(message["tree"], data)

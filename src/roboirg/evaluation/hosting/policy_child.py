@@ -11,6 +11,7 @@ import threading
 from collections.abc import Mapping
 from typing import IO, Self
 
+from roboirg.episodes.private_splits import SALT_VARIABLE
 from roboirg.evaluation.hosting.payload import MAX_MESSAGE, Message, decode, encode
 from roboirg.records.record import ErrorKind
 from roboirg.util.child_process import ChildExit, ChildProcess
@@ -46,8 +47,8 @@ class PolicyChild(ChildProcess):
 
     @classmethod
     def start(cls, variables: Mapping[str, str] | None = None) -> Self:
-        """Start a process with environment variables beside those of this one."""
-        child = cls.run_module(_MODULE, variables or {})
+        """Start a process with environment variables beside those of this one, without a salt."""
+        child = cls.run_module(_MODULE, {**(variables or {}), SALT_VARIABLE: None})
         child.printed = _Output(child.output)
         return child
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.episodes.private_splits import check_salt
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.plan import read_earlier_plans, read_plans
 from roboirg.evaluation.verification.record_check import (
@@ -78,11 +79,14 @@ def verify_run(
 
     Raises:
         InvalidValueError: the sample is not a share.
+        MissingSaltError: the run has private episodes, and their salt is not known.
         StoreError: there are no records, or a line is not a record of this schema version.
     """
     if not 0.0 <= sample <= 1.0:
         raise InvalidValueError(f"sample is {sample}; it must be between 0 % and 100 %.")
     run = read_summaries(folder)
+    for split in sorted({one.split for one in run.newest}):
+        check_salt(split)
     checks: list[RecordCheck] = []
     verdicts: Counter[ReplayVerdict] = Counter()
     deviation = 0.0

@@ -30,7 +30,7 @@ from inspect_ai.util import JSONSchema
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.instruction_options import DEFAULT_DELIVERY, DEFAULT_REASONING, DEFAULT_RIVAL
-from roboirg.episodes.splits import SIZES, check_split
+from roboirg.episodes.splits import split_size
 from roboirg.integrations.inspect.episode_process import SPEC, ModelRequest, play
 from roboirg.policies.planning.models import ModelOptions
 from roboirg.policies.planning.vlm_listener import ListenerOptions
@@ -74,7 +74,7 @@ def listener(
         think: whether the answer begins with a field in which the model may think.
         structured: whether to send the JSON schema of the answer.
     """
-    count = min(episodes, SIZES[check_split(split)])
+    count = min(episodes, split_size(split))
     jobs = [
         Job(
             policy="vlm-listener", spec=SPEC, task=name, split=split, episode=index,

@@ -25,10 +25,15 @@ def make_batch(
         options: keyword arguments of `LeRobotSubEnvironment`.
     """
     makers = sub_environments(task, n_envs, options)
-    if use_async_envs and n_envs > 1:
-        # Spawned, because the threads of the renderer do not survive a fork.
-        return AsyncVectorEnv(makers, context="spawn", autoreset_mode=AutoresetMode.NEXT_STEP)
-    return SyncVectorEnv(makers, autoreset_mode=AutoresetMode.NEXT_STEP)
+    # LeRobot 0.4 reads successes from ``final_info`` alone, which no other mode has.
+    mode = AutoresetMode.SAME_STEP
+    if not use_async_envs or n_envs == 1:
+        return SyncVectorEnv(makers, autoreset_mode=mode)
+    # Spawned, because the threads of the renderer do not survive a fork.
+    vector = AsyncVectorEnv(makers, context="spawn", autoreset_mode=mode)
+    # LeRobot 0.4 looks at the first one for what it may ask all of them.
+    vector.envs = (makers[0](),) * n_envs  # type: ignore[attr-defined]
+    return vector
 
 
 def sub_environments(

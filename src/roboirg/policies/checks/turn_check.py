@@ -42,7 +42,9 @@ def play_in_turns(
         space, found = wanted_actions(policies[0]), [Chunks() for _ in episodes]
         for _ in range(CALLS):
             moments = [copy.deepcopy(episode.first) for episode in episodes]
-            rows = policies[0].act_together(policies, moments) if together else []
+            if together:
+                RandomState.set_aside()
+                rows = policies[0].act_together(policies, moments)
             for number, (policy, random) in enumerate(zip(policies, randoms, strict=True)):
                 with random:
                     chunk = rows[number] if together else policy.act(moments[number])

@@ -1,10 +1,11 @@
-"""Make policies from ``system:…``, ``vlm-listener:…`` and ``learned:…`` on the command line.
+"""Make policies from specs with a kind, such as ``system:…``, on the command line.
 
 | spec | meaning |
 | --- | --- |
 | ``system:NAME?server=host:port&vlm=URL`` | a system of the paper, or of a file |
 | ``vlm-listener:PROVIDER?model=NAME&base_url=URL`` | a model names the goal |
 | ``learned:PATH`` | a listener that `roboirg learn listener` trained names the goal |
+| ``people:FOLDER`` | people name the goal, in a study of `roboirg listen` |
 
 Values that contain ``&`` or ``#`` are percent-encoded.
 """
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 SYSTEM = "system"
 LISTENER = "vlm-listener"
 LEARNED = "learned"
+PEOPLE = "people"
 
 Build = Callable[[int], Policy]
 
@@ -137,8 +139,17 @@ def _learned(spec: str, name: str, options: Mapping[str, str]) -> Build:
     return lambda seed: LearnedListener(Path(name), seed)
 
 
+def _people(spec: str, name: str, options: Mapping[str, str]) -> Build:
+    from roboirg.policies.builtin.people_listener import PeopleListener
+
+    if not name or options:
+        raise InvalidValueError(f"Policy {spec!r} is not people:FOLDER, the folder of a study.")
+    return lambda seed: PeopleListener(Path(name), seed)
+
+
 BUILDERS: Mapping[str, Callable[[str, str, Mapping[str, str]], Build]] = {
     SYSTEM: _system,
     LISTENER: _listener,
     LEARNED: _learned,
+    PEOPLE: _people,
 }

@@ -9,6 +9,7 @@ from roboirg.policies.base import Policy
 from roboirg.policies.loading import is_privileged, load_policy_class, make_policy, policy_version
 from roboirg.policies.protocols import protocols_by_scheme
 from roboirg.policies.remote.endpoints import Endpoint
+from roboirg.policies.serving.arithmetic import describe_arithmetic
 from roboirg.policies.serving.server_options import ServerOptions
 from roboirg.policies.transport import ListeningServer
 
@@ -68,7 +69,12 @@ def open_server(
         return make_policy(spec, seed)
 
     found = protocols[protocol]
-    metadata = {"policy": spec, "version": policy_version(spec), "protocol": protocol}
+    metadata = {
+        "policy": spec,
+        "version": policy_version(spec),
+        "protocol": protocol,
+        **describe_arithmetic(),
+    }
     listen = found.clients[protocol].transport.load_server()
     try:
         listening = listen(service(make), metadata, options)

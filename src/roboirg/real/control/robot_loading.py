@@ -9,9 +9,7 @@ from roboirg.real.control.clock import RealClock, VirtualClock
 from roboirg.real.control.lerobot_arm import PREFIX, make_arm
 from roboirg.real.control.robot import Robot
 from roboirg.real.control.twin import Twin
-from roboirg.records.record import Job
-
-TWIN = "twin"
+from roboirg.records.record import TWIN, Job
 
 
 def make_robot(spec: str, *, real_time: bool, arrange: Callable[[Job], None]) -> Robot:

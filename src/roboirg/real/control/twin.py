@@ -15,7 +15,7 @@ from roboirg.evaluation.policy_environment import EnvRequirements, make_env
 from roboirg.evaluation.rollout_result import RolloutResult
 from roboirg.real.control.clock import Clock, VirtualClock
 from roboirg.real.control.robot import CAMERA_RATE, COMMAND_RATE, Command, SensorReading
-from roboirg.records.record import Job
+from roboirg.records.record import TWIN, Job
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -34,7 +34,7 @@ class Twin:
         clock: virtual by default: as fast as possible, and exact.
     """
 
-    name = "twin"
+    name = TWIN
     rate = COMMAND_RATE
 
     def __init__(self, clock: Clock | None = None) -> None:

@@ -8,14 +8,13 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 from urllib.parse import urlencode
 
-from roboirg.core.extras import extra_needed
 from roboirg.real.pages.arrangement_svg import draw_svg
 from roboirg.real.study.failure_choices import failure_choices
 from roboirg.real.study.study_plan import PlannedTrial
 from roboirg.real.study.trial_log import SUCCESS, VOID_CHOICE, TrialLog, trial_metadata
 from roboirg.real.study.trial_text import describe_positions, explicit_command, spoken_turns
 from roboirg.records.record import Record
-from roboirg.util.page_templates import template_environment
+from roboirg.util.page_templates import check_page_support, template_environment
 
 if TYPE_CHECKING:
     import jinja2
@@ -131,19 +130,9 @@ def _present_choice(trial: PlannedTrial, record: Record | None, state: str) -> s
     return ""
 
 
-def check_page_support() -> None:
-    """Check that the page can be rendered.
-
-    Raises:
-        MissingDependencyError: Jinja is not installed.
-    """
-    with extra_needed("The page needs Jinja", "report"):
-        import jinja2  # noqa: F401 - an extra
-
-
 @functools.cache
 def _template() -> jinja2.Template:
-    check_page_support()
+    check_page_support("The page")
     from markupsafe import Markup
 
     def svg(text: str) -> Markup:

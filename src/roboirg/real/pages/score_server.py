@@ -15,19 +15,15 @@ from pathlib import Path, PurePosixPath
 from urllib.parse import parse_qsl, urlsplit
 
 from roboirg.core.errors import InvalidValueError, RoboIRGError
-from roboirg.real.pages.score_page import check_page_support, page_address, render_trial
+from roboirg.real.pages.score_page import page_address, render_trial
 from roboirg.real.study.study_plan import PlannedTrial, StudyPlan
 from roboirg.real.study.trial_log import TrialLog
 from roboirg.util.http_server import HTML_TYPE, LoopbackRequestHandler, LoopbackServer
+from roboirg.util.keyed_pages import PRIVATE_HEADERS, page_policy
+from roboirg.util.page_templates import check_page_support
 from roboirg.util.request_origin import LOOPBACK
 
 MAX_FORM_BYTES = 65_536
-NO_CONTENT_POLICY = "default-src 'none'; frame-ancestors 'none'; base-uri 'none'"
-PAGE_POLICY = (
-    "default-src 'none'; style-src 'nonce-{0}'; script-src 'nonce-{0}'; form-action 'self'; "
-    "frame-ancestors 'none'; base-uri 'none'"
-)
-"""Allows the page its own style, script and forms only."""
 
 
 class ScoreServer(LoopbackServer):
@@ -45,7 +41,7 @@ class ScoreServer(LoopbackServer):
     """
 
     def __init__(self, plan: StudyPlan, folder: Path, operator: str, port: int = 0) -> None:
-        check_page_support()
+        check_page_support("The page")
         self.plan, self.folder, self.operator = plan, folder, operator
         self.token = secrets.token_urlsafe(24)
         self._writing = threading.Lock()
@@ -135,8 +131,7 @@ class _ScoreHandler(LoopbackRequestHandler):
         except RoboIRGError as error:
             self.send_refusal(HTTPStatus.BAD_REQUEST, str(error))
             return
-        headers = {"Content-Security-Policy": PAGE_POLICY.format(nonce)}
-        self.send_bytes(text.encode(), HTML_TYPE, headers=headers)
+        self.send_bytes(text.encode(), HTML_TYPE, headers=page_policy(nonce))
 
     def do_POST(self) -> None:  # noqa: N802 - name of the base class
         """Store a verdict or undo one, then redirect: reloading the page must not repeat it."""
@@ -163,16 +158,8 @@ class _ScoreHandler(LoopbackRequestHandler):
         self.send_redirect(page_address(query))
 
     def common_headers(self) -> dict[str, str]:
-        """Return headers that forbid caching, referrers with the token, and foreign content.
-
-        With the policy ``no-referrer``, browsers would hide the origin of the page's own forms.
-        """
-        return {
-            **super().common_headers(),
-            "Cache-Control": "no-store",
-            "Referrer-Policy": "same-origin",
-            "Content-Security-Policy": NO_CONTENT_POLICY,
-        }
+        """Return headers that forbid caching, referrers with the token, and foreign content."""
+        return {**super().common_headers(), **PRIVATE_HEADERS}
 
     def _is_allowed(self, token: str) -> bool:
         """Return whether a request comes from a page of this server; refuse it if not."""

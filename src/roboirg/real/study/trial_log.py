@@ -19,11 +19,9 @@ from roboirg.evaluation.episode_errors import format_cause
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.real.study.failure_choices import failure_choices
 from roboirg.real.study.study_plan import PlannedTrial, StudyPlan
-from roboirg.records.record import Record
+from roboirg.records.record import REAL_TRIAL, Record
 from roboirg.records.store import RECORDS_FILE, RecordStore, StoreError, read_contents
 
-METADATA = "real_trial"
-"""Key of a real trial's metadata in a record's ``policy_metadata``."""
 UNSCORED = format_cause("infrastructure", "played; waiting for the operator's verdict")
 WITHDRAWN = format_cause("infrastructure", "the operator undid the score")
 VOID = format_cause("infrastructure", "the operator declared the trial void")
@@ -199,7 +197,7 @@ class TrialLog:
         }  # fmt: skip
         complete = record.model_copy(
             update={
-                "policy_metadata": {**record.policy_metadata, METADATA: merged},
+                "policy_metadata": {**record.policy_metadata, REAL_TRIAL: merged},
                 "plan": self.plan.fingerprint,
             }
         )
@@ -210,7 +208,7 @@ class TrialLog:
 
 def trial_metadata(record: Record) -> dict[str, JsonValue]:
     """Return the metadata of a real trial in its record; empty for other records."""
-    metadata = record.policy_metadata.get(METADATA)
+    metadata = record.policy_metadata.get(REAL_TRIAL)
     return dict(metadata) if isinstance(metadata, dict) else {}
 
 

@@ -1,10 +1,29 @@
-"""Tables in LaTeX; the document needs the package booktabs."""
+"""Tables in LaTeX; the document needs the package booktabs.
+
+A table is no wider than the text of a one-column article, so it fits there, and across both columns
+of a two-column one. What is wider or longer becomes several tables: by groups of columns, as on the
+terminal, and by groups of rows.
+"""
 
 from __future__ import annotations
 
 import itertools
+import re
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
-from roboirg.analysis.tables.table import NOT_APPLICABLE, Entry, Table
+from roboirg.analysis.tables.rendering.column_parts import split_columns
+from roboirg.analysis.tables.table import NOT_APPLICABLE, Column, Entry, Row, Table
+
+TEXT_WIDTH_PT = 340.0
+"""Width of a table: a little less than the 345 pt of a one-column article in 10 pt."""
+MOST_LINES = 42
+"""Lines of rows in one table, in \\footnotesize; with caption and notes they fill a page."""
+_LETTER_PT, _DIGIT_PT, _SIGN_PT, _GAP_PT = 5.0, 4.5, 6.5, 6.0
+"""Generous widths in \\footnotesize: of a letter, of a digit in bold, of a sign or arrow, and
+between columns."""
+_NAMES_PT = 130.0
+"""Width of the rows' names, if they need as much; longer ones are folded."""
 
 _ARROWS = {"up": r"$\uparrow$", "down": r"$\downarrow$", "same": r"$\rightarrow$"}
 _SPECIAL = {
@@ -17,43 +36,101 @@ _SPECIAL = {
     "−": "$-$",
     "±": r"$\pm$",
     "<": "$<$",
+    ">": "$>$",
+    "|": "$|$",
     "×": r"$\times$",
+    "π": r"$\pi$",
     "↑": r"$\uparrow$",
     "↓": r"$\downarrow$",
     "→": r"$\rightarrow$",
     "≠": r"$\neq$",
 }
+_HUMPS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=_)|\s+")
+"""Where a heading may be broken: before a capital, behind an underscore, at blanks."""
+_BREAKS = frozenset("./:_-,=?&")
+"""Signs behind which a long name may be broken."""
+
+
+class _Part(NamedTuple):
+    """One of the tables that a wide or long table becomes."""
+
+    indices: Sequence[int]
+    rows: Sequence[Row]
+    names_pt: float
 
 
 def latex(table: Table) -> str:
-    """Return a table environment with rules between groups of columns and of rows."""
-    columns = "ll" + "r" * len(table.columns)
-    lines = [
-        "% needs \\usepackage{booktabs}",
-        r"\begin{table*}",
-        r"\centering",
-        rf"\caption{{{_escaped(table.title)}.}}",
-        rf"\label{{tab:{table.key}}}",
-        rf"\begin{{tabular}}{{{columns}}}",
-        r"\toprule",
-        *_column_groups(table),
-        _line([*map(_escaped, table.heads), *(_escaped(column.name) for column in table.columns)]),
-    ]
-    for group, rows in table.groups().items():
-        lines.append(r"\midrule")
-        for number, row in enumerate(rows):
-            name = "" if number else _escaped(group)
-            lines.append(_line([name, _escaped(row.label), *map(_cell, row.entries)]))
-    notes = rf"\par\smallskip{{\footnotesize {_escaped(' '.join(table.notes))}}}"
-    lines += [r"\bottomrule", r"\end{tabular}", notes, r"\end{table*}"]
+    """Return table environments with rules between groups of columns and of rows."""
+    lines = ["% needs \\usepackage{booktabs}"]
+    parts = _parts(table)
+    for number, part in enumerate(parts, start=1):
+        lines += _float(table, part, number, len(parts))
     return "\n".join(lines) + "\n"
 
 
-def _column_groups(table: Table) -> list[str]:
-    if not any(column.group for column in table.columns):
+def _parts(table: Table) -> list[_Part]:
+    names = min(_NAMES_PT, max((_width(row.label) for row in table.rows), default=0.0))
+    names = max(names, _width(table.heads[1]))
+    widths = [_column_width(table, index) + _GAP_PT for index in range(len(table.columns))]
+    groups = [column.group for column in table.columns]
+    columns = split_columns(groups, widths, TEXT_WIDTH_PT - names)
+    blocks = _blocks(table, names)
+    return [_Part(indices, rows, names) for indices in columns for rows in blocks]
+
+
+def _blocks(table: Table, names_pt: float) -> list[list[Row]]:
+    """Return the rows of each table; a group is divided only if it is longer than a table."""
+    blocks: list[list[Row]] = [[]]
+    used = 0
+    for rows in table.groups().values():
+        heights = [-(-_width(row.label) // names_pt) for row in rows]
+        if used and used + sum(heights) + 1 > MOST_LINES:
+            blocks.append([])
+            used = 0
+        used += 1
+        for row, height in zip(rows, heights, strict=True):
+            if used + height > MOST_LINES:
+                blocks.append([])
+                used = 1
+            blocks[-1].append(row)
+            used += int(height)
+    return blocks
+
+
+def _float(table: Table, part: _Part, number: int, count: int) -> Iterator[str]:
+    columns = [table.columns[index] for index in part.indices]
+    caption, label = _escaped(table.title), f"tab:{table.key}"
+    if count > 1:
+        caption += f" ({number} of {count})"
+        label += f"-{number}" if number > 1 else ""
+    first = rf"p{{{part.names_pt:.0f}pt}}"
+    yield r"\begin{table*}"
+    yield r"\centering\footnotesize"
+    yield rf"\setlength{{\tabcolsep}}{{{_GAP_PT / 2:.0f}pt}}"
+    yield rf"\caption{{{caption}.}}"
+    yield rf"\label{{{label}}}"
+    yield rf"\begin{{tabular}}{{{first}{'r' * len(columns)}}}"
+    yield r"\toprule"
+    yield from _column_groups(columns)
+    yield _line([_escaped(table.heads[1]), *(_head(column.name) for column in columns)])
+    for group, rows in itertools.groupby(part.rows, key=lambda row: row.group):
+        yield r"\midrule"
+        yield rf"\multicolumn{{{len(columns) + 1}}}{{l}}{{\emph{{{_escaped(group)}}}}} \\"
+        for row in rows:
+            cells = [_cell(row.entries[index]) for index in part.indices]
+            yield _line([rf"\raggedright {_foldable(row.label)}", *cells])
+    yield r"\bottomrule"
+    yield r"\end{tabular}"
+    if number == count:
+        yield rf"\par\smallskip{{\raggedright {_foldable(' '.join(table.notes))}\par}}"
+    yield r"\end{table*}"
+
+
+def _column_groups(columns: Sequence[Column]) -> list[str]:
+    if not any(column.group for column in columns):
         return []
-    cells, rules, place = ["", ""], [], len(table.heads) + 1
-    for name, members in itertools.groupby(column.group for column in table.columns):
+    cells, rules, place = [""], [], 2
+    for name, members in itertools.groupby(column.group for column in columns):
         width = len(list(members))
         cells.append(
             rf"\multicolumn{{{width}}}{{c}}{{{_escaped(name)}}}" if name else " & " * (width - 1)
@@ -62,6 +139,27 @@ def _column_groups(table: Table) -> list[str]:
             rules.append(rf"\cmidrule(lr){{{place}-{place + width - 1}}}")
         place += width
     return [_line(cells), "".join(rules)]
+
+
+def _column_width(table: Table, index: int) -> float:
+    """Return an upper bound of the width of a column, pt."""
+    head = max(_width(word) for word in _HUMPS.split(table.columns[index].name))
+    return max(head, *(_entry_width(row.entries[index]) for row in table.rows), 0.0)
+
+
+def _entry_width(entry: Entry) -> float:
+    return _width(entry.text) + _SIGN_PT * (bool(entry.change) + len(entry.signs))
+
+
+def _width(text: str) -> float:
+    return sum(_DIGIT_PT if sign.isdigit() or sign in " .,:" else _LETTER_PT for sign in text)
+
+
+def _head(name: str) -> str:
+    """Return a heading with a line for each of its words."""
+    words = [_escaped(word) for word in _HUMPS.split(name)]
+    stacked = r"\\".join(words)
+    return stacked if len(words) == 1 else rf"\shortstack[r]{{{stacked}}}"
 
 
 def _line(cells: list[str]) -> str:
@@ -77,6 +175,12 @@ def _cell(entry: Entry) -> str:
     if entry.signs:
         text += rf"\textsuperscript{{{_escaped(entry.signs)}}}"
     return text
+
+
+def _foldable(text: str) -> str:
+    """Return text that may be broken within long names, too."""
+    signs = (_escaped(sign) + (r"\allowbreak{}" if sign in _BREAKS else "") for sign in text)
+    return "".join(signs)
 
 
 def _escaped(text: str) -> str:

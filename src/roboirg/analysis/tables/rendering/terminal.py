@@ -10,60 +10,49 @@ from rich.table import Table as Grid
 from rich.text import Text
 
 from roboirg.analysis.stats.run_summary import ALL_TASKS
+from roboirg.analysis.tables.rendering.column_parts import BORDERS, split_columns
 from roboirg.analysis.tables.table import Entry, Row, Table
 from roboirg.analysis.tables.table_notes import ARROWS
+from roboirg.util.console_width import LINE_WIDTH, line_width, widen
 
-PLAIN_WIDTH = 120
-"""Characters in a line of a text file."""
 _NARROWEST = 9
 """Characters of a rate with its arrow and mark."""
-_BORDERS = 3
-"""Characters of a line and two blanks."""
 
 
 def renderable(table: Table, console: Console) -> RenderableType:
-    """Return the table with its notes, split to fit the console's width."""
-    parts = _parts(table, console.width)
-    grids = [
-        part
+    """Return the table with its notes, split to fit the console's width.
+
+    A console that is no terminal is widened if names need it; in a terminal they are folded.
+    """
+    parts = _parts(table, line_width(console))
+    grids = [_grid(table, indices) for indices in parts]
+    widen(console, *grids)
+    titles = (
+        Text(table.title if len(parts) == 1 else _title(table, indices), "bold")
         for indices in parts
-        for part in (
-            Text(table.title if len(parts) == 1 else _title(table, indices), "bold"),
-            _grid(table, indices),
-        )
-    ]
-    return Group(*grids, *(Text(note, "dim") for note in table.notes))
+    )
+    titled = (part for pair in zip(titles, grids, strict=True) for part in pair)
+    return Group(*titled, *(Text(note, "dim") for note in table.notes))
 
 
 def plain(table: Table) -> str:
-    """Return the table as plain text of at most `PLAIN_WIDTH` characters a line."""
-    console = Console(file=io.StringIO(), width=PLAIN_WIDTH, color_system=None)
+    """Return the table as plain text, in lines of 120 characters unless names need more."""
+    console = Console(file=io.StringIO(), width=LINE_WIDTH, color_system=None)
     with console.capture() as captured:
         console.print(renderable(table, console))
     return "\n".join(line.rstrip() for line in captured.get().splitlines()) + "\n"
 
 
 def _parts(table: Table, width: int) -> list[list[int]]:
-    """Return the columns of each part: whole groups if they fit, at least one column."""
+    """Return the columns of each part."""
     heads = sum(
-        max(map(len, (head, *words))) + _BORDERS
+        max(map(len, (head, *words))) + BORDERS
         for head, words in zip(
             table.heads, ([*table.groups()], [row.label for row in table.rows]), strict=True
         )
     )
-    widths = [max(len(column.name), _NARROWEST) + _BORDERS for column in table.columns]
-    parts: list[list[int]] = []
-    room = 0
-    for index, column in enumerate(table.columns):
-        begins = index == 0 or column.group != table.columns[index - 1].group
-        ahead = [at for at in range(index, len(widths)) if table.columns[at].group == column.group]
-        needed = sum(widths[at] for at in ahead) if begins else widths[index]
-        if not parts or needed > room:
-            parts.append([])
-            room = width - heads - 1
-        parts[-1].append(index)
-        room -= widths[index]
-    return parts
+    widths = [max(len(column.name), _NARROWEST) + BORDERS for column in table.columns]
+    return split_columns([one.group for one in table.columns], widths, width - heads - 1)
 
 
 def _title(table: Table, indices: Sequence[int]) -> str:
@@ -74,7 +63,7 @@ def _title(table: Table, indices: Sequence[int]) -> str:
 def _grid(table: Table, indices: Sequence[int]) -> Grid:
     grid = Grid()
     for head in table.heads:
-        grid.add_column(head, no_wrap=True)
+        grid.add_column(head, overflow="fold")
     for index in indices:
         name = table.columns[index].name
         grid.add_column(name, justify="right", min_width=_NARROWEST, no_wrap=True)

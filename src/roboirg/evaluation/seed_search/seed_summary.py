@@ -11,10 +11,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from roboirg.core.episode import DIFFICULTIES
-from roboirg.evaluation.seed_selection import REASONS, EpisodeSlot, SelectedSeed
-
-MINIMUM_WIDTH = 120
-"""Columns to use where the output is not a terminal."""
+from roboirg.evaluation.seed_search.seed_selection import REASONS, EpisodeSlot, SelectedSeed
+from roboirg.util.console_width import widen
 
 _LINE_EVERY = 50
 """Without a terminal, print a line after this many episodes."""
@@ -91,8 +89,8 @@ def cause_lines(found: Sequence[SelectedSeed]) -> list[str]:
 
 def print_summary(found: Sequence[SelectedSeed], console: Console) -> None:
     """Print the table and, below it, the causes."""
-    if not console.is_terminal:
-        console.width = max(console.width, MINIMUM_WIDTH)
-    console.print(summary_table(found))
+    table = summary_table(found)
+    widen(console, table)
+    console.print(table)
     for line in cause_lines(found):
         console.print(escape(line), highlight=False, soft_wrap=True)

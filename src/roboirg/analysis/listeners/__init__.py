@@ -1,0 +1,1 @@
+"""What a study of listeners shows beside their success: agreement, time, attention."""

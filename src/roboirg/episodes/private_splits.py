@@ -1,0 +1,129 @@
+"""Private splits: random episodes that only those who know a secret, the salt, can draw.
+
+A private split is named after a hash of its salt, for example ``random@1a2b3c4d5e6f``. The seeds of
+its scenes are keyed hashes, so neither they nor the salt follow from the name. The salt itself
+stands in an environment variable, which this process's children inherit; policies' do not get it.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import hmac
+import os
+import re
+
+from roboirg.core.episode import Split
+from roboirg.core.errors import InvalidValueError
+
+SALT_VARIABLE = "ROBOIRG_SALT"
+MIN_SALT_LENGTH = 12
+RANDOM: Split = "random"
+
+_NAME = re.compile(rf"{RANDOM}@[0-9a-f]{{12}}")
+_SEED_BYTES = 6
+_FIRST_SEED = 1 << (8 * _SEED_BYTES)
+"""No public split has a seed as large as this."""
+
+
+class MissingSaltError(InvalidValueError):
+    """The episodes of a private split cannot be drawn: the salt is missing, or is another one."""
+
+
+def use_salt(salt: str) -> Split:
+    """Give a salt to this process and its children; return the name of its split.
+
+    Raises:
+        InvalidValueError: it is too short.
+    """
+    name = _split_of(salt)
+    os.environ[SALT_VARIABLE] = salt
+    return name
+
+
+def known_salt() -> str | None:
+    """Return the salt that this process was given."""
+    return os.environ.get(SALT_VARIABLE) or None
+
+
+def with_salt(split: str, salt: str | None) -> str:
+    """Return the split that is meant: with a salt, ``random`` is the private split of it.
+
+    Args:
+        split: as typed.
+        salt: as typed; None for that of the environment, if there is one.
+
+    Raises:
+        InvalidValueError: the salt is too short, or was typed for a public split.
+    """
+    if salt is not None:
+        use_salt(salt)
+    known = known_salt()
+    if known is None or (split != RANDOM and salt is None):
+        return split
+    if split != RANDOM and not is_private(split):
+        raise InvalidValueError(
+            f"--salt draws the episodes of --split random, but the split is {split!r}."
+        )
+    return _split_of(known) if split == RANDOM else split
+
+
+def is_private(split: str) -> bool:
+    """Return whether a name is that of a private split."""
+    return _NAME.fullmatch(split) is not None
+
+
+def check_salt(split: str) -> None:
+    """Check that this process can draw the episodes of a split; it can those of public ones.
+
+    Raises:
+        MissingSaltError: likewise.
+    """
+    if not is_private(split):
+        return
+    salt = known_salt()
+    if salt is None or _split_of(salt) != split:
+        lack = "has another salt" if salt else "has no salt"
+        raise MissingSaltError(
+            f"The episodes of split {split!r} are private, and this process {lack}: set "
+            f"{SALT_VARIABLE} to the salt that they were drawn with."
+        )
+
+
+def private_seed(task: str, split: Split, index: int, passed_over: int) -> int:
+    """Return a seed to try for a private episode.
+
+    Args:
+        task: name of the task.
+        split: name of the private split.
+        index: position in it.
+        passed_over: number of seeds tried before, which give no scene.
+
+    Raises:
+        MissingSaltError: the salt is missing or is another one.
+    """
+    check_salt(split)
+    message = f"{task}/{index}/{passed_over}".encode()
+    digest = hmac.digest(_key(os.environ[SALT_VARIABLE]), message, "sha256")
+    return _FIRST_SEED + int.from_bytes(digest[:_SEED_BYTES])
+
+
+def _split_of(salt: str) -> Split:
+    name = hmac.digest(_key(salt), b"name", "sha256").hex()
+    return f"{RANDOM}@{name[:12]}"
+
+
+@functools.lru_cache(maxsize=8)
+def _key(salt: str) -> bytes:
+    """Return the key of a salt; slow, so that a guessed salt is not quickly compared with a name.
+
+    Raises:
+        InvalidValueError: the salt is too short.
+    """
+    if len(salt) < MIN_SALT_LENGTH:
+        raise InvalidValueError(
+            f"The salt has {len(salt)} characters; it must have at least {MIN_SALT_LENGTH}."
+        )
+    return hashlib.scrypt(
+        salt.encode(errors="surrogateescape"), salt=b"roboirg private split", n=1 << 14, r=8, p=1
+    )

@@ -1,0 +1,1 @@
+"""Search for the seeds of the splits."""

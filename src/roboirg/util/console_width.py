@@ -1,0 +1,24 @@
+"""Width of what is printed into files and pipes."""
+
+from __future__ import annotations
+
+from rich.console import Console, RenderableType
+from rich.measure import Measurement
+
+LINE_WIDTH = 120
+"""Characters of a line where the output is no terminal, unless a name needs more."""
+_ANY_WIDTH = 10_000
+
+
+def line_width(console: Console) -> int:
+    """Return the characters of a line: the terminal's; in a file at least `LINE_WIDTH`."""
+    return console.width if console.is_terminal else max(console.width, LINE_WIDTH)
+
+
+def widen(console: Console, *tables: RenderableType) -> None:
+    """Widen a console that is no terminal, so that tables in files are neither cut nor folded."""
+    if console.is_terminal:
+        return
+    unlimited = console.options.update(max_width=_ANY_WIDTH)
+    needed = [Measurement.get(console, unlimited, table).maximum for table in tables]
+    console.width = max([line_width(console), *needed])

@@ -1,0 +1,243 @@
+"""Private episodes: drawn by a salt, which is written nowhere and which no policy's process has."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from evaluation_fakes import FakePlay
+from typer.testing import CliRunner
+
+from roboirg.analysis.page.report import write_report
+from roboirg.cli.app import app
+from roboirg.core.errors import InvalidValueError, SceneRejectedError
+from roboirg.episodes.private_splits import (
+    SALT_VARIABLE,
+    MissingSaltError,
+    is_private,
+    known_salt,
+    private_seed,
+    use_salt,
+    with_salt,
+)
+from roboirg.episodes.splits import CYCLE, get_episode, make_episode, split_size
+from roboirg.evaluation.executors.executor import InProcess, LocalProcesses
+from roboirg.evaluation.executors.ray_cluster import RayCluster
+from roboirg.evaluation.plan_maker import make_plan
+from roboirg.evaluation.rollout import EpisodeRunner
+from roboirg.evaluation.runner import run_plan
+from roboirg.evaluation.verification.run_verification import verify_run
+from roboirg.records.merging import merge_runs
+from roboirg.records.packing import pack_run
+from roboirg.records.store import read_records
+from roboirg.tasks import ALL, find_tasks
+
+SALT = "a salt that nobody guesses"
+OTHER = "another salt that nobody guesses"
+
+
+@pytest.fixture(autouse=True)
+def _no_salt(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(SALT_VARIABLE, "")  # so that what a test sets is undone
+
+
+class Spy:
+    """Writes down its environment and the command lines of all processes."""
+
+    cameras = ()
+
+    def reset(self, instruction: str, demonstration: object) -> None:
+        del instruction, demonstration
+        lines = [f"{name}={value}" for name, value in os.environ.items()]
+        lines += [str(path.parent.name) for path in Path("/proc").glob("[0-9]*/cmdline")]
+        for path in Path("/proc").glob("[0-9]*/cmdline"):
+            try:
+                lines.append(path.read_bytes().replace(b"\0", b" ").decode(errors="replace"))
+            except OSError:
+                continue  # it has ended meanwhile
+        Path(os.environ["SPY"]).write_text("\n".join(lines))
+
+    def act(self, observation: dict[str, np.ndarray]) -> np.ndarray:
+        return np.append(observation["joint_positions"], 1.0)
+
+
+def names_of(episodes: int, task: str, split: str) -> list[int]:
+    return [get_episode(task, split, index).seed for index in range(episodes)]
+
+
+def test_a_salt_has_a_split_of_its_own() -> None:
+    first = use_salt(SALT)
+    assert is_private(first)
+    seeds = {task: names_of(4, task, first) for task in find_tasks([ALL])}
+    second = use_salt(OTHER)
+    others = {task: names_of(4, task, second) for task in find_tasks([ALL])}
+    found = [seed for each in (seeds, others) for one in each.values() for seed in one]
+    assert first != second
+    assert len(set(found)) == len(found)
+    # No public seed is as large: 10,000,000 + 100 for each of a million episodes.
+    assert min(found) > 1 << 40
+    assert max(found) < 1 << 53  # a page's script can hold it
+    use_salt(SALT)
+    again = {task: names_of(4, task, first) for task in find_tasks([ALL])}
+    assert again == seeds
+    assert split_size(first) == split_size("random")
+
+
+def test_the_name_and_episodes_of_a_salt_never_change() -> None:
+    assert use_salt("pinned-salt-0123") == "random@9be1761e24b2"
+    seeds = names_of(2, "PickXtimes", "random@9be1761e24b2")
+    assert seeds == [343211101013922, 319322239144157]
+
+
+def test_difficulties_repeat_and_scenes_are_those_of_their_seeds() -> None:
+    split = use_salt(SALT)
+    episodes = [get_episode("BinFill", split, index) for index in range(8)]
+    assert [one.difficulty for one in episodes] == [*CYCLE, *CYCLE]
+    for one in episodes:
+        made = make_episode("BinFill", one.seed, one.difficulty)
+        assert (made.scene, made.goal) == (one.scene, one.goal)
+
+
+def test_seeds_without_a_scene_are_passed_over() -> None:
+    split, task = use_salt(SALT), "VideoPlaceOrder"
+    rejected = 0
+    for index in range(30):
+        episode = get_episode(task, split, index)
+        tried = 0
+        while private_seed(task, split, index, tried) != episode.seed:
+            seed = private_seed(task, split, index, tried)
+            with pytest.raises(SceneRejectedError):
+                make_episode(task, seed, episode.difficulty)
+            tried += 1
+        rejected += tried
+    assert rejected > 0
+
+
+def test_without_its_salt_a_split_is_refused() -> None:
+    split = use_salt(SALT)
+    for other in ("", OTHER):
+        os.environ[SALT_VARIABLE] = other
+        with pytest.raises(MissingSaltError, match=SALT_VARIABLE):
+            get_episode("PickXtimes", split, 0)
+        with pytest.raises(MissingSaltError, match=split):
+            make_plan(["oracle"], split=split, episodes="1")
+
+
+def test_what_a_salt_must_be() -> None:
+    with pytest.raises(InvalidValueError, match="at least 12") as found:
+        use_salt("short")
+    assert "short" not in str(found.value)
+    assert known_salt() is None
+    with pytest.raises(InvalidValueError, match="--split random"):
+        with_salt("test", SALT)
+    assert with_salt("random", SALT) == with_salt("random", None) == use_salt(SALT)
+    assert with_salt("test", None) == "test"
+
+
+def test_a_policy_in_the_worlds_process_is_refused() -> None:
+    split = use_salt(SALT)
+    with pytest.raises(InvalidValueError, match="own"):
+        make_plan(["oracle"], split=split, episodes="1", policy_process="shared")
+
+
+def contents(folder: Path) -> bytes:
+    """Return all that is written below a folder, with what is packed in archives."""
+    found = []
+    for path in sorted(folder.rglob("*")):
+        if path.is_file():
+            found += [path.name.encode(), path.read_bytes()]
+        if zipfile.is_zipfile(path):
+            with zipfile.ZipFile(path) as archive:
+                found += [archive.read(name) for name in archive.namelist()]
+    return b"\n".join(found)
+
+
+def test_results_are_read_without_the_salt(tmp_path: Path) -> None:
+    split, run = use_salt(SALT), tmp_path / "run"
+    run.mkdir()
+    plan = make_plan(["oracle"], tasks="PickXtimes", split=split, episodes="3")
+    run_plan(plan, run, FakePlay(), InProcess())
+    os.environ[SALT_VARIABLE] = ""
+    assert plan.drawable_jobs() == ()
+    merge_runs([run], tmp_path / "merged")
+    pack_run(run, tmp_path / "run.roboirg.zip")
+    page = write_report(run).read_text()
+    assert f"The episodes of {split} are private" in page
+    os.environ[SALT_VARIABLE] = SALT
+    page = write_report(run, planned=plan.jobs()).read_text()
+    assert "are private" not in page
+    assert SALT.encode() not in contents(tmp_path)
+    cli = CliRunner()
+    os.environ[SALT_VARIABLE] = ""
+    for command in (["tables", str(run)], ["board", str(tmp_path)]):
+        done = cli.invoke(app, command)
+        assert done.exit_code == 0, done.output
+    for command in (["verify", str(run)], ["show", "PickXtimes", "0", "--split", split]):
+        done = cli.invoke(app, command)
+        assert isinstance(done.exception, MissingSaltError)
+
+
+@pytest.mark.sim
+def test_no_policy_and_no_file_has_the_salt(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    split, run, seen = use_salt(SALT), tmp_path / "run", tmp_path / "seen.txt"
+    monkeypatch.setenv("SPY", str(seen))
+    monkeypatch.syspath_prepend(Path(__file__).parent)
+    plan = make_plan(
+        [f"{__name__}:Spy"],
+        tasks="StopCube",
+        settings="explicit",
+        split=split,
+        episodes="2",
+        max_steps=10,
+        video="all",
+    )
+    runner = EpisodeRunner(run, plan.video, plan=plan.fingerprint, hosting=plan.hosting)
+    run_plan(plan, run, runner, LocalProcesses(1))
+    assert [one.outcome for one in read_records(run)] == ["failure", "failure"]
+    assert {one.split for one in read_records(run)} == {split}
+    spied = seen.read_text()
+    assert f"SPY={seen}" in spied
+    assert str(os.getpid()) in spied.split()
+    assert SALT not in spied
+    assert SALT.encode() not in contents(tmp_path)
+
+    with_salt_known = verify_run(run, workers=1)
+    assert with_salt_known.holds, with_salt_known
+    os.environ[SALT_VARIABLE] = OTHER
+    with pytest.raises(MissingSaltError, match="another salt"):
+        verify_run(run)
+
+
+def test_the_option_reaches_the_processes_of_a_command(tmp_path: Path) -> None:
+    """One real command: the salt is in no line that it prints, and in no file."""
+    command = [sys.executable, "-m", "roboirg", "run", "--out", str(tmp_path / "run"), "--dry-run"]
+    options = ["--policy", "random", "--split", "random", "--salt", SALT, "--episodes", "1"]
+    done = subprocess.run(
+        [*command, *options], capture_output=True, text=True, check=True, cwd=tmp_path
+    )
+    assert SALT not in done.stdout + done.stderr
+    assert SALT.encode() not in contents(tmp_path)
+
+
+def test_workers_of_a_cluster_get_the_salt_of_the_command(tmp_path: Path) -> None:
+    ray = pytest.importorskip("ray")
+    with tempfile.TemporaryDirectory(prefix="ray-") as logs:  # short: sockets are in it
+        ray.init(num_cpus=1, log_to_driver=False, include_dashboard=False, _temp_dir=logs)
+        try:
+            split, run = use_salt(SALT), tmp_path / "run"  # the cluster was started without it
+            plan = make_plan(["oracle"], tasks="PickXtimes", split=split, episodes="1")
+            run_plan(plan, run, FakePlay(), RayCluster(1))
+        finally:
+            ray.shutdown()
+        assert {one.split for one in read_records(run)} == {split}
+        written = contents(Path(logs))
+        assert b"raylet" in written
+        assert SALT.encode() not in written

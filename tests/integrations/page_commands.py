@@ -1,0 +1,66 @@
+"""The commands of docs/integrations.md, run as they stand there but for named values."""
+
+import importlib.metadata
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+PAGE = (ROOT / "docs" / "integrations.md").read_text()
+
+
+def blocks(section, language):
+    """Return the contents of a section's blocks of code."""
+    text = PAGE.split(f"\n## {section}\n")[1].split("\n## ")[0]
+    return re.findall(rf"```{language}\n(.*?)```", text, flags=re.DOTALL)
+
+
+def replaced(text, values):
+    """Return a text with other values; each must be there."""
+    for old, new in values.items():
+        assert old in text, f"docs/integrations.md does not say {old!r}"
+        text = text.replace(old, str(new))
+    return text
+
+
+def run_page(section, folder, values, **variables):
+    """Run what a section says after the installation; return what it printed.
+
+    Args:
+        section: its heading.
+        folder: where the commands run; `integrations` of this repository is there, too.
+        values: what is said on the page, and what to say instead.
+        **variables: of the environment.
+    """
+    (script,) = [block for block in blocks(section, "sh") if "pip install" in block]
+    commands = [line for line in _joined(script) if not is_installation(line)]
+    (folder / "integrations").symlink_to(ROOT / "integrations")
+    environment = os.environ | variables
+    for name, first in (("PATH", Path(sys.executable).parent), ("PYTHONPATH", HERE)):
+        environment[name] = os.pathsep.join(filter(None, [str(first), os.environ.get(name)]))
+    done = subprocess.run(
+        ["bash", "-ec", replaced("\n".join(commands), values)],
+        capture_output=True, text=True, check=False, cwd=folder, env=environment,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+    return done.stdout
+
+
+def is_installation(line):
+    """Whether a command makes an environment; the script that runs these tests did so."""
+    return line.startswith(("pip install", "python3")) and ("venv" in line or "pip" in line)
+
+
+def check_versions(section):
+    """Fail unless the versions that the page pins are those that are installed."""
+    pinned = re.findall(r"([\w-]+)==([\w.]+)", "".join(blocks(section, "sh")))
+    assert pinned
+    for name, version in pinned:
+        assert importlib.metadata.version(name) == version, name
+
+
+def _joined(script):
+    return script.replace("\\\n", " ").splitlines()

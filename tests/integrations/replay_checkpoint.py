@@ -1,0 +1,28 @@
+"""The replaying policy as a checkpoint of LeRobot; needs LeRobot."""
+
+import torchvision_operators  # noqa: F401 - before LeRobot
+from lerobot.configs.types import FeatureType, PolicyFeature
+from lerobot.processor import (
+    DeviceProcessorStep,
+    PolicyProcessorPipeline,
+    RenameObservationsProcessorStep,
+)
+from replay_policy.configuration_replay import ReplayConfig
+from replay_policy.modeling_replay import ReplayPolicy
+from replay_table import record_table
+
+
+def save_checkpoint(folder, episodes):
+    """Record the episodes and save a policy that repeats them, as LeRobot saves policies."""
+    record_table(folder / "table.npz", episodes)
+    picture = PolicyFeature(type=FeatureType.VISUAL, shape=(3, 256, 256))
+    config = ReplayConfig(
+        device="cpu",
+        table=str(folder / "table.npz"),
+        input_features={"observation.images.front": picture},
+        output_features={"action": PolicyFeature(type=FeatureType.ACTION, shape=(8,))},
+    )
+    ReplayPolicy(config).save_pretrained(folder)
+    steps = [RenameObservationsProcessorStep(), DeviceProcessorStep(device="cpu")]
+    PolicyProcessorPipeline(steps=steps, name="policy_preprocessor").save_pretrained(folder)
+    PolicyProcessorPipeline(steps=[], name="policy_postprocessor").save_pretrained(folder)

@@ -1,0 +1,81 @@
+"""The Hub's file in the real LeRobot 0.4: `make integrations` runs this in its environment."""
+
+import importlib.metadata
+import os
+import re
+
+import pytest
+
+pytest.importorskip("lerobot", reason="LeRobot is not installed here; run `make integrations`")
+if not importlib.metadata.version("lerobot").startswith("0.4."):
+    pytest.skip("this is for LeRobot 0.4", allow_module_level=True)
+
+from page_commands import ROOT, blocks, check_versions, replaced, run_page
+from replay_checkpoint import save_checkpoint
+from replay_table import MANY, MAX_STEPS, MESHES, SETTING, own_outcomes, tasks_of
+
+from roboirg.records.store import read_records
+
+pytestmark = pytest.mark.sim
+
+EPISODES = int(os.environ.get("ROBOIRG_EQUALITY_EPISODES", "4"))
+BATCHES = [(2, False), (2, True)]
+if EPISODES >= MANY:
+    BATCHES = [(1, False), (2, False), (2, True), (8, False), (8, True)]
+
+
+@pytest.fixture(scope="session")
+def checkpoint(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("replay")
+    save_checkpoint(folder, EPISODES)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def ours(checkpoint):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("REPLAY_TABLE", str(checkpoint / "table.npz"))
+        return [one[:3] for one in own_outcomes("replay_table:ReplayPolicy", EPISODES)]
+
+
+@pytest.fixture
+def hub(tmp_path):
+    """A cache as the Hub's client leaves it after the download of `env.py`."""
+    repository = tmp_path / "hub" / "models--org--repo"
+    commit = "0" * 40
+    (repository / "snapshots" / commit).mkdir(parents=True)
+    (repository / "refs").mkdir()
+    (repository / "refs" / "commit").write_text(commit)
+    source = ROOT / "integrations" / "lerobot_env_roboirg" / "env.py"
+    (repository / "snapshots" / commit / "env.py").write_bytes(source.read_bytes())
+    return tmp_path / "hub"
+
+
+@pytest.mark.parametrize(("batch", "use_async"), BATCHES)
+def test_the_page_s_program_has_the_outcomes_of_our_runner(
+    checkpoint, ours, hub, tmp_path, batch, use_async
+):
+    tasks = list(tasks_of(EPISODES))
+    numbers = f"{batch}, {EPISODES // len(tasks)}"
+    values = {
+        "import json\n": "import json\nimport replay_checkpoint\n",  # makes the policy known
+        "lerobot/some-checkpoint": checkpoint,
+        '["PickXtimes", "VideoUnmask"], "contextual", 8, 50': f"{tasks}, {SETTING!r}, {numbers}",
+        "json.dumps(told)": f"json.dumps(told | {options()})",
+        "use_async_envs=False": f"use_async_envs={use_async}",
+    }
+    (program,) = blocks("LeRobot 0.4", "python")
+    (tmp_path / "play_hub.py").write_text(replaced(program, values))
+    shown = run_page("LeRobot 0.4", tmp_path, {}, HF_HUB_CACHE=str(hub), HF_HUB_OFFLINE="1")
+    assert re.search(r"\bact\b", shown)
+    records = read_records(tmp_path / "runs" / "act")
+    found = [(one.task, one.episode, one.outcome == "success") for one in records]
+    assert sorted(found) == sorted(ours)
+
+
+def options():
+    return {"cameras": ["front"], "meshes": MESHES, "max_steps": MAX_STEPS}
+
+
+def test_the_page_names_the_version_that_is_played():
+    check_versions("LeRobot 0.4")

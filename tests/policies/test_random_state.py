@@ -1,0 +1,48 @@
+"""Episodes that take turns in a process draw the numbers that they draw alone."""
+
+import random
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roboirg.policies.random_state import RandomState
+
+NOBODY = None
+
+
+def draw():
+    return random.random(), np.random.random()  # noqa: NPY002 - what policies may use
+
+
+def drawn_alone(seed, count):
+    state, numbers = RandomState(seed), []
+    for _ in range(count):
+        with state:
+            numbers.append(draw())
+    return numbers
+
+
+@given(st.lists(st.sampled_from([0, 1, 2, NOBODY]), max_size=30))
+def test_the_order_of_turns_changes_no_episode_s_numbers(turns):
+    states = [RandomState(seed) for seed in range(3)]
+    found = [[], [], []]
+    for turn in turns:
+        if turn is NOBODY:  # a call for several episodes
+            RandomState.set_aside()
+            draw()
+        else:
+            with states[turn]:
+                found[turn].append(draw())
+    for seed, numbers in enumerate(found):
+        assert numbers == drawn_alone(seed, len(numbers))
+
+
+def test_two_episodes_with_the_same_seed_draw_the_same():
+    one, other = RandomState(5), RandomState(5)
+    with one:
+        first = draw()
+    with other:
+        assert draw() == first
+    with one:
+        assert draw() != first
