@@ -254,6 +254,20 @@ def test_what_is_not_in_the_scene_is_counted_and_nothing_is_done():
         assert policy.metadata["understood"] == {"color": absent, "repeats": 1}
 
 
+def test_a_model_that_reads_text_only_gets_no_picture():
+    episode = get_episode("VideoUnmask", "test", 0)
+    with fake_vlm([answer_text(episode.goal, goal_schema("VideoUnmask"))]) as server:
+        policy = make_listener(server, pictures=False)
+        assert policy.cameras == ()
+        assert policy.demonstration_frames == "none"
+        said = instruct(episode, "direct").text
+        assert policy.decide(stand_in(episode, "direct"), said) == episode.goal
+        (request,) = server.requests
+        assert said in words_of(request)
+        assert "image" not in json.dumps(request)
+        assert make_listener(server).version != policy.version
+
+
 def test_a_new_episode_has_a_new_account():
     with fake_vlm(["?"]) as server:
         policy = make_listener(server, input_price=2.0, output_price=10.0)

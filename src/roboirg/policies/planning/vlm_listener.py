@@ -38,6 +38,7 @@ class ListenerOptions(BaseModel):
         model: the model and its options.
         frames: maximum of video frames, evenly spaced.
         frames_every: control steps between the video frames that are rendered.
+        pictures: whether the model gets pictures and video; no for one that reads text only.
         reasoning: whether the answer begins with a field in which the model may think.
         prompts: a file with other prompts, or None for our own.
     """
@@ -47,6 +48,7 @@ class ListenerOptions(BaseModel):
     model: ModelOptions
     frames: int = Option(default=16, ge=1)
     frames_every: int = Option(default=8, ge=1)
+    pictures: bool = True
     reasoning: bool = False
     prompts: str | None = None
 
@@ -71,7 +73,7 @@ class VLMListener(ScriptedPolicy):
         InvalidValueError: the prompts cannot be read.
     """
 
-    cameras = (CAMERA,)
+    cameras: tuple[str, ...] = (CAMERA,)
 
     def __init__(
         self,
@@ -81,7 +83,9 @@ class VLMListener(ScriptedPolicy):
     ) -> None:
         super().__init__(seed)
         self.options = options
-        self.demonstration_frames = options.frames_every
+        self.demonstration_frames: int | str = options.frames_every
+        if not options.pictures:
+            self.cameras, self.demonstration_frames = (), "none"
         self.prompts = load_prompts(PROMPTS, options.prompts)
         self.understood: Goal | None = None
         self._vlm = VLMQuery(options.model, self.prompts["again"], connect)
@@ -138,8 +142,7 @@ class VLMListener(ScriptedPolicy):
             NotUnderstoodError: there was no valid answer, or the scene has no such goal.
         """
         schema = goal_schema(env.episode.task)
-        picture = Picture(env.picture(CAMERA))
-        goal = self._vlm.ask(self._build_query(schema, instruction, picture), schema.read)
+        goal = self._vlm.ask(self._build_query(env, schema, instruction), schema.read)
         self.understood = goal
         if goal is None:
             raise NotUnderstoodError
@@ -156,13 +159,18 @@ class VLMListener(ScriptedPolicy):
         """Close the connection."""
         self._vlm.close()
 
-    def _build_query(self, schema: GoalSchema, instruction: str, picture: Picture) -> ModelQuery:
+    def _build_query(self, env: RoboIRGEnv, schema: GoalSchema, instruction: str) -> ModelQuery:
         reasoning = self.prompts.fill("reasoning_field") if self.options.reasoning else None
         steps = len(self._demonstration.get("joint_positions", ()))
         texts = question_texts(self.prompts, schema, instruction, steps, reasoning)
-        video: tuple[Picture | Clip, ...] = ()
-        if steps:
-            frames = self._demonstration[f"{CAMERA}_rgb"]
-            video = (summary_clip(frames, self.options.frames, steps),)
-        parts = texts.parts(video, picture)
+        parts: tuple[str | Picture | Clip, ...] = texts.instruction, texts.question
+        if self.options.pictures:
+            parts = texts.parts(*self._media(env, steps))
         return ModelQuery(texts.system, (ChatTurn("user", parts),), schema.schema(reasoning))
+
+    def _media(self, env: RoboIRGEnv, steps: int) -> tuple[tuple[Clip, ...], Picture]:
+        picture = Picture(env.picture(CAMERA))
+        if not steps:
+            return (), picture
+        frames = self._demonstration[f"{CAMERA}_rgb"]
+        return (summary_clip(frames, self.options.frames, steps),), picture
