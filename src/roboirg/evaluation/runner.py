@@ -20,8 +20,8 @@ from roboirg.evaluation.executors.executor import Executor
 from roboirg.evaluation.plan import Plan, write_plan
 from roboirg.evaluation.policy_descriptions import describe_policy
 from roboirg.evaluation.progress import Reporter, SilentReporter
-from roboirg.evaluation.rollout import VIDEO_FOLDER, PlayJob
-from roboirg.evaluation.video_writer import without_unfinished_videos
+from roboirg.evaluation.rollout import VIDEO_FOLDER, EpisodeRunner, PlayJob
+from roboirg.evaluation.video_writer import check_video_support, without_unfinished_videos
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.records.record import Job, Record
 from roboirg.records.record_codec import RecordIndexEntry, identity_key
@@ -119,6 +119,24 @@ def run_plan(
             video_errors=tuple(loop.video_errors),
             unreachable=tuple(loop.unreachable),
         )
+
+
+def episode_runner(plan: Plan, folder: Path) -> EpisodeRunner:
+    """Return what plays a plan's jobs into a folder.
+
+    Raises:
+        MissingDependencyError: the plan wants videos, which cannot be written.
+    """
+    if plan.video != "off":
+        check_video_support()
+    return EpisodeRunner(
+        folder,
+        plan.video,
+        policy_timeout_s=plan.policy_timeout_s,
+        plan=plan.fingerprint,
+        hosting=plan.hosting,
+        refuse_long=plan.long_prompts == "refuse",
+    )
 
 
 def check_run(plan: Plan, folder: Path) -> None:
