@@ -217,6 +217,12 @@ def test_a_new_server_goes_on_where_the_last_one_was(study):
         assert server.key == key
 
 
+def test_a_study_without_pictures_is_not_served(study):
+    (study / "questions" / "items.jsonl").unlink()
+    with pytest.raises(InvalidValueError, match="give roboirg listen plan again"):
+        ListeningSession(study)
+
+
 def test_a_torn_line_is_put_aside(study):
     with AnswerLog(study) as log:
         log.append(PersonJoined(person=1, code="abc", consent="c", at="now"))

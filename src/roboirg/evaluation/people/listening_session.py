@@ -17,7 +17,11 @@ from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.grounding_set.dataset_export import EpisodeName, read_media
-from roboirg.evaluation.grounding_set.grounding_item import GroundingItem, read_items
+from roboirg.evaluation.grounding_set.grounding_item import (
+    ITEMS_FILE,
+    GroundingItem,
+    read_items,
+)
 from roboirg.evaluation.people.answer_form import (
     FormAnswer,
     answer_of,
@@ -71,6 +75,10 @@ class ListeningSession:
         self.questions_folder = folder / QUESTIONS
         if self.study.plan.wordings is not None:
             open_wordings(self.study.plan.wordings, self.study.plan.wordings_identity)
+        if not (self.questions_folder / ITEMS_FILE).exists():
+            raise InvalidValueError(
+                f"The study {str(folder)!r} has no pictures yet; give roboirg listen plan again."
+            )
         self._items: dict[object, GroundingItem] = {
             (one.task, one.split, one.episode, one.options): one
             for one in read_items(self.questions_folder)
