@@ -164,6 +164,13 @@ def test_people_get_codes_and_places_until_the_study_is_full(served, study):
     assert {one.consent for one in read_events(study)} != {""}
 
 
+def test_more_people_can_be_let_in_than_were_planned(study):
+    with Serving(study, people=7) as server:
+        people = [Client(server).join() for _ in range(7)]
+        assert Client(server).ask("/join", {"consent": True})[0] == 400
+        assert people[6].read("/state")["total"] == 10
+
+
 def test_people_who_join_at_once_get_different_places(served, study):
     threads = [threading.Thread(target=Client(served).join) for _ in range(5)]
     for one in threads:

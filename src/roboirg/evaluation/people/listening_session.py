@@ -61,6 +61,7 @@ class ListeningSession:
 
     Args:
         folder: of the study.
+        people: how many may take part, if not as many as planned.
 
     Attributes:
         study: what is asked.
@@ -70,8 +71,9 @@ class ListeningSession:
         StoreError: another process serves the study, or the answers cannot be read.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, people: int | None = None) -> None:
         self.study = read_listening_study(folder)
+        self._most = self.study.people if people is None else people
         self.questions_folder = folder / QUESTIONS
         if self.study.plan.wordings is not None:
             open_wordings(self.study.plan.wordings, self.study.plan.wordings_identity)
@@ -106,7 +108,7 @@ class ListeningSession:
         """
         with self._lock:
             person = len(self._people) + 1
-            if person > self.study.people:
+            if person > self._most:
                 raise InvalidValueError("This study has all the people it needs. Thank you!")
             code = "".join(secrets.choice(_CODE_LETTERS) for _ in range(_CODE_LENGTH))
             consent = short_hash(self.study.consent)
@@ -247,7 +249,7 @@ class ListeningSession:
 
     def _view(self, question: PersonQuestion) -> PersonView:
         job = question.job
-        name = EpisodeName(job.task, job.split, job.episode)  # type: ignore[arg-type]
+        name = EpisodeName(job.task, job.split, job.episode)
         item, media = self._items.get(words_of(job)), read_media(self.questions_folder, name)
         if item is None or media is None:
             raise InvalidValueError(

@@ -137,7 +137,7 @@ class ListeningStudy(BaseModel):
     def export_request(self) -> ExportRequest:
         """Return the dataset with the words and pictures of all questions."""
         plan = self.plan
-        episodes = [EpisodeName(task, plan.split, one) for task, one in self._cells]  # type: ignore[arg-type]
+        episodes = [EpisodeName(task, plan.split, one) for task, one in self._cells]
         training = [*self._practice(), *self._checks()]
         episodes += [EpisodeName(job.task, TRAINING, job.episode) for job in training]
         named = setting_names() if plan.settings == "all" else plan.settings
