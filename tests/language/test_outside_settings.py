@@ -12,8 +12,8 @@ from rich.console import Console
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.episodes.splits import get_episode, split_episodes
-from roboirg.evaluation.seed_search import seed_selection
 from roboirg.evaluation.plan_maker import make_plan
+from roboirg.evaluation.seed_search import seed_selection
 from roboirg.evaluation.seed_search.seed_selection import EpisodeSlot, check_words
 from roboirg.language import (
     FORMS,
