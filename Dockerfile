@@ -6,7 +6,7 @@
 #   docker run --rm --gpus all -v "$PWD/runs:/runs" roboirg:gpu doctor
 ARG VARIANT=cpu
 
-FROM python:3.12-slim-bookworm AS wheel
+FROM python:3.12-slim-trixie AS wheel
 WORKDIR /source
 COPY pyproject.toml README.md LICENSE NOTICE ./
 COPY src src
@@ -39,9 +39,9 @@ ENV ROBOIRG_MODEL_FILES=/opt/roboirg/models
 RUN --mount=from=wheel,source=/wheels,target=/wheels \
     pip install --no-cache-dir "$(echo /wheels/*.whl)[sim,report,remote]" \
     && roboirg fetch-models \
-    && useradd --create-home player \
+    && useradd --create-home --uid 1000 player \
     && install -d -o player /runs
-USER player
+USER 1000
 WORKDIR /runs
 ENTRYPOINT ["roboirg"]
 CMD ["doctor"]
