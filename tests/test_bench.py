@@ -4,12 +4,24 @@ from __future__ import annotations
 
 import io
 import json
+import re
+import runpy
 from pathlib import Path
 
+import pytest
 from rich.console import Console
 
-from roboirg.perf.bench_runner import results_table, run_measures, write_results
+from roboirg.core.errors import InvalidValueError
+from roboirg.perf.bench_runner import (
+    markdown_table,
+    read_figures,
+    results_table,
+    run_measures,
+    write_results,
+)
 from roboirg.perf.measures import Measure
+
+ROOT = Path(__file__).parent.parent
 
 
 def test_a_row_whose_package_is_not_installed_says_so(tmp_path: Path) -> None:
@@ -38,3 +50,34 @@ def test_a_row_whose_package_is_not_installed_says_so(tmp_path: Path) -> None:
     write_results([pace, memory, model], tmp_path / "rounds.json")
     figures = json.loads((tmp_path / "rounds.json").read_text())["figures"]
     assert [one["missing"] for one in figures] == ["", "", "no_such"]
+
+
+def test_a_file_of_results_is_kept_up_to_date(tmp_path: Path) -> None:
+    path = tmp_path / "bench.json"
+
+    def measured(**values: float) -> None:
+        rows = [
+            Measure(name, lambda value=value: value, None, "", 0.5, "s")
+            for name, value in values.items()
+        ]
+        write_results(run_measures(rows, 1, lambda _text: None), path)
+
+    measured(first=1234.0, second=2.0)
+    measured(second=3.0, third=4.0)
+    figures = read_figures(path)
+    assert [(one["name"], one["value"]) for one in figures] == [
+        ("first", 1234.0), ("second", 3.0), ("third", 4.0),
+    ]  # fmt: skip
+    assert all(one["date"] and one["machine"] and one["load"] >= 0 for one in figures)
+    assert "| first | 1,234 s |  |  | at most 0.5 s |" in markdown_table(figures)
+    path.write_text("[]")
+    with pytest.raises(InvalidValueError, match="holds no results of bench"):
+        measured(first=1.0)
+
+
+def test_the_performance_page_shows_the_file_and_no_page_has_figures_of_its_own() -> None:
+    script = runpy.run_path(str(ROOT / "scripts" / "write_bench_table.py"))
+    assert script["PAGE"].read_text() == script["page_text"]()
+    for page in ROOT.glob("docs/*.md"):
+        if page.name != "performance.md":
+            assert not re.search(r"\d steps a second (behind|in process)|\d 1/s", page.read_text())

@@ -46,6 +46,7 @@ NEEDS = {
     "export records": "export", "real run": "sim", "real score": "report",
     "export demonstrations": "sim", "export grounding": "sim",
     "repeat": "sim", "board": "report", "language shortcuts": "report", "real figure": "report",
+    "listen plan": "sim",
 }  # fmt: skip
 """The extra of each command that cannot do its work without one; all others work."""
 

@@ -16,13 +16,14 @@ NAMES = {
     "--policy-process": "mine", "--long-prompts": "cut", "--retry-on": "conection",
     "--executor": "slurm", "--plan": "papr", "--api-key-env": "NO_SUCH_VARIABLE", "--which": "mian",
     "--format": "pdf", "--by": "colour", "--robot": "twn", "--score": "me",
+    "--consent": "nowhere.txt",
 }  # fmt: skip
 """A value that no command takes, for every option that takes names."""
 
 
 TEXTS = {
     "--out", "--trajectories", "--operator", "--policy", "--address", "--devices", "--host",
-    "--allow-host",
+    "--allow-host", "--name",
 }  # fmt: skip
 """Options that take any text; all others take numbers or names."""
 
@@ -53,6 +54,10 @@ RIGHT = {
     "replay": ["nowhere"],
     "score grounding": ["nowhere", "--data", "nowhere"],
     "import-results": ["lerobot", "nowhere", "--out", "out", "--policy", "p"],
+    "listen serve": ["nowhere"],
+    "listen play": ["nowhere"],
+    "listen table": ["nowhere"],
+    "drive": ["PickXtimes", "0", "--port", "99999"],
     "learn listener": ["--out", "out"],
     "learn answers": ["nowhere", "--data", "nowhere", "--out", "out"],
 }

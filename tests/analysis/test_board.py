@@ -199,26 +199,47 @@ def test_what_a_pack_says_is_text() -> None:
 
 
 @pytest.mark.browser
-def test_the_page_sorts_and_filters(open_page: Any, tmp_path: Path) -> None:
+def test_the_page_of_thirty_runs_sorts_and_filters_without_network(
+    open_page: Any, tmp_path: Path, private: str
+) -> None:
     runs = [run_of("good", 6), run_of("weak", 1), run_of("all", 8, privileged=True)]
+    runs += [run_of("good", 2, split=private, episodes=4)._replace(name="good-private")]
+    runs += [run_of(f"p{number}", number % 3, episodes=3) for number in range(26)]
     runs[1] = runs[1]._replace(check=None)
     path = tmp_path / "board.html"
     write_board(runs, path)
-    with open_page(path.as_uri()) as page:
+    rows = board_rows(runs)
+    with open_page(path.as_uri(), offline=True) as page:
 
         def shown() -> list[str]:
             names = "[...document.querySelectorAll('tbody tr:not([hidden]) td:first-child')]"
             return list(page.evaluate(f"{names}.map(one => one.firstChild.textContent.trim())"))
 
-        published = [row.policy for row in board_rows(runs) if row.status == "published"]
-        assert shown() == ["good", "weak", "all (privileged)", *published]
+        marks = [row.policy + " (privileged)" * row.is_privileged for row in rows]
+        assert len(marks) == 29 + len({row.model for row in published_rows("main")})
+        assert shown() == marks
+        assert page.inner_text("#count") == f"{len(rows)} of {len(rows)} rows"
         page.uncheck("#published")
         page.uncheck("#privileged")
-        assert shown() == ["good", "weak"]
-        page.click(f"th button:has-text('{EXPLICIT}')")
-        page.click(f"th button:has-text('{EXPLICIT}')")
-        assert shown() == ["weak", "good"]
+        assert shown() == marks[:28]
+        # Public and private results stand side by side; each column sorts by itself.
+        heads = page.locator("th", has_text=EXPLICIT)
+        assert heads.count() == 2
+        heads.nth(0).get_by_role("button").click()
+        assert shown()[0] == "good"
+        heads.nth(0).get_by_role("button").click()
+        assert shown()[-1] == "good"
+        heads.nth(1).get_by_role("button").click()
+        assert shown()[0] == "good"
+        rates = page.locator("tbody tr:not([hidden])").first.locator("td.number").all_inner_texts()
+        assert [text.split()[0] for text in rates[:2]] == ["75.0", "50.0"]
         page.check("#verified")
-        assert shown() == ["good"]
-        page.set_viewport_size({"width": 390, "height": 800})
-        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        assert "weak" not in shown()
+        assert len(shown()) == 27
+        for width in (390, 1280):
+            page.set_viewport_size({"width": width, "height": 800})
+            assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        page.select_option("#conditions", rows[-1].conditions)
+        assert shown() == []
+        page.check("#published")
+        assert set(shown()) == {row.policy for row in rows if row.status == "published"}

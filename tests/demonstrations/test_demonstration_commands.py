@@ -85,6 +85,31 @@ def test_a_replay_prints_what_deviates(roboirg, export, monkeypatch):
     assert "2 trajectories: 1 with the same verdict, 1 also with a final state" in out
 
 
+def test_a_stopped_replay_goes_on_where_it_was(roboirg, export, monkeypatch, tmp_path):
+    root, log = export(tasks=("PickXtimes",), episodes=(0, 2)), tmp_path / "replay.jsonl"
+    played = []
+
+    def replay(recorded):
+        played.append(recorded.index)
+        return ReplayResult(recorded.name, recorded.task, "success", "success", 6, 6, 0.0, 0.0)
+
+    monkeypatch.setattr(dataset_replay, "replay", replay)
+    whole = roboirg("replay", root, "--workers", "0", "--log", log)
+    lines = log.read_text()
+    log.write_text(lines[:-9])  # stopped in the middle of a line
+    assert roboirg("replay", root, "--workers", "0", "--log", log) == whole
+    assert log.read_text() == lines
+    assert played == [0, 2, 2]
+    log.write_text(lines.replace("/2/", "/3/"))
+    code, _, err = roboirg("replay", root, "--workers", "0", "--log", log)
+    assert code == 2
+    assert "has 'PickXtimes/train/3/0'" in err
+    log.write_text("{}\n")
+    code, _, err = roboirg("replay", root, "--workers", "0", "--log", log)
+    assert code == 2
+    assert "is no log of `roboirg replay`" in err
+
+
 def test_a_folder_without_a_data_set_cannot_be_replayed(roboirg, tmp_path):
     code, _, err = roboirg("replay", tmp_path)
     assert code == 2

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -114,6 +115,8 @@ def test_only_browsers_with_the_key_are_answered(served, study):
     assert {status for status, _, _ in refused} == {403}
     assert not any(served.key in f"{headers}{text}" for _, headers, text in refused)
     assert read_events(study) == []
+    assert Client(served, Origin=f"http://127.0.0.1:{port}").ask("/join", {})[0] == 400
+    assert Client(served, Origin=f"https://127.0.0.1:{port}").ask("/join", {})[0] == 400
     _, headers, _ = me.ask("/")
     assert "connect-src 'self'" in headers["Content-Security-Policy"]
     assert headers["Cache-Control"] == "no-store"
@@ -299,7 +302,7 @@ def test_nothing_privileged_is_sent_before_the_answer(served, study, monkeypatch
             assert [one for one in told if one.lower() in words] == []
             me.read("/answer", first_answer(state))
     _, headers, page = me.ask("/")
-    text = f"{headers}{page.decode()}".lower()
+    text = re.sub("<style.*?</style>", "", f"{headers}{page.decode()}", flags=re.DOTALL).lower()
     assert [one for one in (*every_task(), *setting_names()) if one.lower() in text] == []
 
 

@@ -15,6 +15,7 @@ from roboirg.cli.options import (
     Tasks,
     WordChoices,
     Workers,
+    check_output_file,
     spread,
 )
 from roboirg.core.errors import InvalidValueError
@@ -171,6 +172,10 @@ def replay(
         typer.Argument(help="Folder of an export, or of RoboMME's HDF5 files, or such a file."),
     ],
     workers: Workers = None,
+    log: Annotated[
+        Path | None,
+        typer.Option(help="File with a line for each result; what is in it is not replayed again."),
+    ] = None,
 ) -> None:
     """Execute the actions of a data set in the simulator, and compare states and verdicts."""
     from collections import Counter
@@ -178,8 +183,10 @@ def replay(
     from roboirg.demonstrations.dataset_replay import TOLERANCE, replay_dataset
     from roboirg.evaluation.executors.executor import core_count
 
+    if log is not None:
+        check_output_file(log)
     count, largest = Counter[str](), 0.0
-    for one in replay_dataset(dataset, core_count() if workers is None else workers):
+    for one in replay_dataset(dataset, core_count() if workers is None else workers, log):
         count["trajectories"] += 1
         count["same verdict"] += one.status == one.recorded_status
         count["agree"] += one.agrees

@@ -79,23 +79,28 @@ DEFAULT_WORDS = WordChoices()
 
 
 def spread(command: Callable[..., None]) -> Callable[..., None]:
-    """Let the parameter `words: WordChoices` of a command be given as an option for each field."""
+    """Let a parameter that is a named tuple of options be given as an option for each field."""
     types = get_type_hints(command, include_extras=True)
-    of_words = get_type_hints(WordChoices, include_extras=True)
+    groups = {name: kind for name, kind in types.items() if hasattr(kind, "_field_defaults")}
     parameters: list[inspect.Parameter] = []
     for one in inspect.signature(command).parameters.values():
-        if one.name != "words":
+        kind = groups.get(one.name)
+        if kind is None:
             parameters.append(one.replace(annotation=types[one.name]))
             continue
+        fields = get_type_hints(kind, include_extras=True)
         parameters += [
-            one.replace(name=name, annotation=of_words[name], default=default)
-            for name, default in DEFAULT_WORDS._asdict().items()
+            one.replace(name=name, annotation=fields[name], default=default)
+            for name, default in kind._field_defaults.items()
         ]
 
     @functools.wraps(command)
     def spread_command(**given: Any) -> None:  # noqa: ANN401 - whatever the command takes
-        words = WordChoices(*(given.pop(name) for name in WordChoices._fields))
-        command(**given, words=words)
+        chosen = {
+            name: kind(*(given.pop(field) for field in kind._fields))
+            for name, kind in groups.items()
+        }
+        command(**given, **chosen)
 
     # Typer reads both.
     spread_command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]

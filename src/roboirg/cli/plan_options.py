@@ -6,7 +6,7 @@ Help texts give the default in parentheses.
 from __future__ import annotations
 
 from functools import partial
-from typing import Annotated
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
@@ -22,6 +22,13 @@ _senses = partial(typer.Option, rich_help_panel=SENSES)
 _policies = partial(typer.Option, rich_help_panel=POLICIES)
 _errors = partial(typer.Option, rich_help_panel=ERRORS)
 
+Policies = Annotated[
+    list[str] | None,
+    _policies(
+        "--policy",
+        help="Built-in name, package.module:Class or address, or NAME=one of these; repeatable.",
+    ),
+]
 Tasks = Annotated[
     str | None,
     _episodes(help="Tasks or suites, separated by commas; all for the whole benchmark.  (all)"),
@@ -125,3 +132,44 @@ RetryOn = Annotated[
     str | None,
     _errors(help="Kinds of errors to retry, or none.  (connection, environment, infrastructure)"),
 ]
+
+
+class PlanChoices(NamedTuple):
+    """The options of a plan; a parameter of commands, see `roboirg.cli.options.spread`."""
+
+    policies: Policies = None
+    tasks: Tasks = None
+    settings: Settings = None
+    forms: Forms = None
+    split: Split = None
+    episodes: Episodes = None
+    policy_seeds: PolicySeeds = None
+    stages: Stages = None
+    distractor: Distractor = None
+    distractors: Distractors = None
+    frame: Frame = None
+    delivery: Delivery = None
+    rival: Rival = None
+    reasoning: Reasoning = None
+    wordings: Wordings = None
+    max_steps: MaxSteps = None
+    actions: Actions = None
+    demonstration_frames: DemonstrationFrames = None
+    observe_every: ObserveEvery = None
+    meshes: Meshes = None
+    video: Video = None
+    policy_process: PolicyProcessOption = None
+    batch: Batch = None
+    devices: Devices = None
+    long_prompts: LongPrompts = None
+    policy_timeout_s: PolicyTimeout = None
+    episode_timeout_s: EpisodeTimeout = None
+    tries: Tries = None
+    retry_on: RetryOn = None
+
+    def typed(self) -> dict[str, Any]:
+        """Return those that were typed, by name."""
+        return {name: value for name, value in self._asdict().items() if value not in (None, [])}
+
+
+NO_CHOICES = PlanChoices()

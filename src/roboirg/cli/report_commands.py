@@ -186,7 +186,7 @@ def compare(
     console = Console()
     widen(console)
     flips = read_flips(Path(_split(first)[0])), read_flips(Path(_split(second)[0]))
-    for sentence in sentences(found, *names, flips):
+    for sentence in sentences(found, names[0], names[1], flips):
         console.print(Text(sentence), highlight=False)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +12,7 @@ import typer
 
 from roboirg.cli import plan_options as options
 from roboirg.cli.import_path import add_working_directory
-from roboirg.cli.options import Workers, check_output_file
+from roboirg.cli.options import Workers, check_output_file, spread
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.printable import printable
 from roboirg.util.plurals import counted
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
     from roboirg.evaluation.executors.executor import Executor
     from roboirg.evaluation.plan import Plan
+    from roboirg.evaluation.progress import Reporter
     from roboirg.evaluation.runner import RunSummary
     from roboirg.records.record import Job
 
@@ -29,14 +31,6 @@ if TYPE_CHECKING:
 USAGE_ERROR, INTERRUPTED, TERMINATED = 2, 130, 143
 EXECUTORS = ("local", "ray")
 
-Policies = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--policy",
-        help="Built-in name, package.module:Class or address, or NAME=one of these; repeatable.",
-        rich_help_panel=options.POLICIES,
-    ),
-]
 PlanName = Annotated[
     str | None,
     typer.Option(
@@ -57,91 +51,44 @@ RetryErrors = Annotated[
 ]
 
 
+OnRecord = Annotated[
+    str | None,
+    typer.Option(help="Command that gets each stored record as a line of JSON on its input."),
+]
+
+
+@spread
 def run(
     out: Out,
-    policy: Policies = None,
+    choices: options.PlanChoices = options.NO_CHOICES,
     plan: PlanName = None,
-    tasks: options.Tasks = None,
-    settings: options.Settings = None,
-    forms: options.Forms = None,
-    split: options.Split = None,
     salt: options.Salt = None,
-    episodes: options.Episodes = None,
-    policy_seeds: options.PolicySeeds = None,
-    stages: options.Stages = None,
-    distractor: options.Distractor = None,
-    distractors: options.Distractors = None,
-    frame: options.Frame = None,
-    delivery: options.Delivery = None,
-    rival: options.Rival = None,
-    reasoning: options.Reasoning = None,
-    wordings: options.Wordings = None,
-    max_steps: options.MaxSteps = None,
-    actions: options.Actions = None,
-    demonstration_frames: options.DemonstrationFrames = None,
-    observe_every: options.ObserveEvery = None,
-    meshes: options.Meshes = None,
-    video: options.Video = None,
-    policy_process: options.PolicyProcessOption = None,
-    batch: options.Batch = None,
-    devices: options.Devices = None,
-    long_prompts: options.LongPrompts = None,
-    policy_timeout_s: options.PolicyTimeout = None,
-    episode_timeout_s: options.EpisodeTimeout = None,
-    tries: options.Tries = None,
-    retry_on: options.RetryOn = None,
     workers: Workers = None,
     executor: Annotated[str, typer.Option(help="Where to play: local or ray.")] = "local",
     address: Annotated[str | None, typer.Option(help="Address of the Ray cluster.")] = None,
     retry_errors: RetryErrors = True,
+    on_record: OnRecord = None,
     dry_run: Annotated[
         bool,
         typer.Option("--dry-run", help="Only check, count the episodes and estimate the time."),
     ] = False,
 ) -> None:
     """Play episodes and store a record of each in OUT/records.jsonl; resumes where it stopped."""
-    typed = _typed_options(
-        policies=policy,
-        tasks=tasks,
-        settings=settings,
-        forms=forms,
-        split=split,
-        episodes=episodes,
-        policy_seeds=policy_seeds,
-        stages=stages,
-        distractor=distractor,
-        distractors=distractors,
-        frame=frame,
-        delivery=delivery,
-        rival=rival,
-        reasoning=reasoning,
-        wordings=wordings,
-        max_steps=max_steps,
-        actions=actions,
-        demonstration_frames=demonstration_frames,
-        observe_every=observe_every,
-        meshes=meshes,
-        video=video,
-        policy_process=policy_process,
-        batch=batch,
-        devices=devices,
-        long_prompts=long_prompts,
-        policy_timeout_s=policy_timeout_s,
-        episode_timeout_s=episode_timeout_s,
-        tries=tries,
-        retry_on=retry_on,
-    )
+    from roboirg.evaluation.record_hook import split_command
+
     # Absolute: a policy in this process may change the working directory.
     folder = folder_of(out).absolute()
     add_working_directory()
-    made = _plan(plan, typed, salt)
+    made = _plan(plan, choices.typed(), salt)
+    if on_record is not None:
+        split_command(on_record)
     chosen = _executor(made, executor, address, workers)
     _check_run(made, folder)
     if dry_run:
         _print_estimate(made, folder, workers)
         return
     _warn_of_cut_prompts(made)
-    summary = play(made, folder, chosen, retry=retry_errors)
+    summary = play(made, folder, chosen, retry=retry_errors, on_record=on_record)
     print_tables_of(folder, planned_jobs(folder))
     report_problems(summary, folder)
 
@@ -195,27 +142,22 @@ def folder_of(text: str) -> Path:
     return Path(text)
 
 
-def play(plan: Plan, out: Path, executor: Executor, *, retry: bool) -> RunSummary:
+def play(
+    plan: Plan, out: Path, executor: Executor, *, retry: bool, on_record: str | None = None
+) -> RunSummary:
     """Play a plan with a progress bar; exits the process when it is interrupted."""
     from rich.console import Console
 
     from roboirg.evaluation.progress import ConsoleReporter
-    from roboirg.evaluation.rollout import EpisodeRunner
-    from roboirg.evaluation.runner import Terminated, run_plan
-    from roboirg.evaluation.video_writer import check_video_support
+    from roboirg.evaluation.record_hook import CommandHook, HookedReporter
+    from roboirg.evaluation.runner import Terminated, episode_runner, run_plan
 
-    if plan.video != "off":
-        check_video_support()
-    play_job = EpisodeRunner(
-        out,
-        plan.video,
-        policy_timeout_s=plan.policy_timeout_s,
-        plan=plan.fingerprint,
-        hosting=plan.hosting,
-        refuse_long=plan.long_prompts == "refuse",
-    )
+    play_job = episode_runner(plan, out)
     try:
-        with ConsoleReporter(Console()) as reporter:
+        with ConsoleReporter(Console()) as shown, contextlib.ExitStack() as stack:
+            reporter: Reporter = shown
+            if on_record is not None:
+                reporter = stack.enter_context(HookedReporter(shown, CommandHook(on_record)))
             return run_plan(plan, out, play_job, executor, retry_errors=retry, reporter=reporter)
     except KeyboardInterrupt as interrupt:
         typer.echo(
@@ -272,11 +214,6 @@ def report_problems(summary: RunSummary, folder: Path) -> None:
         )
     if summary.errors or summary.missing:
         sys.exit(USAGE_ERROR)
-
-
-def _typed_options(**options: object) -> dict[str, Any]:
-    """Return the options that were typed."""
-    return {name: value for name, value in options.items() if value not in (None, [])}
 
 
 def _results(folder: Path) -> Any:  # noqa: ANN401 - imported where it is needed

@@ -57,6 +57,12 @@ def describe_policy(spec: str, *, again: bool = False) -> PolicyDescription:
     return _known[spec]
 
 
+def know_policy(spec: str) -> None:
+    """Describe a policy in this process, as one that no other process can import."""
+    load_policy_class(spec)
+    _known[spec] = describe_here(spec)
+
+
 def describe_here(spec: str) -> PolicyDescription:
     """Return the description of a policy of this process; ``unknown`` if it cannot be loaded."""
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
 import threading
 from collections import Counter
@@ -19,16 +20,16 @@ from roboirg.evaluation.executors.executor import Executor
 from roboirg.evaluation.plan import Plan, write_plan
 from roboirg.evaluation.policy_descriptions import describe_policy
 from roboirg.evaluation.progress import Reporter, SilentReporter
-from roboirg.evaluation.rollout import VIDEO_FOLDER, PlayJob
-from roboirg.evaluation.video_writer import without_unfinished_videos
+from roboirg.evaluation.rollout import VIDEO_FOLDER, EpisodeRunner, PlayJob
+from roboirg.evaluation.video_writer import check_video_support, without_unfinished_videos
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.records.record import Job, Record
 from roboirg.records.record_codec import RecordIndexEntry, identity_key
 from roboirg.records.store import (
+    RECORDS_FILE,
     TORN_FILE,
     RecordStore,
     StoreError,
-    check_writable,
     read_index,
 )
 from roboirg.util.plurals import counted
@@ -120,6 +121,24 @@ def run_plan(
         )
 
 
+def episode_runner(plan: Plan, folder: Path) -> EpisodeRunner:
+    """Return what plays a plan's jobs into a folder.
+
+    Raises:
+        MissingDependencyError: the plan wants videos, which cannot be written.
+    """
+    if plan.video != "off":
+        check_video_support()
+    return EpisodeRunner(
+        folder,
+        plan.video,
+        policy_timeout_s=plan.policy_timeout_s,
+        plan=plan.fingerprint,
+        hosting=plan.hosting,
+        refuse_long=plan.long_prompts == "refuse",
+    )
+
+
 def check_run(plan: Plan, folder: Path) -> None:
     """Check what `run_plan` checks before it plays, and write nothing.
 
@@ -127,10 +146,26 @@ def check_run(plan: Plan, folder: Path) -> None:
         StoreError: the folder cannot be written, or its records belong to another version of
             language, environment, scene or policy.
     """
-    check_writable(folder)
+    _check_writable(folder)
     records = read_index(folder).values()
     _check_versions(records, folder)
     _check_policies(plan, records, folder)
+
+
+def _check_writable(folder: Path) -> None:
+    """Check that a run's folder can be written, or made; nothing is.
+
+    Raises:
+        StoreError: it cannot.
+    """
+    place = next(one for one in (folder, *folder.absolute().parents) if one.exists())
+    records = folder / RECORDS_FILE
+    if not place.is_dir():
+        raise StoreError(f"Cannot write to {folder}: {place} is not a folder.")
+    if not os.access(place, os.W_OK | os.X_OK) or (
+        records.exists() and not os.access(records, os.W_OK)
+    ):
+        raise StoreError(f"Cannot write to {folder}: Permission denied.")
 
 
 class _RunLoop:

@@ -8,9 +8,10 @@ import json
 import os
 import platform
 import statistics
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from rich.table import Table
 
@@ -18,6 +19,8 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.version import __version__
 from roboirg.perf.measures import Measure
 
+_WHOLE = 1000
+"""From here on values are shown as whole numbers."""
 _SCALES = {"ms": 1e3}
 """Factors from stored to displayed units; other units have factor 1."""
 
@@ -131,25 +134,66 @@ def results_table(results: Sequence[MeasureResult]) -> Table:
 
 
 def write_results(results: Sequence[MeasureResult], path: Path) -> None:
-    """Write all rounds of all results, the machine, and the processes that it had to run, as JSON.
+    """Write all rounds of all results as JSON, each with its machine, date and load.
+
+    A file of earlier results is kept up to date: what was measured now takes the place of the row
+    of the same name, other rows stay.
 
     Raises:
-        InvalidValueError: the file cannot be written.
+        InvalidValueError: the file cannot be written, or is no file of results.
     """
-    content = {
-        "roboirg": __version__,
-        "python": platform.python_version(),
-        "machine": platform.platform(),
-        "processor": _processor(),
-        "cores": os.cpu_count(),
-        "load": round(os.getloadavg()[1], 1),
+    where = {
         "date": dt.datetime.now(dt.UTC).date().isoformat(),
-        "figures": [asdict(result) for result in results],
+        "machine": f"{os.cpu_count()} cores, {_processor()}",
+        "load": round(os.getloadavg()[1], 1),
+        "roboirg": __version__,
     }
+    rows = {_key(row): row for row in read_figures(path)} if path.exists() else {}
+    for result in results:
+        if result.value is not None or _key(asdict(result)) not in rows:
+            rows[_key(asdict(result))] = {**asdict(result), **where}
+    text = json.dumps({"figures": list(rows.values())}, indent=1)
     try:
-        path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+        path.write_text(text + "\n", encoding="utf-8")
     except OSError as error:
         raise InvalidValueError(f"{str(path)!r} cannot be written: {error}") from error
+
+
+def read_figures(path: Path) -> list[dict[str, Any]]:
+    """Return the rows of a file that `write_results` wrote.
+
+    Raises:
+        InvalidValueError: it is no such file.
+    """
+    try:
+        figures = json.loads(path.read_text(encoding="utf-8"))["figures"]
+        return [dict(row) for row in figures if _key(row)]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InvalidValueError(f"{str(path)!r} holds no results of bench: {error}") from error
+
+
+def markdown_table(figures: Sequence[Mapping[str, Any]]) -> str:
+    """Return the rows of a file of results as a table for the documents."""
+    lines = ["| measure | ours | baseline | ratio | goal | date | load |",
+             "| --- | ---: | ---: | ---: | ---: | --- | ---: |"]  # fmt: skip
+    for row in figures:
+        if row["value"] is None:
+            continue
+        base, goal = "", f"at most {row['goal']:g} {row['unit']}"
+        if row["ratio"] is not None:
+            median = statistics.median(row["baseline"])
+            base = f"{_format_value(median, row['unit'])} ({row['against']})"
+            goal = f"{row['goal']:g} ×"
+        ratio = "" if row["ratio"] is None else f"{row['ratio']:.3g} ×"
+        ours = _format_value(row["value"], row["unit"])
+        load = "" if row["load"] is None else row["load"]
+        cells = (row["name"], ours, base, ratio, goal, row["date"], load)
+        lines.append(f"| {' | '.join(map(str, cells))} |")
+    return "\n".join(lines) + "\n"
+
+
+def _key(row: Mapping[str, Any]) -> tuple[str, str, float]:
+    return (row["name"], row["against"], row["goal"])
 
 
 def _processor() -> str:
@@ -163,4 +207,5 @@ def _processor() -> str:
 
 
 def _format_value(value: float, unit: str) -> str:
-    return f"{value * _SCALES.get(unit, 1.0):.3g} {unit}"
+    shown = value * _SCALES.get(unit, 1.0)
+    return f"{shown:,.0f} {unit}" if shown >= _WHOLE else f"{shown:.3g} {unit}"

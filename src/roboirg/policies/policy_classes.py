@@ -171,7 +171,14 @@ def _describe_module(spec: str) -> str | None:
 
 def _examples() -> list[str]:
     urls = (f"{scheme}://…" for scheme in url_schemes())
-    return [*urls, "system:NAME", "vlm-listener:PROVIDER", "learned:PATH", "people:FOLDER"]
+    return [
+        *urls,
+        "system:NAME",
+        "vlm-listener:PROVIDER",
+        "learned:PATH",
+        "people:FOLDER",
+        "recorded:RUN",
+    ]
 
 
 def _parameters(policy_class: type[Any]) -> Mapping[str, inspect.Parameter]:

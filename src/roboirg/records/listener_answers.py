@@ -139,6 +139,11 @@ class AnswerLog:
         self.close()
 
 
+def person_name(number: int) -> str:
+    """Return the name under which a person appears in records and tables."""
+    return f"p{number:02}"
+
+
 def standing_answers(events: Iterable[ListenerEvent]) -> Iterator[PersonAnswered]:
     """Yield the answers that were not undone, by person in the order of their questions."""
     kept: dict[tuple[int, int], PersonAnswered] = {}
@@ -161,8 +166,9 @@ def read_events(folder: Path) -> list[ListenerEvent]:
 
 def _read_event(line: bytes, path: Path, number: int) -> ListenerEvent:
     try:
-        return _decoder.decode(line)
+        event: ListenerEvent = _decoder.decode(line)
     except msgspec.ValidationError as error:
         raise StoreError(f"{path}, line {number}: not an answer of a study ({error}).") from error
     except msgspec.DecodeError as error:
         raise DamagedLineError(str(error)) from error
+    return event

@@ -12,7 +12,6 @@ that lines are in the order of the plan (they are in the order in which episodes
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Generic, NamedTuple, Self, TypeVar
@@ -209,22 +208,6 @@ def read_index(folder: Path) -> dict[RecordKey, RecordIndexEntry]:
     return {
         identity_key(one): one for one in LineFile(folder / RECORDS_FILE).parse(read_index_entry)
     }
-
-
-def check_writable(folder: Path) -> None:
-    """Check that a run's folder can be written, or made; nothing is.
-
-    Raises:
-        StoreError: it cannot.
-    """
-    place = next(one for one in (folder, *folder.absolute().parents) if one.exists())
-    records = folder / RECORDS_FILE
-    if not place.is_dir():
-        raise StoreError(f"Cannot write to {folder}: {place} is not a folder.")
-    if not os.access(place, os.W_OK | os.X_OK) or (
-        records.exists() and not os.access(records, os.W_OK)
-    ):
-        raise StoreError(f"Cannot write to {folder}: Permission denied.")
 
 
 class StoredRun(Generic[Identified]):

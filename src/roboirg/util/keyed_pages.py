@@ -165,7 +165,9 @@ class KeyedPageHandler(RequestHandler):
 
     def _is_own(self) -> bool:
         hosts, origins = self.headers.get_all("Host", []), self.headers.get_all("Origin", [])
-        return is_own_request(hosts, origins, self.server.names)
+        # A proxy may add HTTPS: the page is then the same host's.
+        plain = [one.replace("https://", "http://", 1) for one in origins]
+        return is_own_request(hosts, plain, self.server.names)
 
     def _is_allowed(self) -> bool:
         """Return whether a request comes from a page of this server; refuse it if not."""

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from roboirg.analysis.figures.figure_data import FigureData
-from roboirg.analysis.figures.figure_style import save
+from roboirg.analysis.figures.figure_style import STYLE, save
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.util.figure_files import check_figure_support
 
-__all__ = ["FIGURES", "FigureData", "write_figures"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["FIGURES", "FigureData", "draw_figure", "write_figures"]
 
 FIGURES = ("averages", "forms", "expressions", "context", "failures")
 
@@ -49,18 +53,37 @@ def write_figures(
 
 
 def _written(name: str, content: FigureData, folder: Path, *, published: bool) -> tuple[Path, ...]:
-    from roboirg.analysis.figures.averages import draw_averages
-    from roboirg.analysis.figures.context import draw_context
     from roboirg.analysis.figures.expressions import write_expressions
-    from roboirg.analysis.figures.failures import draw_failures
-    from roboirg.analysis.figures.forms import draw_forms
 
     if name == "expressions":
         return write_expressions(content, folder, name)
-    drawings = {
-        "averages": partial(draw_averages, content, published=published),
-        "context": partial(draw_context, content, published=published),
-        "forms": partial(draw_forms, content),
-        "failures": partial(draw_failures, content),
-    }
-    return save(drawings[name], folder, name)
+    return save(lambda: _drawn(name, content, published=published), folder, name)
+
+
+def draw_figure(name: str, content: FigureData, *, published: bool = False) -> Figure | None:
+    """Draw averages, forms, context or failures; return None without data.
+
+    Raises:
+        MissingDependencyError: matplotlib is not installed.
+    """
+    check_figure_support()
+    import matplotlib as mpl
+
+    with mpl.rc_context(STYLE):
+        return _drawn(name, content, published=published)
+
+
+def _drawn(name: str, content: FigureData, *, published: bool) -> Figure | None:
+    from roboirg.analysis.figures.averages import draw_averages
+    from roboirg.analysis.figures.context import draw_context
+    from roboirg.analysis.figures.failures import draw_failures
+    from roboirg.analysis.figures.forms import draw_forms
+
+    match name:
+        case "averages":
+            return draw_averages(content, published=published)
+        case "context":
+            return draw_context(content, published=published)
+        case "forms":
+            return draw_forms(content)
+    return draw_failures(content)

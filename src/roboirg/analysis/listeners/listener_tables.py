@@ -16,12 +16,12 @@ from roboirg.analysis.tables.table import NOT_APPLICABLE, Column, Entry, Row, Ta
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.people.answer_form import FormAnswer, answer_of
 from roboirg.language.settings import setting_names
-from roboirg.policies.builtin.people_listener import person_name
 from roboirg.records.listener_answers import (
     AnswerUndone,
     ListenerEvent,
     PersonAnswered,
     PersonJoined,
+    person_name,
     standing_answers,
 )
 

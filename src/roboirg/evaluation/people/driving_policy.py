@@ -19,9 +19,10 @@ from roboirg.policies.planning.model_content import Clip, encode_mp4
 
 FRAMES_EVERY = 4
 """Control steps between two frames of the video."""
-LOW, HIGH = 0.02, 0.2
-"""Heights of the tool above the table, m: to grasp a cube, and to carry it over others."""
+CARRY = 0.2
+"""Height at which the hand moves over everything, m."""
 LOWEST, HIGHEST = 0.004, 0.5
+"""Limits of the tool's height above the table, m."""
 MOST_STEP = 0.5
 """Meters of one move."""
 LONGEST_WAIT_S = 10.0
@@ -101,11 +102,11 @@ class DrivingPolicy:
                 pose[:3] += [_number(one, MOST_STEP) for one in (x, y, z)]
             case {"turn": angle}:
                 pose[5] = _wrapped(pose[5] + _number(angle, math.pi))
-            case {"height": "low" | "high" as height}:
-                pose[2] = LOW if height == "low" else HIGH
+            case {"height": meters}:
+                pose[2] = _number(meters, HIGHEST)
             case {"point": [x, y]}:
                 pose[:2] = self._point_below(_number(x, 255), _number(y, 255))[:2]
-                pose[2] = max(pose[2], HIGH)
+                pose[2] = CARRY
             case {"grip": "open" | "close" as how}:
                 grip = GRIPS[how]
             case {"wait": seconds}:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from roboirg.core.observations import CAMERAS
 from roboirg.evaluation.grounding_set.media_store import encode_jpeg
@@ -58,7 +58,8 @@ class DrivingSession:
 
     def add_frame(self, source: PictureSource, is_demonstration: bool = False) -> None:
         """Make the current pictures those of the page; the video is shown apart."""
-        self.env = source  # type: ignore[assignment] - the only source of frames there is
+        # There is no other source of frames.
+        self.env = cast("RoboIRGEnv", source)
         if is_demonstration:
             return
         self.show_pictures({one: source.picture(one) for one in CAMERAS})

@@ -239,7 +239,7 @@ class ListeningSession:
 
     def _view(self, question: PersonQuestion) -> PersonView:
         job = question.job
-        name = EpisodeName(job.task, job.split, job.episode)  # type: ignore[arg-type]
+        name = EpisodeName(job.task, job.split, job.episode)
         item, media = self._items.get(words_of(job)), read_media(self.questions_folder, name)
         if item is None or media is None:
             raise InvalidValueError(

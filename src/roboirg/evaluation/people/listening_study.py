@@ -42,8 +42,8 @@ robot. You say what is meant: you point at things in the picture and choose numb
 Taking part is voluntary. You may stop at any time by closing the page, and you need give no
 reason.
 
-What is stored: your answers, how long each of them took, how often you watched a video, and the
-time of day. No name, no address and nothing about your browser or computer is stored.
+What is stored: your answers, how long each of them took, how often you watched a video, and date
+and time. No name, no address and nothing about your browser or computer is stored.
 """
 """Text that a person agrees to, unless the study has one of its own."""
 
@@ -91,7 +91,13 @@ class ListeningStudy(BaseModel):
             InvalidValueError: a number is out of range, or a person would be asked about an
                 episode twice.
         """
-        for name, least in (("people", 1), ("practice", 0), ("checks", 0), ("frames_every", 1)):
+        for name, least in (
+            ("people", 1),
+            ("practice", 0),
+            ("checks", 0),
+            ("frames_every", 1),
+            ("seed", 0),
+        ):
             if getattr(self, name) < least:
                 raise InvalidValueError(
                     f"{name} is {getattr(self, name)}; it must be at least {least}."
@@ -131,7 +137,7 @@ class ListeningStudy(BaseModel):
     def export_request(self) -> ExportRequest:
         """Return the dataset with the words and pictures of all questions."""
         plan = self.plan
-        episodes = [EpisodeName(task, plan.split, one) for task, one in self._cells]  # type: ignore[arg-type]
+        episodes = [EpisodeName(task, plan.split, one) for task, one in self._cells]
         training = [*self._practice(), *self._checks()]
         episodes += [EpisodeName(job.task, TRAINING, job.episode) for job in training]
         named = setting_names() if plan.settings == "all" else plan.settings

@@ -94,20 +94,18 @@ def check_line(one: LineToCheck, folder: Path) -> RecordCheck:
 
 
 def _check(record: Record, folder: Path, *, play: bool) -> RecordCheck:
-    findings = [*_versions(record)]
-    if findings:
+    if findings := [*_versions(record)]:
         return RecordCheck(record.slug, tuple(findings))
-    told = unplayed(record)
-    findings += _differences(record, told, WORD_FIELDS)
-    findings += _words(record, told)
-    if record.action_log is None:
-        if record.outcome != "error":
-            findings.append("Its actions were not kept, so the verdict cannot be checked.")
+    log = None if record.action_log is None else read_actions(folder, record.action_log)
+    if log is not None and play:
+        again, played = replay(record, log)
+    else:
+        again, played = unplayed(record), None
+    findings = [*_differences(record, again, WORD_FIELDS), *_words(record, again)]
+    if log is None and record.outcome != "error":
+        findings.append("Its actions were not kept, so the verdict cannot be checked.")
+    if log is None or not play:
         return RecordCheck(record.slug, tuple(findings))
-    log = read_actions(folder, record.action_log)
-    if not play:
-        return RecordCheck(record.slug, tuple(findings))
-    again, played = replay(record, log)
     findings += _differences(record, again, PLAYED_FIELDS)
     verdict, deviation = _compare_ends(record, again, log, played)
     if verdict is ReplayVerdict.DIFFERENT:

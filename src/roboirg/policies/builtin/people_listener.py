@@ -10,7 +10,12 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.policies.planning.goal_schema import goal_schema
 from roboirg.policies.random_state import episode_policy_seed
-from roboirg.records.listener_answers import PersonAnswered, read_events, standing_answers
+from roboirg.records.listener_answers import (
+    PersonAnswered,
+    person_name,
+    read_events,
+    standing_answers,
+)
 from roboirg.util.short_hash import short_hash
 
 if TYPE_CHECKING:
@@ -77,11 +82,6 @@ class PeopleListener(ScriptedPolicy):
         raise InvalidValueError(
             f"No person of this policy seed has answered {episode.key} in {said.setting}."
         )
-
-
-def person_name(number: int) -> str:
-    """Return the name under which a person appears in records and tables."""
-    return f"p{number:02}"
 
 
 def study_version(folder: Path) -> str:

@@ -6,6 +6,7 @@
 | ``vlm-listener:PROVIDER?model=NAME&base_url=URL`` | a model names the goal |
 | ``learned:PATH`` | a listener that `roboirg learn listener` trained names the goal |
 | ``people:FOLDER`` | people name the goal, in a study of `roboirg listen` |
+| ``recorded:RUN?policy=NAME`` | the stored actions of a run |
 
 Values that contain ``&`` or ``#`` are percent-encoded.
 """
@@ -43,6 +44,7 @@ SYSTEM = "system"
 LISTENER = "vlm-listener"
 LEARNED = "learned"
 PEOPLE = "people"
+RECORDED = "recorded"
 
 Build = Callable[[int], Policy]
 
@@ -147,9 +149,20 @@ def _people(spec: str, name: str, options: Mapping[str, str]) -> Build:
     return lambda seed: PeopleListener(Path(name), seed)
 
 
+def _recorded(spec: str, name: str, options: Mapping[str, str]) -> Build:
+    from roboirg.policies.builtin.recorded_policy import RecordedPolicy
+
+    for option in options.keys() - {"policy"}:
+        raise UnknownNameError(f"option of {RECORDED}:", option, ["policy"])
+    if not name:
+        raise InvalidValueError(f"Policy {spec!r} names no folder of a run.")
+    return lambda _seed: RecordedPolicy(Path(name), options.get("policy"))
+
+
 BUILDERS: Mapping[str, Callable[[str, str, Mapping[str, str]], Build]] = {
     SYSTEM: _system,
     LISTENER: _listener,
     LEARNED: _learned,
     PEOPLE: _people,
+    RECORDED: _recorded,
 }

@@ -28,9 +28,10 @@ const COMMANDS = [
   { key: "f", sign: "Lower", label: "Lower the hand", act: () => ({ move: [0, 0, -step] }) },
   { key: "ArrowDown", sign: "↓", label: "Down in the picture", act: () => ({ move: [step, 0, 0] }) },
   { key: "r", sign: "Raise", label: "Raise the hand", act: () => ({ move: [0, 0, step] }) },
-  { key: "l", sign: "To 2 cm", label: "Lower the hand to 2 centimeters", act: () => ({ height: "low" }) },
-  { key: "w", sign: "Wait", label: "Wait half a second", act: () => ({ wait: 0.5 }) },
-  { key: "h", sign: "To 20 cm", label: "Raise the hand to 20 centimeters", act: () => ({ height: "high" }) },
+  { key: "j", sign: "To 2 cm", label: "Move the hand to a height of 2 centimeters", act: () => ({ height: 0.02 }) },
+  { key: "k", sign: "To 6 cm", label: "Move the hand to a height of 6 centimeters", act: () => ({ height: 0.06 }) },
+  { key: "l", sign: "To 20 cm", label: "Move the hand to a height of 20 centimeters", act: () => ({ height: 0.2 }) },
+  { key: "w", sign: "Wait half a second", label: "Wait half a second", act: () => ({ wait: 0.5 }), id: "wait" },
 ];
 const KEYS = { " ": "space", ArrowUp: "", ArrowDown: "", ArrowLeft: "", ArrowRight: "" };
 

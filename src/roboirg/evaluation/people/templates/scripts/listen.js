@@ -66,6 +66,8 @@ const header = (state) => {
   byId("where").textContent = asks ? `${name} ${state.place} of ${state.total}` : "RoboIRGBench";
   progress.hidden = !asks || state.practice;
   if (asks) { progress.max = state.total; progress.value = state.place - 1; }
+  byId("foot").hidden = !state;
+  byId("own-code").textContent = state?.code ?? "";
   undoButton.hidden = !state?.undo;
   undoButton.onclick = async () => {
     undoButton.hidden = true;

@@ -1,0 +1,174 @@
+"""`roboirg.evaluate` and its results; the episodes are not played but for one test."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import roboirg
+from roboirg.analysis.results import Results
+from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
+from roboirg.evaluation import python_run
+from roboirg.evaluation.plan import Plan, read_plan
+from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.policies.local_policies import is_local, spec_of
+from roboirg.records.record import Job, Record
+from roboirg.records.store import read_records
+
+
+class Still:
+    """A policy that stands still."""
+
+    cameras = ()
+    version = "1"
+
+    def __init__(self, reach: float = 1.0) -> None:
+        self.reach = reach
+        self.instructions: list[str] = []
+
+    def reset(self, instruction, demonstration) -> None:
+        self.instructions.append(instruction)
+
+    def act(self, observation):
+        return np.tile(np.append(observation["joint_positions"], 1.0), (16, 1))
+
+
+@pytest.fixture
+def unplayed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Episodes are decided by their setting."""
+
+    def runner(plan: Plan, folder: Path):
+        def play(job: Job) -> Record:
+            won = job.policy != "forgetful" or job.setting == "explicit"
+            course = RolloutResult("success" if won else "failure", cause=None if won else "wrong")
+            return make_record(job, course, started_at="now")
+
+        return play
+
+    monkeypatch.setattr(python_run, "episode_runner", runner)
+
+
+QUICK = {"tasks": "PickXtimes", "episodes": 3, "workers": 0, "progress": False}
+
+
+def test_results_are_those_of_the_records(unplayed: None, tmp_path: Path) -> None:
+    seen: list[Record] = []
+    results = roboirg.evaluate(
+        ["listener", "forgetful"], settings=("explicit", "direct"), forms=["implicit", "resolved"],
+        out=tmp_path, on_record=seen.append, **QUICK,
+    )  # fmt: skip
+    assert list(results.records) == seen == list(read_records(tmp_path))
+    assert len(seen) == 2 * 3 * 3
+    assert (results.errors, results.missing, results.folder) == (0, 0, tmp_path)
+    assert results.rates()["forgetful", "direct"] == 0.0
+    assert results.rates()["listener", "direct (resolved)"] == 1.0
+    frame = results.frame
+    assert frame.groupby("policy")["success"].mean()["forgetful"] == pytest.approx(1 / 3)
+    assert list(frame["episode"].unique()) == [0, 1, 2]
+    assert "listener" in results.table(published=True)
+    assert results.table("main", "latex").startswith("% needs")
+    assert "direct: no clear difference, +100.0 points" in results.compare("listener", "forgetful")
+    assert results._repr_markdown_().startswith("### Success by task and setting")
+    assert "forgetful explicit: 100.0 %" in repr(results)
+    assert results.plot("forms")._repr_png_().startswith(b"\x89PNG")
+    assert results.report().read_text().startswith("<!doctype html>")
+    results.plot("averages", published=True).save(tmp_path / "a.svg")
+    assert "MemER (published)" in (tmp_path / "a.svg").read_text()
+    for wrong in (
+        lambda: results.plot("averagse"),
+        lambda: results.table("mian"),
+        lambda: results.compare("listener", "nobody"),
+    ):
+        with pytest.raises(UnknownNameError):
+            wrong()
+    with pytest.raises(InvalidValueError, match="nothing to draw for 'context'"):
+        results.plot("context")
+
+
+def test_the_same_folder_resumes_and_none_makes_a_new_one(
+    unplayed: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    seen: list[Record] = []
+    for settings in ("explicit", "all"):
+        roboirg.evaluate("oracle", settings=settings, out="kept", on_record=seen.append, **QUICK)
+    assert len(seen) == len(read_records(tmp_path / "kept")) == 3 * 5
+    first, second = (roboirg.evaluate("oracle", settings="explicit", **QUICK) for _ in range(2))
+    assert first.folder.parent == second.folder.parent == tmp_path / "runs"
+    assert first.folder != second.folder
+
+
+def test_classes_and_objects_play_in_this_process(unplayed: None, tmp_path: Path) -> None:
+    given = Still(reach=0.5)
+    results = roboirg.evaluate({"mine": given, "class": Still}, out=tmp_path, **QUICK)
+    plan = read_plan(tmp_path)
+    assert plan is not None
+    assert plan.policy_process == "shared"
+    assert {one.policy for one in results.records} == {"mine", "class"}
+    assert roboirg.evaluate({"mine": given}, out=tmp_path, **QUICK).errors == 0
+    with pytest.raises(InvalidValueError, match="exists in this process only"):
+        roboirg.evaluate(given, out=tmp_path, **{**QUICK, "workers": 2})
+    with pytest.raises(InvalidValueError, match="same name"):
+        roboirg.evaluate([Still(), Still], out=tmp_path, **QUICK)
+    with pytest.raises(InvalidValueError, match="has no method"):
+        roboirg.evaluate(object(), out=tmp_path, **QUICK)
+
+
+def test_what_can_be_imported_has_a_spec_as_on_the_command_line() -> None:
+    from roboirg.policies.builtin.random_policy import RandomPolicy
+
+    assert spec_of("oracle") == "oracle"
+    assert spec_of(RandomPolicy) == "roboirg.policies.builtin.random_policy:RandomPolicy"
+    assert not is_local(spec_of(RandomPolicy))
+    assert is_local(spec_of(RandomPolicy(seed=1)))
+    assert is_local(spec_of(type("Made", (Still,), {})))
+
+
+def test_options_are_those_of_a_plan(unplayed: None, tmp_path: Path) -> None:
+    plan = python_run.python_plan(
+        "oracle", tasks=["PickXtimes"], settings="contextual", episodes=[2],
+        policy_seeds=(7, 42), stages=[(1, 5), (1, 2, 5)], max_steps=600, wordings=None,
+    )  # fmt: skip
+    assert (plan.episodes, plan.policy_seeds, plan.max_steps) == ((2,), (7, 42), 600)
+    assert plan.stages == ((1, 5), (1, 2, 5))
+    assert python_run.python_plan("oracle", tasks="all", episodes=3).episodes == (0, 1, 2)
+    with pytest.raises(UnknownNameError, match="PickXtimes"):
+        roboirg.evaluate("oracle", **{**QUICK, "tasks": "PickXtime"})
+    with pytest.raises(InvalidValueError, match="max_stps"):
+        roboirg.evaluate("oracle", max_stps=3, **QUICK)
+
+
+def test_a_command_may_read_the_records(unplayed: None, tmp_path: Path) -> None:
+    out = tmp_path / "seen.jsonl"
+    code = f"import sys; open('{out}', 'w').write(sys.stdin.read())"
+    roboirg.evaluate(
+        "oracle", out=tmp_path / "run", on_record=f'"{sys.executable}" -c "{code}"', **QUICK
+    )
+    assert {json.loads(line)["policy"] for line in out.read_text().splitlines()} == {"oracle"}
+
+
+def test_without_pandas_the_rest_works(
+    unplayed: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    results = roboirg.evaluate("oracle", out=tmp_path, **QUICK)
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(MissingDependencyError, match="pip install pandas"):
+        _ = results.frame
+    assert Results(tmp_path).rates()["oracle", "explicit"] == 1.0
+
+
+@pytest.mark.sim
+def test_an_object_plays_its_episodes_itself(tmp_path: Path) -> None:
+    given = Still()
+    results = roboirg.evaluate(
+        given, tasks="PickXtimes", settings="explicit,direct", episodes=1, max_steps=32,
+        out=tmp_path, progress=False,
+    )  # fmt: skip
+    assert [one.outcome for one in results.records] == ["failure", "failure"]
+    assert given.instructions == [
+        " ".join(turn.text for turn in one.instruction) for one in results.records
+    ]

@@ -1,0 +1,78 @@
+"""The policies ``people:FOLDER`` and ``recorded:RUN``: specs, and what they play."""
+
+import pytest
+from study_fakes import answer_all, make_study
+
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.episodes.splits import get_episode
+from roboirg.evaluation.people.answer_form import FormAnswer, all_answers, answer_of
+from roboirg.evaluation.people.listening_session import ListeningSession
+from roboirg.evaluation.people.people_run import answered_plan
+from roboirg.evaluation.rollout import EpisodeRunner
+from roboirg.policies.loading import is_privileged, load_policy_class, make_policy, policy_version
+from roboirg.records.record import Job
+from roboirg.records.store import RecordStore, StoreError, read_records
+
+
+def test_specs_that_name_nothing_are_refused(tmp_path):
+    for spec in ("people:", f"people:{tmp_path}", f"people:{tmp_path}?seed=1", "recorded:"):
+        with pytest.raises(InvalidValueError):
+            load_policy_class(spec)
+    with pytest.raises(UnknownNameError, match="option of recorded"):
+        load_policy_class(f"recorded:{tmp_path}?polcy=me")
+    with pytest.raises(StoreError, match="no records"):
+        load_policy_class(f"recorded:{tmp_path}")
+
+
+def test_the_version_is_the_study_s(tmp_path, monkeypatch):
+    make_study(tmp_path / "a", monkeypatch, tasks="StopCube", episodes="1", settings="explicit")
+    make_study(tmp_path / "b", monkeypatch, tasks="StopCube", episodes="2", settings="explicit")
+    versions = [policy_version(f"people:{tmp_path / one}") for one in "ab"]
+    assert len(set(versions)) == 2
+    assert all(one.startswith("study ") for one in versions)
+    assert is_privileged(f"people:{tmp_path / 'a'}")
+
+
+@pytest.mark.sim
+def test_two_people_are_played_apart_and_again_by_the_log(tmp_path, monkeypatch):
+    folder = tmp_path / "study"
+    make_study(folder, monkeypatch, tasks="PickXtimes", episodes="0-1", settings="explicit",
+               people=3, practice=0, checks=0)  # fmt: skip
+
+    def right(question, _things):
+        episode = get_episode(question.job.task, question.job.split, question.job.episode)
+        return answer_of(episode, episode.goal)
+
+    def wrong(question, things):
+        episode = get_episode(question.job.task, question.job.split, question.job.episode)
+        return next(one for one in all_answers(episode, things)
+                    if one.values != right(question, things).values)  # fmt: skip
+
+    session = ListeningSession(folder)
+    answer_all(session, right)
+    answer_all(session, wrong)
+    session.close()
+    jobs = answered_plan(folder).jobs()
+    run = EpisodeRunner(tmp_path / "run")
+    with RecordStore(tmp_path / "run") as store:
+        for job in jobs:
+            store.append(run(job))
+    records = {(one.episode, one.policy_seed): one for one in read_records(tmp_path / "run")}
+    told = [
+        (records[key].outcome, records[key].policy_metadata["person"]) for key in sorted(records)
+    ]
+    assert told == [("success", "p01"), ("failure", "p02")] * 2
+    # The third person has not answered.
+    missing = run(jobs[0].model_copy(update={"policy_seed": 2}))
+    assert (missing.outcome, missing.error) == ("error", "policy")
+    assert "No person of this policy seed has answered" in missing.cause
+
+    spec = f"recorded:{tmp_path / 'run'}"
+    job = Job(policy=spec, task="PickXtimes", split="test", episode=1, setting="direct")
+    again = EpisodeRunner(tmp_path / "again")(job)
+    assert (again.outcome, again.steps) == ("success", records[1, 0].steps)
+    other = run(job.model_copy(update={"episode": 7}))
+    assert (other.outcome, other.error) == ("error", "policy")
+    assert "has no record of PickXtimes/test/7" in other.cause
+    assert make_policy(f"{spec}?policy=nobody", 0)._records == []
+    assert FormAnswer((), {}).category == "[[], {}]"

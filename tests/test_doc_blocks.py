@@ -1,0 +1,163 @@
+"""Every code block of the documents is executed, or a comment before it says why not.
+
+    <!-- not run: why -->
+
+Blocks of a page run in order, in one folder with a policy and two runs of results that nothing
+played. Command lines are checked in any case: commands, options and their names exist.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+import typer.main
+
+from roboirg.cli.app import app, main
+from roboirg.evaluation.plan import write_plan
+from roboirg.evaluation.plan_file import read_plan_file
+from roboirg.evaluation.plan_maker import make_plan
+from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.records.store import RecordStore
+
+ROOT = Path(__file__).parent.parent
+ELSEWHERE = {"integrations.md": "tests/integrations, by `make integrations`"}
+"""Pages whose blocks other tests run."""
+PAGES = [
+    page
+    for page in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/*.md")))
+    if "```" in page.read_text()
+]
+LANGUAGES = ("sh", "bash", "python", "toml", "yaml")
+BLOCK = re.compile(
+    r"(?:<!-- not run: (?P<why>[^>]+?) -->\n\s*)?"
+    r"^ *```(?P<language>\w+)\n(?P<text>.*?)^ *```",
+    re.DOTALL | re.MULTILINE,
+)
+MOST_MARKED_SHARE = 0.75
+"""Of the blocks; more would mean that marking is a habit."""
+
+
+class Block(NamedTuple):
+    language: str
+    text: str
+    why: str | None
+    line: int
+
+
+def blocks_of(page: Path) -> list[Block]:
+    text = page.read_text()
+    return [
+        Block(one["language"], one["text"], one["why"], text[: one.start("text")].count("\n") + 1)
+        for one in BLOCK.finditer(text)
+        if one["language"] in LANGUAGES
+    ]
+
+
+def command_lines(text: str) -> list[str]:
+    """The lines of a script, each with its continuations, without comments and empty ones."""
+    joined = re.sub(r"\\\n\s*", "", text).splitlines()
+    return [line for line in joined if line.strip() and not line.lstrip().startswith("#")]
+
+
+def words_of(line: str) -> list[str] | None:
+    """The words behind `roboirg` if a line calls it, else None."""
+    found = re.match(r"^\s*(?:\.venv/bin/|(?:\w+=\S+ )*)roboirg (.*)$", line)
+    return None if found is None else shlex.split(found[1], comments=True)
+
+
+def write_run(folder: Path, lost: int) -> None:
+    plan = make_plan(
+        ["listener", "forgetful"], tasks="PickXtimes,VideoUnmask", forms="implicit,resolved",
+        episodes="2",
+    )  # fmt: skip
+    with RecordStore(folder) as store:
+        for job in plan.jobs():
+            won = job.policy == "listener" or (job.setting == "explicit" and job.episode != lost)
+            course = RolloutResult("success" if won else "failure", cause=None if won else "wrong")
+            store.append(make_record(job, course, started_at="now"))
+    write_plan(plan, folder)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    policy = next(one.text for one in blocks_of(ROOT / "README.md") if "class MyPolicy" in one.text)
+    (tmp_path / "my_policy.py").write_text(policy)
+    for lost, name in enumerate(("first", "second", "a", "b")):
+        write_run(tmp_path / "runs" / name, lost)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    yield tmp_path
+    sys.modules.pop("my_policy", None)
+
+
+def run_script(text: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for line in command_lines(text):
+        words = words_of(line)
+        if words is None:
+            subprocess.run(["bash", "-ec", line], cwd=folder, check=True)
+            continue
+        monkeypatch.setattr(sys, "argv", ["roboirg", *words])
+        with pytest.raises(SystemExit) as left:
+            main()
+        assert not left.value.code, line
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_the_blocks_of_a_page_run(
+    page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    namespace: dict[str, object] = {"__name__": "page"}
+    for block in blocks_of(page) if page.name not in ELSEWHERE else ():
+        if block.why is not None:
+            continue
+        named = re.match(r"# ([\w-]+\.\w+)\n", block.text)
+        if named is not None:
+            Path(named[1]).write_text(block.text)
+        match block.language:
+            case "python":
+                code = compile(block.text, f"{page.name}:{block.line}", "exec")
+                monkeypatch.setattr(sys, "stdin", [])
+                exec(code, namespace)  # noqa: S102 - our own documents
+            case "toml":
+                tomllib.loads(block.text)
+            case "yaml":
+                assert named is not None
+                read_plan_file(named[1])
+            case _:
+                run_script(block.text, folder, monkeypatch)
+
+
+ALL_LINES = [
+    pytest.param(words, id=f"{page.name}:{block.line} {' '.join(words[:2])}")
+    for page in PAGES
+    for block in blocks_of(page)
+    if block.language in ("sh", "bash")
+    for line in command_lines(block.text)
+    if (words := words_of(line)) is not None
+]
+
+
+@pytest.mark.parametrize("words", ALL_LINES)
+def test_commands_of_the_documents_exist(words: list[str]) -> None:
+    command, rest = typer.main.get_command(app), words
+    while hasattr(command, "commands"):
+        assert rest[0] in command.commands, f"there is no command {rest[0]}"
+        command, rest = command.commands[rest[0]], rest[1:]
+    # It parses: all options exist, have values, and nothing is left over.
+    with command.make_context("roboirg", rest):
+        pass
+
+
+def test_most_blocks_say_something_if_they_are_not_run() -> None:
+    found = [block for page in PAGES if page.name not in ELSEWHERE for block in blocks_of(page)]
+    marked = [block for block in found if block.why]
+    assert len(marked) <= MOST_MARKED_SHARE * len(found)
+    assert all(len(str(block.why).split()) > 1 for block in marked)
