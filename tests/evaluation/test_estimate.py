@@ -5,11 +5,21 @@ from pathlib import Path
 import pytest
 from evaluation_fakes import FakePlay, small_plan
 
-from roboirg.evaluation import world_speed
 from roboirg.evaluation.episode_errors import EpisodeError
-from roboirg.evaluation.estimate import ORACLE_STEPS, cell_sizes, estimate, estimate_text
 from roboirg.evaluation.plan_maker import make_plan
-from roboirg.evaluation.world_speed import ASSUMED, WorldSpeed, has_video, measure_world
+from roboirg.evaluation.time_estimate import world_speed
+from roboirg.evaluation.time_estimate.estimate import (
+    ORACLE_STEPS,
+    cell_sizes,
+    estimate,
+    estimate_text,
+)
+from roboirg.evaluation.time_estimate.world_speed import (
+    ASSUMED,
+    WorldSpeed,
+    has_video,
+    measure_world,
+)
 from roboirg.records.store import RecordStore, read_index
 
 

@@ -121,7 +121,7 @@ class Results:
         """
         return get_format(format).draw(make_table(which, self.cells, **options))
 
-    def plot(self, which: str = "averages", *, published: bool = False) -> Picture:
+    def plot(self, which: str = "averages", *, published: bool = False) -> Plot:
         """Return one of the figures: averages, forms, context or failures.
 
         Raises:
@@ -136,7 +136,7 @@ class Results:
         figure = draw_figure(which, content, published=published)
         if figure is None:
             raise InvalidValueError(f"The run has nothing to draw for {which!r}.")
-        return Picture(figure)
+        return Plot(figure)
 
     def compare(self, first: str, second: str) -> str:
         """Return the comparison of two policies on the same episodes, in sentences.
@@ -184,7 +184,7 @@ class Results:
 
 
 @dataclass(frozen=True)
-class Picture:
+class Plot:
     """A figure that notebooks show.
 
     Attributes:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from statistics import fmean
 from typing import NamedTuple
 
-from roboirg.evaluation.world_speed import WorldSpeed
+from roboirg.evaluation.time_estimate.world_speed import WorldSpeed
 from roboirg.records.record import Job
 from roboirg.records.record_codec import RecordIndexEntry
 from roboirg.util.plurals import counted

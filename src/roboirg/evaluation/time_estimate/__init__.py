@@ -1,0 +1,1 @@
+"""How long a run takes, before it starts."""
