@@ -75,7 +75,8 @@ def latex(table: Table) -> str:
 
 def _parts(table: Table) -> list[_Part]:
     widths = [_column_width(table, index) + _GAP_PT for index in range(len(table.columns))]
-    groups = [column.group for column in table.columns]
+    # An average over all columns stands with the last group.
+    groups = [*itertools.accumulate((one.group for one in table.columns), lambda a, b: b or a)]
     needed = max((_width(row.label) for row in table.rows), default=0.0)
     together = max(
         sum(width for width, own in zip(widths, groups, strict=True) if own == group)
