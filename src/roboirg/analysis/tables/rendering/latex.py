@@ -52,7 +52,7 @@ _HUMPS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=_)|\s+")
 """Where a heading may be broken: before a capital, behind an underscore, at blanks."""
 _BREAKS = frozenset("./:_-,=?&")
 """Signs behind which a long name may be broken."""
-_MOST_LETTERS = 9
+_MOST_LETTERS = 14
 """Letters of a name behind which it may be broken in any case."""
 
 
@@ -74,7 +74,10 @@ def latex(table: Table) -> str:
 
 
 def _parts(table: Table) -> list[_Part]:
-    widths = [_column_width(table, index) + _GAP_PT for index in range(len(table.columns))]
+    # Whole numbers, whose sums are exact.
+    widths = [
+        math.ceil(_column_width(table, index) + _GAP_PT) for index in range(len(table.columns))
+    ]
     # An average over all columns stands with the last group.
     groups = [*itertools.accumulate((one.group for one in table.columns), lambda a, b: b or a)]
     needed = max((_width(row.label) for row in table.rows), default=0.0)
