@@ -79,7 +79,9 @@ def _parts(table: Table) -> list[_Part]:
         math.ceil(_column_width(table, index) + _GAP_PT) for index in range(len(table.columns))
     ]
     # An average over all columns stands with the last group.
-    groups = [*itertools.accumulate((one.group for one in table.columns), lambda a, b: b or a)]
+    groups: list[str] = []
+    for column in table.columns:
+        groups.append(column.group or (groups[-1] if groups else ""))
     needed = max((_width(row.label) for row in table.rows), default=0.0)
     together = max(
         sum(width for width, own in zip(widths, groups, strict=True) if own == group)
