@@ -69,6 +69,7 @@ def draw_figure(name: str, content: FigureData, *, published: bool = False) -> F
     check_figure_support()
     import matplotlib as mpl
 
+    # The keys of its own type are those of one version.
     with mpl.rc_context(cast("Any", STYLE)):
         return _drawn(name, content, published=published)
 
