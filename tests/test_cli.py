@@ -56,7 +56,7 @@ class CannedPlayer:
 
 @pytest.fixture
 def canned(monkeypatch: pytest.MonkeyPatch) -> type[CannedPlayer]:
-    monkeypatch.setattr("roboirg.evaluation.rollout.EpisodeRunner", CannedPlayer)
+    monkeypatch.setattr("roboirg.evaluation.runner.EpisodeRunner", CannedPlayer)
     monkeypatch.setattr(CannedPlayer, "result", RolloutResult("success", cause=None, steps=7))
     return CannedPlayer
 
@@ -216,7 +216,7 @@ def test_missing_graphics_are_one_sentence(
     def fail(_self: CannedPlayer, _job: Job) -> None:
         raise RenderDeviceError("No Vulkan device can render; install Mesa.")
 
-    monkeypatch.setattr("roboirg.evaluation.rollout.EpisodeRunner", CannedPlayer)
+    monkeypatch.setattr("roboirg.evaluation.runner.EpisodeRunner", CannedPlayer)
     monkeypatch.setattr(CannedPlayer, "__call__", fail)
     said = roboirg(*RUN, "--workers", "0", "--out", tmp_path)
     assert (said.code, said.err) == (2, "roboirg: No Vulkan device can render; install Mesa.\n")
@@ -437,7 +437,7 @@ def test_a_relative_folder_stays_where_it_is(
     home.mkdir()
     away.mkdir()
     monkeypatch.chdir(home)
-    monkeypatch.setattr("roboirg.evaluation.rollout.EpisodeRunner", Wanderer)
+    monkeypatch.setattr("roboirg.evaluation.runner.EpisodeRunner", Wanderer)
     monkeypatch.setattr(Wanderer, "away", away)
     said = roboirg(*RUN, "--episodes", "2", "--workers", "0", "--out", "mine")
     assert said.code == 0, said.err

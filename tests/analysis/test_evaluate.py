@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import roboirg
+from roboirg.analysis import python_run
 from roboirg.analysis.results import Results
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
-from roboirg.evaluation import python_run
 from roboirg.evaluation.plan import Plan, read_plan
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.policies.local_policies import is_local, spec_of

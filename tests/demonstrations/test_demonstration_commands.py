@@ -29,7 +29,7 @@ def test_a_dry_run_says_how_big_it_gets_and_writes_nothing(roboirg, tmp_path):
     words = ("export", "demonstrations", *FEW, "--dry-run", "--out", tmp_path / "data")
     code, out, err = roboirg(*words)
     assert (code, out) == (0, "")
-    assert "2 trajectories, 4 episodes, about 2,128 frames and 218 MB" in err
+    assert "2 trajectories, 4 episodes, about 2,032 frames and 209 MB" in err
     assert not (tmp_path / "data").exists()
 
 

@@ -116,7 +116,7 @@ def _go_on(log: ActionLog) -> ActionLog:
 
 
 def _invent_end(log: ActionLog) -> ActionLog:
-    return ActionLog(log.space, log.rows, log.requests, log.end_state + 0.01)
+    return ActionLog(log.space, log.rows, log.requests, log.end_state + 0.05)
 
 
 def _lose_actions(lines: Lines, folder: Path, rng: random.Random) -> Lines:

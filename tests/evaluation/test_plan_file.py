@@ -1,11 +1,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.evaluation.plan import write_plan
 from roboirg.evaluation.plan_file import named_plans, read_plan_file
 from roboirg.evaluation.plan_maker import make_plan
 from roboirg.language import STAGE_SETS
@@ -103,9 +105,25 @@ def test_an_unknown_plan_is_told_with_the_nearest() -> None:
         read_plan_file("nowhere/plan.yaml")
 
 
-def test_a_plan_and_its_file_are_the_same_plan(tmp_path: Path) -> None:
-    plan = make_plan(["random"], tasks="BinFill", episodes="0,2", stages="1,5;1-5", tries=3)
-    path = write(tmp_path, yaml.safe_dump(plan.model_dump(mode="json")))
-    options = read_plan_file(path)
-    again = make_plan(options.pop("policies"), **options)
-    assert again == plan
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"tasks": "BinFill", "episodes": "0,2", "stages": "1,5;1-5", "tries": 3},
+        {"episodes": "3,", "policy_seeds": "7,42,0", "retry_on": "none"},
+        {"settings": "contextual", "stages": "1,5", "policy_seeds": "3"},
+        {"demonstration_frames": 4, "observe_every": 2, "devices": "0,1", "video": "failures"},
+        {"demonstration_frames": "none", "meshes": "light", "actions": "waypoint"},
+        {"settings": "direct", "delivery": "turns", "rival": "drawn", "frame": "camera"},
+        {"wordings": "train", "split": "random", "episodes": "5,99999", "max_steps": 60},
+    ],
+)
+def test_a_plan_and_its_files_are_the_same_plan(tmp_path: Path, options: dict[str, Any]) -> None:
+    """Both as YAML and as the plan.json that a run writes."""
+    plan = make_plan(["random", "mine=oracle"], **{"tasks": "PickXtimes", **options})
+    write_plan(plan, tmp_path)
+    typed = write(tmp_path, yaml.safe_dump(plan.model_dump(mode="json")))
+    for path in (typed, str(tmp_path / "plan.json")):
+        found = read_plan_file(path)
+        again = make_plan(found.pop("policies"), **found)
+        assert again == plan
+        assert again.fingerprint == plan.fingerprint

@@ -104,7 +104,8 @@ def test_lerobot_s_batches_have_them_too(table, ours):
             actions = np.stack([next(player) for player in players]).astype(np.float32)
             _, _, terminated, truncated, infos = env.step(actions)
             steps += ~done
-            success |= infos["is_success"] & ~done
+            if "final_info" in infos:  # where LeRobot 0.4 looks; later ones look there first
+                success |= infos["final_info"]["is_success"] & ~done
             done |= terminated | truncated
         found += list(zip(success.tolist(), steps.tolist(), strict=True))
     env.close()

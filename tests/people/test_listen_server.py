@@ -164,6 +164,13 @@ def test_people_get_codes_and_places_until_the_study_is_full(served, study):
     assert {one.consent for one in read_events(study)} != {""}
 
 
+def test_more_people_can_be_let_in_than_were_planned(study):
+    with Serving(study, people=7) as server:
+        people = [Client(server).join() for _ in range(7)]
+        assert Client(server).ask("/join", {"consent": True})[0] == 400
+        assert people[6].read("/state")["total"] == 4  # practice
+
+
 def test_people_who_join_at_once_get_different_places(served, study):
     threads = [threading.Thread(target=Client(served).join) for _ in range(5)]
     for one in threads:
@@ -215,6 +222,12 @@ def test_a_new_server_goes_on_where_the_last_one_was(study):
         again.code = me.code
         assert again.read("/state") == state
         assert server.key == key
+
+
+def test_a_study_without_pictures_is_not_served(study):
+    (study / "questions" / "items.jsonl").unlink()
+    with pytest.raises(InvalidValueError, match="give roboirg listen plan again"):
+        ListeningSession(study)
 
 
 def test_a_torn_line_is_put_aside(study):

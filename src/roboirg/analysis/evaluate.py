@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from roboirg.analysis.python_run import AnyPolicy
     from roboirg.analysis.results import Results
-    from roboirg.evaluation.python_run import AnyPolicy
     from roboirg.evaluation.record_hook import RecordFunction
 
 # Imported inside, so that `import roboirg` stays fast.
@@ -62,8 +62,8 @@ def evaluate(
         InvalidValueError: a number or combination is out of range.
         StoreError: the folder cannot be written, or holds records of other versions.
     """
+    from roboirg.analysis.python_run import play_plan, python_plan
     from roboirg.analysis.results import Results
-    from roboirg.evaluation.python_run import play_plan, python_plan
 
     seeds = str(policy_seeds) if isinstance(policy_seeds, int) else policy_seeds
     plan = python_plan(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 from roboirg.cli.options import (
+    DEFAULT_WORDS,
     AnySplit,
     Distractor,
     Forms,
@@ -18,9 +19,11 @@ from roboirg.cli.options import (
     Settings,
     Stages,
     Tasks,
+    WordChoices,
     Wordings,
     Workers,
     check_output_file,
+    spread,
 )
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.util.plurals import counted
@@ -190,19 +193,15 @@ def card(
 
 
 @language_app.command("shortcuts")
+@spread
 def score_shortcuts(
     split: Annotated[str, typer.Option(help="train, val, test, all or none.")] = "test",
     seeds: Annotated[int, typer.Option(help="Random scenes for each task, beyond the split.")] = 0,
     tasks: Tasks = "all",
     settings: Settings = "all",
     form: Annotated[str, typer.Option(help="implicit or resolved.")] = "implicit",
-    stages: Stages = "1-5",
-    distractor: Distractor = "neutral",
+    words: WordChoices = DEFAULT_WORDS,
     distractors: Annotated[int, typer.Option(help="Number of distractors.")] = 1,
-    frame: Frame = "robot",
-    rival: Rival = "none",
-    reasoning: Reasoning = "plain",
-    wordings: Wordings = None,
     by: Annotated[
         str | None, typer.Option(help="A row for each pattern or task of a setting.")
     ] = None,
@@ -211,8 +210,7 @@ def score_shortcuts(
     ] = False,
 ) -> None:
     """Score rules that see the words only, beside chance: how much needs no understanding."""
-    from roboirg.core.instruction_options import InstructionOptions
-    from roboirg.evaluation.plan_parsing import parse_splits, parse_stages
+    from roboirg.evaluation.plan_parsing import parse_splits
     from roboirg.language import FORMS
     from roboirg.language.shortcuts.learned_floor import check_learning_support
     from roboirg.language.shortcuts.shortcut_scores import GROUPINGS
@@ -221,7 +219,6 @@ def score_shortcuts(
         shortcut_rows,
         shortcut_table,
     )
-    from roboirg.language.wordings.wording_store import open_wordings
 
     splits = () if split.strip().lower() == "none" else parse_splits(split)
     grouping = None if by is None else known_name("row", by, GROUPINGS)
@@ -232,18 +229,10 @@ def score_shortcuts(
                 f"--learned learns from the split {TRAINING_SPLIT}, so --split {split} would test "
                 "it on what it has seen; ask for val or test."
             )
-    identity = open_wordings(wordings)
-    options = InstructionOptions(
-        form=known_name("form", form, FORMS),
-        stages=parse_stages(stages),
-        distractor=distractor,
-        distractors=distractors,
-        frame=frame,
-        wordings=identity,
-        rival=rival,
-        reasoning=reasoning,
+    options = words.instruction_options()._replace(
+        form=known_name("form", form, FORMS), distractors=distractors
     )
-    names, chosen = known_tasks(tasks, identity), known_settings(settings)
+    names, chosen = known_tasks(tasks, options.wordings), known_settings(settings)
     rows = shortcut_rows(names, splits, chosen, options, seeds=seeds, by=grouping, learned=learned)
     if not rows:
         raise InvalidValueError(

@@ -136,11 +136,15 @@ def serve_study(
     host: Host = "127.0.0.1",
     port: Port = 0,
     allow_host: AllowHost = None,
+    people: Annotated[
+        int | None,
+        typer.Option(min=1, help="How many may take part, if not as many as planned."),
+    ] = None,
 ) -> None:
     """Serve the page of a study; every answer is on the disk before the next question comes."""
     from roboirg.evaluation.people.listen_server import ListenServer
 
-    server = ListenServer(folder, host, port, allow_host or ())
+    server = ListenServer(folder, host, port, allow_host or (), people)
     _serve(server, "Press Ctrl-C to stop; all answers are stored.")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 from roboirg.analysis.figures.figure_data import FigureData
 from roboirg.analysis.figures.figure_style import STYLE, save
@@ -69,7 +69,8 @@ def draw_figure(name: str, content: FigureData, *, published: bool = False) -> F
     check_figure_support()
     import matplotlib as mpl
 
-    with mpl.rc_context(STYLE):
+    # The keys of its own type are those of one version.
+    with mpl.rc_context(cast("Any", STYLE)):
         return _drawn(name, content, published=published)
 
 

@@ -32,6 +32,7 @@ class ListenServer(KeyedPageServer):
         host: address to listen at.
         port: 0 for any free port.
         names: further names under which browsers reach this machine.
+        people: how many may take part, if not as many as planned.
 
     Raises:
         InvalidValueError: the folder holds no study, or the port is not available.
@@ -40,10 +41,15 @@ class ListenServer(KeyedPageServer):
     """
 
     def __init__(
-        self, folder: Path, host: str = LOOPBACK, port: int = 0, names: Sequence[str] = ()
+        self,
+        folder: Path,
+        host: str = LOOPBACK,
+        port: int = 0,
+        names: Sequence[str] = (),
+        people: int | None = None,
     ) -> None:
         check_page_support("The page")
-        self.session = ListeningSession(folder)
+        self.session = ListeningSession(folder, people)
         try:
             super().__init__(_ListenHandler, stored_key(folder), host, port, names)
         except RoboIRGError:

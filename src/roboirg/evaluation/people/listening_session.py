@@ -17,7 +17,11 @@ from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.grounding_set.dataset_export import EpisodeName, read_media
-from roboirg.evaluation.grounding_set.grounding_item import GroundingItem, read_items
+from roboirg.evaluation.grounding_set.grounding_item import (
+    ITEMS_FILE,
+    GroundingItem,
+    read_items,
+)
 from roboirg.evaluation.people.answer_form import (
     FormAnswer,
     answer_of,
@@ -57,6 +61,7 @@ class ListeningSession:
 
     Args:
         folder: of the study.
+        people: how many may take part, if not as many as planned.
 
     Attributes:
         study: what is asked.
@@ -66,11 +71,16 @@ class ListeningSession:
         StoreError: another process serves the study, or the answers cannot be read.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, people: int | None = None) -> None:
         self.study = read_listening_study(folder)
+        self._most = self.study.people if people is None else people
         self.questions_folder = folder / QUESTIONS
         if self.study.plan.wordings is not None:
             open_wordings(self.study.plan.wordings, self.study.plan.wordings_identity)
+        if not (self.questions_folder / ITEMS_FILE).exists():
+            raise InvalidValueError(
+                f"The study {str(folder)!r} has no pictures yet; give roboirg listen plan again."
+            )
         self._items: dict[object, GroundingItem] = {
             (one.task, one.split, one.episode, one.options): one
             for one in read_items(self.questions_folder)
@@ -98,7 +108,7 @@ class ListeningSession:
         """
         with self._lock:
             person = len(self._people) + 1
-            if person > self.study.people:
+            if person > self._most:
                 raise InvalidValueError("This study has all the people it needs. Thank you!")
             code = "".join(secrets.choice(_CODE_LETTERS) for _ in range(_CODE_LENGTH))
             consent = short_hash(self.study.consent)

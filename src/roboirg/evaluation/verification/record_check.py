@@ -18,8 +18,9 @@ from roboirg.records.record import Record
 from roboirg.records.record_codec import read_line
 from roboirg.records.store import RECORDS_FILE
 
-TOLERANCE = 1e-3
-"""Largest difference of an end state, in m, rad and s, that other processors are granted."""
+TOLERANCE = 0.02
+"""Largest difference of an end state, in m, rad and s, that other processors are granted: ten times
+the largest on an emulated one. It changes no verdict: events and steps must be equal."""
 
 WORD_FIELDS = ("seed", "difficulty", "mentions", "command", "goal", "metadata")
 """Fields that follow from the job alone."""

@@ -8,6 +8,7 @@ terminal, and by groups of rows.
 from __future__ import annotations
 
 import itertools
+import math
 import re
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -15,15 +16,17 @@ from typing import NamedTuple
 from roboirg.analysis.tables.rendering.column_parts import split_columns
 from roboirg.analysis.tables.table import NOT_APPLICABLE, Column, Entry, Row, Table
 
-TEXT_WIDTH_PT = 340.0
+TEXT_WIDTH_PT = 343.0
 """Width of a table: a little less than the 345 pt of a one-column article in 10 pt."""
 MOST_LINES = 42
 """Lines of rows in one table, in \\footnotesize; with caption and notes they fill a page."""
-_LETTER_PT, _DIGIT_PT, _SIGN_PT, _GAP_PT = 5.0, 4.5, 6.5, 6.0
+_LETTER_PT, _DIGIT_PT, _SIGN_PT, _GAP_PT = 5.2, 4.9, 7.0, 6.0
 """Generous widths in \\footnotesize: of a letter, of a digit in bold, of a sign or arrow, and
 between columns."""
-_NAMES_PT = 130.0
-"""Width of the rows' names, if they need as much; longer ones are folded."""
+_ARROW_PT = {"up": 6.0, "down": 6.0, "same": 10.0}
+_NAMES_PT, _NARROW_NAMES_PT = 130.0, 70.0
+"""Widths of the rows' names, if they need as much, and if the columns of a group need the room;
+longer ones are folded."""
 
 _ARROWS = {"up": r"$\uparrow$", "down": r"$\downarrow$", "same": r"$\rightarrow$"}
 _SPECIAL = {
@@ -49,6 +52,8 @@ _HUMPS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=_)|\s+")
 """Where a heading may be broken: before a capital, behind an underscore, at blanks."""
 _BREAKS = frozenset("./:_-,=?&")
 """Signs behind which a long name may be broken."""
+_MOST_LETTERS = 14
+"""Letters of a name behind which it may be broken in any case."""
 
 
 class _Part(NamedTuple):
@@ -69,11 +74,22 @@ def latex(table: Table) -> str:
 
 
 def _parts(table: Table) -> list[_Part]:
-    names = min(_NAMES_PT, max((_width(row.label) for row in table.rows), default=0.0))
-    names = max(names, _width(table.heads[1]))
-    widths = [_column_width(table, index) + _GAP_PT for index in range(len(table.columns))]
-    groups = [column.group for column in table.columns]
-    columns = split_columns(groups, widths, TEXT_WIDTH_PT - names)
+    # Whole numbers, whose sums are exact.
+    widths = [
+        math.ceil(_column_width(table, index) + _GAP_PT) for index in range(len(table.columns))
+    ]
+    # An average over all columns stands with the last group.
+    groups: list[str] = []
+    for column in table.columns:
+        groups.append(column.group or (groups[-1] if groups else ""))
+    needed = max((_width(row.label) for row in table.rows), default=0.0)
+    together = max(
+        sum(width for width, own in zip(widths, groups, strict=True) if own == group)
+        for group in groups
+    )
+    room = max(_NARROW_NAMES_PT, math.floor(TEXT_WIDTH_PT - _GAP_PT - together))
+    names = max(min(_NAMES_PT, needed, room), _width(table.heads[1]))
+    columns = split_columns(groups, widths, TEXT_WIDTH_PT - names - _GAP_PT)
     blocks = _blocks(table, names)
     return [_Part(indices, rows, names) for indices in columns for rows in blocks]
 
@@ -148,7 +164,8 @@ def _column_width(table: Table, index: int) -> float:
 
 
 def _entry_width(entry: Entry) -> float:
-    return _width(entry.text) + _SIGN_PT * (bool(entry.change) + len(entry.signs))
+    arrow = _ARROW_PT[entry.change] if entry.change else 0.0
+    return _width(entry.text) + arrow + _SIGN_PT * len(entry.signs)
 
 
 def _width(text: str) -> float:
@@ -179,8 +196,13 @@ def _cell(entry: Entry) -> str:
 
 def _foldable(text: str) -> str:
     """Return text that may be broken within long names, too."""
-    signs = (_escaped(sign) + (r"\allowbreak{}" if sign in _BREAKS else "") for sign in text)
-    return "".join(signs)
+    found, run = [], 0
+    for sign in text:
+        run = 0 if sign in _BREAKS or sign == " " else run + 1
+        may_break = sign in _BREAKS or run == _MOST_LETTERS
+        found.append(_escaped(sign) + (r"\allowbreak{}" if may_break else ""))
+        run = 0 if may_break else run
+    return "".join(found)
 
 
 def _escaped(text: str) -> str:
