@@ -1,7 +1,7 @@
 """Where the objects of pictures stand on the table, and how they rank among their kind.
 
-Words such as *the cube second closest to the button* name a rank. A network of this size finds it
-hard to count and compare places, so each object tells its ranks itself.
+Words such as *the cube second closest to the button* name a rank. Each object tells its ranks
+itself, so that a small network need not count and compare places.
 """
 
 from __future__ import annotations
