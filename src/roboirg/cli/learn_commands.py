@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -93,7 +93,7 @@ def learn_study(
     if out.exists() and not out.is_dir():
         raise InvalidValueError(f"{str(out)!r} is a file; --out needs a folder.")
     out.mkdir(parents=True, exist_ok=True)
-    training = {
+    training: dict[str, Any] = {
         "scenes": scenes,
         "detector_epochs": detector_epochs,
         "reader_epochs": reader_epochs,

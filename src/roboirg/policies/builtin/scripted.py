@@ -43,7 +43,7 @@ class ScriptedPolicy(ABC):
         stage: the stage that the last chunk belongs to; None before the first one.
     """
 
-    cameras: ClassVar[tuple[str, ...]] = ()
+    cameras: tuple[str, ...] = ()
     listens: ClassVar[bool] = True
 
     def __init__(self, seed: int = 0) -> None:

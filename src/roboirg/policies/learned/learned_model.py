@@ -15,7 +15,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.policies.learned.detector_net import DetectorNet
 from roboirg.policies.learned.labeled_views import LATER_STEP
 from roboirg.policies.learned.listener_net import ListenerInput, ListenerNet, Vocabulary
-from roboirg.policies.learned.object_relations import SeenScene, TablePlane, nothing_of, relate
+from roboirg.policies.learned.object_relations import ObjectsInView, TablePlane, nothing_of, relate
 from roboirg.policies.planning.goal_schema import goal_schema
 from roboirg.util.short_hash import short_hash
 
@@ -62,7 +62,7 @@ class LearnedModel(NamedTuple):
         """
         return self.understand_seen(task, text, self.see(pictures))
 
-    def understand_seen(self, task: str, text: str, seen: SeenScene) -> Goal:
+    def understand_seen(self, task: str, text: str, seen: ObjectsInView) -> Goal:
         """Return the best goal of a task for an instruction, of a scene that has been seen.
 
         Raises:
@@ -77,7 +77,7 @@ class LearnedModel(NamedTuple):
             (scores,) = self.reader([self.hide(ListenerInput(task, text, seen))])
         return list(goal_schema(task).goals.values())[int(scores.argmax())]
 
-    def see(self, pictures: Sequence[Pixels]) -> SeenScene:
+    def see(self, pictures: Sequence[Pixels]) -> ObjectsInView:
         """Return the objects of pictures."""
         return relate(self.detector.find(pictures), self.plane, self.vocabulary.classes)
 

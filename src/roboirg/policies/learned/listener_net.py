@@ -11,7 +11,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
-from roboirg.policies.learned.object_relations import VIEWS, SeenScene, relation_count
+from roboirg.policies.learned.object_relations import VIEWS, ObjectsInView, relation_count
 from roboirg.policies.planning.goal_schema import goal_schema
 
 WIDTH, HEADS, LAYERS = 96, 4, 3
@@ -51,7 +51,7 @@ class ListenerInput(NamedTuple):
 
     task: str
     text: str
-    seen: SeenScene
+    seen: ObjectsInView
 
 
 def split_words(text: str) -> list[str]:

@@ -31,8 +31,8 @@ from roboirg.policies.learned.listener_net import (
     make_vocabulary,
 )
 from roboirg.policies.learned.object_relations import (
+    ObjectsInView,
     SeenObjects,
-    SeenScene,
     TablePlane,
     fit_plane,
     relate,
@@ -92,7 +92,7 @@ class SeenEpisodes(NamedTuple):
     """
 
     episodes: tuple[Episode, ...]
-    seen: Mapping[str, SeenScene]
+    seen: Mapping[str, ObjectsInView]
     classes: tuple[str, ...]
     detector: DetectorNet
     plane: TablePlane
@@ -207,10 +207,14 @@ def _seen(
     views: Sequence[LabeledView], detector: DetectorNet, classes: Sequence[str]
 ) -> list[SeenObjects]:
     if all(view.picture.size for view in views):
-        return detector.find([view.picture for view in views])
+        found: list[SeenObjects] = detector.find([view.picture for view in views])
+        return found
     numbers = {name: number for number, name in enumerate(classes)}
     return [
-        SeenObjects(np.array([numbers[name] for name in view.names], np.int64), view.centers / SIZE)
+        SeenObjects(
+            np.array([numbers[name] for name in view.names], np.int64),
+            view.centers / np.float32(SIZE),
+        )
         for view in views
     ]
 

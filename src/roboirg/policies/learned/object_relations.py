@@ -54,7 +54,7 @@ class TablePlane(NamedTuple):
         return np.asarray(mapped[:, :2] / mapped[:, 2:], np.float64)
 
 
-class SeenScene(NamedTuple):
+class ObjectsInView(NamedTuple):
     """All objects seen, of one or two pictures.
 
     Attributes:
@@ -91,11 +91,13 @@ def fit_plane(places: NDArray[np.floating], positions: NDArray[np.floating]) -> 
 
 
 def relation_count(classes: int) -> int:
-    """Return the number of ranks that are told, of so many classes of objects."""
+    """Return the number of ranks that are told of `classes` classes of objects."""
     return (_FIXED + VIEWS * classes) * _CODES
 
 
-def relate(views: Sequence[SeenObjects], plane: TablePlane, classes: Sequence[str]) -> SeenScene:
+def relate(
+    views: Sequence[SeenObjects], plane: TablePlane, classes: Sequence[str]
+) -> ObjectsInView:
     """Return the objects of pictures with their ranks among their kind.
 
     Args:
@@ -113,12 +115,13 @@ def relate(views: Sequence[SeenObjects], plane: TablePlane, classes: Sequence[st
         members = np.flatnonzero((where == view) & (names == name))
         for landmark, others, values in _orders(members, kinds, where, positions, plane, classes):
             _note_ranks(relations, landmark, others, values)
-    return SeenScene(kinds, where, positions.astype(np.float32), relations, len(views))
+    return ObjectsInView(kinds, where, positions.astype(np.float32), relations, len(views))
 
 
-def nothing_of(seen: SeenScene) -> SeenScene:
+def nothing_of(seen: ObjectsInView) -> ObjectsInView:
     """Return what is seen of a scene that is not looked at."""
-    return SeenScene(*(one[:0] for one in seen[:4]), looks=0)
+    kinds, views, positions, relations, _ = seen
+    return ObjectsInView(kinds[:0], views[:0], positions[:0], relations[:0], looks=0)
 
 
 def _orders(
