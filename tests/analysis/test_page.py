@@ -317,7 +317,7 @@ def test_rows_open_close_and_follow_the_arrow_keys(page: Any) -> None:
 
 def check_seeking(page: Any) -> None:
     row = first_row(page, policy="listener (privileged)", task=FILMED, setting="explicit")
-    row.locator(".moments button", has_text=": no longer").click()
+    row.locator(".moments button", has_text="lowered").click()
     page.wait_for_function("document.querySelector('video').currentTime > 0")
     film = row.locator("video")
     page.wait_for_function("!document.querySelector('video').seeking")

@@ -131,7 +131,7 @@ def test_without_pyarrow_one_sentence_says_what_to_do(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
     monkeypatch.setitem(__import__("sys").modules, "pyarrow.parquet", None)
     export.check_export_support("jsonl")
-    with pytest.raises(MissingDependencyError, match=r"roboirgbench\[export\]"):
+    with pytest.raises(MissingDependencyError, match=r"\[export\]"):
         export.check_export_support("parquet")
 
 

@@ -99,5 +99,5 @@ def test_a_folder_that_cannot_be_is_one_sentence(tmp_path):
 
 def test_without_matplotlib_one_sentence_says_what_to_install(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "matplotlib", None)
-    with pytest.raises(MissingDependencyError, match=r"roboirgbench\[report\]"):
+    with pytest.raises(MissingDependencyError, match=r"\[report\]"):
         figure_files.check_figure_support()

@@ -190,7 +190,9 @@ def test_tokenizers_that_cannot_be_read(tmp_path, monkeypatch):
     for name, library in (("other.model", "sentencepiece"), ("a.json", "tokenizers")):
         (tmp_path / name).write_text("{}")
         monkeypatch.setitem(sys.modules, library, None)
-        with pytest.raises(MissingDependencyError, match=rf"needs {library}; install .*tokens"):
+        with pytest.raises(
+            MissingDependencyError, match=rf"needs {library}, which is not installed .*tokens"
+        ):
             read_tokenizer(str(tmp_path / name))
 
 

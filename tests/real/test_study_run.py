@@ -112,15 +112,16 @@ def test_scored_in_a_browser_it_is_the_table_that_the_judge_would_have_given(stu
     samples = gather([("run", read_results(study))])
     table = make_table("real", samples, published=True)
     marked = [row for row in table.rows if row.source == "ours"]
-    assert all(row.name.endswith(" (privileged)") for row in marked)
-    ours = {(row.group, row.name.removesuffix(" (privileged)")): row for row in marked}
+    marks = " (privileged) (twin)"
+    assert all(row.name.endswith(marks) for row in marked)
+    ours = {(row.group, row.name.removesuffix(marks)): row for row in marked}
     assert set(ours) == {(one, who) for one in SETTINGS for who in ("listener", "forgetful")}
     for setting in SETTINGS:
         assert [float(entry.percent) for entry in ours[setting, "listener"].entries] == [100.0] * 3
     assert sum(row.source == "published" for row in table.rows) == 10
     # And the figure has the same numbers.
     bars = {one.name: one.bars for one in bar_series(table)}
-    assert bars["listener (privileged)"]["PutInBox", "reasoning"].percent == 100.0
+    assert bars["listener" + marks]["PutInBox", "reasoning"].percent == 100.0
     assert bars["pi0.5"]["PickByCount", "explicit"].percent == 50.0
     low, high = bars["pi0.5"]["PickByCount", "explicit"][1:]
     assert (low, high) == pytest.approx((23.7, 76.3), abs=0.1)
