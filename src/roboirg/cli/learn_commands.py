@@ -78,7 +78,7 @@ def learn_study(
     seed: _Seed = 0,
     workers: Workers = None,
 ) -> None:
-    """Train listeners on all settings, on explicit words only, without video …, and compare."""
+    """Train listeners that get or lack settings, video, pictures or words, and compare them."""
     from roboirg.evaluation.executors.executor import core_count
     from roboirg.policies.learned.learned_listener import check_learn_support
 
