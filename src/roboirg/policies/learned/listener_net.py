@@ -159,7 +159,8 @@ def _waves(places: Tensor) -> Tensor:
 
 def _padded(rows: Sequence[Sequence[int]]) -> Tensor:
     longest = max(map(len, rows))
-    return torch.tensor([[*row, *[PADDING] * (longest - len(row))] for row in rows])
+    padded = [[*row, *[PADDING] * (longest - len(row))] for row in rows]
+    return torch.tensor(padded, dtype=torch.long)  # also where nothing is said
 
 
 def _marked(parts: Iterable[str], numbers: dict[str, int]) -> Tensor:
