@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import json
 import os
@@ -87,36 +88,32 @@ class AppendFile:
         folder: of the file; created if it does not exist. It has one writer at a time.
         name: of the file.
         torn_name: of the file that gets unfinished lines.
+        read: called under the lock with the lines that are there, all of which it parses.
 
     Raises:
-        OSError: the folder cannot be written.
-        StoreError: another process writes to the folder.
+        StoreError: another process writes to the folder, it cannot be written, or `read` raises it.
     """
 
-    def __init__(self, folder: Path, name: str, torn_name: str) -> None:
+    def __init__(
+        self, folder: Path, name: str, torn_name: str, read: Callable[[LineFile], None]
+    ) -> None:
         self.path = folder / name
         self._folder, self._torn_path = folder, folder / torn_name
-        self._file: int | None = None
-        folder.mkdir(parents=True, exist_ok=True)
-        self._lock = os.open(folder / LOCK_FILE, os.O_RDWR | os.O_CREAT, 0o644)
-        try:
-            self._take_lock()
-        except BaseException:
-            os.close(self._lock)
-            raise
-
-    def open(self, torn: bytes) -> None:
-        """Open the file, after it was read.
-
-        Args:
-            torn: bytes of an unfinished last line, to be moved aside.
-
-        Raises:
-            OSError: the file cannot be written.
-        """
-        self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
-        self._repair_tail(self._file, torn)
-        sync_to_disk(self._folder)
+        with contextlib.ExitStack() as undo:
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+                self._lock = os.open(folder / LOCK_FILE, os.O_RDWR | os.O_CREAT, 0o644)
+                undo.callback(os.close, self._lock)
+                self._take_lock()
+                lines = LineFile(self.path)
+                read(lines)
+                self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+                undo.callback(os.close, self._file)
+                self._repair_tail(lines.torn)
+                sync_to_disk(folder)
+            except OSError as error:
+                raise StoreError(f"Cannot write to {folder}: {error.strerror}.") from error
+            undo.pop_all()
 
     def extend(self, lines: Iterable[bytes]) -> None:
         """Write lines, given without newlines; when this returns, all are on disk.
@@ -124,8 +121,6 @@ class AppendFile:
         Raises:
             StoreError: they cannot be written, or `lines` raises it; the file is unchanged.
         """
-        if self._file is None:
-            raise RuntimeError(f"{self.path} is not open.")
         size = os.fstat(self._file).st_size
         try:
             for line in lines:
@@ -139,8 +134,7 @@ class AppendFile:
 
     def close(self) -> None:
         """Close the file and release the lock."""
-        if self._file is not None:
-            os.close(self._file)
+        os.close(self._file)
         os.close(self._lock)
 
     def _take_lock(self) -> None:
@@ -155,9 +149,9 @@ class AppendFile:
         os.ftruncate(self._lock, 0)
         os.pwrite(self._lock, f"{os.getpid()}\n".encode(), 0)
 
-    def _repair_tail(self, file: int, torn: bytes) -> None:
+    def _repair_tail(self, torn: bytes) -> None:
         """Move a torn line aside, so that the file is empty or ends in a newline."""
-        size = os.fstat(file).st_size
+        file, size = self._file, os.fstat(self._file).st_size
         if torn:
             aside = os.open(self._torn_path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
             try:

@@ -5,7 +5,6 @@ Nothing in the file tells who a person is: people have numbers, and a code with 
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Self
@@ -108,16 +107,13 @@ class AnswerLog:
     """
 
     def __init__(self, folder: Path) -> None:
-        with contextlib.ExitStack() as undo:
-            try:
-                self._file = AppendFile(folder, ANSWERS_FILE, TORN_ANSWERS_FILE)
-                undo.callback(self._file.close)
-                lines = LineFile(self._file.path)
-                self.events: list[ListenerEvent] = list(lines.parse(_read_event))
-                self._file.open(lines.torn)
-            except OSError as error:
-                raise StoreError(f"Cannot write to {folder}: {error.strerror}.") from error
-            undo.pop_all()
+        self.events: list[ListenerEvent] = []
+        self._file = AppendFile(
+            folder,
+            ANSWERS_FILE,
+            TORN_ANSWERS_FILE,
+            lambda lines: self.events.extend(lines.parse(_read_event)),
+        )
 
     def append(self, event: ListenerEvent) -> None:
         """Write an event; when this returns, it is on disk.

@@ -11,7 +11,6 @@ that lines are in the order of the plan (they are in the order in which episodes
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Generic, NamedTuple, Self, TypeVar
@@ -91,20 +90,9 @@ class RecordStore:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.path = folder / RECORDS_FILE
-        with contextlib.ExitStack() as undo:
-            try:
-                self._file = AppendFile(folder, RECORDS_FILE, TORN_FILE)
-                undo.callback(self._file.close)
-                lines = LineFile(self.path)
-                self.stored: dict[RecordKey, RecordIndexEntry] = {
-                    identity_key(one): one for one in lines.parse(read_index_entry)
-                }
-                self.torn, self.damaged = lines.torn, tuple(lines.damaged)
-                self._told = told_versions(self.stored.values())
-                self._file.open(self.torn)
-            except OSError as error:
-                raise StoreError(f"Cannot write to {folder}: {error.strerror}.") from error
-            undo.pop_all()
+        self.stored: dict[RecordKey, RecordIndexEntry] = {}
+        self._told: dict[str, str | None] = {}
+        self._file = AppendFile(folder, RECORDS_FILE, TORN_FILE, self._read)
 
     def append(self, record: Record) -> None:
         """Write one record; when this returns, it is on disk.
@@ -136,6 +124,11 @@ class RecordStore:
         self._file.extend(checked())
         self.stored |= added
         self._told = told
+
+    def _read(self, lines: LineFile) -> None:
+        self.stored = {identity_key(one): one for one in lines.parse(read_index_entry)}
+        self.torn, self.damaged = lines.torn, tuple(lines.damaged)
+        self._told = told_versions(self.stored.values())
 
     def close(self) -> None:
         """Close the file and release the lock."""
