@@ -45,7 +45,6 @@ from roboirg.cli.run_commands import INTERRUPTED, USAGE_ERROR, Out
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.printable import printable
 from roboirg.core.version import __version__
-from roboirg.util.freed_memory import keep_freed_memory
 from roboirg.util.plurals import counted
 
 # Heavy modules are imported inside the commands, so that --help is fast.
@@ -291,7 +290,6 @@ def instruct(
 
 def main() -> None:
     """Run the command; errors are one sentence on stderr, never a traceback."""
-    keep_freed_memory()
     try:
         code = app(prog_name="roboirg", standalone_mode=False)
     except RoboIRGError as error:

@@ -18,7 +18,9 @@ def bench(
     from roboirg.perf.bench_runner import results_table, run_measures, write_results
     from roboirg.perf.measures import measures
     from roboirg.util.console_width import widen
+    from roboirg.util.freed_memory import keep_freed_memory
 
+    keep_freed_memory()
     figures = run_measures(measures(), rounds, lambda words: typer.echo(words, err=True))
     console, table = Console(), results_table(figures)
     widen(console, table)

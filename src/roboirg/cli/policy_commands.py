@@ -79,7 +79,9 @@ def serve(
     """Serve a policy to this benchmark and other clients of a protocol."""
     from roboirg.policies.serving.policy_server import open_server
     from roboirg.policies.serving.server_options import ServerOptions
+    from roboirg.util.freed_memory import keep_freed_memory
 
+    keep_freed_memory()
     add_working_directory()
     key = None if api_key_env is None else os.environ.get(api_key_env)
     if api_key_env is not None and not key:

@@ -151,7 +151,9 @@ def play(
     from roboirg.evaluation.progress import ConsoleReporter
     from roboirg.evaluation.record_hook import CommandHook, HookedReporter
     from roboirg.evaluation.runner import Terminated, episode_runner, run_plan
+    from roboirg.util.freed_memory import keep_freed_memory
 
+    keep_freed_memory()
     play_job = episode_runner(plan, out)
     try:
         with ConsoleReporter(Console()) as shown, contextlib.ExitStack() as stack:
