@@ -11,13 +11,10 @@ import typer
 from roboirg.cli.options import (
     DEFAULT_WORDS,
     AnySplit,
-    Distractor,
     Forms,
-    Frame,
     Reasoning,
     Rival,
     Settings,
-    Stages,
     Tasks,
     WordChoices,
     Wordings,
@@ -55,6 +52,7 @@ def _export() -> None:
 
 
 @export_app.command("instructions")
+@spread
 def export_instructions(
     out: Annotated[Path, typer.Option(help="File to write.")],
     format: Annotated[str, typer.Option(help="File format: jsonl or parquet.")] = "jsonl",  # noqa: A002
@@ -62,42 +60,23 @@ def export_instructions(
     tasks: Tasks = "all",
     settings: Settings = "all",
     forms: Forms = "implicit,resolved",
-    stages: Stages = "1-5",
-    distractor: Distractor = "neutral",
-    frame: Frame = "robot",
-    rival: Rival = "none",
-    reasoning: Reasoning = "plain",
-    wordings: Wordings = None,
+    words: WordChoices = DEFAULT_WORDS,
 ) -> None:
     """Export a row per episode, setting and form (columns: see docs/language.md)."""
-    from roboirg.core.instruction_options import InstructionOptions
     from roboirg.episodes.splits import split_episodes
-    from roboirg.evaluation.plan_parsing import parse_names, parse_splits, parse_stages
+    from roboirg.evaluation.plan_parsing import parse_names, parse_splits
     from roboirg.language import FORMS
     from roboirg.language.export import EXPORT_FORMATS, check_export_support, row, write_rows
     from roboirg.language.variants import instructions
-    from roboirg.language.wordings.wording_store import open_wordings
 
     kind = known_name("format", format, EXPORT_FORMATS)
     check_export_support(kind)
     check_output_file(out)
-    identity = open_wordings(wordings)
-    names, chosen = known_tasks(tasks, identity), known_settings(settings)
+    options = words.instruction_options()
+    names, chosen = known_tasks(tasks, options.wordings), known_settings(settings)
     spoken = [known_name("form", one, FORMS) for one in parse_names("form", forms)]
     episodes = list(split_episodes(names, parse_splits(split)))
-    said = instructions(
-        episodes,
-        chosen,
-        spoken,
-        InstructionOptions(
-            stages=parse_stages(stages),
-            distractor=distractor,
-            frame=frame,
-            wordings=identity,
-            rival=rival,
-            reasoning=reasoning,
-        ),
-    )
+    said = instructions(episodes, chosen, spoken, options)
     rows = [row(episode, instruction) for episode, instruction in said]
     if not rows:
         raise InvalidValueError(f"None of these tasks has the setting {', '.join(chosen)}.")

@@ -132,16 +132,14 @@ def _plan(tasks: str, settings: str, words: str, without: str) -> TrainingPlan:
     from roboirg.cli.language_commands import known_name, known_settings, known_tasks
     from roboirg.core.word_pools import POOLS
     from roboirg.policies.learned.learned_model import WITHOUTS
-    from roboirg.policies.learned.listener_training import TrainingPlan, check_settings
+    from roboirg.policies.learned.listener_training import TrainingPlan
 
-    plan = TrainingPlan(
+    return TrainingPlan(
         known_tasks(tasks),
         known_settings(settings),
         words=known_name("pool of words", words, POOLS),
         without=known_name("variant", without, WITHOUTS),
     )
-    check_settings(plan)
-    return plan
 
 
 def _print_tenths() -> Callable[[str, int, int], None]:

@@ -10,16 +10,13 @@ import typer
 
 from roboirg.cli import run_commands
 from roboirg.cli.options import (
-    Distractor,
-    Frame,
-    Reasoning,
-    Rival,
+    DEFAULT_WORDS,
     Settings,
     Split,
-    Stages,
     Tasks,
-    Wordings,
+    WordChoices,
     Workers,
+    spread,
 )
 from roboirg.core.errors import InvalidValueError
 from roboirg.util.plurals import counted
@@ -28,9 +25,6 @@ if TYPE_CHECKING:
     from roboirg.util.keyed_pages import KeyedPageServer
 
 # Heavy modules are imported inside the commands, so that --help is fast.
-
-MINIMUM_WIDTH = 120
-"""Columns of output that is not a terminal."""
 
 listen_app = typer.Typer(
     no_args_is_help=True, help="Ask people what is meant; the oracle's hands play their answers."
@@ -49,6 +43,7 @@ Delivery = Annotated[
 
 
 @listen_app.command()
+@spread
 def plan(
     folder: Study,
     people: Annotated[
@@ -62,12 +57,7 @@ def plan(
         str, typer.Option(help="4 for the first four, or a list such as 0,3,5-9.")
     ] = "4",
     delivery: Delivery = "prompt",
-    stages: Stages = "1-5",
-    distractor: Distractor = "neutral",
-    frame: Frame = "robot",
-    rival: Rival = "none",
-    reasoning: Reasoning = "plain",
-    wordings: Wordings = None,
+    words: WordChoices = DEFAULT_WORDS,
     practice: Annotated[int, typer.Option(help="Practice questions for each task.")] = 1,
     checks: Annotated[int, typer.Option(help="Attention checks for each person.")] = 2,
     seed: Annotated[int, typer.Option(help="Seed of the order of the episodes.")] = 0,
@@ -101,12 +91,7 @@ def plan(
         split=split,
         episodes=episodes,
         delivery=delivery,
-        stages=stages,
-        distractor=distractor,
-        frame=frame,
-        rival=rival,
-        reasoning=reasoning,
-        wordings=wordings,
+        **words._asdict(),
     )
     study = ListeningStudy(
         plan=made.model_copy(update={"policies": (PEOPLE,)}),
@@ -174,14 +159,14 @@ def _print_listeners(folder: Path) -> None:
     from roboirg.analysis.tables.rendering.terminal import renderable
     from roboirg.evaluation.people.listening_study import read_listening_study
     from roboirg.records.listener_answers import read_events
+    from roboirg.util.console_width import widen
 
     read_listening_study(folder)
     events = read_events(folder)
     if not events:
         raise InvalidValueError(f"No question of {str(folder)!r} was answered yet.")
     console = Console()
-    if not console.is_terminal:
-        console.width = max(console.width, MINIMUM_WIDTH)
+    widen(console)
     for table in (setting_table(events), person_table(events)):
         console.print(renderable(table, console))
 
@@ -208,6 +193,7 @@ def _read_text(path: Path) -> str:
         raise InvalidValueError(f"The text {str(path)!r} cannot be read ({error}).") from error
 
 
+@spread
 def drive(
     task: Annotated[str, typer.Argument(help="Name of the task.")],
     episode: Annotated[int, typer.Argument(help="Position in the split, from 0.")],
@@ -215,12 +201,7 @@ def drive(
     form: Annotated[str, typer.Option(help="implicit or resolved.")] = "implicit",
     split: Split = "test",
     delivery: Delivery = "prompt",
-    stages: Stages = "1-5",
-    distractor: Distractor = "neutral",
-    frame: Frame = "robot",
-    rival: Rival = "none",
-    reasoning: Reasoning = "plain",
-    wordings: Wordings = None,
+    words: WordChoices = DEFAULT_WORDS,
     max_steps: Annotated[int, typer.Option(help="Limit in control steps, 20 per second.")] = 1300,
     out: run_commands.Out = "runs/driven",
     name: Annotated[str, typer.Option(help="Name of the policy in the records.")] = "person",
@@ -243,12 +224,7 @@ def drive(
         split=split,
         episodes=f"{episode},",
         delivery=delivery,
-        stages=stages,
-        distractor=distractor,
-        frame=frame,
-        rival=rival,
-        reasoning=reasoning,
-        wordings=wordings,
+        **words._asdict(),
         max_steps=max_steps,
     )
     check_simulator()

@@ -31,6 +31,15 @@ def all_variants() -> tuple[Variant, ...]:
     )
 
 
+def settings_with_rivals() -> tuple[str, ...]:
+    """Return the names of the settings whose instructions can have a rival."""
+    return tuple(
+        name
+        for name, setting in all_settings().items()
+        if any("rival" in changes for changes in setting.variants)
+    )
+
+
 def expressible_options(
     episode: Episode, wordings: str | None = None
 ) -> Iterator[InstructionOptions]:

@@ -26,24 +26,16 @@ from roboirg.analysis.stats.run_summary import ALL, SummaryRow, summarize
 from roboirg.analysis.tables.rendering.markdown import markdown
 from roboirg.analysis.tables.table import NOT_APPLICABLE, Column, Entry, Row, Table
 from roboirg.core.episode import ENVIRONMENT_VERSION
-from roboirg.core.instruction_options import DEFAULT_RIVAL, InstructionOptions
-from roboirg.evaluation.learning.listener_study import TEST, VARIANTS, StudyAnswer
+from roboirg.core.instruction_options import DEFAULT_RIVAL, RIVALS, InstructionOptions
+from roboirg.evaluation.learning.listener_study import HELD_OUT, TEST, VARIANTS, StudyAnswer
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.language.settings import all_settings
 
 FIGURE = "study"
-LISTENERS = {
-    "all": "all settings",
-    "explicit": "explicit only",
-    "rivals": "all settings, rivals too",
-    "no-video": "without video",
-    "no-pictures": "without pictures",
-    "no-words": "without words",
-}
 _SECTIONS = (
-    ("Held-out words", {"wordings": "test", "rival": DEFAULT_RIVAL}),
+    ("Held-out words", {"wordings": HELD_OUT, "rival": DEFAULT_RIVAL}),
     ("Words of the training pool", {"wordings": "train", "rival": DEFAULT_RIVAL}),
-    ("Held-out words with rivals", {"wordings": "test", "rival": "drawn"}),
+    ("Held-out words with rivals", {"wordings": HELD_OUT, "rival": RIVALS[-1]}),
 )
 _NOTE = (
     "Right answers in percent, and the 95 % interval: means over tasks, implicit form, test split."
@@ -55,7 +47,7 @@ def study_cells(answers: Iterable[StudyAnswer]) -> Cells:
     verdicts: dict[CellKey, dict[Trial, bool]] = defaultdict(dict)
     versions = Versions("study", LANGUAGE_VERSION, ENVIRONMENT_VERSION)
     for one in answers:
-        run = PolicyRun(LISTENERS[one.listener], EvalConditions(TEST), versions)
+        run = PolicyRun(one.listener, EvalConditions(TEST), versions)
         verdicts[CellKey(run, one.task, one.options)][Trial(one.episode, 0)] = one.is_right
     return {key: CellResults(own) for key, own in verdicts.items()}
 
@@ -116,7 +108,7 @@ def _cells_of(cells: Cells, wanted: Mapping[str, str]) -> Cells:
 
 def _rows(found: Mapping[tuple[str, str], SummaryRow], settings: list[str]) -> Iterator[Row]:
     for variant in VARIANTS:
-        name = LISTENERS[variant.name]
+        name = variant.title
         own = [found.get((name, setting)) for setting in settings]
         yield Row(name, "right", "ours", tuple(Entry(word=_percent(one)) for one in own))
         yield Row(name, "interval", "ours", tuple(Entry(word=_interval(one)) for one in own))

@@ -7,15 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from roboirg.core.episode import Episode, Split
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.instruction_options import RIVALS, InstructionOptions
 from roboirg.core.observations import FRONT
-from roboirg.core.word_pools import POOLS
+from roboirg.core.word_pools import POOLS, PoolName
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.episodes.splits import SIZES, get_episode
 from roboirg.language import FORMS
 from roboirg.language.settings import all_settings
-from roboirg.language.variants import instructions
-from roboirg.policies.learned.learned_listener import FRAMES_EVERY
+from roboirg.language.variants import instructions, settings_with_rivals
+from roboirg.policies.learned.labeled_views import LATER_STEP
 from roboirg.util.parallel_map import parallel_map
 
 if TYPE_CHECKING:
@@ -23,28 +23,30 @@ if TYPE_CHECKING:
     from roboirg.policies.learned.listener_training import Progress, TrainingPlan
 
 TEST: Split = "test"
-RIVAL = "drawn"
+HELD_OUT: PoolName = "test"
 
 
 class StudyVariant(NamedTuple):
     """One listener of the study.
 
     Attributes:
-        name: of its file and its row.
+        name: of its file.
+        title: of its row.
         changes: of the common plan.
     """
 
     name: str
+    title: str
     changes: Mapping[str, Any]
 
 
 VARIANTS = (
-    StudyVariant("all", {}),
-    StudyVariant("explicit", {"settings": ("explicit",)}),
-    StudyVariant("rivals", {"rivals": True}),
-    StudyVariant("no-video", {"without": "video"}),
-    StudyVariant("no-pictures", {"without": "pictures"}),
-    StudyVariant("no-words", {"without": "words"}),
+    StudyVariant("all", "all settings", {}),
+    StudyVariant("explicit", "explicit only", {"settings": ("explicit",)}),
+    StudyVariant("rivals", "all settings, rivals too", {"rivals": True}),
+    StudyVariant("no-video", "without video", {"without": "video"}),
+    StudyVariant("no-pictures", "without pictures", {"without": "pictures"}),
+    StudyVariant("no-words", "without words", {"without": "words"}),
 )
 """Trained on all settings; on explicit words only; on rivals too; without parts of the input."""
 
@@ -53,7 +55,7 @@ class StudyAnswer(NamedTuple):
     """What one listener made of one instruction of the test split.
 
     Attributes:
-        listener: name of the variant.
+        listener: title of the variant.
         task: of the episode.
         episode: its place in the split.
         options: of the instruction; `wordings` is the pool of words.
@@ -92,7 +94,7 @@ def run_study(
 
         model = teach(scenes, plan._replace(**variant.changes), follow)
         save_model(model, folder / f"{variant.name}.pt")
-        yield from _answers(model, variant.name, shown)
+        yield from _answers(model, variant.title, shown)
 
 
 def _show_all(
@@ -111,18 +113,19 @@ def pictures_of(episode: Episode) -> list[Pixels]:
     """Return the pictures that a learned listener looks at when it plays an episode."""
     from roboirg.policies.learned.learned_model import pictures_to_see
 
-    env = RoboIRGEnv(episode, cameras=(FRONT,), demonstration_frames=FRAMES_EVERY)
+    # Only the first frame and the one at that step are looked at.
+    env = RoboIRGEnv(episode, cameras=(FRONT,), demonstration_frames=LATER_STEP)
     try:
         observation, info = env.reset()
         video = info["demonstration"]
         frames = video["front_rgb"] if video.length else ()
-        return pictures_to_see(observation["front_rgb"], frames, FRAMES_EVERY)
+        return pictures_to_see(observation["front_rgb"], frames, LATER_STEP)
     finally:
         env.close()
 
 
 def _answers(
-    model: LearnedModel, name: str, shown: Sequence[tuple[Episode, Sequence[Pixels]]]
+    model: LearnedModel, title: str, shown: Sequence[tuple[Episode, Sequence[Pixels]]]
 ) -> Iterator[StudyAnswer]:
     understand = _reader_of(model, shown)
     episodes = [episode for episode, _ in shown]
@@ -130,16 +133,16 @@ def _answers(
         told = instructions(episodes, (options.setting,), FORMS[:1], options)
         for episode, instruction in told:
             is_right = understand(episode, instruction.text)
-            yield StudyAnswer(name, episode.task, episode.index, options, is_right)
+            yield StudyAnswer(title, episode.task, episode.index, options, is_right)
 
 
 def told_options() -> Iterator[InstructionOptions]:
     """Yield how the test split is told: in words of both pools, and with rivals."""
-    for setting, details in all_settings().items():
+    for setting in all_settings():
         for pool in POOLS:
             yield InstructionOptions(setting, wordings=pool)
-        if any(other.get("rival") == RIVAL for other in details.variants):
-            yield InstructionOptions(setting, wordings=TEST, rival=RIVAL)
+        if setting in settings_with_rivals():
+            yield InstructionOptions(setting, wordings=HELD_OUT, rival=RIVALS[-1])
 
 
 def _reader_of(

@@ -14,13 +14,13 @@ from torch.nn import functional
 
 from roboirg.core.episode import Episode, Split
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.instruction_options import RIVALS, InstructionOptions
 from roboirg.core.word_pools import PoolName
 from roboirg.episodes.splits import SIZES, get_episode
 from roboirg.language import FORMS, LANGUAGE_VERSION
 from roboirg.language.instruction import Instruction
-from roboirg.language.settings import all_settings, settings_of
-from roboirg.language.variants import instructions
+from roboirg.language.settings import settings_of
+from roboirg.language.variants import instructions, settings_with_rivals
 from roboirg.policies.learned.detector_net import SIZE, DetectorNet, detector_loss
 from roboirg.policies.learned.labeled_views import LabeledView, look
 from roboirg.policies.learned.learned_model import LearnedModel, Without, hide
@@ -47,7 +47,6 @@ DETECTOR_RATE, READER_RATE = 1e-2, 1e-3
 FORGOTTEN_WORDS = 0.05
 """Share of the words that are unknown in training, so that new ones do no harm."""
 
-RIVAL = "drawn"
 _NO_PICTURE = np.zeros((0, 0, 3), np.uint8)
 
 Progress = Callable[[str, int, int], None]
@@ -186,12 +185,8 @@ def _instructions(
     options = InstructionOptions(wordings=plan.words)
     yield from instructions(scenes.episodes, plan.settings, FORMS[:1], options)
     if plan.rivals:
-        with_rivals = [
-            name
-            for name in plan.settings
-            if any(other.get("rival") == RIVAL for other in all_settings()[name].variants)
-        ]
-        options = options._replace(rival=RIVAL)
+        with_rivals = [name for name in plan.settings if name in settings_with_rivals()]
+        options = options._replace(rival=RIVALS[-1])
         yield from instructions(scenes.episodes, with_rivals, FORMS[:1], options)
 
 
@@ -289,9 +284,9 @@ def _batch_count(lessons: Sequence[object]) -> int:
 
 
 def _batches(lessons: Sequence[One], rng: random.Random) -> Iterator[list[One]]:
-    order = rng.sample(range(len(lessons)), len(lessons))
-    for start in range(0, len(order), BATCH):
-        yield [lessons[place] for place in order[start : start + BATCH]]
+    mixed = rng.sample(lessons, len(lessons))
+    for start in range(0, len(mixed), BATCH):
+        yield mixed[start : start + BATCH]
 
 
 def _even_batches(lessons: Sequence[_Lesson], rng: random.Random) -> Iterator[list[_Lesson]]:
