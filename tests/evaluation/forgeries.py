@@ -106,7 +106,7 @@ def _cut(log: ActionLog) -> ActionLog:
 
 def _nudge(log: ActionLog) -> ActionLog:
     rows = log.rows.copy()
-    rows[len(rows) // 2 :] += 0.05  # less, or for a moment, may be within the tolerance
+    rows[len(rows) // 2 :] += 0.001
     return ActionLog(log.space, rows, log.requests, log.end_state)
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import random
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from forgeries import FORGERIES, forge
+from forgeries import FORGERIES, Forgery, Lines, forge
 from typer.testing import CliRunner
 
 from roboirg.cli.app import app
@@ -19,7 +20,7 @@ from roboirg.evaluation.rollout import EpisodeRunner
 from roboirg.evaluation.runner import run_plan
 from roboirg.evaluation.verification.record_check import ReplayVerdict
 from roboirg.evaluation.verification.run_verification import verify_run
-from roboirg.records.action_log import read_actions
+from roboirg.records.action_log import read_actions, write_actions
 from roboirg.records.merging import merge_runs
 from roboirg.records.store import read_records
 
@@ -80,6 +81,27 @@ def test_a_forged_run_does_not(name: str, honest: Path, tmp_path: Path) -> None:
     shutil.copytree(honest, forged)
     assert forge(forged, FORGERIES[name], random.Random(name))
     assert not verify_run(forged).holds
+
+
+def test_only_other_processors_may_end_a_little_elsewhere(honest: Path, tmp_path: Path) -> None:
+    def shift(processor: str | None) -> Forgery:
+        def forgery(lines: Lines, folder: Path, rng: random.Random) -> Lines:
+            one = rng.choice(lines)
+            log = read_actions(folder, one["action_log"])
+            moved = replace(log, end_state=log.end_state + 0.001)
+            one.update(action_log=write_actions(moved, folder), end_state="0" * 64)
+            one.update({} if processor is None else {"processor": processor})
+            return lines
+
+        return forgery
+
+    for processor, holds in ((None, False), ("x86_64 OtherMaker 1", True)):
+        folder = tmp_path / str(processor)
+        shutil.copytree(honest, folder)
+        assert forge(folder, shift(processor), random.Random(0))
+        found = verify_run(folder)
+        assert found.holds is holds
+        assert found.verdicts[ReplayVerdict.TOLERANT] == holds
 
 
 def test_errors_of_policies_are_played_as_far_as_they_came(tmp_path: Path) -> None:

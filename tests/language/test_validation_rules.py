@@ -27,7 +27,7 @@ from roboirg.language.validation.episode_checks import (
 )
 from roboirg.language.validation.validation_tables import validation_tables
 from roboirg.tasks import every_task, get_task
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 EPISODE = get_episode("PickXtimes", "test", 3)
 

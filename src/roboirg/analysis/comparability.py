@@ -15,7 +15,7 @@ from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.language.settings import EXPLICIT
 from roboirg.language.wordings.worded_command import ROBOMME_NAME
 from roboirg.records.record import DEFAULT_MESHES
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 Differences = tuple[str, ...]
 """What differs from the published rate; empty if the two can be compared."""

@@ -45,7 +45,7 @@ from roboirg.cli.run_commands import INTERRUPTED, USAGE_ERROR, Out
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.printable import printable
 from roboirg.core.version import __version__
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 # Heavy modules are imported inside the commands, so that --help is fast.
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from roboirg.cli.options import AnySplit, Tasks, check_output_file
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 
 def export_episodes(

@@ -23,7 +23,7 @@ from roboirg.cli.options import (
     spread,
 )
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 if TYPE_CHECKING:
     from rich.console import Console

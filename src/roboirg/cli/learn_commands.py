@@ -10,7 +10,7 @@ import typer
 
 from roboirg.cli.options import Settings, Tasks, Workers, check_output_file
 from roboirg.core.errors import InvalidValueError
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 if TYPE_CHECKING:
     from roboirg.policies.learned.listener_training import TrainingPlan

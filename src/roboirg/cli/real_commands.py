@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 if TYPE_CHECKING:
     from roboirg.real.pages.operator_console import OperatorConsole

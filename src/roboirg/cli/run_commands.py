@@ -15,7 +15,7 @@ from roboirg.cli.import_path import add_working_directory
 from roboirg.cli.options import Workers, check_output_file, spread
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.printable import printable
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -14,7 +14,7 @@ from roboirg.cli.progress_bar import progress_bar
 from roboirg.cli.run_commands import USAGE_ERROR, Folder, folder_of, report_problems
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.printable import printable
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 if TYPE_CHECKING:
     from roboirg.analysis.stats.flips import RepeatedEpisode
@@ -130,8 +130,8 @@ def _print(found: Verification) -> None:
     typer.echo(f"End states equal bit for bit: {found.verdicts[ReplayVerdict.EXACT]:,}.")
     if tolerant := found.verdicts[ReplayVerdict.TOLERANT]:
         typer.echo(
-            f"End states equal within {TOLERANCE:g} (m, rad, s): {tolerant:,}; "
-            f"the largest difference is {found.deviation:.1g}."
+            f"End states from other processors equal within {TOLERANCE:g} (m, rad, s): "
+            f"{tolerant:,}; the largest difference is {found.deviation:.1g}."
         )
     if found.errors:
         typer.echo(

@@ -15,7 +15,7 @@ from rich.text import Text
 
 from roboirg.core.printable import printable
 from roboirg.records.record import Record
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 _MINUTE = 60
 

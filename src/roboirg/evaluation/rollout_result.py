@@ -42,6 +42,7 @@ from roboirg.records.record import (
     Record,
     UtteranceRecord,
 )
+from roboirg.util.processor import processor_family
 
 UNDECLARED: PromptVerdict = "unknown"
 """Verdict on the prompts of a policy that declares no limit."""
@@ -217,6 +218,7 @@ def make_record(
         video=video,
         video_error=video_error,
         **_versions(),
+        processor=processor_family(),
         plan=plan,
         started_at=started_at,
         duration_s=duration_s,

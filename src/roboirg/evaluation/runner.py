@@ -32,7 +32,7 @@ from roboirg.records.store import (
     StoreError,
     read_index,
 )
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 UNREACHABLE_AFTER = 20
 """After this many consecutive connection errors, skip the rest of this policy."""

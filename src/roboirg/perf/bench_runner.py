@@ -6,7 +6,6 @@ import datetime as dt
 import importlib.util
 import json
 import os
-import platform
 import statistics
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -18,6 +17,7 @@ from rich.table import Table
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.version import __version__
 from roboirg.perf.measures import Measure
+from roboirg.util.processor import processor_model
 
 _WHOLE = 1000
 """From here on values are shown as whole numbers."""
@@ -144,7 +144,7 @@ def write_results(results: Sequence[MeasureResult], path: Path) -> None:
     """
     where = {
         "date": dt.datetime.now(dt.UTC).date().isoformat(),
-        "machine": f"{os.cpu_count()} cores, {_processor()}",
+        "machine": f"{os.cpu_count()} cores, {processor_model()}",
         "load": round(os.getloadavg()[1], 1),
         "roboirg": __version__,
     }
@@ -194,16 +194,6 @@ def markdown_table(figures: Sequence[Mapping[str, Any]]) -> str:
 
 def _key(row: Mapping[str, Any]) -> tuple[str, str, float]:
     return (row["name"], row["against"], row["goal"])
-
-
-def _processor() -> str:
-    """Return the model of the processor; empty where the system does not tell."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return platform.processor()
-    names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
-    return next(names, platform.processor())
 
 
 def _format_value(value: float, unit: str) -> str:

@@ -37,7 +37,7 @@ from roboirg.policies.checks.influence_checks import (
     check_video,
 )
 from roboirg.policies.checks.policy_player import PolicyPlayer
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 if TYPE_CHECKING:
     from rich.console import Console

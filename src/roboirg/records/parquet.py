@@ -49,6 +49,7 @@ _TEXT_COLUMNS = [
     "video_error",
     "details",
     "render_device",
+    "processor",
     "action_log",
     "end_state",
     "started_at",

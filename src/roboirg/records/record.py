@@ -54,6 +54,7 @@ NON_DETERMINISTIC_FIELDS = frozenset(
         "details",
         "duration_s",
         "plan",
+        "processor",
         "spec",
         "started_at",
         "timings",
@@ -368,6 +369,8 @@ class Record(Result):
         video_error: why the requested video could not be written, or None.
         details: traceback of an error, or None.
         render_device: the driver's name of the render device; None if nothing was rendered.
+        processor: architecture, maker and family of the processor that simulated it, which decide
+            the last bits of `end_state`; None in records from before this was kept.
         started_at: ISO 8601, UTC.
         duration_s: wall-clock seconds.
     """
@@ -389,6 +392,7 @@ class Record(Result):
     video_error: str | None = None
     details: str | None = None
     render_device: str | None = None
+    processor: str | None = None
     started_at: str
     duration_s: float
 

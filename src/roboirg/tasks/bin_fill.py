@@ -38,7 +38,7 @@ from roboirg.tasks.shared.fixtures import (
 )
 from roboirg.tasks.shared.placement import Obstacle, Region
 from roboirg.tasks.task import Commands, Task, Wording
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 COLORS_PRESENT: dict[Difficulty, int] = {"easy": 1, "medium": 2, "hard": 3}
 CUBES: dict[Difficulty, tuple[int, int]] = {"easy": (4, 6), "medium": (8, 10), "hard": (10, 12)}

@@ -1,1 +1,1 @@
-"""Helpers without robot code: cache, parallel map, discovery, plurals, text in pictures."""
+"""Helpers without robot code: cache, parallel map, discovery, plain text, text in pictures."""

@@ -1,4 +1,4 @@
-"""Text from outside, made fit for records, pages and terminals."""
+"""Text for messages: counts with their nouns, and text from outside that is fit to be written."""
 
 from __future__ import annotations
 
@@ -15,3 +15,15 @@ def is_encodable(text: str) -> bool:
     except UnicodeEncodeError:
         return False
     return True
+
+
+def counted(count: int, noun: str, plural: str | None = None) -> str:
+    """Return a count with its noun: ``1 episode``, ``2,550 episodes``, ``0 tries``.
+
+    Args:
+        count: the number.
+        noun: the noun in the singular.
+        plural: the plural, unless it is the singular with an ``s``.
+    """
+    word = noun if count == 1 else plural or f"{noun}s"
+    return f"{count:,} {word}"

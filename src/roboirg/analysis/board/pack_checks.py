@@ -16,7 +16,7 @@ from roboirg.evaluation.verification.run_verification import Verification, verif
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.records.packing import opened_run
 from roboirg.util.atomic_write import write_atomically
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 CHECKS_FILE = "checks.json"
 _BLOCK = 1 << 20

@@ -19,7 +19,7 @@ from roboirg.analysis.stats.cells import Cells, PolicyRun
 from roboirg.analysis.stats.option_labels import has_default_options, setting_sort_key
 from roboirg.analysis.stats.run_summary import ALL, ScopeKey
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -21,7 +21,7 @@ from roboirg.analysis.grounding_scores.score_tables import (
 from roboirg.analysis.tables.rendering.markdown import markdown
 from roboirg.analysis.tables.table import Column, Entry, Row, Table
 from roboirg.evaluation.grounding_set.verdicts import right_reply
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 NO_ANSWER = "no answer"
 MOST_MISTAKES = 40

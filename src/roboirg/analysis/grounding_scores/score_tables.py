@@ -17,7 +17,7 @@ from roboirg.analysis.stats.rates import p_text, points
 from roboirg.analysis.tables.breakdown_table import make_breakdown_table
 from roboirg.analysis.tables.table import NOT_APPLICABLE, Column, Entry, Row, Table
 from roboirg.evaluation.grounding_set.grounding_item import GroundingItem
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 COLUMNS = tuple(
     map(

@@ -12,7 +12,7 @@ from roboirg.analysis.stats.option_labels import words_label
 from roboirg.core.fact_traits import fact_traits
 from roboirg.language.settings import EXPLICIT
 from roboirg.records.record import EventRecord, Record
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 EMBEDDED = "#"
 """Stands for a video that is part of the page."""

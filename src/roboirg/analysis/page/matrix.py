@@ -17,7 +17,7 @@ from roboirg.analysis.stats.run_summary import ALL, ALL_TASKS, Scope, SummaryRow
 from roboirg.core.episode import DIFFICULTIES
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.tasks import all_tasks
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 
 class MatrixRow(NamedTuple):

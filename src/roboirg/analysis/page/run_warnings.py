@@ -18,7 +18,7 @@ from roboirg.analysis.stats.intervals import SEED
 from roboirg.core.errors import InvalidValueError
 from roboirg.episodes.private_splits import SALT_VARIABLE, MissingSaltError, check_salt
 from roboirg.language.settings import EXPLICIT
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 MAX_COMPARISONS = 6
 """Pairs of policies that are compared in words."""

@@ -10,7 +10,7 @@ from roboirg.analysis.stats.flips import Flips
 from roboirg.analysis.stats.option_labels import options_label
 from roboirg.analysis.stats.power import MAX_EPISODES, POWER
 from roboirg.analysis.stats.rates import p_text, points
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 
 def sentences(

@@ -8,7 +8,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import POOLS
 from roboirg.language import STAGE_SETS
 from roboirg.language.settings import EXPLICIT, all_settings, setting_names
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 REFERENCE = InstructionOptions(EXPLICIT)
 """The options that every gap refers to."""

@@ -13,7 +13,7 @@ from roboirg.analysis.stats.intervals import SEED
 from roboirg.analysis.stats.option_labels import options_label
 from roboirg.analysis.stats.rates import p_text, percent, points
 from roboirg.analysis.tables.table import NOT_APPLICABLE, Column, Counts, Entry, Row, Table
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 COLUMNS = tuple(map(Column, ("episodes", "success", "gap", "95 % interval", "p")))
 

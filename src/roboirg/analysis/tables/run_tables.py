@@ -43,7 +43,7 @@ from roboirg.core.printable import printable
 from roboirg.records.record import Job
 from roboirg.records.record_codec import AnyResult
 from roboirg.util.console_width import line_width, widen
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 NO_GAP = "–"
 

@@ -29,7 +29,7 @@ from roboirg.analysis.tables.table import (
     Row,
 )
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 RATES_NOTE = (
     "Success rate in percent, the mean over policy seeds; averages are unweighted means over tasks."

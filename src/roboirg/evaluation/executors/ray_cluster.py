@@ -38,7 +38,7 @@ from roboirg.evaluation.hosting.host_pool import (
 from roboirg.evaluation.rollout import PlayJob
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.records.record import Job, Record
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 POLL_S = 1.0
 NO_CPU_TIMEOUT_S = 300.0

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from roboirg.evaluation.time_estimate.world_speed import WorldSpeed
 from roboirg.records.record import Job
 from roboirg.records.record_codec import RecordIndexEntry
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 ORACLE_STEPS = 236
 """Mean control steps of the oracle over the test split."""

@@ -19,8 +19,8 @@ from roboirg.records.record_codec import read_line
 from roboirg.records.store import RECORDS_FILE
 
 TOLERANCE = 0.02
-"""Largest difference of an end state, in m, rad and s, that other processors are granted: ten times
-the largest on an emulated one. It changes no verdict: events and steps must be equal."""
+"""Largest difference of an end state, in m, rad and s, that is granted to a record from another
+family of processors: ten times the largest on an emulated one. Events and steps must be equal."""
 
 WORD_FIELDS = ("seed", "difficulty", "mentions", "command", "goal", "metadata")
 """Fields that follow from the job alone."""
@@ -46,7 +46,8 @@ class ReplayVerdict(StrEnum):
 
     Attributes:
         EXACT: equal, bit for bit.
-        TOLERANT: equal but for `TOLERANCE`, as on a processor of another family.
+        TOLERANT: equal but for `TOLERANCE`, and the record is from a processor of another family,
+            or does not tell.
         DIFFERENT: not equal.
         NOT_REPLAYED: not in the sample, or an error that kept no actions.
     """
@@ -166,5 +167,6 @@ def _compare_ends(
     if deviation == 0.0:
         same = record.end_state == again.end_state
         return ReplayVerdict.EXACT if same else ReplayVerdict.DIFFERENT, 0.0
+    elsewhere = record.processor != again.processor
     within = deviation <= TOLERANCE and record.end_state != again.end_state
-    return ReplayVerdict.TOLERANT if within else ReplayVerdict.DIFFERENT, deviation
+    return ReplayVerdict.TOLERANT if elsewhere and within else ReplayVerdict.DIFFERENT, deviation

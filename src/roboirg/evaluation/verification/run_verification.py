@@ -24,7 +24,7 @@ from roboirg.language.generator import find_refusal
 from roboirg.records.record_codec import EpisodeSummary, identity_key
 from roboirg.records.store import StoredRun, read_summaries
 from roboirg.util.parallel_map import parallel_map
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 Progress = Callable[[int, int], object]
 

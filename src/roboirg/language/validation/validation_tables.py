@@ -16,7 +16,7 @@ from roboirg.language.validation.validation_results import (
     ValidationResults,
 )
 from roboirg.tasks import every_task
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 Group = TypeVar("Group", CommandGroup, SceneGroup)
 

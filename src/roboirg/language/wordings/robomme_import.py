@@ -40,7 +40,7 @@ from roboirg.language.wordings.wording_file import check_name, parse_wordings
 from roboirg.language.wordings.wording_store import forget_wordings, register_wordings
 from roboirg.language.wordings.wording_writer import wording_text
 from roboirg.tasks import Task, all_tasks
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 SPLIT: Split = "train"
 READ_SCENES = 8

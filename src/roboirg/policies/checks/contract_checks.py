@@ -39,7 +39,7 @@ from roboirg.policies.requirements import (
     wanted_depth,
     wanted_history,
 )
-from roboirg.util.plurals import counted
+from roboirg.util.plain_text import counted
 
 
 def check_loading(player: PolicyPlayer) -> Iterator[CheckResult]:

@@ -20,6 +20,7 @@ from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import MotionPlanningError
 from roboirg.simulation.demonstration.recording import Recording
 from roboirg.util.cache import open_cache
+from roboirg.util.processor import processor_features
 
 PlayDemonstration = Callable[[Recording | None], Recording]
 """Starts the episode and plays its demonstration: replays the given recording, or plans if None."""
@@ -93,7 +94,7 @@ def _platform_fingerprint() -> str:
     versions = [f"{package} {importlib.metadata.version(package)}" for package in _PACKAGES]
     python = f"python {platform.python_version()}"
     # The planner's sines and cosines depend on the processor and the C library.
-    machine = (platform.machine(), *platform.libc_ver(), _processor())
+    machine = (platform.machine(), *platform.libc_ver(), processor_features())
     return "\n".join([str(ENVIRONMENT_VERSION), _SOURCE_HASH, python, *versions, *machine])
 
 
@@ -110,13 +111,3 @@ def _source_hash() -> str:
 
 _SOURCE_HASH = _source_hash()
 """Computed at import: files may change while the process runs the code it has loaded."""
-
-
-def _processor() -> str:
-    """Return the processor's name and features."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        return platform.processor()
-    fields = {line.partition(":")[0].strip(): line for line in reversed(lines)}
-    return "\n".join(fields.get(field, "") for field in ("model name", "flags", "Features"))
