@@ -12,6 +12,7 @@ import pytest
 import typer.main
 
 from roboirg.cli import app as cli
+from roboirg.cli.progress_bar import progress_bars, progress_console
 from roboirg.evaluation.plan import read_plan
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.records.record import Job
@@ -544,3 +545,14 @@ def test_colors_are_left_out_where_they_are_not_wanted() -> None:
         env={**os.environ, "FORCE_COLOR": "1", "NO_COLOR": "1"},
     ).stdout  # fmt: skip
     assert not re.search(r"\x1b\[[0-9;]*3[0-7]m", forced)
+
+
+def test_progress_moves_no_cursor_in_a_pipe_even_if_colors_are_forced(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    with progress_bars() as report:
+        report("record", 1, 2, "")
+        report("record", 2, 2, "done")
+    assert not progress_console().is_terminal
+    assert capsys.readouterr().err.splitlines() == ["record 1/2", "record 2/2  done"]

@@ -1,14 +1,16 @@
 """The policies ``people:FOLDER`` and ``recorded:RUN``: specs, and what they play."""
 
+import numpy as np
 import pytest
 from study_fakes import answer_all, make_study
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.people.answer_form import FormAnswer, all_answers, answer_of
+from roboirg.evaluation.people.answer_form import FormAnswer, all_answers, answer_of, goal_of
 from roboirg.evaluation.people.listening_session import ListeningSession
 from roboirg.evaluation.people.people_run import answered_plan
 from roboirg.evaluation.rollout import EpisodeRunner
+from roboirg.language.command_chance import is_right
 from roboirg.policies.loading import is_privileged, load_policy_class, make_policy, policy_version
 from roboirg.records.record import Job
 from roboirg.records.store import RecordStore, StoreError, read_records
@@ -76,3 +78,27 @@ def test_two_people_are_played_apart_and_again_by_the_log(tmp_path, monkeypatch)
     assert "has no record of PickXtimes/test/7" in other.cause
     assert make_policy(f"{spec}?policy=nobody", 0)._records == []
     assert FormAnswer((), {}).category == "[[], {}]"
+
+
+@pytest.mark.sim
+def test_random_answers_succeed_when_they_are_right(tmp_path, monkeypatch):
+    folder = tmp_path / "study"
+    make_study(folder, monkeypatch, tasks="PickXtimes,ButtonUnmask", episodes="8", people=1,
+               settings="direct", practice=0, checks=0)  # fmt: skip
+    rng, right = np.random.default_rng(2), {}
+
+    def choose(question, things):
+        episode = get_episode(question.job.task, question.job.split, question.job.episode)
+        every = all_answers(episode, things)
+        answer = every[int(rng.integers(len(every)))]
+        goal = goal_of(episode, answer)
+        right[episode.task, episode.index] = goal is not None and is_right(goal, episode)
+        return answer
+
+    session = ListeningSession(folder)
+    answer_all(session, choose)
+    session.close()
+    run = EpisodeRunner(tmp_path / "run")
+    records = [run(job) for job in answered_plan(folder).jobs()]
+    assert {(one.task, one.episode): one.outcome == "success" for one in records} == right
+    assert {*right.values()} == {True, False}

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 # Rich is imported where it is used, so that --help is fast.
 
@@ -33,7 +38,6 @@ def progress_bars(*, has_lines: bool = True) -> Iterator[Callable[[str, int, int
     Yields:
         A function to tell a stage, how many of it are done, how many there are, and a remark.
     """
-    from rich.console import Console
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -42,7 +46,7 @@ def progress_bars(*, has_lines: bool = True) -> Iterator[Callable[[str, int, int
         TimeRemainingColumn,
     )
 
-    console = Console(stderr=True)
+    console = progress_console(stderr=True)
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -72,6 +76,14 @@ def progress_bars(*, has_lines: bool = True) -> Iterator[Callable[[str, int, int
                 console.print(f"{stage} {done}/{total} {left} {remark}".rstrip(), highlight=False)
 
         yield report
+
+
+def progress_console(*, stderr: bool = False) -> Console:
+    """Return a console that moves its cursor on a terminal only, whatever FORCE_COLOR says."""
+    from rich.console import Console
+
+    stream = sys.stderr if stderr else sys.stdout
+    return Console(stderr=stderr, force_terminal=None if stream.isatty() else False)
 
 
 def _time_left(now: float, start: float, first: int, done: int, total: int) -> str:

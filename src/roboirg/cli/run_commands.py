@@ -146,8 +146,7 @@ def play(
     plan: Plan, out: Path, executor: Executor, *, retry: bool, on_record: str | None = None
 ) -> RunSummary:
     """Play a plan with a progress bar; exits the process when it is interrupted."""
-    from rich.console import Console
-
+    from roboirg.cli.progress_bar import progress_console
     from roboirg.evaluation.progress import ConsoleReporter
     from roboirg.evaluation.record_hook import CommandHook, HookedReporter
     from roboirg.evaluation.runner import Terminated, episode_runner, run_plan
@@ -156,7 +155,7 @@ def play(
     keep_freed_memory()
     play_job = episode_runner(plan, out)
     try:
-        with ConsoleReporter(Console()) as shown, contextlib.ExitStack() as stack:
+        with ConsoleReporter(progress_console()) as shown, contextlib.ExitStack() as stack:
             reporter: Reporter = shown
             if on_record is not None:
                 reporter = stack.enter_context(HookedReporter(shown, CommandHook(on_record)))

@@ -7,9 +7,9 @@ RoboMME's.
 
 from __future__ import annotations
 
-import contextlib
+import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +46,7 @@ ARM_LAG = 3
 NARROW = 0.6
 """Gripper action that leaves 0.06 m between the fingers, to pick a cube with others close by; used
 after the pick with open fingers has failed, as they landed on something."""
-SHORTFALLS = (0.0025, 0.005, 0.0075, 0.01)
+SHORTFALLS = (0.0, 0.0025, 0.005, 0.0075, 0.01)
 """Meters by which a move stays short of a place that lies just beyond the arm's reach."""
 ASIDE = Point(0.0, 0.0, 0.2)
 HOMING_STEPS = 30
@@ -185,27 +185,27 @@ class MotionPrimitives:
 
     def _approach(self, name: str, height: float) -> tuple[JointTrajectory, Rotation]:
         """Plan a move to above an object; returns it with the grasp rotation."""
-        goal = _above(self._position(name), height)
         rotations = grasp_rotations(name, self._world.bodies, self._rotation())
-        for rotation in rotations[:-1]:
-            try:
-                return self._plan(goal, rotation), rotation
-            except MotionPlanningError:
-                continue  # a wrist limit; another side may work
-        return self._move(goal, rotations[-1]), rotations[-1]
+        return self._plan_any(_above(self._position(name), height), rotations)
 
     def _move(self, position: Point, rotation: Rotation) -> JointTrajectory:
-        """Plan a straight move to a pose, via home if the straight line is not feasible.
+        """Plan a straight move to a pose, via home if the straight line is not feasible."""
+        return self._plan_any(position, [rotation])[0]
+
+    def _plan_any(
+        self, position: Point, rotations: Sequence[Rotation]
+    ) -> tuple[JointTrajectory, Rotation]:
+        """Plan a move with the first of some rotations that the wrist can take.
 
         At the edge of the workspace the move ends up to 1 cm nearer to the robot.
         """
-        try:
-            return self._plan(position, rotation)
-        except MotionPlanningError:
-            for shortfall in SHORTFALLS:
-                with contextlib.suppress(MotionPlanningError):
-                    return self._plan(_towards_robot(position, shortfall), rotation)
-            raise
+        refused = []
+        for shortfall, rotation in itertools.product(SHORTFALLS, rotations):
+            try:
+                return self._plan(_towards_robot(position, shortfall), rotation), rotation
+            except MotionPlanningError as error:
+                refused.append(error)
+        raise refused[len(rotations) - 1]
 
     def _plan(self, position: Point, rotation: Rotation) -> JointTrajectory:
         goal = ToolPose(np.asarray(position, dtype=np.float64), rotation)
