@@ -10,10 +10,10 @@ from roboirg.evaluation.people.answer_form import FormAnswer, all_answers, answe
 from roboirg.evaluation.people.listening_session import ListeningSession
 from roboirg.evaluation.people.people_run import answered_plan
 from roboirg.evaluation.rollout import EpisodeRunner
-from roboirg.language.command_chance import is_right
 from roboirg.policies.loading import is_privileged, load_policy_class, make_policy, policy_version
 from roboirg.records.record import Job
 from roboirg.records.store import RecordStore, StoreError, read_records
+from roboirg.tasks import get_task
 
 
 def test_specs_that_name_nothing_are_refused(tmp_path):
@@ -81,7 +81,7 @@ def test_two_people_are_played_apart_and_again_by_the_log(tmp_path, monkeypatch)
 
 
 @pytest.mark.sim
-def test_random_answers_succeed_when_they_are_right(tmp_path, monkeypatch):
+def test_random_answers_succeed_as_far_as_they_are_right(tmp_path, monkeypatch):
     folder = tmp_path / "study"
     make_study(folder, monkeypatch, tasks="PickXtimes,ButtonUnmask", episodes="8", people=1,
                settings="direct", practice=0, checks=0)  # fmt: skip
@@ -92,7 +92,9 @@ def test_random_answers_succeed_when_they_are_right(tmp_path, monkeypatch):
         every = all_answers(episode, things)
         answer = every[int(rng.integers(len(every)))]
         goal = goal_of(episode, answer)
-        right[episode.task, episode.index] = goal is not None and is_right(goal, episode)
+        # An episode ends with its success, so what an answer adds to the right things is not done.
+        told = () if goal is None else get_task(episode.task).stages(episode.scene, goal)
+        right[episode.task, episode.index] = told[: len(episode.stages)] == episode.stages
         return answer
 
     session = ListeningSession(folder)

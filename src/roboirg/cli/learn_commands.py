@@ -24,6 +24,7 @@ _Rivals = Annotated[bool, typer.Option("--rivals", help="Also hear instructions 
 _Scenes = Annotated[
     int, typer.Option(min=0, help="Random scenes of each task beyond the train split.")
 ]
+_Goals = Annotated[int, typer.Option(min=1, help="Goals of each scene that are told by place.")]
 _DetectorEpochs = Annotated[int, typer.Option(min=1, help="Passes over the pictures.")]
 _ReaderEpochs = Annotated[int, typer.Option(min=1, help="Passes over the instructions.")]
 _Without = Annotated[
@@ -40,6 +41,7 @@ def learn_listener(
     words: _Words = "train",
     rivals: _Rivals = False,
     scenes: _Scenes = 300,
+    goals: _Goals = 4,
     detector_epochs: _DetectorEpochs = 6,
     reader_epochs: _ReaderEpochs = 12,
     without: _Without = "none",
@@ -58,6 +60,7 @@ def learn_listener(
     plan = _plan(tasks, settings, words, without)._replace(
         rivals=rivals,
         scenes=scenes,
+        goals=goals,
         detector_epochs=detector_epochs,
         reader_epochs=reader_epochs,
         seed=seed,
@@ -73,6 +76,7 @@ def learn_study(
     tasks: Tasks = "all",
     words: _Words = "train",
     scenes: _Scenes = 300,
+    goals: _Goals = 4,
     detector_epochs: _DetectorEpochs = 6,
     reader_epochs: _ReaderEpochs = 12,
     seed: _Seed = 0,
@@ -95,6 +99,7 @@ def learn_study(
     out.mkdir(parents=True, exist_ok=True)
     training: dict[str, Any] = {
         "scenes": scenes,
+        "goals": goals,
         "detector_epochs": detector_epochs,
         "reader_epochs": reader_epochs,
         "seed": seed,

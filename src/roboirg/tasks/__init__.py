@@ -11,13 +11,14 @@ from __future__ import annotations
 import functools
 import sys
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
-from roboirg.core.episode import BENCHMARK_SUITES, SUITES
+from roboirg.core.episode import BENCHMARK_SUITES, SUITES, Episode, Goal
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.tasks.task import Task
 from roboirg.util.discovery import discover, discover_in_modules
 
-__all__ = ["Task", "all_suites", "all_tasks", "every_task", "find_tasks", "get_task"]
+__all__ = ["Task", "all_suites", "all_tasks", "every_task", "find_tasks", "get_task", "with_goal"]
 
 ALL = "all"
 """Stands for all tasks of the benchmark wherever tasks are named."""
@@ -65,6 +66,11 @@ def find_tasks(words: Iterable[str]) -> tuple[str, ...]:
     """
     in_turn = sorted(words, key=lambda word: word.lower() != ALL)
     return tuple(dict.fromkeys(name for word in in_turn for name in _expand(word)))
+
+
+def with_goal(episode: Episode, goal: Goal) -> Episode:
+    """Return the episode with another goal of its scene, and the stages to it."""
+    return replace(episode, goal=goal, stages=get_task(episode.task).stages(episode.scene, goal))
 
 
 @functools.cache

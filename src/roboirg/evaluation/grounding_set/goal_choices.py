@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +12,7 @@ from roboirg.core.episode import Episode, Goal
 from roboirg.language import instruct
 from roboirg.language.command_chance import blind_goals, is_right
 from roboirg.language.instruction import Instruction
-from roboirg.tasks import get_task
+from roboirg.tasks import get_task, with_goal
 
 MOST = 4
 _BLOCK = 12
@@ -55,8 +54,7 @@ def draw_choices(episode: Episode, instruction: Instruction, identity: str) -> G
 
 def explicit_command(episode: Episode, goal: Goal, pool: str) -> str:
     """Return the explicit command of a goal of the scene, in words of a pool."""
-    stages = get_task(episode.task).stages(episode.scene, goal)
-    return instruct(replace(episode, goal=goal, stages=stages), "explicit", wordings=pool).text
+    return instruct(with_goal(episode, goal), "explicit", wordings=pool).text
 
 
 def _wrong_goals(episode: Episode, instruction: Instruction) -> Sequence[Goal]:

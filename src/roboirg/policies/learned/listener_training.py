@@ -19,7 +19,7 @@ from roboirg.core.word_pools import PoolName
 from roboirg.episodes.splits import SIZES, get_episode
 from roboirg.language import FORMS, LANGUAGE_VERSION
 from roboirg.language.instruction import Instruction
-from roboirg.language.settings import settings_of
+from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.variants import instructions, settings_with_rivals
 from roboirg.policies.learned.detector_net import SIZE, DetectorNet, detector_loss
 from roboirg.policies.learned.labeled_views import LabeledView, look
@@ -38,7 +38,7 @@ from roboirg.policies.learned.object_relations import (
     relate,
 )
 from roboirg.policies.planning.goal_schema import goal_schema
-from roboirg.tasks import get_task
+from roboirg.tasks import get_task, with_goal
 from roboirg.util.parallel_map import parallel_map
 
 TRAINING_SPLIT: Split = "train"
@@ -62,6 +62,8 @@ class TrainingPlan(NamedTuple):
         words: the pool of words.
         rivals: whether it also hears instructions with a rival, where there are some.
         scenes: random scenes of each task beyond the train split.
+        goals: goals of each scene that are told by place, where there is the most to learn. In
+            other settings only the episode's own is.
         detector_epochs: passes over all pictures of the train split.
         reader_epochs: passes over all instructions.
         without: what it does not get.
@@ -73,6 +75,7 @@ class TrainingPlan(NamedTuple):
     words: PoolName = "train"
     rivals: bool = False
     scenes: int = 300
+    goals: int = 4
     detector_epochs: int = 6
     reader_epochs: int = 12
     without: Without = "none"
@@ -183,11 +186,25 @@ def _instructions(
     scenes: SeenEpisodes, plan: TrainingPlan
 ) -> Iterator[tuple[Episode, Instruction]]:
     options = InstructionOptions(wordings=plan.words)
-    yield from instructions(scenes.episodes, plan.settings, FORMS[:1], options)
+    by_place = [name for name in plan.settings if "frame" in all_settings()[name].reads]
+    others = [name for name in plan.settings if name not in by_place]
+    yield from instructions(scenes.episodes, others, FORMS[:1], options)
+    yield from instructions(_with_goals(scenes.episodes, plan), by_place, FORMS[:1], options)
     if plan.rivals:
         with_rivals = [name for name in plan.settings if name in settings_with_rivals()]
         options = options._replace(rival=RIVALS[-1])
         yield from instructions(scenes.episodes, with_rivals, FORMS[:1], options)
+
+
+def _with_goals(episodes: Iterable[Episode], plan: TrainingPlan) -> Iterator[Episode]:
+    """Yield each episode, and again with other goals of its scene."""
+    rng = random.Random(plan.seed)
+    for episode in episodes:
+        yield episode
+        goals = get_task(episode.task).goals(episode.scene)
+        others = [goal for goal in goals if goal != episode.goal]
+        for goal in rng.sample(others, min(plan.goals - 1, len(others))):
+            yield with_goal(episode, goal)
 
 
 def _look(episode: Episode) -> tuple[LabeledView, ...]:
