@@ -24,6 +24,7 @@ def test_a_number_is_the_first_episodes_and_a_list_is_a_list() -> None:
     assert parse_episodes("4") == (0, 1, 2, 3)
     assert parse_episodes("0,3,5-9") == (0, 3, 5, 6, 7, 8, 9)
     assert parse_episodes("7,") == (7,)
+    assert parse_episodes("all", "train") == tuple(range(100))
     assert parse_numbers("stage", "1,5,1") == (1, 5)
 
 

@@ -123,7 +123,7 @@ language_commands.export_app.command("demonstrations")(demonstration_commands.ex
 def demo(
     out: Out = "runs/demo",
     episodes: Annotated[
-        str, typer.Option(help="4 for the first four, or a list such as 0,3.")
+        str, typer.Option(help="all, 4 for the first four, or a list such as 0,3.")
     ] = "2-2",
     video: Video = "all",
     workers: Workers = None,

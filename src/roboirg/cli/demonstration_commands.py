@@ -18,7 +18,6 @@ from roboirg.cli.options import (
     check_output_file,
     spread,
 )
-from roboirg.core.errors import InvalidValueError
 from roboirg.util.plain_text import counted
 
 if TYPE_CHECKING:
@@ -87,7 +86,7 @@ def export_demonstrations(
     from roboirg.demonstrations.export_run import run_export
     from roboirg.demonstrations.size_estimate import size_text
     from roboirg.evaluation.executors.executor import core_count
-    from roboirg.evaluation.plan_parsing import means_all, parse_names
+    from roboirg.evaluation.plan_parsing import means_all, parse_episodes, parse_names
     from roboirg.language import FORMS
     from roboirg.policies import load_policy_class
     from roboirg.tasks import find_tasks
@@ -97,7 +96,7 @@ def export_demonstrations(
     plan = ExportPlan(
         tasks=tuple(find_tasks(parse_names("task", tasks))),
         split=split,
-        episodes=_episodes(split, episodes),
+        episodes=parse_episodes(episodes, split),
         settings=known_settings(settings),
         forms=FORMS if means_all(forms) else parse_names("form", forms),
         options=words.instruction_options(delivery),
@@ -126,22 +125,6 @@ def export_demonstrations(
         f"{counted(summary.episodes, 'episode')}, {size_text(summary.size)}: {out} "
         f"(trajectories: {ends})"
     )
-
-
-def _episodes(split: str, text: str) -> tuple[int, ...]:
-    """Return the positions of episodes in a split."""
-    from roboirg.core.episode import SPLITS
-    from roboirg.episodes.splits import split_size
-    from roboirg.evaluation.plan_parsing import means_all, parse_episodes
-
-    size = split_size(split)
-    if not means_all(text):
-        return parse_episodes(text, split)
-    if split not in SPLITS:
-        raise InvalidValueError(
-            f"The split {split!r} has {size:,} episodes; say how many with --episodes."
-        )
-    return tuple(range(size))
 
 
 def _default_video(format_name: str) -> str:

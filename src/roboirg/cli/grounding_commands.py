@@ -43,9 +43,8 @@ def export_grounding(
     settings: Settings = "all",
     forms: Forms = "implicit",
     episodes: Annotated[
-        str | None,
-        typer.Option(help="4 for the first four, or a list such as 0,3,5-9; all by default."),
-    ] = None,
+        str, typer.Option(help="all, 4 for the first four, or a list such as 0,3,5-9.")
+    ] = "all",
     variants: Annotated[
         bool, typer.Option(help="Add every combination of the options below.")
     ] = False,
@@ -62,7 +61,6 @@ def export_grounding(
     """Export questions of grounding with pictures: Parquet, JSON lines, VLMEvalKit's TSV."""
     from roboirg.cli.language_commands import known_name, known_settings, known_tasks
     from roboirg.cli.progress_bar import progress_bar
-    from roboirg.episodes.splits import SIZES
     from roboirg.evaluation.executors.executor import core_count
     from roboirg.evaluation.grounding_set.dataset_export import (
         TABLE_FORMATS,
@@ -86,7 +84,7 @@ def export_grounding(
             EpisodeName(task, one, index)
             for task in known_tasks(tasks, options.wordings)
             for one in parse_splits(split)
-            for index in (range(SIZES[one]) if episodes is None else parse_episodes(episodes, one))
+            for index in parse_episodes(episodes, one)
         ),
         settings=known_settings(settings),
         forms=tuple(known_name("form", one, FORMS) for one in parse_names("form", forms)),

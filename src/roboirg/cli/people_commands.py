@@ -54,7 +54,7 @@ def plan(
     form: Annotated[str, typer.Option(help="implicit or resolved.")] = "implicit",
     split: Split = "test",
     episodes: Annotated[
-        str, typer.Option(help="4 for the first four, or a list such as 0,3,5-9.")
+        str, typer.Option(help="all, 4 for the first four, or a list such as 0,3,5-9.")
     ] = "4",
     delivery: Delivery = "prompt",
     words: WordChoices = DEFAULT_WORDS,

@@ -48,7 +48,7 @@ Salt = Annotated[
     ),
 ]
 Episodes = Annotated[
-    str | None, _episodes(help="4 for the first four, or a list such as 0,3,5-9.  (4)")
+    str | None, _episodes(help="all, 4 for the first four, or a list such as 0,3,5-9.  (4)")
 ]
 PolicySeeds = Annotated[
     str | None,

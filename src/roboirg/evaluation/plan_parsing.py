@@ -19,6 +19,7 @@ _MAX_NUMBERS = 10_000
 _MAX_DIGITS = 18
 _MAX_QUOTED_LENGTH = 40
 _NUMBERS_HINT = "write numbers and ranges such as 0,3,5-9"
+_EPISODES_HINT = f"{_NUMBERS_HINT}, or all"
 
 
 def parse_names(kind: str, text: str) -> tuple[str, ...]:
@@ -85,14 +86,22 @@ def parse_splits(text: str) -> tuple[Split, ...]:
 def parse_episodes(text: str, split: str = "test") -> tuple[int, ...]:
     """Parse episodes: ``4`` is the first four; with a comma or a dash it is a list of positions.
 
+    ``all`` is every episode of a split of fixed episodes.
+
     Raises:
         UnknownNameError: there is no such split.
         InvalidValueError: the text is neither a number nor a list, or the split has fewer episodes.
     """
     size = splits.split_size(split)
+    if means_all(text):
+        if split not in SPLITS:
+            raise InvalidValueError(
+                f"The split {split!r} has {size:,} episodes; say how many with --episodes."
+            )
+        return tuple(range(size))
     found = re.fullmatch(r"\s*(-?)(\d+)\s*", text)
     if found is None:
-        ranges = _parse_ranges("episode", text, _NUMBERS_HINT)
+        ranges = _parse_ranges("episode", text, _EPISODES_HINT)
     else:
         count = _number("number of episodes", found[2])
         if found[1] or count == 0:
