@@ -11,6 +11,7 @@ from roboirg.evaluation.learning.listener_study import VARIANTS
 from roboirg.policies.learned.labeled_views import LATER_STEP, class_of, look
 from roboirg.policies.loading import is_privileged, make_policy
 from roboirg.policies.planning.goal_schema import goal_schema
+from roboirg.tasks import get_task
 
 
 def test_without_pytorch_one_sentence_says_what_to_do(monkeypatch, tmp_path):
@@ -145,6 +146,21 @@ def test_it_learns_and_its_file_is_the_same_listener(trained):
     )
     with pytest.raises(InvalidValueError, match="was not trained on BinFill, but on StopCube"):
         again.understand("BinFill", "Do it.", [picture])
+
+
+def test_by_place_other_goals_of_a_scene_are_told_too(torch):
+    from roboirg.policies.learned import listener_training
+
+    episode = get_episode("ButtonUnmask", "train", 3)
+    plan = plan_of(tasks=(episode.task,), settings=("explicit", "spatial"), goals=3)
+    scenes = listener_training.SeenEpisodes((episode,), {}, (), None, None)
+    told = list(listener_training._instructions(scenes, plan))
+    by_place = [one.goal for one, words in told if words.setting == "spatial"]
+    assert [one.goal for one, words in told if words.setting == "explicit"] == [episode.goal]
+    assert by_place[0] == episode.goal
+    assert len(set(by_place)) == 3
+    assert set(by_place) <= set(get_task(episode.task).goals(episode.scene))
+    assert len({words.text for _, words in told}) == 4
 
 
 @pytest.mark.sim
