@@ -480,6 +480,7 @@ def test_a_module_without_a_class_gets_a_hint(
         path.write_text("raise SystemExit('not imported')\nclass Mine:\n    pass\nclass _X: pass\n")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", list(sys.path))
+    monkeypatch.delitem(sys.modules, "my_policy", raising=False)  # another test's
     said = roboirg("run", "--policy", word, "--out", tmp_path / "out")
     assert said.code == 2
     name = word.removesuffix(".py").replace("/", ".")

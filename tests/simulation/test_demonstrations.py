@@ -353,7 +353,7 @@ def test_keys_change_with_what_determines_a_demonstration(monkeypatch):
     key = demonstration_cache.recording_key(episode)
     assert demonstration_cache.recording_key(get_episode(SHORT, "test", 1)) == key
     assert demonstration_cache.recording_key(get_episode(SHORT, "test", 2)) != key
-    for name, other in (("_SOURCE_HASH", "another"), ("_processor", lambda: "another")):
+    for name, other in (("_SOURCE_HASH", "another"), ("processor_features", lambda: "another")):
         with monkeypatch.context() as patch:
             patch.setattr(demonstration_cache, name, other)
             demonstration_cache._platform_fingerprint.cache_clear()
