@@ -353,8 +353,7 @@ class Record(Result):
         prompt: what of them reached its language model; None if the policy declares no limit.
         command: the same task in the explicit setting.
         goal: what the instruction conveys, a value for each slot.
-        metadata: of the instruction: reasoning pattern, relation, stages, landmarks, template
-            ids, ….
+        metadata: of the instruction: reasoning pattern, relation, stages, landmarks, ….
         policy_metadata: what the policy reports about itself: checkpoint, server, model, ….
         action_log: digest of the executed actions, as in `roboirg.records.action_log`; None if they
             were not kept.
@@ -363,8 +362,7 @@ class Record(Result):
         events: facts that became true or false, in order.
         usage: what models queried by the policy cost: ``calls``, ``input_tokens``,
             ``output_tokens``, ``cost_usd``.
-        timings: wall-clock seconds by phase: ``policy_load``, ``policy_reset``, ``policy_act``,
-            ``env_reset``, ``env_step``, ….
+        timings: wall-clock seconds by phase: ``policy_load``, ``policy_act``, ``env_step``, ….
         video: path of the video relative to the records file, or None.
         video_error: why the requested video could not be written, or None.
         details: traceback of an error, or None.
