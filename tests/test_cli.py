@@ -12,11 +12,12 @@ import pytest
 import typer.main
 
 from roboirg.cli import app as cli
-from roboirg.cli.progress_bar import progress_bars, progress_console
+from roboirg.cli.progress_bar import progress_bars
 from roboirg.evaluation.plan import read_plan
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.records.record import Job
 from roboirg.records.store import RecordStore
+from roboirg.util.console_width import progress_console
 
 RUN = ("run", "--policy", "random", "--tasks", "PickXtimes")
 

@@ -7,8 +7,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.executors.executor import choose_executor
 from roboirg.evaluation.plan import Plan
@@ -18,6 +16,7 @@ from roboirg.evaluation.progress import ConsoleReporter, SilentReporter
 from roboirg.evaluation.record_hook import CommandHook, HookedReporter, RecordFunction
 from roboirg.evaluation.runner import RunSummary, episode_runner, run_plan
 from roboirg.policies.local_policies import is_local, policy_name, spec_of
+from roboirg.util.console_width import progress_console
 
 AnyPolicy = str | type[Any] | object
 """A spec as on the command line, a class, or an object with ``reset`` and ``act``."""
@@ -72,7 +71,7 @@ def play_plan(
             )
         workers = 0
     executor = choose_executor(workers, plan.episode_timeout_s)
-    shown = ConsoleReporter(Console(stderr=True)) if progress else None
+    shown = ConsoleReporter(progress_console(stderr=True)) if progress else None
     hook = CommandHook(on_record) if isinstance(on_record, str) else on_record
     reporter = HookedReporter(shown or SilentReporter(), hook or (lambda _record: None))
     try:

@@ -180,8 +180,6 @@ def build_splits(
     out: Annotated[str | None, typer.Option(help="Write to this file instead of stdout.")] = None,
 ) -> None:
     """Select the seeds of the splits again; tasks and splits not named stay unchanged."""
-    from rich.console import Console
-
     from roboirg.episodes import splits
     from roboirg.evaluation.executors.executor import core_count
     from roboirg.evaluation.plan_parsing import parse_names, parse_splits
@@ -194,6 +192,7 @@ def build_splits(
     from roboirg.evaluation.seed_search.seed_summary import follow_progress, print_summary
     from roboirg.tasks import find_tasks
     from roboirg.util.atomic_write import write_atomically
+    from roboirg.util.console_width import progress_console
 
     names = find_tasks(parse_names("task", tasks))
     wanted = parse_splits(split)
@@ -201,7 +200,7 @@ def build_splits(
     if out is not None and not Path(out).parent.is_dir():
         raise InvalidValueError(f"There is no folder for {out!r}; create it first.")
     slots = episode_slots(names, wanted)
-    console = Console(stderr=True)
+    console = progress_console(stderr=True)
     count = core_count() if workers is None else workers
     found = follow_progress(find_seeds(slots, count), slots, console)
     print_summary(found, console)

@@ -226,10 +226,11 @@ def _with_progress(
     found: Iterable[tuple[Batch, ValidationResults]], work: Sequence[Batch]
 ) -> Iterable[ValidationResults]:
     """Yield the results; show progress as a bar, or as lines without a terminal."""
-    from rich.console import Console
     from rich.progress import Progress
 
-    console = Console(stderr=True)
+    from roboirg.util.console_width import progress_console
+
+    console = progress_console(stderr=True)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("episodes", total=sum(batch.size for batch in work))
         for number, (batch, results) in enumerate(found, start=1):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from roboirg.cli.options import Settings, Tasks, Workers, check_output_file
+from roboirg.cli.options import Settings, Tasks, Workers, check_output_file, spread
 from roboirg.core.errors import InvalidValueError
 from roboirg.util.plain_text import counted
 
@@ -21,31 +21,38 @@ learn_app = typer.Typer(no_args_is_help=True, help="Train a listener, and let it
 
 _Words = Annotated[str, typer.Option(help="Pool of words: train or test.")]
 _Rivals = Annotated[bool, typer.Option("--rivals", help="Also hear instructions with a rival.")]
-_Scenes = Annotated[
-    int, typer.Option(min=0, help="Random scenes of each task beyond the train split.")
-]
-_Goals = Annotated[int, typer.Option(min=1, help="Goals of each scene that are told by place.")]
-_DetectorEpochs = Annotated[int, typer.Option(min=1, help="Passes over the pictures.")]
-_ReaderEpochs = Annotated[int, typer.Option(min=1, help="Passes over the instructions.")]
 _Without = Annotated[
     str, typer.Option(help="What it does not get: none, pictures, video or words.")
 ]
-_Seed = Annotated[int, typer.Option(help="Of initial weights and order.")]
+
+
+class TrainingChoices(NamedTuple):
+    """Options of a training; a parameter of commands, see `spread`."""
+
+    scenes: Annotated[
+        int, typer.Option(min=0, help="Random scenes of each task beyond the train split.")
+    ] = 300
+    goals: Annotated[
+        int, typer.Option(min=1, help="Goals of each scene that are told by place.")
+    ] = 4
+    detector_epochs: Annotated[int, typer.Option(min=1, help="Passes over the pictures.")] = 6
+    reader_epochs: Annotated[int, typer.Option(min=1, help="Passes over the instructions.")] = 12
+    seed: Annotated[int, typer.Option(help="Of initial weights and order.")] = 0
+
+
+_DEFAULT_TRAINING = TrainingChoices()
 
 
 @learn_app.command("listener")
+@spread
 def learn_listener(
     out: Annotated[Path, typer.Option(help="File for what it has learned.")],
     tasks: Tasks = "all",
     settings: Settings = "all",
     words: _Words = "train",
     rivals: _Rivals = False,
-    scenes: _Scenes = 300,
-    goals: _Goals = 4,
-    detector_epochs: _DetectorEpochs = 6,
-    reader_epochs: _ReaderEpochs = 12,
+    training: TrainingChoices = _DEFAULT_TRAINING,
     without: _Without = "none",
-    seed: _Seed = 0,
     workers: Workers = None,
 ) -> None:
     """Train a listener on the train split: pictures with free labels, then instructions."""
@@ -57,29 +64,19 @@ def learn_listener(
     from roboirg.policies.learned.listener_training import train_listener
 
     check_output_file(out)
-    plan = _plan(tasks, settings, words, without)._replace(
-        rivals=rivals,
-        scenes=scenes,
-        goals=goals,
-        detector_epochs=detector_epochs,
-        reader_epochs=reader_epochs,
-        seed=seed,
-    )
+    plan = _plan(tasks, settings, words, without)._replace(rivals=rivals, **training._asdict())
     count = core_count() if workers is None else workers
     save_model(train_listener(plan, count, _print_tenths()), out)
     typer.echo(f"{out}, {out.stat().st_size / 2**20:.1f} MiB")
 
 
 @learn_app.command("study")
+@spread
 def learn_study(
     out: Annotated[Path, typer.Option(help="Folder for listeners, tables and figure.")],
     tasks: Tasks = "all",
     words: _Words = "train",
-    scenes: _Scenes = 300,
-    goals: _Goals = 4,
-    detector_epochs: _DetectorEpochs = 6,
-    reader_epochs: _ReaderEpochs = 12,
-    seed: _Seed = 0,
+    training: TrainingChoices = _DEFAULT_TRAINING,
     workers: Workers = None,
 ) -> None:
     """Train listeners that get or lack settings, video, pictures or words, and compare them."""
@@ -97,18 +94,11 @@ def learn_study(
     if out.exists() and not out.is_dir():
         raise InvalidValueError(f"{str(out)!r} is a file; --out needs a folder.")
     out.mkdir(parents=True, exist_ok=True)
-    training: dict[str, Any] = {
-        "scenes": scenes,
-        "goals": goals,
-        "detector_epochs": detector_epochs,
-        "reader_epochs": reader_epochs,
-        "seed": seed,
-    }
-    plan = _plan(tasks, "all", words, "none")._replace(**training)
+    plan = _plan(tasks, "all", words, "none")._replace(**training._asdict())
     count = core_count() if workers is None else workers
     cells = study_cells(run_study(plan, out, count, _print_tenths()))
     page = out / "study.md"
-    page.write_text(study_text(cells, {"words": words, **training}), encoding="utf-8")
+    page.write_text(study_text(cells, {"words": words, **training._asdict()}), encoding="utf-8")
     save_study_figure(cells, out)
     typer.echo(str(page))
 

@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 # Rich is imported where it is used, so that --help is fast.
 
@@ -46,6 +41,8 @@ def progress_bars(*, has_lines: bool = True) -> Iterator[Callable[[str, int, int
         TimeRemainingColumn,
     )
 
+    from roboirg.util.console_width import progress_console
+
     console = progress_console(stderr=True)
     columns = (
         TextColumn("{task.description}"),
@@ -76,14 +73,6 @@ def progress_bars(*, has_lines: bool = True) -> Iterator[Callable[[str, int, int
                 console.print(f"{stage} {done}/{total} {left} {remark}".rstrip(), highlight=False)
 
         yield report
-
-
-def progress_console(*, stderr: bool = False) -> Console:
-    """Return a console that moves its cursor on a terminal only, whatever FORCE_COLOR says."""
-    from rich.console import Console
-
-    stream = sys.stderr if stderr else sys.stdout
-    return Console(stderr=stderr, force_terminal=None if stream.isatty() else False)
 
 
 def _time_left(now: float, start: float, first: int, done: int, total: int) -> str:

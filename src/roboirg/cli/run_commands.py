@@ -146,10 +146,10 @@ def play(
     plan: Plan, out: Path, executor: Executor, *, retry: bool, on_record: str | None = None
 ) -> RunSummary:
     """Play a plan with a progress bar; exits the process when it is interrupted."""
-    from roboirg.cli.progress_bar import progress_console
     from roboirg.evaluation.progress import ConsoleReporter
     from roboirg.evaluation.record_hook import CommandHook, HookedReporter
     from roboirg.evaluation.runner import Terminated, episode_runner, run_plan
+    from roboirg.util.console_width import progress_console
     from roboirg.util.freed_memory import keep_freed_memory
 
     keep_freed_memory()

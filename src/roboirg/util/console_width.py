@@ -1,6 +1,8 @@
-"""Width of what is printed into files and pipes."""
+"""What is printed into files and pipes: its width, and no moving cursor."""
 
 from __future__ import annotations
+
+import sys
 
 from rich.console import Console, RenderableType
 from rich.measure import Measurement
@@ -22,3 +24,9 @@ def widen(console: Console, *tables: RenderableType) -> None:
     unlimited = console.options.update(max_width=_ANY_WIDTH)
     needed = [Measurement.get(console, unlimited, table).maximum for table in tables]
     console.width = max([line_width(console), *needed])
+
+
+def progress_console(*, stderr: bool = False) -> Console:
+    """Return a console that moves its cursor on a terminal only, whatever FORCE_COLOR says."""
+    stream = sys.stderr if stderr else sys.stdout
+    return Console(stderr=stderr, force_terminal=None if stream.isatty() else False)

@@ -205,7 +205,7 @@ class MotionPrimitives:
                 return self._plan(_towards_robot(position, shortfall), rotation), rotation
             except MotionPlanningError as error:
                 refused.append(error)
-        raise refused[len(rotations) - 1]
+        raise refused[len(rotations) - 1]  # the place itself, from the last side
 
     def _plan(self, position: Point, rotation: Rotation) -> JointTrajectory:
         goal = ToolPose(np.asarray(position, dtype=np.float64), rotation)
