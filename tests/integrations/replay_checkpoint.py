@@ -9,16 +9,14 @@ from lerobot.processor import (
 )
 from replay_policy.configuration_replay import ReplayConfig
 from replay_policy.modeling_replay import ReplayPolicy
-from replay_table import record_table
 
 
-def save_checkpoint(folder, episodes):
-    """Record the episodes and save a policy that repeats them, as LeRobot saves policies."""
-    record_table(folder / "table.npz", episodes)
+def save_checkpoint(folder, table):
+    """Save a policy that repeats the actions of a table, as LeRobot saves policies."""
     picture = PolicyFeature(type=FeatureType.VISUAL, shape=(3, 256, 256))
     config = ReplayConfig(
         device="cpu",
-        table=str(folder / "table.npz"),
+        table=str(table),
         input_features={"observation.images.front": picture},
         output_features={"action": PolicyFeature(type=FeatureType.ACTION, shape=(8,))},
     )

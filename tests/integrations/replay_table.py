@@ -20,19 +20,22 @@ TASKS = ("VideoUnmask", "ButtonUnmask", "VideoUnmaskSwap", "StopCube", "VideoPla
 SETTING = "contextual"
 MESHES = "light"
 MAX_STEPS = 230
-MANY = 40
-"""From this number of episodes on, all tasks are played."""
+EPISODES = int(os.environ.get("ROBOIRG_EQUALITY_EPISODES", "8"))
+MANY = EPISODES >= 40
+"""Whether all tasks and all sizes of batches are played."""
+PLAYED = TASKS if MANY else TASKS[:2]
+PER_TASK = EPISODES // len(PLAYED)
 
 
-def tasks_of(episodes):
-    """Return the tasks that so many episodes are spread over."""
-    return TASKS if episodes >= MANY else TASKS[:1]
+def in_batches_of(count):
+    """Return what the programs of docs/integrations.md say of the episodes, and what to say."""
+    played = f"{list(PLAYED)}, {SETTING!r}, {count}, {PER_TASK}"
+    return {'["PickXtimes", "VideoUnmask"], "contextual", 8, 50': played}
 
 
-def cases(episodes):
+def cases():
     """Return task and number of each episode."""
-    tasks = tasks_of(episodes)
-    return [(task, number) for task in tasks for number in range(episodes // len(tasks))]
+    return [(task, number) for task in PLAYED for number in range(PER_TASK)]
 
 
 def key_of(picture, instruction):
@@ -41,9 +44,9 @@ def key_of(picture, instruction):
     return hashlib.sha256(content).hexdigest()
 
 
-def record_table(path: Path, episodes: int) -> None:
+def record_table(path: Path) -> None:
     """Record the oracle in the episodes of `cases` and write the table of their keys."""
-    recorded = [_record(*case) for case in cases(episodes)]
+    recorded = [_record(*case) for case in cases()]
     table = {}
     for index, (key, rows) in enumerate(recorded):
         played = (rows, rows[: len(rows) // 2], recorded[index - 1][1])[index % 3]
@@ -107,10 +110,10 @@ class ReplayPolicy:
         return next(self.player)[None]
 
 
-def own_outcomes(spec, episodes, meshes=MESHES):
+def own_outcomes(spec, meshes=MESHES):
     """Return (task, episode, whether it succeeded, steps) of each episode in our own runner."""
     played = []
-    for task, episode in cases(episodes):
+    for task, episode in cases():
         job = Job(
             policy="replay", spec=spec, task=task, split="test", episode=episode, setting=SETTING,
             max_steps=MAX_STEPS, meshes=meshes,
@@ -118,6 +121,6 @@ def own_outcomes(spec, episodes, meshes=MESHES):
         one = play_episode(job)
         assert one.outcome in ("success", "failure"), one
         played.append((task, episode, one.outcome == "success", one.steps))
-    for task in tasks_of(episodes):
+    for task in PLAYED:
         assert {success for name, _, success, _ in played if name == task} == {True, False}, task
     return played

@@ -1,19 +1,17 @@
 """One policy, the same outcomes: in our runner, `gymnasium.make_vec`, and LeRobot's batches."""
 
-import os
-
 import numpy as np
 import pytest
 from page_commands import blocks, replaced, run_page
 from replay_table import (
+    EPISODES,
     MANY,
     MAX_STEPS,
     MESHES,
     SETTING,
+    TASKS,
     Replay,
-    own_outcomes,
-    record_table,
-    tasks_of,
+    in_batches_of,
 )
 
 from roboirg.integrations.lerobot.vector import make_batch
@@ -21,14 +19,13 @@ from roboirg.records.store import read_records
 
 pytestmark = pytest.mark.sim
 
-EPISODES = int(os.environ.get("ROBOIRG_EQUALITY_EPISODES", "4"))
 MODES = {
     "ours": "lazy=True, workers={workers}",
     "sync": "vectorization_mode='sync', episode=None",
     "async": "vectorization_mode='async', episode=None, vector_kwargs={{'context': 'spawn'}}",
 }
 BATCHES = [(2, "ours", 2)]
-if EPISODES >= MANY:
+if MANY:
     BATCHES = [
         (1, "ours", 1), (2, "ours", 1), (2, "ours", 2), (8, "ours", 1), (8, "ours", 8),
         (1, "sync", 0), (2, "sync", 0), (2, "async", 0), (8, "sync", 0), (8, "async", 0),
@@ -52,28 +49,12 @@ class MyPolicy:
 """
 
 
-@pytest.fixture(scope="module")
-def table(tmp_path_factory):
-    path = tmp_path_factory.mktemp("replay") / "table.npz"
-    record_table(path, EPISODES)
-    return path
-
-
-@pytest.fixture(scope="module")
-def ours(table):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("REPLAY_TABLE", str(table))
-        return own_outcomes("replay_table:ReplayPolicy", EPISODES)
-
-
 @pytest.mark.parametrize(("count", "mode", "workers"), BATCHES)
 def test_the_page_s_program_has_the_outcomes_of_our_runner(
     table, ours, tmp_path, count, mode, workers
 ):
-    tasks = list(tasks_of(EPISODES))
-    numbers = f"{count}, {EPISODES // len(tasks)}"
     values = {
-        '["PickXtimes", "VideoUnmask"], "contextual", 8, 50': f"{tasks}, {SETTING!r}, {numbers}",
+        **in_batches_of(count),
         "lazy=True": f"cameras=('front',), meshes={MESHES!r}, max_steps={MAX_STEPS}, "
         f"demonstration_frames='none', {MODES[mode].format(workers=workers)}",
     }
@@ -93,7 +74,7 @@ def test_lerobot_s_batches_have_them_too(table, ours):
     options = {
         "setting": SETTING, "cameras": ("front",), "meshes": MESHES, "max_steps": MAX_STEPS,
     }  # fmt: skip
-    env = make_batch(tasks_of(1)[0], count, True, options)
+    env = make_batch(TASKS[0], count, True, options)
     for start in range(0, 4, count):
         seeds = [1000 + start + index for index in range(count)]
         observation, _ = env.reset(seed=seeds, options={"lerobot_new_rollout": True})

@@ -12,7 +12,17 @@ pytest.importorskip("inspect_ai", reason="Inspect is not installed here; run `ma
 from inspect_ai.log import read_eval_log
 from page_commands import check_versions, run_page
 from planning_fakes import TOKENS, fake_vlm, words_of
-from replay_table import MANY, MAX_STEPS, SETTING, TASKS, cases, own_outcomes, tasks_of
+from replay_table import (
+    EPISODES,
+    MANY,
+    MAX_STEPS,
+    PER_TASK,
+    PLAYED,
+    SETTING,
+    TASKS,
+    cases,
+    own_outcomes,
+)
 
 from roboirg.episodes.splits import get_episode
 from roboirg.language import instruct
@@ -21,8 +31,7 @@ from roboirg.records.store import read_records
 
 pytestmark = pytest.mark.sim
 
-EPISODES = int(os.environ.get("ROBOIRG_EQUALITY_EPISODES", "4"))
-SAMPLES = [2] if EPISODES < MANY else [1, 2, 8]
+SAMPLES = [1, 2, 8] if MANY else [2]
 """Episodes at a time."""
 
 
@@ -30,7 +39,7 @@ SAMPLES = [2] if EPISODES < MANY else [1, 2, 8]
 def replies():
     """By what is said: the right goal in every other episode, else a wrong one."""
     found = {}
-    for task, index in cases(EPISODES):
+    for task, index in cases():
         episode = get_episode(task, "test", index)
         goals = goal_schema(task).goals.items()
         is_right = index % 2 == 0
@@ -57,18 +66,17 @@ def ours(model):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("OPENAI_API_KEY", "none")
         spec = f"vlm-listener:openai?base_url={model.url}/v1&model=gpt-4o"
-        return own_outcomes(spec, EPISODES, meshes="faithful")
+        return own_outcomes(spec, meshes="faithful")
 
 
 @pytest.mark.parametrize("samples", SAMPLES)
 def test_the_page_s_commands_have_the_outcomes_of_our_runner(model, ours, tmp_path, samples):
-    tasks = ",".join(tasks_of(EPISODES))
     model.requests.clear()
-    more = f"-T episodes={EPISODES // len(tasks_of(EPISODES))} -T max_steps={MAX_STEPS}"
+    more = f"-T episodes={PER_TASK} -T max_steps={MAX_STEPS}"
     shown = run_page(
         "Inspect",
         tmp_path,
-        {"tasks=all": f"tasks={tasks} {more} --max-samples {samples} --display plain"},
+        {"tasks=all": f"tasks={','.join(PLAYED)} {more} --max-samples {samples} --display plain"},
         OPENAI_BASE_URL=f"{model.url}/v1",
         OPENAI_API_KEY="none",
     )
@@ -93,11 +101,11 @@ def test_the_page_names_the_version_that_is_played():
     check_versions("Inspect")
 
 
-def test_the_entry_point_is_found_by_inspect_s_command(tmp_path):
+def test_the_entry_point_plays_several_tasks_by_inspect_s_command(tmp_path):
     command = [
         str(Path(sys.executable).with_name("inspect")), "eval", "roboirg/listener",
         "--model", "mockllm/model", "--display", "plain", "--log-dir", str(tmp_path),
-        "-T", f"tasks={TASKS[0]}", "-T", "episodes=1", "-T", "max_steps=20",
+        "-T", f"tasks={','.join(TASKS[::3])}", "-T", "episodes=1", "-T", "max_steps=20",
     ]  # fmt: skip
     # Inspect's mock model counts tokens with a tokenizer that it downloads; here it counts letters.
     counter = tmp_path / "offline" / "tiktoken.py"
@@ -115,9 +123,10 @@ def test_the_entry_point_is_found_by_inspect_s_command(tmp_path):
     )
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     (path,) = tmp_path.glob("*.eval")
-    (sample,) = read_eval_log(str(path)).samples
-    assert sample.id == f"{TASKS[0]}-contextual-000"
-    (score,) = sample.scores.values()
-    assert score.value == 0
-    assert score.explanation == "not done after 20 steps"
-    assert score.metadata["record"]["usage"]["unparsed"] == 1
+    samples = read_eval_log(str(path)).samples
+    assert [one.id for one in samples] == [f"{one}-contextual-000" for one in TASKS[::3]]
+    for sample in samples:
+        (score,) = sample.scores.values()
+        assert score.value == 0
+        assert score.explanation == "not done after 20 steps"
+        assert score.metadata["record"]["usage"]["unparsed"] == 1

@@ -1,7 +1,5 @@
 """The plugin in the real LeRobot: `make integrations` runs this with LeRobot's own environment."""
 
-import os
-
 import numpy as np
 import pytest
 
@@ -11,8 +9,16 @@ pytest.importorskip("lerobot_env_roboirg", reason="the plugin is not installed h
 from lerobot.envs.configs import EnvConfig
 from lerobot.envs.utils import preprocess_observation
 from page_commands import check_versions, run_page
-from replay_checkpoint import save_checkpoint
-from replay_table import MANY, MAX_STEPS, MESHES, SETTING, TASKS, own_outcomes, tasks_of
+from replay_table import (
+    MANY,
+    MAX_STEPS,
+    MESHES,
+    PER_TASK,
+    PLAYED,
+    SETTING,
+    TASKS,
+    own_outcomes,
+)
 
 import roboirg
 from roboirg.records.store import read_records
@@ -20,40 +26,31 @@ from roboirg.records.store import read_records
 pytestmark = pytest.mark.sim
 
 TASK = TASKS[0]
-EPISODES = int(os.environ.get("ROBOIRG_EQUALITY_EPISODES", "6"))
 BATCHES = [(2, True), (3, False)]
-if EPISODES >= MANY:
+if MANY:
     BATCHES = [(1, False), (2, False), (2, True), (8, False), (8, True)]
-
-
-@pytest.fixture(scope="session")
-def checkpoint(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("replay")
-    save_checkpoint(folder, EPISODES)
-    return folder
 
 
 @pytest.fixture(scope="session")
 def ours(checkpoint):
     """Outcomes of our own runner with the same checkpoint."""
-    return [one[:3] for one in own_outcomes(f"lerobot://{checkpoint}", EPISODES)]
+    return [one[:3] for one in own_outcomes(f"lerobot://{checkpoint}")]
 
 
 @pytest.mark.parametrize(("batch", "use_async"), BATCHES)
 def test_the_page_s_commands_have_the_outcomes_of_our_runner(
     checkpoint, ours, tmp_path, batch, use_async
 ):
-    tasks = tasks_of(EPISODES)
     shown = run_page(
         "LeRobot",
         tmp_path,
         {
             "lerobot/some-checkpoint": checkpoint,
-            "PickXtimes,VideoUnmask": ",".join(tasks),
+            "PickXtimes,VideoUnmask": ",".join(PLAYED),
             "contextual": f"{SETTING} --env.discover_packages_path=replay_policy "
             f"--policy.device=cpu --env.meshes={MESHES} --env.cameras=front "
             f"--env.episode_length={MAX_STEPS} --eval.use_async_envs={str(use_async).lower()}",
-            "n_episodes=50": f"n_episodes={EPISODES // len(tasks)}",
+            "n_episodes=50": f"n_episodes={PER_TASK}",
             "batch_size=8": f"batch_size={batch}",
         },
     )

@@ -1,7 +1,6 @@
 """The Hub's file in the real LeRobot 0.4: `make integrations` runs this in its environment."""
 
 import importlib.metadata
-import os
 import re
 
 import pytest
@@ -11,31 +10,15 @@ if not importlib.metadata.version("lerobot").startswith("0.4."):
     pytest.skip("this is for LeRobot 0.4", allow_module_level=True)
 
 from page_commands import ROOT, blocks, check_versions, replaced, run_page
-from replay_checkpoint import save_checkpoint
-from replay_table import MANY, MAX_STEPS, MESHES, SETTING, own_outcomes, tasks_of
+from replay_table import MANY, MAX_STEPS, MESHES, in_batches_of
 
 from roboirg.records.store import read_records
 
 pytestmark = pytest.mark.sim
 
-EPISODES = int(os.environ.get("ROBOIRG_EQUALITY_EPISODES", "4"))
 BATCHES = [(2, False), (2, True)]
-if EPISODES >= MANY:
+if MANY:
     BATCHES = [(1, False), (2, False), (2, True), (8, False), (8, True)]
-
-
-@pytest.fixture(scope="session")
-def checkpoint(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("replay")
-    save_checkpoint(folder, EPISODES)
-    return folder
-
-
-@pytest.fixture(scope="session")
-def ours(checkpoint):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("REPLAY_TABLE", str(checkpoint / "table.npz"))
-        return [one[:3] for one in own_outcomes("replay_table:ReplayPolicy", EPISODES)]
 
 
 @pytest.fixture
@@ -55,12 +38,10 @@ def hub(tmp_path):
 def test_the_page_s_program_has_the_outcomes_of_our_runner(
     checkpoint, ours, hub, tmp_path, batch, use_async
 ):
-    tasks = list(tasks_of(EPISODES))
-    numbers = f"{batch}, {EPISODES // len(tasks)}"
     values = {
         "import json\n": "import json\nimport replay_checkpoint\n",  # makes the policy known
         "lerobot/some-checkpoint": checkpoint,
-        '["PickXtimes", "VideoUnmask"], "contextual", 8, 50': f"{tasks}, {SETTING!r}, {numbers}",
+        **in_batches_of(batch),
         "json.dumps(told)": f"json.dumps(told | {options()})",
         "use_async_envs=False": f"use_async_envs={use_async}",
     }
@@ -70,7 +51,7 @@ def test_the_page_s_program_has_the_outcomes_of_our_runner(
     assert re.search(r"\bact\b", shown)
     records = read_records(tmp_path / "runs" / "act")
     found = [(one.task, one.episode, one.outcome == "success") for one in records]
-    assert sorted(found) == sorted(ours)
+    assert sorted(found) == sorted(one[:3] for one in ours)
 
 
 def options():

@@ -16,13 +16,13 @@ pytest.importorskip("vla_eval", reason="vla-eval is not installed here; run `mak
 import yaml
 from page_commands import HERE, ROOT, check_versions, run_page
 from replay_table import (
+    EPISODES,
     MANY,
     MAX_STEPS,
     MESHES,
+    PER_TASK,
+    PLAYED,
     SETTING,
-    own_outcomes,
-    record_table,
-    tasks_of,
 )
 
 from roboirg.integrations.vla_eval.step_benchmark import RoboIRGBenchmark
@@ -30,25 +30,10 @@ from roboirg.records.store import read_records
 
 pytestmark = pytest.mark.sim
 
-EPISODES = int(os.environ.get("ROBOIRG_EQUALITY_EPISODES", "6"))
-BATCHES = [1] if EPISODES < MANY else [1, 2, 8]
-SENDS_ALL = EPISODES < MANY
+BATCHES = [1, 2, 8] if MANY else [1]
+SENDS_ALL = not MANY
 """Whether the policy gets videos and wrist pictures, which take most of the time."""
 SHARD = "--shard-id 0 --num-shards 1"
-
-
-@pytest.fixture(scope="session")
-def table(tmp_path_factory):
-    path = tmp_path_factory.mktemp("replay") / "table.npz"
-    record_table(path, EPISODES)
-    return path
-
-
-@pytest.fixture(scope="session")
-def ours(table):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("REPLAY_TABLE", str(table))
-        return own_outcomes("replay_table:ReplayPolicy", EPISODES)
 
 
 @contextlib.contextmanager
@@ -78,11 +63,10 @@ def write_configuration(path, port):
     """Write our configuration with one of its entries and fewer episodes."""
     content = yaml.safe_load((ROOT / "integrations/vla_eval/roboirg.yaml").read_text())
     (entry,) = [one for one in content["benchmarks"] if one["params"]["setting"] == SETTING]
-    tasks = list(tasks_of(EPISODES))
-    entry["params"] |= {"tasks": tasks, "max_steps": MAX_STEPS, "meshes": MESHES}
+    entry["params"] |= {"tasks": list(PLAYED), "max_steps": MAX_STEPS, "meshes": MESHES}
     if not SENDS_ALL:
         entry["params"] |= {"send_wrist_image": False, "send_video_history": False}
-    entry["episodes_per_task"] = EPISODES // len(tasks)
+    entry["episodes_per_task"] = PER_TASK
     content |= {"server": {"url": f"ws://127.0.0.1:{port}"}, "benchmarks": [entry]}
     path.write_text(yaml.safe_dump(content))
 
@@ -122,7 +106,7 @@ def check_that_nothing_is_told(log):
     assert len(starts) == EPISODES
     assert all(one["task"] == {"name": "RoboIRGBench"} for one in starts)
     words = json.dumps([content for kind, content in told if kind != "observation"])
-    for secret in (SETTING, *tasks_of(EPISODES), "goal", "seed", "episode_idx"):
+    for secret in (SETTING, *PLAYED, "goal", "seed", "episode_idx"):
         assert secret not in words
     later = ["images", "states", "task_description"]
     first = ["episode_restart", *later, "video_history", "wrist_video_history"]

@@ -48,7 +48,7 @@ VIA = "http://inspect"
 @task  # type: ignore[untyped-decorator] # Inspect is not installed where this is checked
 def listener(
     setting: str = "contextual",
-    tasks: str = "all",
+    tasks: str | list[str] = "all",
     split: str = "test",
     episodes: int = 50,
     rival: str = DEFAULT_RIVAL,
@@ -63,7 +63,7 @@ def listener(
 
     Args:
         setting: explicit, direct, reasoning, contextual or spatial.
-        tasks: names of tasks or suites, separated by commas.
+        tasks: names of tasks or suites, separated by commas, or a list of them.
         split: train, val, test or random.
         episodes: number of episodes of each task, from 0 on.
         rival: none or drawn.
@@ -81,7 +81,7 @@ def listener(
             setting=setting, rival=rival, reasoning=reasoning, delivery=delivery,
             max_steps=max_steps,
         )
-        for name in find_tasks(tasks.split(","))
+        for name in find_tasks(tasks.split(",") if isinstance(tasks, str) else tasks)
         for index in range(count)
     ]  # fmt: skip
     return Task(
