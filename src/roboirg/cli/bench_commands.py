@@ -13,6 +13,8 @@ def bench(
     out: Annotated[Path | None, typer.Option(help="JSON file for the results.")] = None,
 ) -> None:
     """Measure the time and memory of steps, resets and starts on this machine."""
+    import os
+
     from rich.console import Console
 
     from roboirg.perf.bench_runner import results_table, run_measures, write_results
@@ -21,9 +23,10 @@ def bench(
     from roboirg.util.freed_memory import keep_freed_memory
 
     keep_freed_memory()
+    load = os.getloadavg()[1]
     figures = run_measures(measures(), rounds, lambda words: typer.echo(words, err=True))
     console, table = Console(), results_table(figures)
     widen(console, table)
     console.print(table)
     if out is not None:
-        write_results(figures, out)
+        write_results(figures, out, load)

@@ -133,11 +133,16 @@ def results_table(results: Sequence[MeasureResult]) -> Table:
     return table
 
 
-def write_results(results: Sequence[MeasureResult], path: Path) -> None:
+def write_results(results: Sequence[MeasureResult], path: Path, load: float) -> None:
     """Write all rounds of all results as JSON, each with its machine, date and load.
 
     A file of earlier results is kept up to date: what was measured now takes the place of the row
     of the same name, other rows stay.
+
+    Args:
+        results: what was measured.
+        path: the file.
+        load: load average of the five minutes before, which is the load of others.
 
     Raises:
         InvalidValueError: the file cannot be written, or is no file of results.
@@ -145,7 +150,7 @@ def write_results(results: Sequence[MeasureResult], path: Path) -> None:
     where = {
         "date": dt.datetime.now(dt.UTC).date().isoformat(),
         "machine": f"{os.cpu_count()} cores, {processor_model()}",
-        "load": round(os.getloadavg()[1], 1),
+        "load": round(load, 1),
         "roboirg": __version__,
     }
     rows = {_key(row): row for row in read_figures(path)} if path.exists() else {}
