@@ -2,7 +2,8 @@
 #
 #   docker build -t roboirg .                                    the processor renders
 #   docker build -t roboirg:gpu --build-arg VARIANT=gpu .        an NVIDIA GPU renders
-#   docker run --rm -v "$PWD/runs:/runs" roboirg demo --out /runs/demo
+#   mkdir -p runs
+#   docker run --rm --user "$(id -u)" -v "$PWD/runs:/runs" roboirg demo --out /runs/demo
 #   docker run --rm --gpus all -v "$PWD/runs:/runs" roboirg:gpu doctor
 ARG VARIANT=cpu
 
