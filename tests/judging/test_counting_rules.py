@@ -279,6 +279,11 @@ def test_stop_cube_punishes_a_press_off_the_target_at_once(pressed_at):
     assert judge.cause.startswith("pressed the button while the cube was off the target")
 
 
+def test_stop_cube_expects_to_wait_between_hovering_and_pressing():
+    judge, _ = stop(pressed_at=200)
+    assert judge.cause == "pressed the button while the cube was off the target; expected: wait"
+
+
 @pytest.mark.parametrize("pressed_at", [60, 180, 188])
 def test_stop_cube_punishes_an_earlier_visit_when_it_is_time_to_press(pressed_at):
     judge, step = stop(pressed_at=pressed_at)

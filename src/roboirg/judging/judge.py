@@ -139,6 +139,8 @@ def describe_violation(violation: Fact | Rule, stage: Stage, scene: Scene) -> st
 
 def describe_expected(stage: Stage) -> str:
     """Return what the stage expects, to follow an act: ``"expected: press the button"``."""
+    if isinstance(stage.expects, Elapsed):
+        return "expected: wait"  # the subgoal is RoboMME's "remain static"
     return f"expected: {plain_subgoal(stage)}"
 
 
