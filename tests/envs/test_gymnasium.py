@@ -82,6 +82,21 @@ print("equal")
     assert done.stdout.strip() == "equal", done.stderr
 
 
+@pytest.mark.parametrize("kind", ["sync", "async"])
+def test_gymnasium_s_vector_environments_hold_videos_of_different_lengths(kind):
+    name = NAME.replace("PickXtimes", "VideoUnmaskSwap")
+    context = {"vector_kwargs": {"context": "spawn"}} if kind == "async" else {}
+    vector = gymnasium.make_vec(name, 2, kind, episode=None, cameras=(), **context)
+    _, infos = vector.reset(seed=0)
+    single = roboirg.make("VideoUnmaskSwap", episode=1, cameras=())
+    _, info = single.reset()
+    videos = infos["demonstration"]
+    assert [one.length for one in videos] == [114, 168]
+    for field in info["demonstration"]:
+        assert np.array_equal(videos[1][field], info["demonstration"][field])
+    vector.close()
+
+
 def test_a_fork_after_drawing_fails_at_once_with_the_reason():
     roboirg.make("PickXtimes", **OPTIONS).reset()
     vector = gymnasium.make_vec(NAME, 2, "async", **OPTIONS)

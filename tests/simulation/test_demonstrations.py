@@ -148,9 +148,12 @@ def test_nothing_is_drawn_before_it_is_read(drawn):
     assert world() is None
     assert video["wrist_rgb"].shape == (66, 256, 256, 3)
     assert drawn == ["front", "wrist"] + ["wrist"] * 66
-    plain = pickle.loads(pickle.dumps(video))  # noqa: S301 - our own
-    assert type(plain) is dict
-    same(plain, dict(video))
+    other = pickle.loads(pickle.dumps(video))  # noqa: S301 - our own
+    same(dict(other), dict(video))
+    assert list(other) == list(video)
+    assert other.length == video.length
+    assert not isinstance(other, dict)
+    assert len(other.actions) == 0
 
 
 def test_all_pictures_are_drawn_in_one_replay(drawn, monkeypatch):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,8 @@ class DemonstrationVideo(Mapping[str, NDArray[Any]]):
 
     Pictures are drawn when they are first read, at any later time, and then stored. To read
     several picture fields, call `draw` first, which is faster. Pickling draws all pictures and
-    gives a plain dictionary.
+    leaves the actions out. The pickled video is no dictionary either: Gymnasium's vector
+    environments put the arrays of dictionaries into one, and videos differ in length.
 
     Args:
         proprioception: the fields that are not drawn, with a leading axis T.
@@ -76,9 +77,9 @@ class DemonstrationVideo(Mapping[str, NDArray[Any]]):
     def __contains__(self, field: object) -> bool:
         return field in self._sequences or field in self._arrays
 
-    def __reduce__(self) -> tuple[type[dict[str, Any]], tuple[dict[str, Any]]]:
+    def __reduce__(self) -> tuple[type[Self], tuple[Any, ...]]:
         self.draw()
-        return dict, (dict(self),)
+        return type(self), (dict(self), {}, self.length, self.actions[:0])
 
     def __repr__(self) -> str:
         fields = [
