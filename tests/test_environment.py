@@ -158,8 +158,8 @@ def test_subgoals_change_one_step_after_their_stage_and_only_pointing_ones_are_g
 def test_make_is_typed_with_the_options_of_the_environment():
     typed = {name: hint.__forward_arg__ for name, hint in EnvOptions.__annotations__.items()}
     assert typed == {option.name: option.type for option in dataclasses.fields(EnvSettings)}
-    documented = roboirg.make.__doc__.partition("Keyword Args:")[2].partition("Raises:")[0]
-    assert re.findall(r"^        (\w+): ", documented, re.MULTILINE) == list(typed)
+    documented = inspect.getdoc(roboirg.make).partition("Keyword Args:")[2].partition("Raises:")[0]
+    assert re.findall(r"^    (\w+): ", documented, re.MULTILINE) == list(typed)
     for made in (roboirg.make, roboirg.make_vec, RoboIRGEnv, RoboIRGVectorEnv):
         annotation = inspect.signature(made).parameters["options"].annotation
         assert annotation == "Unpack[EnvOptions]"

@@ -77,7 +77,7 @@ def in_shards(count):
         return {}
     shell = "& shards+=($!); done; for shard in ${shards[@]}; do wait $shard; done"
     return {
-        "vla-eval run": f"for i in $(seq 0 {count - 1}); do vla-eval run",
+        "vla-eval run --": f"for i in $(seq 0 {count - 1}); do vla-eval run --",
         SHARD: f"--shard-id $i --num-shards {count} {shell}",
     }
 

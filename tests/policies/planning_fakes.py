@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import contextmanager
+from fractions import Fraction
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from types import SimpleNamespace
 
@@ -232,6 +233,6 @@ def _described(kind, data):
 def decoded(content):
     """Frames (T, height, width, 3) of a file, and its rate."""
     with av.open(io.BytesIO(content)) as container:
-        rate = container.streams.video[0].average_rate
+        rate = container.streams.video[0].average_rate  # a rational of the library's own
         frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
-    return np.stack(frames), rate
+    return np.stack(frames), Fraction(rate.numerator, rate.denominator)
