@@ -154,9 +154,9 @@ def test_a_run_that_is_told_to_end_keeps_what_was_played(sign, tmp_path):
     assert process.stdout.readline().startswith("1. ")
     process.send_signal(sign)
     try:
-        process.communicate(timeout=600)
+        text, _ = process.communicate(timeout=600)
     except subprocess.TimeoutExpired:
         process.kill()
         raise
-    assert process.returncode == 130
+    assert process.returncode == 130, text
     assert read_records(tmp_path)
