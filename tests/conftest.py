@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import signal
+import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -38,11 +39,16 @@ def wait_s() -> float:
     return WAIT_S
 
 
+def starts(browser: str) -> bool:
+    """Whether a browser is more than Ubuntu's advice to install it by snap."""
+    return subprocess.run([browser, "--version"], capture_output=True, check=False).returncode == 0
+
+
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     reason = "no browser: pip install playwright, and a Chromium (Debian's package chromium)"
     playwright = pytest.importorskip("playwright.sync_api", reason=reason)
-    path = next(filter(None, map(shutil.which, BROWSERS)), None)
+    path = next(filter(starts, filter(None, map(shutil.which, BROWSERS))), None)
     with playwright.sync_playwright() as driver:
         if path is None and not Path(driver.chromium.executable_path).exists():
             pytest.skip(reason)

@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 import signal
 import threading
 import urllib.error
@@ -18,7 +17,6 @@ from roboirg.real.study.study_plan import make_study, write_study
 from roboirg.real.study.trial_log import TrialLog, trial_metadata
 from roboirg.records.store import read_records
 
-CHROMIUM = shutil.which("chromium") or ""
 NARROW = {"width": 400, "height": 800}
 
 
@@ -161,17 +159,6 @@ def test_a_kill_between_two_clicks_costs_nothing(small):
 
 
 # In a browser.
-
-
-@pytest.fixture(scope="module")
-def browser():
-    if not CHROMIUM:
-        pytest.skip("no chromium on this machine")
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as driver:
-        found = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield found
-        found.close()
 
 
 def press(page, key):

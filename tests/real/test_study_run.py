@@ -1,7 +1,6 @@
 """A study from its plan to its table: played on the twin, killed, resumed, scored, told."""
 
 import re
-import shutil
 import signal
 import subprocess
 import time
@@ -21,7 +20,6 @@ pytestmark = pytest.mark.sim
 
 SETTINGS = ("explicit", "reasoning", "contextual")
 OPTIONS = ("--policy", "listener", "--policy", "forgetful", "--settings", ",".join(SETTINGS))
-CHROMIUM = shutil.which("chromium")
 
 
 def finished(*words):
@@ -73,32 +71,27 @@ def test_every_trial_was_played_once_and_waits(study):
 
 
 @pytest.mark.browser
-def test_scored_in_a_browser_it_is_the_table_that_the_judge_would_have_given(study):
-    if not CHROMIUM:
-        pytest.skip("no chromium on this machine")
-    driver = pytest.importorskip("playwright.sync_api")
+def test_scored_in_a_browser_it_is_the_table_that_the_judge_would_have_given(browser, study):
     plan = read_study(study)
     before = TrialLog.read(plan, study)
     judged = {t.name: trial_metadata(before.newest(t.name))["judge"] for t in plan.trials}
     process = start("score", study, "--operator", "ann")
-    with driver.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        page = browser.new_page()
-        page.goto(re.search(r"http\S+", process.stdout.readline())[0])
-        for number, trial in enumerate(plan.trials):
-            verdict = judged[trial.name]
-            choices = [one.failure for one in failure_choices(trial.episode)]
-            key = "s" if verdict["outcome"] == "success" else str(
-                choices.index(verdict["failure"]) + 1
-            )  # fmt: skip
-            with page.expect_navigation():
-                page.keyboard.press(key)
-            if number == 5:  # killed in the middle, and gone on
-                process.send_signal(signal.SIGKILL)
-                process.wait(timeout=600)
-                process = start("score", study, "--operator", "bob")
-                page.goto(re.search(r"http\S+", process.stdout.readline())[0])
-        browser.close()
+    page = browser.new_page()
+    page.goto(re.search(r"http\S+", process.stdout.readline())[0])
+    for number, trial in enumerate(plan.trials):
+        verdict = judged[trial.name]
+        choices = [one.failure for one in failure_choices(trial.episode)]
+        key = "s" if verdict["outcome"] == "success" else str(
+            choices.index(verdict["failure"]) + 1
+        )  # fmt: skip
+        with page.expect_navigation():
+            page.keyboard.press(key)
+        if number == 5:  # killed in the middle, and gone on
+            process.send_signal(signal.SIGKILL)
+            process.wait(timeout=600)
+            process = start("score", study, "--operator", "bob")
+            page.goto(re.search(r"http\S+", process.stdout.readline())[0])
+    page.close()
     process.kill()
     process.wait(timeout=600)
     records = {record.identity: record for record in read_records(study)}
