@@ -3,6 +3,7 @@
 import re
 import signal
 import subprocess
+import sys
 import time
 
 import pytest
@@ -10,6 +11,7 @@ from real_start import start
 
 from roboirg.analysis.stats.cells import gather
 from roboirg.analysis.tables.paper_tables import make_table
+from roboirg.real.control.interruption import Interruption
 from roboirg.real.pages.study_figure import bar_series, write_figure
 from roboirg.real.study.failure_choices import failure_choices
 from roboirg.real.study.study_plan import read_study
@@ -136,6 +138,29 @@ def test_a_policy_outside_the_plan_is_refused(study):
     process = start("run", study, "--policy", "oracle")
     text, _ = process.communicate(timeout=120)
     assert "There is no policy in the plan 'oracle'" in text
+
+
+@pytest.mark.parametrize("sign", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_run_also_where_python_drops_the_exception(sign, monkeypatch):
+    class Finalized:
+        def __del__(self):
+            signal.raise_signal(sign)
+
+    before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
+    interruption = Interruption()
+    interruption.watch()
+    ask = interruption.before(lambda: True)
+    dropped = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda lost: dropped.append(lost.exc_type))
+    try:
+        assert ask()
+        Finalized()
+        assert dropped == [KeyboardInterrupt]
+        with pytest.raises(KeyboardInterrupt):
+            ask()
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
 
 
 @pytest.mark.parametrize("sign", [signal.SIGINT, signal.SIGTERM])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -188,8 +187,12 @@ def figure(
 
 def _play(study: Study, console: OperatorConsole, policies: list[str], *, retry: bool) -> None:
     """Play a study and print a summary; exits with 2 if a trial ended in an error."""
+    from roboirg.real.control.interruption import Interruption
+
     # SIGTERM stops the run like Ctrl-C, with the arm at rest.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    interruption = Interruption()
+    interruption.watch()
+    study.stop_requested = interruption.before(study.stop_requested)
     try:
         records = study.run(policies, retry_errors=retry)
     except KeyboardInterrupt:
