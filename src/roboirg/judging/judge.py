@@ -17,6 +17,10 @@ from roboirg.core.episode import Scene, Stage
 from roboirg.judging.fact_history import FactHistory
 
 
+_PLAINER = {"remain static": "wait"}
+"""Subgoals of RoboMME, and what a cause says instead."""
+
+
 class Status(StrEnum):
     """Status of an episode."""
 
@@ -139,9 +143,8 @@ def describe_violation(violation: Fact | Rule, stage: Stage, scene: Scene) -> st
 
 def describe_expected(stage: Stage) -> str:
     """Return what the stage expects, to follow an act: ``"expected: press the button"``."""
-    if isinstance(stage.expects, Elapsed):
-        return "expected: wait"  # the subgoal is RoboMME's "remain static"
-    return f"expected: {plain_subgoal(stage)}"
+    words = plain_subgoal(stage)
+    return f"expected: {_PLAINER.get(words, words)}"
 
 
 def describe_act(fact: Fact, scene: Scene) -> str:
