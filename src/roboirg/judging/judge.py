@@ -16,7 +16,6 @@ from roboirg.core.conditions import All, Condition, Elapsed, Fact, Rule
 from roboirg.core.episode import Scene, Stage
 from roboirg.judging.fact_history import FactHistory
 
-
 _PLAINER = {"remain static": "wait"}
 """Subgoals of RoboMME, and what a cause says instead."""
 
