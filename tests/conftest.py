@@ -49,16 +49,21 @@ def browser() -> Iterator[Any]:
     reason = "no browser: pip install playwright, and a Chromium (Debian's package chromium)"
     playwright = pytest.importorskip("playwright.sync_api", reason=reason)
     path = next(filter(starts, filter(None, map(shutil.which, BROWSERS))), None)
-    with playwright.sync_playwright() as driver:
-        if path is None and not Path(driver.chromium.executable_path).exists():
-            pytest.skip(reason)
-        # Chromium refuses its sandbox to root, the user of most containers.
-        arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
-        chromium = driver.chromium.launch(
-            executable_path=path, args=arguments, timeout=1000 * WAIT_S
-        )
-        yield chromium
-        chromium.close()
+    try:
+        driver = playwright.sync_playwright().start()
+    except Exception:  # Playwright's program needs libraries that come with Debian's Chromium
+        if path is not None:
+            raise
+        pytest.skip(reason)
+    if path is None and not Path(driver.chromium.executable_path).exists():
+        driver.stop()
+        pytest.skip(reason)
+    # Chromium refuses its sandbox to root, the user of most containers.
+    arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
+    chromium = driver.chromium.launch(executable_path=path, args=arguments, timeout=1000 * WAIT_S)
+    yield chromium
+    chromium.close()
+    driver.stop()
 
 
 @pytest.fixture
