@@ -26,7 +26,7 @@ from roboirg.records.store import read_records
 pytestmark = pytest.mark.sim
 
 TASK = TASKS[0]
-BATCHES = [(2, True), (3, False)]
+BATCHES = [(2, True), (4, False)]
 if MANY:
     BATCHES = [(1, False), (2, False), (2, True), (8, False), (8, True)]
 
