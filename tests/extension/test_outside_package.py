@@ -83,8 +83,8 @@ def outside(tmp_path_factory):
     # The environment sees what this one has, and the package under test.
     here = [sysconfig.get_path("purelib"), str(ROOT / "src")]
     (site / "parent.pth").write_text("\n".join(here) + "\n")
-    install = ["install", "--quiet", "--no-deps", "--no-build-isolation", str(package.parent)]
-    subprocess.run([sys.executable, "-m", "pip", f"--python={python}", *install], check=True)
+    install = ["install", "--quiet", "--no-deps", "--no-build-isolation", "--target", str(site)]
+    subprocess.run([sys.executable, "-m", "pip", *install, str(package.parent)], check=True)
     return python
 
 
