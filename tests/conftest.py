@@ -7,7 +7,7 @@ import shutil
 import signal
 import subprocess
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -55,15 +55,17 @@ def browser() -> Iterator[Any]:
         if path is not None:
             raise
         pytest.skip(reason)
-    if path is None and not Path(driver.chromium.executable_path).exists():
-        driver.stop()
-        pytest.skip(reason)
-    # Chromium refuses its sandbox to root, the user of most containers.
-    arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
-    chromium = driver.chromium.launch(executable_path=path, args=arguments, timeout=1000 * WAIT_S)
-    yield chromium
-    chromium.close()
-    driver.stop()
+    with ExitStack() as stack:
+        stack.callback(driver.stop)
+        if path is None and not Path(driver.chromium.executable_path).exists():
+            pytest.skip(reason)
+        # Chromium refuses its sandbox to root, the user of most containers.
+        arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
+        chromium = driver.chromium.launch(
+            executable_path=path, args=arguments, timeout=1000 * WAIT_S
+        )
+        stack.callback(chromium.close)
+        yield chromium
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -13,8 +14,6 @@ def bench(
     out: Annotated[Path | None, typer.Option(help="JSON file for the results.")] = None,
 ) -> None:
     """Measure the time and memory of steps, resets and starts on this machine."""
-    import os
-
     from rich.console import Console
 
     from roboirg.perf.bench_runner import results_table, run_measures, write_results
