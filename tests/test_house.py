@@ -2,30 +2,20 @@
 
 import ast
 import io
-import itertools
 import re
 import tokenize
 from collections import defaultdict
-from functools import cache
 from pathlib import Path
 
+import layout
 import pytest
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "roboirg"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 
-MAX_ROOMS = 22
-MAX_ARROWS = 125
-MAX_FILES = 20
-
-FORBIDDEN_MODULES = {
-    "acceptance", "asking", "balance", "benchmark", "code", "deadman", "derived", "desk",
-    "excerpts", "feel", "fitting", "grounding", "handed", "hands", "happenings", "hearing",
-    "kinds", "leases", "ledger", "lettering", "library", "lines", "links", "listing", "moments",
-    "notices", "planned", "proof", "retelling", "retrace", "ring", "senses", "sharing",
-    "showing", "slips", "standing", "telling", "watching", "wishes", "words",
-}  # fmt: skip
+MOST_ROOMS = 22
+MOST_ARROWS = 125
 
 FORBIDDEN_IDENTIFIERS = {
     "Asker", "Began", "Board", "Chooser", "Company", "Contestant", "Courier", "Course", "DeadMan",
@@ -53,137 +43,83 @@ SPOKEN = (
 FORBIDDEN_PROSE = ("whoever", "nobody", "somebody", "anybody", "so many", "so often", "while due")
 
 
-@cache
-def tree(path):
-    return ast.parse(path.read_text(encoding="utf-8"))
-
-
-def module_name(path):
-    parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
-    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-
-
-MODULES = {module_name(path) for path in SOURCES}
-
-
 def check_empty(found):
     """Fail with a line for each entry."""
     if found:
         pytest.fail("\n".join(map(str, found)), pytrace=False)
 
 
-def room_of(module):
-    """The top-level folder or module below the package; the package's own file is a room too."""
-    return module.split(".")[1] if "." in module else module
-
-
-def imports(path):
-    """Yield every module of the package that a file imports, at any level of nesting."""
-    package = module_name(path) if path.name == "__init__.py" else module_name(path.parent / "x")
-    package = package.removesuffix(".x")
-    for node in ast.walk(tree(path)):
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            base = node.module or ""
-            if node.level:
-                parent = package.split(".")[: len(package.split(".")) - node.level + 1]
-                base = ".".join([*parent, *filter(None, [base])])
-            names = []
-            for alias in node.names:
-                submodule = f"{base}.{alias.name}"
-                names.append(submodule if submodule in MODULES else base)
-        else:
-            continue
-        yield from (name for name in names if name.split(".")[0] == PACKAGE.name)
-
-
-@cache
-def arrows():
-    """Return the rooms that each room imports, with an example of each import."""
-    found = {room_of(module): {} for module in MODULES}
-    for path in SOURCES:
-        room = room_of(module_name(path))
-        for module in imports(path):
-            if room_of(module) != room:
-                found[room].setdefault(room_of(module), f"{path.relative_to(ROOT)}: {module}")
-    return found
-
-
-def find_circle(graph):
-    """Return the rooms of a circle; empty if there is none."""
-    finished, trail = set(), []
-
-    def visit(room):
-        if room in trail:
-            return [*trail[trail.index(room) :], room]
-        if room in finished:
-            return []
-        trail.append(room)
-        for other in graph.get(room, ()):
-            if circle := visit(other):
-                return circle
-        trail.pop()
-        finished.add(room)
-        return []
-
-    return next((circle for room in graph if (circle := visit(room))), [])
-
-
 def test_rooms_import_each_other_in_no_circle():
-    circle = find_circle(arrows())
-    check_empty([arrows()[one][other] for one, other in itertools.pairwise(circle)])
+    check_empty(layout.circles(layout.arrows()))
+
+
+def test_files_import_each_other_in_no_circle():
+    check_empty(layout.file_circles())
 
 
 def test_circles_are_found():
-    assert find_circle({"a": ["b"], "b": ["c"], "c": []}) == []
-    assert find_circle({"a": ["b", "c"], "b": ["c"], "c": ["b"]}) == ["b", "c", "b"]
+    assert layout.circles({"a": ["b"], "b": ["c"], "c": []}) == []
+    assert layout.circles({"a": ["b", "c"], "b": ["c"], "c": ["b"]}) == [["b", "c"]]
 
 
 def test_rooms_and_arrows_are_few():
-    assert len(arrows()) <= MAX_ROOMS, sorted(arrows())
-    assert sum(map(len, arrows().values())) <= MAX_ARROWS, {
-        room: sorted(others) for room, others in arrows().items()
+    print("\n".join(f"{n:>7,} {name}" for name, n in layout.figures().items()))  # noqa: T201
+    assert len(layout.arrows()) <= MOST_ROOMS, sorted(layout.arrows())
+    assert sum(map(len, layout.arrows().values())) <= MOST_ARROWS, {
+        room: sorted(others) for room, others in layout.arrows().items()
     }
 
 
-def test_folders_are_small():
-    sizes = {
-        str(folder.relative_to(ROOT)): sum(one.is_file() for one in folder.iterdir())
-        for folder in (PACKAGE, *PACKAGE.rglob("*"))
-        if folder.is_dir() and folder.name != "__pycache__"
-    }
-    check_empty([f"{folder}: {size}" for folder, size in sizes.items() if size > MAX_FILES])
+def test_only_the_command_imports_applications():
+    check_empty(layout.importers_of_applications() - {"roboirg.main"})
+
+
+def test_applications_do_not_import_each_other():
+    check_empty(layout.imports_between_applications())
+
+
+def test_no_text_below_the_applications_names_one():
+    found = [
+        f"{path.relative_to(ROOT)}:{line}"
+        for module, path in layout.modules().items()
+        if layout.room_of(module) not in ("apps", "main")
+        for line, text in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if layout.APPS in text
+    ]
+    check_empty(found)
+
+
+def imported_below(room):
+    """Return the rooms that a room reaches, directly or through others."""
+    reached, left = set(), [room]
+    while left:
+        new = set(layout.arrows()[left.pop()]) - reached
+        reached |= new
+        left += new
+    return reached
+
+
+def test_nothing_below_the_environments_imports_gymnasium():
+    found = [
+        str(path.relative_to(ROOT))
+        for module, path in layout.modules().items()
+        if layout.room_of(module) in imported_below("envs")
+        and any(name.split(".")[0] == "gymnasium" for name in layout.imported_names(path))
+    ]
+    check_empty(found)
 
 
 def repeated(places):
     return [f"{name}: {', '.join(found)}" for name, found in places.items() if len(found) > 1]
 
 
-def test_every_module_has_a_name_of_its_own():
-    places = defaultdict(list)
-    for path in SOURCES:
-        if path.stem != "__init__":
-            places[path.stem].append(str(path.relative_to(ROOT)))
-    check_empty(repeated(places))
-
-
 def test_every_class_has_a_name_of_its_own():
     places = defaultdict(list)
     for path in SOURCES:
-        for node in ast.walk(tree(path)):
+        for node in ast.walk(layout.tree(path)):
             if isinstance(node, ast.ClassDef):
                 places[node.name].append(f"{path.relative_to(ROOT)}:{node.lineno}")
     check_empty(repeated(places))
-
-
-def test_no_module_has_a_forbidden_name():
-    found = [
-        path.relative_to(ROOT)
-        for path in SOURCES
-        if {path.stem, path.parent.name} & FORBIDDEN_MODULES
-    ]
-    check_empty(found)
 
 
 def test_no_identifier_is_forbidden():
@@ -216,33 +152,3 @@ def test_no_prose_has_a_forbidden_phrase(phrase):
         for match in pattern.finditer(text)
     ]
     check_empty(found)
-
-
-def public_definitions(node):
-    """Yield the public functions and classes of a module or class, without those in functions."""
-    for child in ast.iter_child_nodes(node):
-        if isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-            if child.name.startswith("_"):
-                continue
-            yield child
-            if isinstance(child, ast.ClassDef):
-                yield from public_definitions(child)
-        elif isinstance(child, ast.If | ast.Try):
-            yield from public_definitions(child)
-
-
-def is_overload(node):
-    decorators = getattr(node, "decorator_list", [])
-    return any(ast.unparse(one).endswith("overload") for one in decorators)
-
-
-@pytest.mark.parametrize("path", SOURCES, ids=module_name)
-def test_modules_and_public_names_have_docstrings(path):
-    text = path.read_text(encoding="utf-8")
-    missing = [] if ast.get_docstring(tree(path)) or not text.strip() else ["module"]
-    missing += [
-        f"{node.name}, line {node.lineno}"
-        for node in public_definitions(tree(path))
-        if not ast.get_docstring(node) and not is_overload(node)
-    ]
-    check_empty(missing)
