@@ -17,9 +17,9 @@ from gymnasium.utils.env_checker import check_env
 import roboirg
 from roboirg.core.actions import ACTION_SPACES
 from roboirg.core.errors import InvalidActionError, InvalidValueError, UnknownNameError
+from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.env_settings import EnvSettings
 from roboirg.envs.environment import RoboIRGEnv
-from roboirg.envs.factory import EnvOptions
 from roboirg.envs.registration import environment_id
 from roboirg.envs.vector_environment import RoboIRGVectorEnv
 from roboirg.episodes.splits import get_episode

@@ -12,7 +12,7 @@ import pytest
 
 from roboirg.analysis.stats.chance import FLOORS, chance_level, floor_level
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.plan import instruct_job
+from roboirg.evaluation.job_instruction import instruct_job
 from roboirg.language.settings import settings_of
 from roboirg.language.shortcuts import SURFACE_RULES
 from roboirg.language.variants import all_variants

@@ -15,7 +15,8 @@ import numpy as np
 from roboirg.evaluation import rollout
 from roboirg.evaluation.executors.executor import LocalProcesses
 from roboirg.evaluation.hosting.host_pool import HostSettings
-from roboirg.evaluation.plan import Plan, instruct_job
+from roboirg.evaluation.job_instruction import instruct_job
+from roboirg.evaluation.plan import Plan
 from roboirg.evaluation.rollout import EpisodeRunner
 from roboirg.evaluation.runner import run_plan
 from roboirg.records.record import Job, Record

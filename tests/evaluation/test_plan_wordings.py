@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.plan import Plan, instruct_job, read_plan, write_plan
+from roboirg.evaluation.job_instruction import instruct_job
+from roboirg.evaluation.plan import Plan, read_plan, write_plan
 from roboirg.evaluation.plan_file import read_plan_file
 from roboirg.evaluation.plan_maker import make_plan
 from roboirg.language.wordings import wording_store

@@ -16,7 +16,7 @@ from roboirg.analysis.stats.heard_rates import count_heard
 from roboirg.analysis.tables.run_tables import make_run_tables, print_run_tables
 from roboirg.cli import app
 from roboirg.core.errors import UnknownNameError
-from roboirg.evaluation.plan import instruct_job
+from roboirg.evaluation.job_instruction import instruct_job
 from roboirg.evaluation.plan_file import read_plan_file
 from roboirg.evaluation.plan_maker import make_plan
 from roboirg.evaluation.prompt_shares import (

@@ -19,10 +19,11 @@ from roboirg.core.errors import (
 )
 from roboirg.evaluation import rollout
 from roboirg.evaluation.episode_errors import one_line
-from roboirg.evaluation.plan import instruct_job
+from roboirg.evaluation.job_instruction import instruct_job
 from roboirg.evaluation.rollout import EpisodeRunner, load_policy, play_episode
 from roboirg.evaluation.rollout_result import RolloutResult
-from roboirg.evaluation.video_writer import VideoOptions, VideoWriter
+from roboirg.evaluation.video_writer import VideoWriter
+from roboirg.records.film import VideoOptions
 from roboirg.records.record import EventRecord, Job, Record
 
 JOB = Job(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")

@@ -5,13 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from roboirg.evaluation.video_writer import (
-    DEMONSTRATION_COLOR,
-    GAP,
-    VideoOptions,
-    VideoWriter,
-    compose_frame,
-)
+from roboirg.evaluation.video_writer import DEMONSTRATION_COLOR, GAP, VideoWriter, compose_frame
+from roboirg.records.film import VideoOptions
 
 av = pytest.importorskip("av")
 

@@ -22,9 +22,9 @@ from roboirg.evaluation.grounding_set.media_store import store_content
 from roboirg.language import setting_names
 from roboirg.language.command_chance import is_right
 from roboirg.policies.planning.goal_schema import goal_schema
-from roboirg.policies.planning.model_content import Picture, encode_png
 from roboirg.policies.planning.vlm_listener import NotUnderstoodError
 from roboirg.tasks import all_tasks
+from roboirg.util.media import Picture, encode_png
 
 NUMBER = 500
 PICTURE = encode_png(Picture(np.zeros((256, 256, 3), np.uint8)))

@@ -28,7 +28,7 @@ from roboirg.language import (
     settings,
     statistics_tables,
 )
-from roboirg.language.export import row
+from roboirg.language.instruction_row import row
 from roboirg.language.setting import Setting
 from roboirg.language.settings import all_settings, direct
 from roboirg.language.validation import Batch, check_episode, episode_checks, validate_batch

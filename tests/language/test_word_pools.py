@@ -14,7 +14,7 @@ from roboirg.cli import app as cli
 from roboirg.core.episode import SPLITS
 from roboirg.core.word_pools import POOLS, Pools, pool_of
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.plan import instruct_job
+from roboirg.evaluation.job_instruction import instruct_job
 from roboirg.evaluation.plan_maker import make_plan
 from roboirg.language import instruct, setting_names
 from roboirg.language.settings import all_settings

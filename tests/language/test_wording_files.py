@@ -13,8 +13,8 @@ from roboirg.core.episode import Goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import FORMS, generator, instruct, instruct_with, interpret
-from roboirg.language.export import row
 from roboirg.language.generator import find_refusal
+from roboirg.language.instruction_row import row
 from roboirg.language.phrases import plain
 from roboirg.language.request import InstructionSpec, UtteranceSpec
 from roboirg.language.settings import get_setting
@@ -23,7 +23,7 @@ from roboirg.language.validation.episode_checks import check_episode
 from roboirg.language.validation.leaks import find_leaks
 from roboirg.language.validation.pairing import unpaired
 from roboirg.language.variants import instructions
-from roboirg.language.wordings.worded_command import StatedPhrase, TaskWordings, WordedCommand
+from roboirg.language.worded_command import StatedPhrase, TaskWordings, WordedCommand
 from roboirg.language.wordings.wording_file import parse_wordings, read_wordings
 from roboirg.language.wordings.wording_store import find_wordings, open_wordings, register_wordings
 from roboirg.language.wordings.wording_writer import wording_text

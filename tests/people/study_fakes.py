@@ -19,8 +19,8 @@ from roboirg.evaluation.people.listening_study import (
     write_listening_study,
 )
 from roboirg.evaluation.plan_maker import make_plan
-from roboirg.policies.planning.model_content import Clip, Picture, encode_mp4, encode_png
 from roboirg.tasks import get_task
+from roboirg.util.media import Clip, Picture, encode_mp4, encode_png
 
 SIDE, STRIDE = 16, 40
 

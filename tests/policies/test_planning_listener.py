@@ -42,8 +42,8 @@ from roboirg.policies import play
 from roboirg.policies.planning.goal_schema import goal_schema
 from roboirg.policies.planning.models import ModelOptions
 from roboirg.policies.planning.vlm_listener import NotUnderstoodError
-from roboirg.policies.planning.vlm_query import UnparsableReplyError
 from roboirg.tasks import every_task
+from roboirg.util.json_reply import UnparsableReplyError
 
 EPISODES = 3
 

@@ -14,14 +14,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import DemonstrationFrames
 from roboirg.episodes.splits import get_episode
 from roboirg.policies.planning.keyframes import MAX_GAP, merge_keyframes
-from roboirg.policies.planning.model_content import (
-    Clip,
-    Picture,
-    encode_mp4,
-    encode_png,
-    sample_evenly,
-    summary_clip,
-)
+from roboirg.policies.planning.model_content import summary_clip
 from roboirg.policies.planning.observation_merging import (
     DemonstrationSubset,
     merge_cameras,
@@ -38,8 +31,9 @@ from roboirg.policies.planning.points import (
     to_pixel,
 )
 from roboirg.policies.planning.prompts import load_prompts
-from roboirg.policies.planning.vlm_query import UnparsableReplyError, json_object, text_of
 from roboirg.tasks import every_task
+from roboirg.util.json_reply import UnparsableReplyError, json_object, text_of
+from roboirg.util.media import Clip, Picture, encode_mp4, encode_png, sample_evenly
 
 thousandths = st.integers(0, 1000)
 PROMPTS = ("listener", "qwen", "gemini", "memer", "subgoals")

@@ -13,7 +13,7 @@ from roboirg.analysis.stats.cells import CellKey, CellResults, PolicyRun
 from roboirg.analysis.stats.option_labels import words_label
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.language.settings import EXPLICIT
-from roboirg.language.wordings.worded_command import ROBOMME_NAME
+from roboirg.language.worded_command import ROBOMME_NAME
 from roboirg.records.record import DEFAULT_MESHES
 from roboirg.util.plain_text import counted
 

@@ -181,7 +181,6 @@ def build_splits(
 ) -> None:
     """Select the seeds of the splits again; tasks and splits not named stay unchanged."""
     from roboirg.episodes import splits
-    from roboirg.evaluation.executors.executor import core_count
     from roboirg.evaluation.plan_parsing import parse_names, parse_splits
     from roboirg.evaluation.seed_search.seed_selection import (
         check_kept_splits,
@@ -193,6 +192,7 @@ def build_splits(
     from roboirg.tasks import find_tasks
     from roboirg.util.atomic_write import write_atomically
     from roboirg.util.console_width import progress_console
+    from roboirg.util.processor import core_count
 
     names = find_tasks(parse_names("task", tasks))
     wanted = parse_splits(split)

@@ -85,11 +85,11 @@ def export_demonstrations(
     from roboirg.demonstrations.export_plan import ExportPlan
     from roboirg.demonstrations.export_run import run_export
     from roboirg.demonstrations.size_estimate import size_text
-    from roboirg.evaluation.executors.executor import core_count
     from roboirg.evaluation.plan_parsing import means_all, parse_episodes, parse_names
     from roboirg.language import FORMS
     from roboirg.policies import load_policy_class
     from roboirg.tasks import find_tasks
+    from roboirg.util.processor import core_count
 
     load_policy_class(policy)
     # `validated` checks the names that are cast.
@@ -164,7 +164,7 @@ def replay(
     from collections import Counter
 
     from roboirg.demonstrations.dataset_replay import TOLERANCE, replay_dataset
-    from roboirg.evaluation.executors.executor import core_count
+    from roboirg.util.processor import core_count
 
     if log is not None:
         check_output_file(log)

@@ -61,7 +61,6 @@ def export_grounding(
     """Export questions of grounding with pictures: Parquet, JSON lines, VLMEvalKit's TSV."""
     from roboirg.cli.language_commands import known_name, known_settings, known_tasks
     from roboirg.cli.progress_bar import progress_bar
-    from roboirg.evaluation.executors.executor import core_count
     from roboirg.evaluation.grounding_set.dataset_export import (
         TABLE_FORMATS,
         EpisodeName,
@@ -72,6 +71,7 @@ def export_grounding(
     from roboirg.language import FORMS
     from roboirg.language.export import check_export_support
     from roboirg.language.generator import check_options
+    from roboirg.util.processor import core_count
 
     tables = () if formats.strip().lower() == "none" else parse_names("format", formats)
     kinds = tuple(known_name("format", one, TABLE_FORMATS) for one in tables)

@@ -66,7 +66,8 @@ def export_instructions(
     from roboirg.episodes.splits import split_episodes
     from roboirg.evaluation.plan_parsing import parse_names, parse_splits
     from roboirg.language import FORMS
-    from roboirg.language.export import EXPORT_FORMATS, check_export_support, row, write_rows
+    from roboirg.language.export import EXPORT_FORMATS, check_export_support, write_rows
+    from roboirg.language.instruction_row import row
     from roboirg.language.variants import instructions
 
     kind = known_name("format", format, EXPORT_FORMATS)
@@ -132,11 +133,11 @@ def validate_instructions(
     workers: Workers = None,
 ) -> None:
     """Read all instructions back and check their rules; exit code 2 if one is broken."""
-    from roboirg.evaluation.executors.executor import core_count
     from roboirg.evaluation.plan_parsing import parse_splits
     from roboirg.language.validation import ValidationResults, batches, validate
     from roboirg.language.validation.validation_tables import validation_tables
     from roboirg.language.wordings.wording_store import open_wordings
+    from roboirg.util.processor import core_count
 
     names = known_tasks(tasks, open_wordings(wordings))
     wanted = () if split.strip().lower() == "none" else parse_splits(split)

@@ -56,8 +56,8 @@ def learn_listener(
     workers: Workers = None,
 ) -> None:
     """Train a listener on the train split: pictures with free labels, then instructions."""
-    from roboirg.evaluation.executors.executor import core_count
     from roboirg.policies.learned.learned_listener import check_learn_support
+    from roboirg.util.processor import core_count
 
     check_learn_support()
     from roboirg.policies.learned.learned_model import save_model
@@ -80,8 +80,8 @@ def learn_study(
     workers: Workers = None,
 ) -> None:
     """Train listeners that get or lack settings, video, pictures or words, and compare them."""
-    from roboirg.evaluation.executors.executor import core_count
     from roboirg.policies.learned.learned_listener import check_learn_support
+    from roboirg.util.processor import core_count
 
     check_learn_support()
     from roboirg.analysis.grounding_scores.study_report import (

@@ -71,7 +71,6 @@ def plan(
 ) -> None:
     """Plan a study of listeners and draw its pictures; continues one that was interrupted."""
     from roboirg.cli.progress_bar import progress_bar
-    from roboirg.evaluation.executors.executor import core_count
     from roboirg.evaluation.grounding_set.dataset_export import export_grounding
     from roboirg.evaluation.people.listening_session import QUESTIONS
     from roboirg.evaluation.people.listening_study import (
@@ -81,6 +80,7 @@ def plan(
         write_listening_study,
     )
     from roboirg.evaluation.plan_maker import make_plan
+    from roboirg.util.processor import core_count
 
     # The policy can be checked only when its answers are there; the oracle stands in for it.
     made = make_plan(

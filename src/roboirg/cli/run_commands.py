@@ -275,12 +275,12 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from roboirg.evaluation.executors.executor import core_count
     from roboirg.evaluation.time_estimate.estimate import cell_sizes, estimate, estimate_text
     from roboirg.evaluation.time_estimate.world_speed import ASSUMED, measure_world
     from roboirg.records.record_codec import identity_key
     from roboirg.records.store import read_index
     from roboirg.util.console_width import widen
+    from roboirg.util.processor import core_count
 
     jobs, console = plan.jobs(), Console()
     table = Table(title=f"plan {plan.fingerprint}", title_justify="left")

@@ -37,9 +37,9 @@ def verify(
     workers: Workers = None,
 ) -> None:
     """Play the actions of a run again and check its records; exit code 2 if one does not hold."""
-    from roboirg.evaluation.executors.executor import core_count
     from roboirg.evaluation.verification.run_verification import verify_run
     from roboirg.records.packing import opened_run
+    from roboirg.util.processor import core_count
 
     _take_salt(salt)
     with opened_run(folder_of(run)) as folder, progress_bar("records") as show:
@@ -85,7 +85,7 @@ def board(
     """Make a leaderboard page of packed runs: verified, privileged, comparable or not."""
     from roboirg.analysis.board.board_page import BOARD_FILE, read_packs, write_board
     from roboirg.analysis.page.report import check_report_support
-    from roboirg.evaluation.executors.executor import core_count
+    from roboirg.util.processor import core_count
 
     check_report_support()
     _take_salt(salt)

@@ -16,8 +16,8 @@ from roboirg.demonstrations.trajectory import SUFFIX, TRAJECTORY_VERSION, Pictur
 from roboirg.demonstrations.trajectory_recorder import RecordingSpec
 from roboirg.episodes.splits import get_episode
 from roboirg.language import FORMS, LANGUAGE_VERSION
-from roboirg.language.export import row
 from roboirg.language.generator import instruct_with
+from roboirg.language.instruction_row import row
 from roboirg.language.settings import all_settings
 from roboirg.language.variants import instructions
 from roboirg.util.short_hash import short_hash

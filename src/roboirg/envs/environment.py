@@ -15,8 +15,8 @@ from roboirg.core.delivery import SpokenInstruction
 from roboirg.core.episode import Episode, Stage
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
 from roboirg.core.observations import CAMERAS
+from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.env_settings import RENDER_MODES, EnvSettings, choose_index
-from roboirg.envs.factory import EnvOptions
 from roboirg.envs.observation_spaces import make_observation_space
 from roboirg.episodes.recordings import is_recorded, recorded_actions
 from roboirg.judging import Event, Status, plain_subgoal

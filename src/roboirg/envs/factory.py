@@ -3,48 +3,18 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 from roboirg.core.extras import extra_needed
+from roboirg.envs.env_options import EnvOptions
 
 if TYPE_CHECKING:
     # Not at run time: these load NumPy and SAPIEN, which `import roboirg` must not.
     from gymnasium.vector import AutoresetMode
 
     from roboirg.core.episode import Episode
-    from roboirg.core.observations import DemonstrationFrames
     from roboirg.envs.environment import RoboIRGEnv
     from roboirg.envs.vector_environment import RoboIRGVectorEnv
-
-
-class EnvOptions(TypedDict, total=False):
-    """Keyword arguments of `make`, which documents them; `EnvSettings` has their defaults."""
-
-    setting: str
-    form: str
-    split: str
-    episode: int | None
-    stages: Sequence[int]
-    distractor: str
-    distractors: int
-    frame: str
-    wordings: str | Path | None
-    delivery: str
-    rival: str
-    reasoning: str
-    actions: str
-    cameras: Sequence[str]
-    depth: bool
-    calibration: bool
-    grounded: bool
-    demonstration_frames: DemonstrationFrames
-    observe_every: int | None
-    history_cameras: Sequence[str] | None
-    meshes: str
-    max_steps: int
-    render_mode: str | None
 
 
 def make(task: str | Episode, **options: Unpack[EnvOptions]) -> RoboIRGEnv:

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector.utils import shared_memory
 
+from roboirg.core.actions import JOINT_HIGH, JOINT_LOW
 from roboirg.simulation.observation_builder import (
+    FieldFormat,
     ObservationSpec,
-    history_space,
-    observation_space,
+    picture_fields,
+    proprioception_fields,
 )
 
 MAX_INSTRUCTION_LENGTH = 100_000
 PRINTABLE = "".join(chr(code) for code in range(32, 127))
+_SLACK = 0.1
+"""Radians by which joints may exceed their limits under load."""
 
 
 class InstructionSpace(spaces.Text):
@@ -70,8 +74,27 @@ def _read(space: InstructionSpace, block: Any, n: int = 1) -> _TextView:  # noqa
 def make_observation_space(spec: ObservationSpec) -> spaces.Dict:
     """Return the space of the observations of an environment."""
     instruction = InstructionSpace()
-    fields = {**observation_space(spec), "instruction": instruction}
+    fields: dict[str, spaces.Space[Any]] = {**_spaces(spec), "instruction": instruction}
     if spec.observe_every is not None:
-        entry = spaces.Dict({**history_space(spec), "instruction": instruction})
+        entry = spaces.Dict({**_spaces(spec.for_history), "instruction": instruction})
         fields["history"] = spaces.Sequence(entry)
     return spaces.Dict(fields)
+
+
+def _spaces(spec: ObservationSpec) -> dict[str, spaces.Space[Any]]:
+    """Return the space of each field of `ObservationBuilder.read`."""
+    fields = {**picture_fields(spec), **proprioception_fields(spec)}
+    return {name: _space(name, kind) for name, kind in fields.items()}
+
+
+def _space(field: str, kind: FieldFormat) -> spaces.Box:
+    shape, dtype = kind
+    if field == "joint_positions":
+        low, high = JOINT_LOW - _SLACK, JOINT_HIGH + _SLACK
+        return spaces.Box(low.astype(np.float32), high.astype(np.float32))
+    if field == "gripper":
+        return spaces.Box(-0.01, 0.05, shape, np.float32)
+    if issubclass(dtype, np.integer):
+        range_of = np.iinfo(dtype)
+        return spaces.Box(int(range_of.min), int(range_of.max), shape, dtype)
+    return spaces.Box(-np.inf, np.inf, shape, cast("type[np.floating[Any]]", dtype))

@@ -20,9 +20,9 @@ from roboirg.core.actions import check_chunk, find_action_space
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidActionError, InvalidValueError, UnknownNameError
 from roboirg.envs.drawn_on_demand import LazyObservation, WorkerVideo
+from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.env_settings import EnvSettings, choose_index
 from roboirg.envs.environment import RoboIRGEnv
-from roboirg.envs.factory import EnvOptions
 from roboirg.envs.shared_arrays import SharedArrays, picture_fields
 from roboirg.envs.vector_infos import stack_infos
 from roboirg.envs.vector_workers import Recipe, Request, Transition, WorkerProcesses

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from roboirg.core.episode import Episode
 from roboirg.core.errors import RoboIRGError
+from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.environment import RoboIRGEnv
-from roboirg.envs.factory import EnvOptions
 from roboirg.envs.shared_arrays import SharedArrays, picture_fields
 from roboirg.util.child_process import ChildExit, ChildProcess, serve
 

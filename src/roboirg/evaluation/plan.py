@@ -31,12 +31,13 @@ from roboirg.core.word_pools import POOLS
 from roboirg.episodes import splits
 from roboirg.episodes.private_splits import MissingSaltError, is_private
 from roboirg.evaluation.hosting.host_pool import DEFAULT_BATCH, HostSettings
+from roboirg.evaluation.job_instruction import instruct_job
 from roboirg.evaluation.plan_parsing import check_names, name_and_spec
 from roboirg.evaluation.policy_descriptions import describe_policy
 from roboirg.language.generator import check_options, find_refusal
-from roboirg.language.instruction import Instruction
 from roboirg.language.settings import EXPLICIT, all_settings
 from roboirg.language.wordings.wording_store import open_wordings
+from roboirg.records.film import VideoMode
 from roboirg.records.plan_files import PLAN_FILE, earlier_plans, store_plan
 from roboirg.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, ErrorKind, Job
 from roboirg.util.plain_text import is_encodable
@@ -45,8 +46,6 @@ from roboirg.util.short_hash import short_hash
 REQUIRED = "required"
 """Instead of a wording file in a plan: one must be given when the plan is run."""
 
-VideoMode = Literal["off", "failures", "all"]
-VIDEO_MODES: tuple[VideoMode, ...] = get_args(VideoMode)
 
 PolicyProcessMode = Literal["own", "shared"]
 POLICY_PROCESSES: tuple[PolicyProcessMode, ...] = get_args(PolicyProcessMode)
@@ -388,16 +387,3 @@ def _read_plan_at(path: Path) -> Plan | None:
         return Plan.model_validate_json(path.read_bytes())
     except (OSError, ValidationError):
         return None
-
-
-def instruct_job(job: Job) -> Instruction:
-    """Return the instruction of a job.
-
-    Raises:
-        InvalidValueError: the setting and options cannot express the episode, or the job's
-            wording file is missing or has changed.
-    """
-    episode = splits.get_episode(job.task, job.split, job.episode)
-    if job.wordings is not None:
-        open_wordings(job.wordings_file, job.wordings)
-    return language.instruct_with(episode, job.options._replace(wordings=job.wordings))

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from roboirg import tasks as task_registry
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.plan import LONG_PROMPTS, REQUIRED, RETRYABLE, VIDEO_MODES, Plan
+from roboirg.evaluation.plan import LONG_PROMPTS, REQUIRED, RETRYABLE, Plan
 from roboirg.evaluation.plan_parsing import (
     ALL,
     check_names,
@@ -19,6 +19,7 @@ from roboirg.evaluation.plan_parsing import (
     parse_policies,
     parse_stage_sets,
 )
+from roboirg.records.film import VIDEO_MODES
 from roboirg.records.record import ERROR_KINDS, ErrorKind
 
 

@@ -9,7 +9,7 @@ from operator import itemgetter
 from typing import NamedTuple
 
 from roboirg.core.delivery import PromptVerdict, utterance_steps
-from roboirg.evaluation.plan import instruct_job
+from roboirg.evaluation.job_instruction import instruct_job
 from roboirg.evaluation.policy_descriptions import describe_policy
 from roboirg.language.instruction import Instruction
 from roboirg.policies.prompt_length.declared_limit import prompt_limit

@@ -33,19 +33,19 @@ from roboirg.evaluation.episode_errors import (
 )
 from roboirg.evaluation.hosting.host_pool import HostAddress, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
-from roboirg.evaluation.plan import VideoMode
 from roboirg.evaluation.policy_calls import next_actions, policy_metadata, policy_usage
 from roboirg.evaluation.policy_descriptions import PolicyDescription, describe_here
 from roboirg.evaluation.policy_environment import EnvRequirements, env_requirements, make_env
 from roboirg.evaluation.prompt_shares import audit_job, too_long_text
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
-from roboirg.evaluation.video_writer import FrameSink, VideoOptions, VideoWriter
+from roboirg.evaluation.video_writer import FrameSink, VideoWriter
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.policies.base import Policy, PrivilegedPolicy, close_policy, tell_policy
 from roboirg.policies.loading import needs_host
 from roboirg.policies.prompt_length.declared_limit import prompt_limit
 from roboirg.policies.random_state import episode_policy_seed
 from roboirg.records.action_log import write_actions
+from roboirg.records.film import VideoMode, VideoOptions
 from roboirg.records.record import Job, Record
 
 if TYPE_CHECKING:

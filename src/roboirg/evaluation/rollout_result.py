@@ -23,7 +23,7 @@ from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.observations import DemonstrationSource
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.code_fingerprint import code_fingerprint
-from roboirg.evaluation.plan import instruct_job
+from roboirg.evaluation.job_instruction import instruct_job
 from roboirg.evaluation.policy_descriptions import PolicyDescription, describe_policy
 from roboirg.evaluation.prompt_shares import audit_job, audit_prompt
 from roboirg.judging import Event, attribute_failure

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from roboirg.core.errors import MissingDependencyError, RenderDeviceError
 from roboirg.core.extras import extra_needed
+from roboirg.records.film import LAST_FRAME_REPEATS, VideoOptions
 from roboirg.util.text_overlay import draw_text, wrap_text
 
 if TYPE_CHECKING:
@@ -29,8 +30,6 @@ DEMONSTRATION_COLOR = (255, 176, 32)
 BORDER = 6
 GAP = 4
 """Pixels of the black line between two pictures; even, because H.264 needs an even width."""
-LAST_FRAME_REPEATS = 8
-"""The last frame stays for most of a second, so that a viewer sees how the episode ended."""
 
 POSTER_SUFFIX = ".jpg"
 _PARTIAL_SUFFIX = ".part"
@@ -38,23 +37,6 @@ _PARTIAL_SUFFIX = ".part"
 _TEXT_SCALE, _TEXT_LINE, _TEXT_MARGIN = 0.4, 16, 6
 _MAX_LINES = 12
 _TEXT_COLOR, _BACKGROUND = (31, 35, 40), 255
-
-
-@dataclass(frozen=True, slots=True)
-class VideoOptions:
-    """Format of a video.
-
-    Attributes:
-        every: control steps between two frames (20 control steps are one second).
-        rate: frames per second of the video; 10 with every 8th step is fourfold speed.
-        cameras: shown side by side, 256 pixels each, with a black line of `GAP` between them.
-        quality: x264's constant rate factor; higher is smaller.
-    """
-
-    every: int = 8
-    rate: int = 10
-    cameras: tuple[str, ...] = ("front", "wrist")
-    quality: int = 28
 
 
 class PictureSource(Protocol):

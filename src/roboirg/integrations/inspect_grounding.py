@@ -41,7 +41,8 @@ from roboirg.evaluation.plan_parsing import means_all, parse_names
 from roboirg.policies.planning.goal_schema import goal_schema
 from roboirg.policies.planning.listener_query import PROMPTS, QuestionTexts
 from roboirg.policies.planning.prompts import load_prompts
-from roboirg.policies.planning.vlm_query import SILENCE, UnparsableReplyError
+from roboirg.policies.planning.vlm_query import SILENCE
+from roboirg.util.json_reply import UnparsableReplyError
 
 EPISODE = "episode"
 

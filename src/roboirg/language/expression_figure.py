@@ -6,7 +6,11 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from roboirg.language.corpus_statistics import expression_counts, expression_order, scene_counts
+from roboirg.language.expression_counts import (
+    expression_counts,
+    expression_order,
+    scene_counts,
+)
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import all_settings
 from roboirg.util.figure_files import save_figure

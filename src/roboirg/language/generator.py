@@ -35,7 +35,7 @@ from roboirg.language.setting import Setting
 from roboirg.language.settings import all_settings, get_setting, settings_of
 from roboirg.language.template_sampler import TemplateSampler
 from roboirg.language.templates import LANGUAGE_VERSION
-from roboirg.language.wordings.worded_command import TaskWordings, describe_goal
+from roboirg.language.worded_command import TaskWordings, describe_goal
 from roboirg.language.wordings.wording_store import find_wordings
 from roboirg.tasks import get_task
 

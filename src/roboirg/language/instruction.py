@@ -16,6 +16,8 @@ Expression = Literal[
 ]  # fmt: skip
 
 FORMS: tuple[Form, ...] = get_args(Form)
+REFERENCE = "reference"
+"""Slot of the mentions that only lead to the goal, such as a number to count from."""
 
 
 @dataclass(frozen=True, slots=True)

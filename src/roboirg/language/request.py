@@ -9,18 +9,14 @@ from typing import Literal, NamedTuple, TypeVar, cast
 
 from roboirg.core.episode import Color, Episode, Goal, Scene, SceneObject
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.goal_slots import COLOR_SLOTS, SLOT_TYPE_NAMES, SlotTypeName
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import PoolName, Pools, pool_of
 from roboirg.language.instruction import UtteranceStage
 from roboirg.language.landmarks import Frame
 from roboirg.language.phrases import Phrase, antecedent, fill, plain, swap_particles
 from roboirg.language.template_sampler import TemplateSampler
-from roboirg.language.wordings.worded_command import (
-    StatedPhrase,
-    TaskWordings,
-    WordedCommand,
-    goal_fields,
-)
+from roboirg.language.worded_command import StatedPhrase, TaskWordings, WordedCommand, goal_fields
 from roboirg.tasks import Task, get_task
 
 Distractor = Literal["neutral", "competing"]
@@ -28,18 +24,6 @@ Option = TypeVar("Option")
 DISTRACTORS: tuple[Distractor, ...] = ("neutral", "competing")
 STAGE_SETS: tuple[tuple[int, ...], ...] = ((1, 5), (1, 2, 5), (1, 2, 3, 5), (1, 2, 3, 4, 5))
 
-SlotTypeName = Literal["number", "visit", "placement", "relation", "color", "amount"]
-SLOT_TYPE_NAMES: Mapping[str, SlotTypeName] = {
-    "color": "color",
-    "colors": "color",
-    "counts": "amount",
-    "repeats": "number",
-    "visit": "visit",
-    "placement": "placement",
-    "relation": "relation",
-}
-"""The type of each goal slot; counted colors are amounts, together with their counts."""
-COLOR_SLOTS = ("color", "colors")
 AMOUNT_FIELD = "cubes"
 """The field of our commands that holds all colors with their counts.
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from rich.table import Table
 
 from roboirg.language import corpus_statistics
-from roboirg.language.corpus_statistics import ClassCounts
+from roboirg.language.expression_counts import ClassCounts, expression_counts, expression_order
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import setting_names
 from roboirg.language.templates import open_reasoning
@@ -20,7 +20,7 @@ def overview_tables(instructions: Sequence[Instruction]) -> Iterator[Table]:
     """Yield tables of lengths, expressions, patterns, relations and landmark classes."""
     yield _lengths(corpus_statistics.word_counts(instructions))
     yield _tokens(corpus_statistics.token_counts(instructions))
-    yield expression_table(corpus_statistics.expression_counts(instructions))
+    yield expression_table(expression_counts(instructions))
     by_task = (
         ("Reasoning patterns (scenes)", corpus_statistics.pattern_counts(instructions), None),
         ("Relations (scenes)", corpus_statistics.relation_counts(instructions), _RELATIONS),
@@ -48,7 +48,7 @@ _RELATIONS = [
 
 def expression_table(counts: ClassCounts) -> Table:
     """Return the number of scenes with each class of referring expression, by setting."""
-    classes = corpus_statistics.expression_order(counts)
+    classes = expression_order(counts)
     title = "Referring expressions (each once per scene)"
     return _count_table(title, "setting", counts, setting_names(), classes)
 

@@ -6,10 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from gymnasium import spaces
 from numpy.typing import NDArray
 
-from roboirg.core.actions import JOINT_HIGH, JOINT_LOW, POSE_SIZE
+from roboirg.core.actions import JOINT_LOW, POSE_SIZE
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import (
     DemonstrationFrames,
@@ -21,9 +20,6 @@ from roboirg.simulation.proprioception import Proprioception
 from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
 from roboirg.simulation.rendering.viewpoint import SIZE
 from roboirg.simulation.world import World
-
-_SLACK = 0.1
-"""Radians by which joints may exceed their limits under load."""
 
 
 class ObservationSpec(NamedTuple):
@@ -93,8 +89,8 @@ class ObservationBuilder:
     def __init__(self, world: World, spec: ObservationSpec) -> None:
         self._world = world
         self._spec = spec
-        self._picture_fields = tuple(picture_space(spec))
-        self._history_picture_fields = tuple(picture_space(spec.for_history))
+        self._picture_fields = tuple(picture_fields(spec))
+        self._history_picture_fields = tuple(picture_fields(spec.for_history))
         self.proprioception = Proprioception(world.robot)
 
     def read(self) -> dict[str, Any]:
@@ -135,42 +131,35 @@ _PICTURE_READERS: Mapping[str, Callable[[World, str], NDArray[Any]]] = {
 }
 
 
-def picture_space(spec: ObservationSpec) -> dict[str, spaces.Space[Any]]:
-    """Return the space of each field that is drawn."""
-    fields: dict[str, spaces.Space[Any]] = {
-        f"{camera}_rgb": spaces.Box(0, 255, (SIZE, SIZE, 3), np.uint8) for camera in spec.cameras
+class FieldFormat(NamedTuple):
+    """Shape and type of one reading of a field."""
+
+    shape: tuple[int, ...]
+    dtype: type[np.generic]
+
+
+def picture_fields(spec: ObservationSpec) -> dict[str, FieldFormat]:
+    """Return the format of each field that is drawn."""
+    pictures = {f"{camera}_rgb": FieldFormat((SIZE, SIZE, 3), np.uint8) for camera in spec.cameras}
+    depth = {
+        f"{camera}_depth": FieldFormat((SIZE, SIZE, 1), np.int16)
+        for camera in (spec.cameras if spec.depth else ())
     }
-    millimeters = np.iinfo(np.int16)
-    for camera in spec.cameras if spec.depth else ():
-        fields[f"{camera}_depth"] = spaces.Box(
-            int(millimeters.min), int(millimeters.max), (SIZE, SIZE, 1), np.int16
-        )
-    return fields
+    return pictures | depth
 
 
-def proprioception_space(spec: ObservationSpec) -> dict[str, spaces.Space[Any]]:
-    """Return the space of each field of `ObservationBuilder.read_proprioception`."""
-    fields: dict[str, spaces.Space[Any]] = {}
+def proprioception_fields(spec: ObservationSpec) -> dict[str, FieldFormat]:
+    """Return the format of each field of `ObservationBuilder.read_proprioception`."""
+    fields: dict[str, FieldFormat] = {}
     for camera in spec.cameras if spec.calibration else ():
-        fields[f"{camera}_extrinsic"] = spaces.Box(-np.inf, np.inf, (3, 4), np.float32)
-        fields[f"{camera}_intrinsic"] = spaces.Box(-np.inf, np.inf, (3, 3), np.float32)
-    low, high = (JOINT_LOW - _SLACK).astype(np.float32), (JOINT_HIGH + _SLACK).astype(np.float32)
+        fields[f"{camera}_extrinsic"] = FieldFormat((3, 4), np.float32)
+        fields[f"{camera}_intrinsic"] = FieldFormat((3, 3), np.float32)
     return {
         **fields,
-        "joint_positions": spaces.Box(low, high),
-        "gripper": spaces.Box(-0.01, 0.05, (2,), np.float32),
-        "end_effector": spaces.Box(-np.inf, np.inf, (POSE_SIZE,), np.float64),
+        "joint_positions": FieldFormat(JOINT_LOW.shape, np.float32),
+        "gripper": FieldFormat((2,), np.float32),
+        "end_effector": FieldFormat((POSE_SIZE,), np.float64),
     }
-
-
-def observation_space(spec: ObservationSpec) -> dict[str, spaces.Space[Any]]:
-    """Return the space of each field of `ObservationBuilder.read`."""
-    return {**picture_space(spec), **proprioception_space(spec)}
-
-
-def history_space(spec: ObservationSpec) -> dict[str, spaces.Space[Any]]:
-    """Return the space of each field of `ObservationBuilder.read_history_entry`."""
-    return {**picture_space(spec.for_history), **proprioception_space(spec)}
 
 
 def stack_proprioception(
@@ -178,10 +167,8 @@ def stack_proprioception(
 ) -> dict[str, NDArray[Any]]:
     """Stack readings of `read_proprioception` to arrays with a leading axis T >= 0."""
     return {
-        key: np.stack([reading[key] for reading in readings]) if readings else _empty(space)
-        for key, space in proprioception_space(spec).items()
+        key: np.stack([reading[key] for reading in readings])
+        if readings
+        else np.zeros((0, *kind.shape), kind.dtype)
+        for key, kind in proprioception_fields(spec).items()
     }
-
-
-def _empty(space: spaces.Space[Any]) -> NDArray[Any]:
-    return np.zeros((0, *(space.shape or ())), dtype=space.dtype)

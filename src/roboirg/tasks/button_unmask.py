@@ -15,8 +15,8 @@ from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import unmask
 from roboirg.tasks.shared.fixtures import button_keep_out, draw_button
 from roboirg.tasks.shared.placement import Region
+from roboirg.tasks.shared.unmask import CONTAINERS, GAP, PICKS, REGION
 from roboirg.tasks.task import Task, Wording
-from roboirg.tasks.video_unmask import CONTAINERS, GAP, PICKS, REGION
 
 BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.05)
 

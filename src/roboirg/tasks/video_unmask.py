@@ -12,15 +12,9 @@ import numpy as np
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import unmask, video_stages
-from roboirg.tasks.shared.placement import Region
+from roboirg.tasks.shared.unmask import CONTAINERS, GAP, PICKS, REGION
 from roboirg.tasks.task import Task, Wording
 
-CONTAINERS: dict[Difficulty, int] = {"easy": 3, "medium": 5, "hard": 15}
-"""Upper bounds: placement ends at the first container without a free place."""
-PICKS: dict[Difficulty, int] = {"easy": 1, "medium": 1, "hard": 2}
-
-REGION = Region(0.0, 0.0, 0.2, 0.2)
-GAP = 0.04
 HOLD_STEPS = 64
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import os
 import platform
 from pathlib import Path
 
@@ -41,3 +42,10 @@ def _fields() -> dict[str, str]:
     except OSError:
         return {}
     return {line.partition(":")[0].strip(): line.partition(":")[2].strip() for line in lines[::-1]}
+
+
+def core_count() -> int:
+    """Return the number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -7,7 +7,7 @@ from pathlib import Path
 from roboirg import language
 from roboirg.analysis.figures.figure_data import FigureData
 from roboirg.core.errors import RoboIRGError
-from roboirg.evaluation.plan import instruct_job
+from roboirg.evaluation.job_instruction import instruct_job
 from roboirg.language.expression_figure import write_figure
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import EXPLICIT

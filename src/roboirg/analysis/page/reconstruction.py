@@ -17,7 +17,7 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.plan import instruct_job
+from roboirg.evaluation.job_instruction import instruct_job
 from roboirg.judging import Event
 from roboirg.judging.episode_replay import completed_stages
 from roboirg.judging.judge import describe_object

@@ -19,9 +19,9 @@ from roboirg.analysis.stats.breakdowns import BREAKDOWNS, label_instructions
 from roboirg.analysis.stats.cells import Cells, PolicyRun
 from roboirg.analysis.tables.breakdown_table import make_breakdown_table
 from roboirg.analysis.tables.table import Table
-from roboirg.evaluation.video_writer import LAST_FRAME_REPEATS, VideoOptions
 from roboirg.language.settings import EXPLICIT, all_settings
 from roboirg.records.episode_log import logged_slugs
+from roboirg.records.film import LAST_FRAME_REPEATS, VideoOptions
 from roboirg.records.record import Job, Record
 from roboirg.records.store import read_summaries
 from roboirg.util.atomic_write import write_atomically

@@ -16,7 +16,7 @@ from fractions import Fraction
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.plan import instruct_job
+from roboirg.evaluation.job_instruction import instruct_job
 from roboirg.language.command_chance import blind_goals, right_share
 from roboirg.language.shortcuts import SURFACE_RULES, goal_share, guess_goal
 from roboirg.records.record import Job

@@ -7,7 +7,6 @@ implement `Executor`; `roboirg.evaluation.executors.ray_cluster` is one for many
 
 from __future__ import annotations
 
-import os
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from roboirg.evaluation.executors.workers import MAX_FAILED_STARTS, POLL_S, Work
 from roboirg.evaluation.hosting.host_pool import open_hosts
 from roboirg.evaluation.rollout import PlayJob
 from roboirg.records.record import Job, Record
+from roboirg.util.processor import core_count
 
 NO_TIMEOUT_S = float("inf")
 
@@ -127,10 +127,3 @@ def choose_executor(workers: int | None, episode_timeout_s: float = NO_TIMEOUT_S
     if workers == 0:
         return InProcess()
     return LocalProcesses(core_count() if workers is None else workers, episode_timeout_s)
-
-
-def core_count() -> int:
-    """Return the number of cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

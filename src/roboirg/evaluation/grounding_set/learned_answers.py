@@ -12,8 +12,8 @@ import numpy as np
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.grounding_set.answer_file import Answer
 from roboirg.evaluation.grounding_set.grounding_item import GroundingItem
-from roboirg.evaluation.grounding_set.seen_scene import Pixels
 from roboirg.policies.planning.goal_schema import goal_schema
+from roboirg.util.media import Pixels
 
 if TYPE_CHECKING:
     from roboirg.policies.learned.learned_model import LearnedModel

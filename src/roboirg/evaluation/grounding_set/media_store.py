@@ -7,25 +7,23 @@ from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 
-import cv2
-
 from roboirg.core.episode import Episode
 from roboirg.evaluation.grounding_set.item_builder import EpisodeMedia
-from roboirg.evaluation.grounding_set.seen_scene import Pixels, SeenScene, look_at_episode
-from roboirg.policies.planning.model_content import (
+from roboirg.evaluation.grounding_set.seen_scene import SeenScene, look_at_episode
+from roboirg.util.atomic_write import write_atomically
+from roboirg.util.media import (
+    CONTROL_RATE,
     Clip,
     Picture,
+    Pixels,
+    encode_jpeg,
     encode_mp4,
     encode_png,
     sample_evenly,
 )
-from roboirg.util.atomic_write import write_atomically
 
 PICTURES, VIDEOS = "pictures", "videos"
 NAME_DIGITS = 24
-JPEG_QUALITY = 90
-CONTROL_RATE = 20
-"""Control steps per second: videos run as fast as the world."""
 
 
 def store_media(folder: Path, episode: Episode, every: int, most: int) -> EpisodeMedia:
@@ -73,12 +71,6 @@ def _store_picture(folder: Path, pixels: Pixels) -> str:
 
 def _store_frames(folder: Path, frames: Pixels) -> Sequence[str]:
     return [store_content(folder, PICTURES, encode_jpeg(pixels), ".jpg") for pixels in frames]
-
-
-def encode_jpeg(pixels: Pixels) -> bytes:
-    """Return a picture, RGB, as a JPEG file: a sixth of a PNG, and a video is compressed anyway."""
-    _, encoded = cv2.imencode(".jpg", pixels[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    return encoded.tobytes()
 
 
 def _store_video(folder: Path, seen: SeenScene, every: int) -> str | None:

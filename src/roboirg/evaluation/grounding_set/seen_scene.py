@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from roboirg.core.episode import Episode
 from roboirg.core.errors import RoboIRGError
@@ -14,11 +13,10 @@ from roboirg.core.observations import FRONT
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.evaluation.grounding_set.grounding_item import Mask, PointTarget, encode_mask
 from roboirg.evaluation.grounding_set.referents import find_candidates, find_referents
+from roboirg.util.media import Pixels
 
 FIRST = "first"
 """Name of the picture at the start of the policy's turn."""
-
-Pixels = NDArray[np.uint8]
 
 
 class SeenScene(NamedTuple):

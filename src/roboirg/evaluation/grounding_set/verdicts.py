@@ -17,7 +17,7 @@ from roboirg.evaluation.grounding_set.grounding_item import (
     QuestionKind,
 )
 from roboirg.policies.planning.goal_schema import goal_schema
-from roboirg.policies.planning.vlm_query import UnparsableReplyError, json_object
+from roboirg.util.json_reply import UnparsableReplyError, json_object
 
 _FIRST_LETTER = re.compile(r"^\W*([A-D])(?![A-Za-z'])", re.IGNORECASE)
 _CONCLUSION = re.compile(

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from roboirg.core.actions import POSE_SIZE, REACH_HIGH, REACH_LOW, WAYPOINT
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
 from roboirg.core.observations import CAMERAS, FRONT, Demonstration, Observation
-from roboirg.evaluation.grounding_set.media_store import CONTROL_RATE
 from roboirg.evaluation.people.driving_session import DrivingSession
-from roboirg.policies.planning.model_content import Clip, encode_mp4
+from roboirg.util.media import CONTROL_RATE, Clip, encode_mp4
 
 FRAMES_EVERY = 4
 """Control steps between two frames of the video."""

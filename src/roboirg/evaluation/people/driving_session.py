@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, cast
 
 from roboirg.core.observations import CAMERAS
-from roboirg.evaluation.grounding_set.media_store import encode_jpeg
-from roboirg.evaluation.video_writer import PictureSource, VideoOptions
+from roboirg.evaluation.video_writer import PictureSource
+from roboirg.records.film import VideoOptions
 from roboirg.records.record import Record
+from roboirg.util.media import encode_jpeg
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv

@@ -93,7 +93,7 @@ def listener(
 
 
 def _sample(job: Job) -> Sample:
-    from roboirg.evaluation.plan import instruct_job
+    from roboirg.evaluation.job_instruction import instruct_job
 
     return Sample(
         input=instruct_job(job).text,

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from roboirg.core.errors import InvalidActionError, InvalidValueError, UnknownNameError
 from roboirg.core.observations import CAMERAS, proprioception
+from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.env_settings import MAX_STEPS
-from roboirg.envs.factory import EnvOptions, make
+from roboirg.envs.factory import make
 
 VideoMode = Literal["none", "stream", "key"]
 VIDEO_MODES: tuple[VideoMode, ...] = ("none", "stream", "key")

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from roboirg.core.word_pools import Pools
-from roboirg.language.instruction import Expression
+from roboirg.language.instruction import REFERENCE, Expression
 from roboirg.language.number_words import cardinal, ordinal, plural
 from roboirg.language.pairs.value_pair import PairDraw
-from roboirg.language.patterns import REFERENCE
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, sentences
 from roboirg.language.request import GoalValue, InstructionRequest, UtteranceSpec
-from roboirg.language.settings.explicit import stated
-from roboirg.language.slot_types import Fields, amount, described, relation
+from roboirg.language.slot_types import Fields, amount, described, relation, stated
 from roboirg.language.slot_types.ordinal import series_noun, wrapped
 from roboirg.language.templates import rivals as templates
 from roboirg.language.templates.derivations import MOMENTS

@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Literal, NamedTuple
 
 from roboirg.core.episode import Difficulty, Goal, SlotValue, Split
+from roboirg.core.goal_slots import COLOR_SLOTS
 from roboirg.core.instruction_options import DEFAULT_DISTRACTOR, DEFAULT_RIVAL
 from roboirg.episodes.splits import split_episodes
-from roboirg.language.instruction import Instruction
+from roboirg.language.balanced_draw import draw_balanced
+from roboirg.language.instruction import REFERENCE, Instruction
 from roboirg.language.landmarks import Landmark
-from roboirg.language.pairs.balanced_draw import draw_balanced
-from roboirg.language.patterns import REFERENCE
-from roboirg.language.request import COLOR_SLOTS, GoalValue, InstructionRequest
+from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.templates import rivals as templates
 from roboirg.tasks import get_task
 

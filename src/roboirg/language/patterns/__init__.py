@@ -13,10 +13,10 @@ from roboirg.language.patterns import (
     open_numbers,
     sequence,
 )
-from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
+from roboirg.language.patterns.pattern import Derived, Pattern
 from roboirg.language.request import InstructionRequest
 
-__all__ = ["OPEN_PATTERNS", "PATTERNS", "REFERENCE", "Derived", "Pattern", "find_pattern"]
+__all__ = ["OPEN_PATTERNS", "PATTERNS", "Derived", "Pattern", "find_pattern"]
 
 PATTERNS: Mapping[str, tuple[Pattern, ...]] = {
     "color exclusion": (exclusion.ONE_COLOR,),

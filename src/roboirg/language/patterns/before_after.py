@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
+from roboirg.language.instruction import REFERENCE
+from roboirg.language.patterns.pattern import Derived, Pattern
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain
 from roboirg.language.request import GoalValue, InstructionRequest, NoCommandError
 from roboirg.language.slot_types import relation

@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from roboirg.core.goal_slots import SlotTypeName
+from roboirg.language.instruction import REFERENCE
 from roboirg.language.number_words import cardinal
-from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
+from roboirg.language.patterns.pattern import Derived, Pattern
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill
-from roboirg.language.request import (
-    AMOUNT_FIELD,
-    GoalValue,
-    InstructionRequest,
-    SlotTypeName,
-)
+from roboirg.language.request import AMOUNT_FIELD, GoalValue, InstructionRequest
 from roboirg.language.slot_types import amount
 from roboirg.language.slot_types.number import introduce_quantity
 from roboirg.language.templates import derivations

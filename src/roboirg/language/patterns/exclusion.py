@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 
-from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
+from roboirg.language.instruction import REFERENCE
+from roboirg.language.patterns.pattern import Derived, Pattern
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, sentences
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.slot_types import described

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from roboirg.core.motions import Swap
+from roboirg.language.instruction import REFERENCE
 from roboirg.language.landmarks import MARGIN
-from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
+from roboirg.language.patterns.pattern import Derived, Pattern
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain
 from roboirg.language.request import InstructionRequest
 from roboirg.language.slot_types import described

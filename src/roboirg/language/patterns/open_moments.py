@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from roboirg.language.pairs.balanced_draw import draw_balanced
-from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
+from roboirg.language.balanced_draw import draw_balanced
+from roboirg.language.instruction import REFERENCE
+from roboirg.language.patterns.pattern import Derived, Pattern
 from roboirg.language.phrases import anaphor, antecedent, fill
 from roboirg.language.request import InstructionRequest
 from roboirg.language.slot_types import relation

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Literal, NamedTuple
 
+from roboirg.language.instruction import REFERENCE
 from roboirg.language.number_words import CARDINALS, cardinal
-from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
+from roboirg.language.patterns.pattern import Derived, Pattern
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.slot_types import Fields, amount

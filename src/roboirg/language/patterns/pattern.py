@@ -10,9 +10,6 @@ from roboirg.language.phrases import Phrase
 from roboirg.language.request import InstructionRequest
 from roboirg.language.slot_types import Fields
 
-REFERENCE = "reference"
-"""Slot of the mentions that only lead to the goal, such as a number to count from."""
-
 
 class Derived(NamedTuple):
     """Words from which the goal follows.

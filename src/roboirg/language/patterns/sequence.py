@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from roboirg.language.instruction import REFERENCE
 from roboirg.language.number_words import ordinal as ordinal_word
-from roboirg.language.patterns.pattern import REFERENCE, Derived, Pattern
+from roboirg.language.patterns.pattern import Derived, Pattern
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.slot_types import Fields, ordinal

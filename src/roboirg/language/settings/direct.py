@@ -20,8 +20,7 @@ from roboirg.language.pairs import (
 from roboirg.language.phrases import sentences
 from roboirg.language.request import InstructionRequest, InstructionSpec, UtteranceSpec
 from roboirg.language.setting import Instruct, Setting
-from roboirg.language.settings.explicit import stated
-from roboirg.language.slot_types import Fields, slot_types_in
+from roboirg.language.slot_types import Fields, slot_types_in, stated
 
 
 def introduction(request: InstructionRequest) -> UtteranceSpec:

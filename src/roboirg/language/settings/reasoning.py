@@ -7,12 +7,13 @@ that the pattern does not cover.
 from __future__ import annotations
 
 from roboirg.core.episode import Goal
+from roboirg.core.goal_slots import COLOR_SLOTS
 from roboirg.core.instruction_options import DEFAULT_REASONING, REASONINGS
 from roboirg.language.instruction import Instruction
 from roboirg.language.patterns import OPEN_PATTERNS, Pattern, find_pattern
-from roboirg.language.request import COLOR_SLOTS, InstructionRequest, InstructionSpec, UtteranceSpec
+from roboirg.language.request import InstructionRequest, InstructionSpec, UtteranceSpec
 from roboirg.language.setting import Setting
-from roboirg.language.settings.explicit import stated
+from roboirg.language.slot_types import stated
 
 _COLOR_SLOTS = frozenset(COLOR_SLOTS)
 _DERIVED = {

@@ -7,6 +7,7 @@ import itertools
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from roboirg.core.goal_slots import SLOT_TYPE_NAMES
 from roboirg.language.interpreter.quantities import ADVERBS
 from roboirg.language.interpreter.tokens import (
     Sentence,
@@ -16,7 +17,6 @@ from roboirg.language.interpreter.tokens import (
     split_sentences,
     word_set,
 )
-from roboirg.language.request import SLOT_TYPE_NAMES
 from roboirg.language.shortcuts.goal_vocabulary import GoalVocabulary, SlotVocabulary, Value
 
 ORDINAL_TYPES = ("visit", "placement")

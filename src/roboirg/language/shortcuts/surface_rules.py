@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
+from roboirg.core.goal_slots import SLOT_TYPE_NAMES
 from roboirg.language.interpreter.tokens import Sentence, number_of
-from roboirg.language.request import SLOT_TYPE_NAMES
 from roboirg.language.shortcuts.goal_vocabulary import SlotVocabulary, Value
 from roboirg.language.shortcuts.named_values import EXCLUSIONS, NEIGHBOR, ORDINAL_TYPES
 

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from roboirg.core.goal_slots import SlotTypeName
 from roboirg.language.phrases import Phrase
-from roboirg.language.request import GoalValue, InstructionRequest, SlotTypeName
+from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.slot_types import amount, color, number, ordinal, relation
 from roboirg.language.slot_types.slot_type import Fields, SlotType
+from roboirg.language.worded_command import goal_fields
 
-__all__ = ["SLOT_TYPES", "Fields", "SlotType", "described", "slot_types_in"]
+__all__ = ["SLOT_TYPES", "Fields", "SlotType", "described", "slot_types_in", "stated"]
 
 SLOT_TYPES: Mapping[SlotTypeName, SlotType] = {
     slot_type.name: slot_type
@@ -42,4 +44,14 @@ def described(request: InstructionRequest, things: Sequence[Phrase]) -> Fields:
     for slot_type, goal_values in slot_types_in(request):
         if slot_type.described is not None:
             fields |= slot_type.described(request, goal_values, things)
+    return fields
+
+
+def stated(request: InstructionRequest) -> Fields:
+    """Return the fields of the command with every value named."""
+    if request.wordings is not None:
+        return {name: request.outside_stated(name) for name in goal_fields(request.episode.goal)}
+    fields: Fields = {}
+    for slot_type, goal_values in slot_types_in(request):
+        fields |= slot_type.stated(request, goal_values)
     return fields

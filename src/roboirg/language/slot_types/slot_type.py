@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from roboirg.core.goal_slots import SlotTypeName
 from roboirg.core.word_pools import Pools
 from roboirg.language.phrases import Phrase, fill, plain
-from roboirg.language.request import GoalValue, InstructionRequest, SlotTypeName
+from roboirg.language.request import GoalValue, InstructionRequest
 
 Fields = dict[str, Phrase]
 """Words for the fields of a command."""

@@ -10,7 +10,7 @@ from roboirg.core.episode import ALL_COLORS, Goal, SlotValue
 from roboirg.core.instruction_options import REASONINGS
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import all_settings
-from roboirg.language.wordings.worded_command import FIELD
+from roboirg.language.worded_command import FIELD
 from roboirg.language.wordings.wording_store import find_wordings
 
 _NUMBERS = {

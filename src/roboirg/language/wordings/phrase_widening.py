@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 from roboirg.core.episode import ALL_COLORS
 from roboirg.language.number_words import CARDINALS
+from roboirg.language.worded_command import StatedPhrase
 from roboirg.language.wordings.template_search import DraftTemplate
-from roboirg.language.wordings.worded_command import StatedPhrase
 
 _COLOR = rf"(?:{'|'.join(ALL_COLORS)})"
 _CUBE = r"(?:cube|block)"

@@ -19,6 +19,14 @@ from roboirg.episodes.splits import SIZES
 from roboirg.language.interpreter import interpret
 from roboirg.language.settings import EXPLICIT, settings_of
 from roboirg.language.validation.episode_checks import check_episode
+from roboirg.language.worded_command import (
+    ROBOMME_NAME,
+    TaskWordings,
+    WordedCommand,
+    Wordings,
+    describe_goal,
+    goal_fields,
+)
 from roboirg.language.wordings.goal_sentences import (
     FUNCTION,
     SentenceError,
@@ -28,14 +36,6 @@ from roboirg.language.wordings.goal_sentences import (
 )
 from roboirg.language.wordings.phrase_widening import widen
 from roboirg.language.wordings.template_search import find_templates
-from roboirg.language.wordings.worded_command import (
-    ROBOMME_NAME,
-    TaskWordings,
-    WordedCommand,
-    Wordings,
-    describe_goal,
-    goal_fields,
-)
 from roboirg.language.wordings.wording_file import check_name, parse_wordings
 from roboirg.language.wordings.wording_store import forget_wordings, register_wordings
 from roboirg.language.wordings.wording_writer import wording_text

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from roboirg.core.episode import Goal, SlotValue
-from roboirg.language.wordings.worded_command import goal_fields
+from roboirg.language.worded_command import goal_fields
 
 Sentences = Mapping[Goal, str]
 _TOKEN = re.compile(r"\w+|\s+|[^\w\s]")

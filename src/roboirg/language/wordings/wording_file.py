@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 from roboirg.core.episode import SlotValue
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.language.settings import all_settings
-from roboirg.language.wordings.worded_command import (
+from roboirg.language.worded_command import (
     FIELD,
     StatedPhrase,
     TaskWordings,

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.word_pools import POOLS
-from roboirg.language.wordings.worded_command import Wordings
+from roboirg.language.worded_command import Wordings
 from roboirg.language.wordings.wording_file import read_wordings
 
 _OPEN: dict[str, Wordings] = {}

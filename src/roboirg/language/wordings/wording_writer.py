@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator, Mapping
 
 from roboirg.core.episode import SlotValue
-from roboirg.language.wordings.worded_command import StatedPhrase, TaskWordings, WordedCommand
+from roboirg.language.worded_command import StatedPhrase, TaskWordings, WordedCommand
 
 Tables = Mapping[str, Mapping[str, StatedPhrase]]
 _BARE = frozenset("abcdefghijklmnopqrstuvwxyz0123456789")

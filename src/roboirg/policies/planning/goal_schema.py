@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from roboirg.core.episode import Goal, SlotValue, Split
+from roboirg.core.goal_slots import COLOR_SLOTS, SLOT_TYPE_NAMES
 from roboirg.episodes.splits import SIZES, get_episode
-from roboirg.language.request import COLOR_SLOTS, SLOT_TYPE_NAMES
-from roboirg.policies.planning.vlm_query import UnparsableReplyError, json_object
 from roboirg.tasks import get_task
+from roboirg.util.json_reply import UnparsableReplyError, json_object
 
 Answer = Mapping[str, Any]
 """JSON values by field: numbers, words and lists of words."""

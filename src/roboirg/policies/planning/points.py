@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-from roboirg.policies.planning.vlm_query import UnparsableReplyError
+from roboirg.util.json_reply import UnparsableReplyError
 
 PICTURE_SIZE = 256
 """Rows and columns of the front picture."""

@@ -19,11 +19,12 @@ from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.policies.planning.config_fingerprint import config_version
 from roboirg.policies.planning.goal_schema import GoalSchema, goal_schema
 from roboirg.policies.planning.listener_query import PROMPTS, question_texts
-from roboirg.policies.planning.model_content import ChatTurn, Clip, Picture, summary_clip
+from roboirg.policies.planning.model_content import ChatTurn, summary_clip
 from roboirg.policies.planning.models import Model, ModelOptions, ModelQuery, make_model
 from roboirg.policies.planning.prompts import load_prompts
 from roboirg.policies.planning.vlm_query import VLMQuery
 from roboirg.tasks import get_task
+from roboirg.util.media import Clip, Picture
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from string import Template
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from roboirg.policies.planning.model_content import ChatTurn
 from roboirg.policies.planning.models import Model, ModelOptions, ModelQuery, ModelReply, make_model
+from roboirg.util.json_reply import UnparsableReplyError
 
 Value = TypeVar("Value")
 
 MILLION = 1_000_000
 SILENCE = "(no answer)"
 """Stands for an empty reply when it is quoted back; services refuse empty turns."""
-
-
-class UnparsableReplyError(Exception):
-    """A reply is unusable; `VLMQuery.ask` sends the message to the model and asks again."""
 
 
 @dataclass
@@ -98,34 +94,3 @@ class VLMQuery:
         self.input_tokens += reply.input_tokens
         self.output_tokens += reply.output_tokens
         return reply
-
-
-def json_object(text: str) -> dict[str, Any]:
-    """Return the JSON object in a reply, which may have words or a code fence around it.
-
-    Raises:
-        UnparsableReplyError: there is none.
-    """
-    decoder = json.JSONDecoder()
-    start = text.find("{")
-    while start >= 0:
-        try:
-            found, _ = decoder.raw_decode(text, start)
-        except (ValueError, RecursionError):
-            start = text.find("{", start + 1)
-            continue
-        if isinstance(found, dict):
-            return found
-    raise UnparsableReplyError("The reply holds no JSON object.")
-
-
-def text_of(reply: dict[str, Any], name: str) -> str:
-    """Return a text field of a reply, in one line.
-
-    Raises:
-        UnparsableReplyError: there is no such text.
-    """
-    value = reply.get(name)
-    if not isinstance(value, str) or not value.strip():
-        raise UnparsableReplyError(f"The field {name!r} has to hold words.")
-    return " ".join(value.split())

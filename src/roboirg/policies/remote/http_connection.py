@@ -23,12 +23,11 @@ from roboirg.policies.remote.connections import (
     error_reply,
     read_reply,
 )
-from roboirg.policies.remote.message_codec import pack
+from roboirg.policies.remote.message_codec import MSGPACK, pack
 
 with extra_needed("Policies over HTTP need httpx", "remote"):
     import httpx
 
-MSGPACK = "application/msgpack"
 _OK, _SERVER_ERROR = 200, 500
 _STARTING = frozenset({502, 503, 504})
 """Statuses that a proxy returns while the server starts."""

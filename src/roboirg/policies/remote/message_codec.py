@@ -134,3 +134,6 @@ def _dtype(keys: ArrayKeys, found: dict[Any, Any]) -> np.dtype[Any]:
     if dtype.kind in _UNSUPPORTED:
         raise ValueError(f"arrays of dtype {text!r} are not accepted")
     return dtype
+
+
+MSGPACK = "application/msgpack"

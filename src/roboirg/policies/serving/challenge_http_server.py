@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from http import HTTPStatus
 from typing import Any
 
-from roboirg.policies.remote.http_connection import MSGPACK
-from roboirg.policies.remote.message_codec import pack, unpack
+from roboirg.policies.remote.message_codec import MSGPACK, pack, unpack
 from roboirg.policies.serving.server_options import ServerOptions
 from roboirg.policies.serving.service import Service
 from roboirg.util.http_server import HTTPServerBase, RequestHandler

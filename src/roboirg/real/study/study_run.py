@@ -17,7 +17,7 @@ from roboirg.core.actions import JOINT_ANGLE
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import DEFAULT_DELIVERY
-from roboirg.evaluation.plan import instruct_job
+from roboirg.evaluation.job_instruction import instruct_job
 from roboirg.evaluation.plan_parsing import name_and_spec
 from roboirg.evaluation.policy_descriptions import describe_policy
 from roboirg.evaluation.rollout_result import make_record, utc_now

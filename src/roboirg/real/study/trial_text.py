@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from roboirg import language
-from roboirg.evaluation.plan import instruct_job
+from roboirg.evaluation.job_instruction import instruct_job
 from roboirg.language.settings import EXPLICIT
 from roboirg.real.study.arrangement_shapes import describe_position, scene_shapes
 from roboirg.real.study.study_plan import PlannedDemonstration, PlannedTrial

@@ -16,7 +16,7 @@ from roboirg.simulation.demonstration.frame_sequence import (
 from roboirg.simulation.demonstration.recording import Recording
 from roboirg.simulation.observation_builder import (
     ObservationSpec,
-    picture_space,
+    picture_fields,
     stack_proprioception,
 )
 
@@ -106,8 +106,8 @@ def make_video(
     selection = spec.demonstration_frames
     every = selection if isinstance(selection, int) else 1
     sequences = {
-        field: FrameSequence(episode, recording, field, space, every, spec.rendering)
-        for field, space in picture_space(spec).items()
+        field: FrameSequence(episode, recording, field, kind, every, spec.rendering)
+        for field, kind in picture_fields(spec).items()
         if selection != "none"
     }
     arrays = stack_proprioception(proprioception, spec)

@@ -15,14 +15,13 @@ from typing import Any
 
 import numpy as np
 import zstandard
-from gymnasium import spaces
 from numpy.typing import NDArray
 
 from roboirg.core.episode import Episode, Stage
 from roboirg.simulation.demonstration.demonstration_cache import recording_key
 from roboirg.simulation.demonstration.recording import Recording
 from roboirg.simulation.episode_session import EpisodeSession
-from roboirg.simulation.observation_builder import read_picture
+from roboirg.simulation.observation_builder import FieldFormat, read_picture
 from roboirg.simulation.rendering.render_device import describe_device, find_render_device
 from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
 from roboirg.util.cache import open_cache
@@ -43,7 +42,7 @@ class FrameSequence:
         episode: the episode.
         recording: the recorded demonstration.
         field: observation field, for example ``"front_rgb"``.
-        space: space of one picture.
+        format: of one picture.
         every: steps of the video from one picture to the next.
         rendering: how pictures are drawn.
     """
@@ -51,14 +50,14 @@ class FrameSequence:
     episode: Episode
     recording: Recording
     field: str
-    space: spaces.Space[Any]
+    format: FieldFormat
     every: int = 1
     rendering: RenderSettings = FAITHFUL
 
     def empty(self) -> NDArray[Any]:
         """Return an uninitialized array for all pictures, with a leading axis."""
         count = math.ceil(self.recording.video_length(self.episode) / self.every)
-        return np.empty((count, *(self.space.shape or ())), self.space.dtype)
+        return np.empty((count, *self.format.shape), self.format.dtype)
 
     def key(self) -> str:
         """Return the cache key."""

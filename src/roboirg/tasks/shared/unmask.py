@@ -14,6 +14,7 @@ from roboirg.core.conditions import Condition, Fact
 from roboirg.core.episode import (
     COLORS,
     Color,
+    Difficulty,
     Goal,
     Primitive,
     Scene,
@@ -184,3 +185,11 @@ def seen_commands(wordings: Pools[Wording]) -> Commands:
         patterns=("color exclusion",),
         wordings=wordings,
     )
+
+
+CONTAINERS: dict[Difficulty, int] = {"easy": 3, "medium": 5, "hard": 15}
+"""Upper bounds: placement ends at the first container without a free place."""
+PICKS: dict[Difficulty, int] = {"easy": 1, "medium": 1, "hard": 2}
+
+REGION = Region(0.0, 0.0, 0.2, 0.2)
+GAP = 0.04

@@ -10,10 +10,11 @@ from roboirg.core.errors import (
     RoboIRGError,
 )
 from roboirg.core.extras import extra_needed
-from roboirg.policies.planning.model_content import Part, Picture, encode_png
+from roboirg.policies.planning.model_content import Part
 from roboirg.policies.planning.models.bounded_wait import call_with_timeout, timeout_error
 from roboirg.policies.planning.models.model import ModelOptions, ModelQuery, ModelReply
 from roboirg.policies.planning.models.response_limits import PLAIN_HEADERS, limit_response
+from roboirg.util.media import Picture, encode_png
 
 if TYPE_CHECKING:
     from google.genai import types

@@ -13,17 +13,11 @@ from roboirg.core.errors import (
     RoboIRGError,
 )
 from roboirg.core.extras import extra_needed
-from roboirg.policies.planning.model_content import (
-    ChatTurn,
-    Clip,
-    Part,
-    Picture,
-    encode_png,
-    sample_evenly,
-)
+from roboirg.policies.planning.model_content import ChatTurn, Part
 from roboirg.policies.planning.models.bounded_wait import call_with_timeout, timeout_error
 from roboirg.policies.planning.models.model import ModelOptions, ModelQuery, ModelReply
 from roboirg.policies.planning.models.response_limits import PLAIN_HEADERS, limit_response
+from roboirg.util.media import Clip, Picture, encode_png, sample_evenly
 
 OPENAI = "https://api.openai.com/v1"
 BUSY = frozenset({408, 409, 429, 502, 503, 504})

@@ -10,14 +10,7 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from roboirg.core.observations import Demonstration, Observation
-from roboirg.policies.planning.model_content import (
-    VIDEO_RATE,
-    ChatTurn,
-    Clip,
-    Part,
-    Picture,
-    Pixels,
-)
+from roboirg.policies.planning.model_content import ChatTurn, Part
 from roboirg.policies.planning.models import ModelQuery
 from roboirg.policies.planning.planners.vlm_planner import (
     VLMPlanner,
@@ -26,7 +19,8 @@ from roboirg.policies.planning.planners.vlm_planner import (
     front_picture,
 )
 from roboirg.policies.planning.points import parse_points, says_finished
-from roboirg.policies.planning.vlm_query import UnparsableReplyError, json_object, text_of
+from roboirg.util.json_reply import UnparsableReplyError, json_object, text_of
+from roboirg.util.media import VIDEO_RATE, Clip, Picture, Pixels
 
 PERIOD = 48
 """Control steps between calls."""

@@ -9,14 +9,7 @@ from pydantic import BaseModel, Field
 
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.policies.planning.keyframes import MAX_GAP, merge_keyframes
-from roboirg.policies.planning.model_content import (
-    ChatTurn,
-    Clip,
-    Part,
-    Picture,
-    Pixels,
-    summary_clip,
-)
+from roboirg.policies.planning.model_content import ChatTurn, Part, summary_clip
 from roboirg.policies.planning.models import ModelQuery
 from roboirg.policies.planning.planners.qwen import VIDEO_FRAMES
 from roboirg.policies.planning.planners.vlm_planner import (
@@ -26,7 +19,8 @@ from roboirg.policies.planning.planners.vlm_planner import (
     front_picture,
 )
 from roboirg.policies.planning.points import parse_boxes
-from roboirg.policies.planning.vlm_query import UnparsableReplyError, json_object, text_of
+from roboirg.util.json_reply import UnparsableReplyError, json_object, text_of
+from roboirg.util.media import Clip, Picture, Pixels
 
 RECENT = 8
 STRIDE = 2

@@ -9,7 +9,7 @@ from typing import ClassVar
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from roboirg.core.observations import Demonstration, Observation
-from roboirg.policies.planning.model_content import ChatTurn, Clip, Part, Picture, summary_clip
+from roboirg.policies.planning.model_content import ChatTurn, Part, summary_clip
 from roboirg.policies.planning.models import ModelQuery
 from roboirg.policies.planning.planners.vlm_planner import (
     VLMPlanner,
@@ -18,6 +18,7 @@ from roboirg.policies.planning.planners.vlm_planner import (
     front_picture,
 )
 from roboirg.policies.planning.points import normalize_subgoal, parse_boxes, strip_points
+from roboirg.util.media import Clip, Picture
 
 VIDEO_FRAMES = 10
 """Maximum of demonstration frames."""

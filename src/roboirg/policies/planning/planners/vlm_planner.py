@@ -9,10 +9,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from roboirg.core.observations import Demonstration, DemonstrationFrames, Observation
 from roboirg.policies.planning.config_fingerprint import config_version
-from roboirg.policies.planning.model_content import Pixels
 from roboirg.policies.planning.models import ModelOptions
 from roboirg.policies.planning.prompts import SHARED, load_prompts
 from roboirg.policies.planning.vlm_query import VLMQuery
+from roboirg.util.media import Pixels
 
 CAMERA = "front"
 PLACE = "[at]"

@@ -1,0 +1,39 @@
+"""The keyword arguments of `roboirg.make`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, TypedDict
+
+if TYPE_CHECKING:
+    # Not at run time: it loads NumPy, which `import roboirg` must not.
+    from roboirg.core.observations import DemonstrationFrames
+
+
+class EnvOptions(TypedDict, total=False):
+    """Keyword arguments of `make`, which documents them; `EnvSettings` has their defaults."""
+
+    setting: str
+    form: str
+    split: str
+    episode: int | None
+    stages: Sequence[int]
+    distractor: str
+    distractors: int
+    frame: str
+    wordings: str | Path | None
+    delivery: str
+    rival: str
+    reasoning: str
+    actions: str
+    cameras: Sequence[str]
+    depth: bool
+    calibration: bool
+    grounded: bool
+    demonstration_frames: DemonstrationFrames
+    observe_every: int | None
+    history_cameras: Sequence[str] | None
+    meshes: str
+    max_steps: int
+    render_mode: str | None
