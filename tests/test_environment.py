@@ -27,8 +27,8 @@ from roboirg.evaluation.policy_environment import EnvRequirements, make_env
 from roboirg.policies import make_policy, play
 from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.records.record import Job
+from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.physics_settings import HOME_ACTION
-from roboirg.simulation.rendering.cameras import Cameras
 from roboirg.tasks import every_task, get_task
 
 pytestmark = pytest.mark.sim

@@ -185,8 +185,8 @@ def test_objects_change_places_with_the_partners_that_robomme_saw(converter):
 @pytest.mark.sim
 @pytest.mark.parametrize("task", RECORDED)
 def test_a_recording_replays_to_robomme_s_poses(task, converter):
-    from roboirg.simulation.demonstration.recording import Recording
     from roboirg.simulation.episode_session import EpisodeSession
+    from roboirg.simulation.recording import Recording
 
     row = next(
         row for row in converter.read_rows(ROWS) if (row["task"], row["dataset"]) == (task, "test")

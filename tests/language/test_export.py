@@ -10,6 +10,7 @@ from language_variants import TASKS
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.episodes.splits import get_episode, split_episodes
 from roboirg.language import FORMS, export, setting_names
+from roboirg.language.instruction_row import row
 from roboirg.language.variants import instructions
 
 LISTS = {
@@ -26,7 +27,7 @@ LISTS = {
 def rows():
     """Eight episodes of each task in all settings and forms."""
     episodes = [get_episode(task, "test", index) for task in TASKS for index in range(8)]
-    return tuple(export.row(*one) for one in instructions(episodes, setting_names(), FORMS))
+    return tuple(row(*one) for one in instructions(episodes, setting_names(), FORMS))
 
 
 def test_every_row_has_the_same_columns_and_types():
@@ -137,6 +138,6 @@ def test_without_pyarrow_one_sentence_says_what_to_do(monkeypatch):
 
 def test_every_episode_is_there():
     episodes = list(split_episodes(["StopCube"], ["test"]))
-    found = [export.row(*one) for one in instructions(episodes, setting_names(), FORMS)]
+    found = [row(*one) for one in instructions(episodes, setting_names(), FORMS)]
     assert len(found) == 50 * 4 * 2  # no spatial setting
     assert [one["episode"] for one in found[::8]] == list(range(50))

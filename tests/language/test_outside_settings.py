@@ -18,8 +18,8 @@ from roboirg.evaluation.seed_search.seed_selection import EpisodeSlot, check_wor
 from roboirg.language import (
     FORMS,
     card,
-    corpus_statistics,
     expressible,
+    expression_counts,
     expression_figure,
     find_refusals,
     instruct,
@@ -148,7 +148,7 @@ def test_statistics_figure_and_export_have_the_setting(register, tmp_path):
     dummies = [one for one in (row(*one) for one in found) if one["setting"] == "dummy"]
     assert len(dummies) == 2 * sum(episode.difficulty != "easy" for episode in episodes)
     said = [one for _, one in found if one.form == "implicit"]
-    assert corpus_statistics.scene_counts(said)["dummy"] == len(dummies) / 2
+    assert expression_counts.scene_counts(said)["dummy"] == len(dummies) / 2
     assert "dummy" in printed(*statistics_tables.overview_tables(said))
     _, picture = expression_figure.write_figure(said, tmp_path, "expressions", "A title")
     assert DUMMY.color in picture.read_text()

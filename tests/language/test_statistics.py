@@ -9,7 +9,13 @@ from rich.console import Console
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.episodes.splits import split_episodes
-from roboirg.language import corpus_statistics, expression_figure, setting_names, statistics_tables
+from roboirg.language import (
+    corpus_statistics,
+    expression_counts,
+    expression_figure,
+    setting_names,
+    statistics_tables,
+)
 from roboirg.language.settings import settings_of
 from roboirg.language.variants import instructions
 from roboirg.tasks import every_task
@@ -24,9 +30,9 @@ def said():
 
 
 def test_expressions_are_counted_once_per_scene():
-    counts = corpus_statistics.expression_counts(said())
-    assert corpus_statistics.expression_counts(said() * 2) == counts
-    scenes = corpus_statistics.scene_counts(said() * 2)
+    counts = expression_counts.expression_counts(said())
+    assert expression_counts.expression_counts(said() * 2) == counts
+    scenes = expression_counts.scene_counts(said() * 2)
     assert scenes["direct"] == 50 * len(TASKS)
     assert scenes["spatial"] == 50 * sum(
         "spatial" in settings_of(one) for one in every_task().values()
@@ -38,7 +44,7 @@ def test_expressions_are_counted_once_per_scene():
     assert set(counts["direct"]) == {"it", "them", "that", "then", "former", "latter"}
     assert {"pair", "that", "each", "other"} == set(counts["reasoning"])
     assert {"there", *ranks} == set(counts["spatial"])
-    order = corpus_statistics.expression_order(counts)
+    order = expression_counts.expression_order(counts)
     assert set(order) == {name for by_class in counts.values() for name in by_class}
     assert order.index("it") < order.index("former") < order.index("there")
 
@@ -62,7 +68,7 @@ def test_the_tables_hold_the_counts():
     for table in statistics_tables.overview_tables(said()):
         console.print(table)
     text = console.file.getvalue()
-    counts = corpus_statistics.expression_counts(said())
+    counts = expression_counts.expression_counts(said())
     row = next(
         line for line in text.splitlines() if line.startswith("│ spatial") and "." not in line
     )

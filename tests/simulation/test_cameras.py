@@ -5,8 +5,8 @@ import pytest
 
 from roboirg.core.observations import CAMERAS
 from roboirg.episodes.splits import get_episode
+from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.physics_settings import HOME_ACTION
-from roboirg.simulation.rendering.cameras import Cameras
 from roboirg.simulation.world import World
 
 pytestmark = pytest.mark.sim

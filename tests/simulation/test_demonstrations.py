@@ -15,13 +15,13 @@ import roboirg
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.rollout import EpisodeRunner
 from roboirg.records.record import Job
-from roboirg.simulation.demonstration import demonstration_cache, frame_sequence
-from roboirg.simulation.demonstration.recording import RecordedStep, Recording
+from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.episode_session import EpisodeSession
 from roboirg.simulation.expert.primitives import MotionPrimitives
 from roboirg.simulation.physics_settings import HOME_ACTION
-from roboirg.simulation.rendering.cameras import Cameras
+from roboirg.simulation.recording import RecordedStep, Recording
 from roboirg.simulation.rendering.render_settings import FAITHFUL
+from roboirg.simulation.video import demonstration_cache, frame_sequence
 from roboirg.tasks import all_tasks
 
 pytestmark = pytest.mark.sim

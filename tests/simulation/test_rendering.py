@@ -15,9 +15,9 @@ from roboirg.core.observations import CAMERAS
 from roboirg.episodes.splits import get_episode
 from roboirg.policies import make_policy, play
 from roboirg.simulation import bodies, physics_settings
+from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.panda import BASE_LINK, CAMERA_LINK, FINGERS, Panda
 from roboirg.simulation.rendering import culling, robot_meshes, shaders
-from roboirg.simulation.rendering.cameras import Cameras
 from roboirg.simulation.rendering.render_device import render_system
 from roboirg.simulation.rendering.render_settings import FAITHFUL, LIGHT, STOCK, RenderSettings
 from roboirg.simulation.scenery import add_scenery

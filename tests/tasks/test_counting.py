@@ -13,6 +13,7 @@ from roboirg.core import object_sizes
 from roboirg.core.conditions import Elapsed, Fact
 from roboirg.core.episode import DIFFICULTIES
 from roboirg.core.errors import SceneRejectedError
+from roboirg.core.footprints import Circle, Rectangle, Region, overlap
 from roboirg.core.motions import Away, Glow, Shuttle, Vanish
 from roboirg.tasks import bin_fill, stop_cube, swing_x_times
 from roboirg.tasks.shared.fixtures import (
@@ -24,7 +25,6 @@ from roboirg.tasks.shared.fixtures import (
     cube_obstacle,
     draw_bin,
 )
-from roboirg.tasks.shared.placement import Circle, Rectangle, Region, overlap
 
 SEEDS = 300
 TASKS = {module.TASK.name: module for module in (bin_fill, swing_x_times, stop_cube)}

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roboirg.core.episode import Point, SceneObject
-from roboirg.tasks.shared.fixtures import cube_footprint, cube_obstacle
-from roboirg.tasks.shared.placement import (
+from roboirg.core.footprints import (
     MAX_DRAWS,
     Circle,
     Line,
@@ -19,6 +18,7 @@ from roboirg.tasks.shared.placement import (
     overlap,
     place,
 )
+from roboirg.tasks.shared.fixtures import cube_footprint, cube_obstacle
 
 coordinates = st.floats(-0.3, 0.3)
 sizes = st.floats(0.01, 0.15)

@@ -9,11 +9,11 @@ import pytest
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import BENCHMARK_SUITES, DIFFICULTIES, SUITES, Goal
 from roboirg.core.errors import SceneRejectedError, UnknownNameError
+from roboirg.core.footprints import Rectangle, Region
 from roboirg.judging import Judge, Status
 from roboirg.language import variants
 from roboirg.tasks import all_tasks, every_task, find_tasks, get_task, pick_by_count, put_in_box
 from roboirg.tasks.pick_by_count import WAIT_STEPS
-from roboirg.tasks.shared.placement import Rectangle, Region
 from roboirg.tasks.shared.real_table import draw_tape, left_to_right, on_side
 
 REAL = ("PutInBox", "PickByCount")

@@ -12,9 +12,9 @@ import pytest
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import DIFFICULTIES, Goal
 from roboirg.core.errors import SceneRejectedError
+from roboirg.core.footprints import Circle, overlap
 from roboirg.core.motions import Swap
 from roboirg.tasks.shared.fixtures import button_keep_out, cube_footprint, cube_obstacle
-from roboirg.tasks.shared.placement import Circle, overlap
 from roboirg.tasks.shared.swapping import nearest
 from roboirg.tasks.video_place_button import TASK as VIDEO_PLACE_BUTTON
 from roboirg.tasks.video_place_order import TASK as VIDEO_PLACE_ORDER

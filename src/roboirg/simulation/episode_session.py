@@ -14,8 +14,8 @@ from roboirg.core.episode import Episode, Stage
 from roboirg.core.errors import MotionPlanningError
 from roboirg.judging import Event, Judge, Status, changes
 from roboirg.simulation.bodies import Body
-from roboirg.simulation.demonstration.recording import RecordedStep, Recording
 from roboirg.simulation.physics_settings import HOME_ACTION
+from roboirg.simulation.recording import RecordedStep, Recording
 from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
 from roboirg.simulation.world import World
 

@@ -12,7 +12,7 @@ from roboirg.judging import Event, plain_subgoal
 from roboirg.simulation.controllers import Controller
 from roboirg.simulation.episode_session import EpisodeSession
 from roboirg.simulation.observation_builder import ObservationBuilder
-from roboirg.simulation.rendering.pixel_grounding import PixelGrounding
+from roboirg.simulation.pixel_grounding import PixelGrounding
 
 
 @dataclass

@@ -9,7 +9,7 @@ import numpy as np
 from roboirg.core.episode import Stage
 from roboirg.judging import plain_subgoal
 from roboirg.simulation.bodies import Body
-from roboirg.simulation.rendering.cameras import Cameras
+from roboirg.simulation.cameras import Cameras
 
 CAMERA = "front"
 

@@ -14,11 +14,11 @@ from roboirg.core.episode import Scene
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.observations import CAMERAS
 from roboirg.simulation import bodies, physics_settings
+from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.fact_detection import FactDetector
 from roboirg.simulation.fork_check import check_drawing_process
 from roboirg.simulation.motion_player import MotionContext, MotionPlayer
 from roboirg.simulation.panda import Panda
-from roboirg.simulation.rendering.cameras import Cameras
 from roboirg.simulation.rendering.render_device import render_system
 from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
 from roboirg.simulation.scenery import add_scenery

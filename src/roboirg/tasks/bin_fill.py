@@ -23,6 +23,7 @@ from roboirg.core.episode import (
     SceneObject,
     Stage,
 )
+from roboirg.core.footprints import Obstacle, Region
 from roboirg.core.motions import Away, Motion, Vanish
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import (
@@ -36,7 +37,6 @@ from roboirg.tasks.shared.fixtures import (
     draw_cube,
     draw_number,
 )
-from roboirg.tasks.shared.placement import Obstacle, Region
 from roboirg.tasks.task import Commands, Task, Wording
 from roboirg.util.plain_text import counted
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
+from roboirg.core.footprints import Region
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import unmask
 from roboirg.tasks.shared.fixtures import button_keep_out, draw_button
-from roboirg.tasks.shared.placement import Region
 from roboirg.tasks.shared.unmask import CONTAINERS, GAP, PICKS, REGION
 from roboirg.tasks.task import Task, Wording
 

@@ -12,11 +12,11 @@ import numpy as np
 
 from roboirg.core.conditions import All, Fact, FactCount, OccurrenceCount
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
+from roboirg.core.footprints import Region
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import unmask, unmask_swap
 from roboirg.tasks.shared.fixtures import button_keep_out, draw_button
 from roboirg.tasks.shared.layouts import PlanePoint
-from roboirg.tasks.shared.placement import Region
 from roboirg.tasks.task import Task, Wording
 
 RIGHT, LEFT = "button_right", "button_left"

@@ -10,9 +10,9 @@ import numpy as np
 
 from roboirg.core.conditions import Elapsed, Fact, Rule
 from roboirg.core.episode import Color, Difficulty, Goal, Primitive, Scene, Stage
+from roboirg.core.footprints import Circle, Footprint, Region
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import ORDINALS, draw_number, draw_target
-from roboirg.tasks.shared.placement import Circle, Footprint, Region
 from roboirg.tasks.shared.real_table import Side, draw_sides, draw_tape, on_side
 from roboirg.tasks.task import Commands, Task, Wording
 

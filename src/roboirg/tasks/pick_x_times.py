@@ -10,6 +10,7 @@ import numpy as np
 
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, Stage
+from roboirg.core.footprints import Obstacle, Region
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
@@ -20,7 +21,6 @@ from roboirg.tasks.shared.fixtures import (
     draw_number,
     draw_target,
 )
-from roboirg.tasks.shared.placement import Obstacle, Region
 from roboirg.tasks.task import Commands, Task, Wording
 
 CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}

@@ -11,8 +11,8 @@ import numpy as np
 
 from roboirg.core.conditions import Fact, Rule
 from roboirg.core.episode import Color, Difficulty, Goal, Primitive, Scene, Stage
+from roboirg.core.footprints import Footprint, Region
 from roboirg.core.word_pools import Pools
-from roboirg.tasks.shared.placement import Footprint, Region
 from roboirg.tasks.shared.real_table import (
     Side,
     box_footprint,

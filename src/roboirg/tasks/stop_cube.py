@@ -14,10 +14,10 @@ import numpy as np
 
 from roboirg.core.conditions import All, Elapsed, Fact, OccurrenceCount, Rule, absent
 from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, SceneObject, Stage
+from roboirg.core.footprints import Region
 from roboirg.core.motions import Point, Shuttle
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import ORDINALS, draw_button
-from roboirg.tasks.shared.placement import Region
 from roboirg.tasks.task import Commands, Task, Wording
 
 BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.2)

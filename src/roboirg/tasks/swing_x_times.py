@@ -12,6 +12,7 @@ import numpy as np
 
 from roboirg.core.conditions import Fact, OccurrenceCount, Rule
 from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, SceneObject, Stage
+from roboirg.core.footprints import Circle, Obstacle, Region
 from roboirg.core.motions import Glow
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import (
@@ -24,7 +25,6 @@ from roboirg.tasks.shared.fixtures import (
     draw_target,
     marker_over,
 )
-from roboirg.tasks.shared.placement import Circle, Obstacle, Region
 from roboirg.tasks.task import Commands, Task, Wording
 
 CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}

@@ -13,6 +13,7 @@ import numpy as np
 
 from roboirg.core.conditions import All, Elapsed, Fact, Rule
 from roboirg.core.episode import COLORS, Difficulty, Goal, Primitive, Scene, SceneObject, Stage
+from roboirg.core.footprints import Obstacle, Region
 from roboirg.core.motions import Swap
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import video_stages
@@ -25,7 +26,6 @@ from roboirg.tasks.shared.fixtures import (
     draw_number,
 )
 from roboirg.tasks.shared.layouts import layout_points
-from roboirg.tasks.shared.placement import Obstacle, Region
 from roboirg.tasks.shared.swapping import SWAP_START, SWAP_STEPS, plan_swaps
 from roboirg.tasks.task import Commands, Task, Wording
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from roboirg.core import object_sizes
+from roboirg.core.footprints import Circle, Footprint, Rectangle, overlap
 from roboirg.simulation.bodies import Body
-from roboirg.tasks.shared.placement import Circle, Footprint, Rectangle, overlap
 
 FINGER_OFFSET = 0.048
 """From the tool's axis to the middle of an open finger, m."""

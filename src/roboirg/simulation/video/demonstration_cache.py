@@ -18,7 +18,7 @@ from pathlib import Path
 
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import MotionPlanningError
-from roboirg.simulation.demonstration.recording import Recording
+from roboirg.simulation.recording import Recording
 from roboirg.util.cache import open_cache
 from roboirg.util.processor import processor_features
 

@@ -9,16 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.episode import Episode
-from roboirg.simulation.demonstration.frame_sequence import (
-    FrameSequence,
-    read_frames,
-)
-from roboirg.simulation.demonstration.recording import Recording
 from roboirg.simulation.observation_builder import (
     ObservationSpec,
     picture_fields,
     stack_proprioception,
 )
+from roboirg.simulation.recording import Recording
+from roboirg.simulation.video.frame_sequence import FrameSequence, read_frames
 
 
 class DemonstrationVideo(Mapping[str, NDArray[Any]]):

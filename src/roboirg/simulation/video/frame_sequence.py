@@ -18,12 +18,12 @@ import zstandard
 from numpy.typing import NDArray
 
 from roboirg.core.episode import Episode, Stage
-from roboirg.simulation.demonstration.demonstration_cache import recording_key
-from roboirg.simulation.demonstration.recording import Recording
 from roboirg.simulation.episode_session import EpisodeSession
 from roboirg.simulation.observation_builder import FieldFormat, read_picture
+from roboirg.simulation.recording import Recording
 from roboirg.simulation.rendering.render_device import describe_device, find_render_device
 from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
+from roboirg.simulation.video.demonstration_cache import recording_key
 from roboirg.util.cache import open_cache
 
 COMPRESSION_LEVEL = 3

@@ -10,16 +10,8 @@ import numpy as np
 from roboirg.core import object_sizes
 from roboirg.core.episode import COLORS, Color, SceneObject
 from roboirg.core.errors import SceneRejectedError
+from roboirg.core.footprints import Circle, Footprint, Line, Obstacle, Rectangle, Region, place
 from roboirg.core.motions import Point
-from roboirg.tasks.shared.placement import (
-    Circle,
-    Footprint,
-    Line,
-    Obstacle,
-    Rectangle,
-    Region,
-    place,
-)
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth")
 

@@ -15,9 +15,9 @@ import numpy as np
 
 from roboirg.core import object_sizes
 from roboirg.core.episode import Color, ObjectKind, Scene, SceneObject
+from roboirg.core.footprints import Circle, Footprint, Rectangle, Region
 from roboirg.core.motions import Point
 from roboirg.tasks.shared.fixtures import placed
-from roboirg.tasks.shared.placement import Circle, Footprint, Rectangle, Region
 
 BOX_YAW = math.radians(15.0)
 """Largest rotation of a box to either side."""

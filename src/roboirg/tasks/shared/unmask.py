@@ -22,9 +22,9 @@ from roboirg.core.episode import (
     Stage,
 )
 from roboirg.core.errors import SceneRejectedError
+from roboirg.core.footprints import Circle, Footprint, Rectangle, Region, place
 from roboirg.core.motions import Away, Point
 from roboirg.core.word_pools import Pools
-from roboirg.tasks.shared.placement import Circle, Footprint, Rectangle, Region, place
 from roboirg.tasks.task import Commands, Wording
 
 APPEAR_STEP = 32

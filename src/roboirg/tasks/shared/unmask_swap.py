@@ -7,9 +7,9 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from roboirg.core.episode import COLORS, Difficulty, Goal, Scene, SceneObject
+from roboirg.core.footprints import Footprint, Region
 from roboirg.core.motions import Away, Motion
 from roboirg.tasks.shared.fixtures import draw_number
-from roboirg.tasks.shared.placement import Footprint, Region
 from roboirg.tasks.shared.swapping import last_step, plan_swaps
 from roboirg.tasks.shared.unmask import appearing, draw_containers_in, hide_cubes
 

@@ -14,6 +14,7 @@ import numpy as np
 from roboirg.core import object_sizes
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Primitive, Scene, SceneObject, Stage
+from roboirg.core.footprints import Circle, Obstacle, Region
 from roboirg.core.motions import Point, Swap
 from roboirg.tasks.shared import video_stages
 from roboirg.tasks.shared.fixtures import (
@@ -23,7 +24,6 @@ from roboirg.tasks.shared.fixtures import (
     draw_colored_cubes,
     draw_target,
 )
-from roboirg.tasks.shared.placement import Circle, Obstacle, Region
 from roboirg.tasks.shared.swapping import SWAP_START, SWAP_STEPS
 
 CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
