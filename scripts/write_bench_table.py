@@ -1,6 +1,6 @@
 """Write the table of docs/performance.md anew from docs/bench.json.
 
-roboirg bench --out docs/bench.json && python scripts/write_bench_table.py
+python scripts/bench.py --out docs/bench.json && python scripts/write_bench_table.py
 """
 
 from __future__ import annotations

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 import typer.main
 
-from roboirg.cli import app as cli
+from roboirg import main as cli
+from roboirg.cli import demo_commands
 from roboirg.cli.progress_bar import progress_bars
 from roboirg.evaluation.plan import read_plan
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
@@ -229,7 +230,7 @@ def test_demo_ends_with_the_path_of_the_page(roboirg, tmp_path: Path) -> None:
     said = roboirg("demo", "--out", tmp_path, "--episodes", "1", "--workers", "0")
     assert said.code == 0, said.err
     assert said.out.splitlines()[-1] == str(tmp_path / "report.html")
-    for policy in cli.DEMO_POLICIES:
+    for policy in demo_commands.DEMO_POLICIES:
         assert policy in said.out
 
 
@@ -329,7 +330,7 @@ def test_a_shown_episode_is_a_picture(roboirg, tmp_path: Path) -> None:
 def test_help_needs_nothing_heavy() -> None:
     code = (
         "import sys; sys.argv = ['roboirg', '--help']\n"
-        "from roboirg.cli import main\n"
+        "from roboirg.main import main\n"
         "try: main()\n"
         "except SystemExit: pass\n"
         "heavy = {'numpy', 'pydantic', 'sapien', 'gymnasium', 'jinja2', 'av'} & set(sys.modules)\n"

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from roboirg.cli import app as cli
+from roboirg import main as cli
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.language import card
 from roboirg.language.validation import RuleViolation, ValidationResults
@@ -62,7 +62,7 @@ def test_all_test_episodes_are_exported_without_a_simulator(tmp_path: Path):
     out = tmp_path / "instructions.jsonl"
     program = (
         "import sys\n"
-        "from roboirg.cli import main\n"
+        "from roboirg.main import main\n"
         f"sys.argv = ['roboirg', 'export', 'instructions', '--out', {str(out)!r}]\n"
         "try:\n    main()\nexcept SystemExit as left:\n    assert not left.code\n"
         f"print([name for name in {HEAVY!r} if name in sys.modules])\n"

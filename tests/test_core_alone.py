@@ -24,14 +24,14 @@ class Without:
 
 refused, commands = set(json.loads(sys.argv[1])), json.loads(sys.argv[2])
 sys.meta_path[:] = map(Without, sys.meta_path)
-from roboirg.cli import app
+from roboirg import main
 found = {}
 for name, words in commands.items():
     out, err, code = io.StringIO(), io.StringIO(), 0
     sys.argv = ["roboirg", *name.split(), *words]
     with redirect_stdout(out), redirect_stderr(err):
         try:
-            app.main()
+            main.main()
         except SystemExit as left:
             code = left.code or 0
         except BaseException:

@@ -7,7 +7,6 @@ from typer.testing import CliRunner
 
 import roboirg
 from roboirg import language
-from roboirg.cli.app import app
 from roboirg.core.delivery import (
     DELIVERIES,
     LATEST,
@@ -20,6 +19,7 @@ from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.episodes.splits import get_episode
 from roboirg.language.settings import all_settings, settings_of
+from roboirg.main import app
 from roboirg.policies import make_policy, play
 from roboirg.records.store import read_records
 from roboirg.tasks import all_tasks, get_task

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from roboirg import doctor
-from roboirg.doctor import Check
+from roboirg.cli import doctor
+from roboirg.cli.doctor import Check
 
 
 def run_module(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "roboirg.doctor", *arguments],
+        [sys.executable, "-m", "roboirg.cli.doctor", *arguments],
         env=os.environ | environment,
         capture_output=True,
         text=True,

@@ -5,7 +5,7 @@ import sys
 import pytest
 from all_commands import all_commands, make_run, words_of
 
-from roboirg.cli import app as cli
+from roboirg import main as cli
 
 NAMES = {
     "--tasks": "PickXtime", "--settings": "spatail", "--setting": "spatail", "--forms": "implict",

@@ -1,6 +1,6 @@
 """``python -m roboirg`` is the ``roboirg`` command."""
 
-from roboirg.cli import main
+from roboirg.main import main
 
 if __name__ == "__main__":
     main()

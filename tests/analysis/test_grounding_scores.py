@@ -17,7 +17,6 @@ from roboirg.analysis.grounding_scores.answer_scores import (
 from roboirg.analysis.grounding_scores.score_report import confusion_tables, report_text
 from roboirg.analysis.grounding_scores.score_tables import breakdown_tables, range_label
 from roboirg.analysis.stats.chance import floor_level
-from roboirg.cli.app import app
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.episodes.splits import get_episode
@@ -38,6 +37,7 @@ from roboirg.evaluation.grounding_set.item_builder import (
 )
 from roboirg.evaluation.grounding_set.verdicts import guess_chance, judge_reply, right_reply
 from roboirg.language import setting_names
+from roboirg.main import app
 from roboirg.records.record import Job
 
 TASKS = ("PickXtimes", "BinFill", "VideoUnmask", "VideoPlaceButton", "StopCube")

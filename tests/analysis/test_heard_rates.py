@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from rich.console import Console
 from typer.testing import CliRunner
 
+from roboirg import main
 from roboirg.analysis.page.details import Strings, details_of
 from roboirg.analysis.page.entries import Run, make_entries
 from roboirg.analysis.page.run_warnings import run_warnings
@@ -20,7 +21,6 @@ from roboirg.analysis.stats.heard_rates import add_up, count_heard, cut_text, he
 from roboirg.analysis.tables.heard_table import make_heard_table
 from roboirg.analysis.tables.rendering import get_format
 from roboirg.analysis.tables.run_tables import make_run_tables, print_run_tables
-from roboirg.cli import app
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit, most_tokens
 from roboirg.records.record import Job, Record, Result
@@ -116,12 +116,12 @@ def run(tmp_path: Path) -> Path:
 
 
 def test_the_command_prints_it_on_request(run: Path) -> None:
-    said = CliRunner().invoke(app.app, ["tables", str(run), "--heard", "--format", "csv"])
+    said = CliRunner().invoke(main.app, ["tables", str(run), "--heard", "--format", "csv"])
     assert said.exit_code == 0, said.output
     assert "cutting" in said.output
     assert "whole" in said.output
     assert "silent" not in said.output
-    refused = CliRunner().invoke(app.app, ["tables", str(run), "--heard", "--chance"])
+    refused = CliRunner().invoke(main.app, ["tables", str(run), "--heard", "--chance"])
     assert "--heard has a table of its own" in str(refused.exception or refused.output)
 
 
@@ -144,7 +144,7 @@ def test_the_page_says_what_was_cut() -> None:
 
 @pytest.mark.browser
 def test_the_page_strikes_out_what_was_cut(open_page: Any, run: Path) -> None:
-    said = CliRunner().invoke(app.app, ["report", str(run)])
+    said = CliRunner().invoke(main.app, ["report", str(run)])
     assert said.exit_code == 0, said.output
     with open_page((run / "report.html").as_uri()) as page:
         page.select_option("#filters [name=policy]", "cutting")

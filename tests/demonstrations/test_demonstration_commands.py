@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from roboirg.cli import app as cli
+from roboirg import main as cli
 from roboirg.demonstrations import dataset_replay
 from roboirg.demonstrations.dataset_replay import ReplayResult
 

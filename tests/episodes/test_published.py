@@ -15,7 +15,6 @@ import typer
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboirg.cli.app import app
 from roboirg.core.episode import DIFFICULTIES, SPLITS, Scene, SceneObject
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.motions import Point, Swap
@@ -25,6 +24,7 @@ from roboirg.episodes.published_episodes import published_episode, published_tex
 from roboirg.episodes.recordings import INCOMPLETE, is_recorded, recorded_actions
 from roboirg.episodes.scene_codec import decode, encode
 from roboirg.episodes.splits import SIZES, get_episode
+from roboirg.main import app
 from roboirg.tasks import all_tasks, every_task, get_task
 
 ROWS = Path(__file__).parent / "robomme"

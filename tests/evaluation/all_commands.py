@@ -2,10 +2,10 @@
 
 import typer.main
 
-from roboirg.cli.app import app
 from roboirg.evaluation.plan import write_plan
 from roboirg.evaluation.plan_maker import make_plan
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.main import app
 from roboirg.records.record import Job
 from roboirg.records.store import RecordStore
 

@@ -15,17 +15,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from roboirg.cli.app import app
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.episodes.splits import SIZES, get_episode
-from roboirg.evaluation.grounding_set import dataset_export
-from roboirg.evaluation.grounding_set.dataset_export import (
-    EpisodeName,
-    ExportRequest,
-    export_grounding,
-)
+from roboirg.evaluation.grounding_set import question_set
+from roboirg.evaluation.grounding_set.dataset_export import export_grounding
 from roboirg.evaluation.grounding_set.grounding_item import (
     LETTERS,
     PointTarget,
@@ -40,11 +35,13 @@ from roboirg.evaluation.grounding_set.item_builder import (
     wanted_options,
     words_back,
 )
+from roboirg.evaluation.grounding_set.question_set import EpisodeName, ExportRequest
 from roboirg.evaluation.grounding_set.referents import find_referents, pointed_kinds
 from roboirg.evaluation.grounding_set.seen_scene import nearest_to_center
 from roboirg.language import FORMS, instruct, setting_names
 from roboirg.language.interpreter import interpret
 from roboirg.language.settings import all_settings
+from roboirg.main import app
 from roboirg.policies.planning.goal_schema import goal_schema
 from roboirg.policies.planning.prompts import load_prompts
 from roboirg.tasks import all_tasks, get_task
@@ -324,7 +321,7 @@ def test_masks_of_cubes_have_the_color_of_the_answer(exported):
 def test_an_export_goes_on_and_gives_the_same_bytes(exported, monkeypatch):
     request, folder, facts = exported
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    monkeypatch.setattr(dataset_export, "store_media", None)  # nothing is drawn again
+    monkeypatch.setattr(question_set, "store_media", None)  # nothing is drawn again
     assert export_grounding(request, folder, 0) == facts
     assert {path: path.read_bytes() for path in before} == before
     with pytest.raises(InvalidValueError, match="pictures of another frames; choose another"):

@@ -15,7 +15,6 @@ from evaluation_fakes import FakePlay
 from typer.testing import CliRunner
 
 from roboirg.analysis.page.report import write_report
-from roboirg.cli.app import app
 from roboirg.core.errors import InvalidValueError, SceneRejectedError
 from roboirg.episodes.private_splits import (
     SALT_VARIABLE,
@@ -33,6 +32,7 @@ from roboirg.evaluation.plan_maker import make_plan
 from roboirg.evaluation.rollout import EpisodeRunner
 from roboirg.evaluation.runner import run_plan
 from roboirg.evaluation.verification.run_verification import verify_run
+from roboirg.main import app
 from roboirg.records.merging import merge_runs
 from roboirg.records.packing import pack_run
 from roboirg.records.store import read_records

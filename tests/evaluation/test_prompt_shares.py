@@ -12,9 +12,9 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
+from roboirg import main
 from roboirg.analysis.stats.heard_rates import count_heard
 from roboirg.analysis.tables.run_tables import make_run_tables, print_run_tables
-from roboirg.cli import app
 from roboirg.core.errors import UnknownNameError
 from roboirg.evaluation.job_instruction import instruct_job
 from roboirg.evaluation.plan_file import read_plan_file
@@ -172,7 +172,7 @@ def test_only_what_is_certainly_cut_is_refused() -> None:
 def test_the_dry_run_prints_the_shares(tmp_path: Path) -> None:
     words = ["run", "--dry-run", "--out", str(tmp_path), "--tasks", "PickXtimes"]
     words += ["--policy", "system:pi0.5", "--policy", "far=openpi://localhost:1"]
-    said = CliRunner().invoke(app.app, [*words, "--distractors", "16"])
+    said = CliRunner().invoke(main.app, [*words, "--distractors", "16"])
     assert said.exit_code == 0, said.output
     row = next(line for line in said.output.splitlines() if "64 tokens" in line)
     assert "system:pi0.5" in row

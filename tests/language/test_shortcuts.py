@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from language_variants import PAIRS, TASKS, first_episodes
 from typer.testing import CliRunner
 
-from roboirg.cli.app import app
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.episodes.splits import get_episode
@@ -33,6 +32,7 @@ from roboirg.language.shortcuts.shortcut_scores import (
 )
 from roboirg.language.shortcuts.shortcut_tables import LEARNED_SETTING, shortcut_rows
 from roboirg.language.variants import expressible_options, instructions
+from roboirg.main import app
 from roboirg.tasks import all_tasks, get_task
 
 COLORS = ("blue", "green", "red")

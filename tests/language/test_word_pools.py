@@ -10,7 +10,7 @@ import pytest
 from language_variants import TASKS, split_episodes
 from typer.testing import CliRunner
 
-from roboirg.cli import app as cli
+from roboirg import main as cli
 from roboirg.core.episode import SPLITS
 from roboirg.core.word_pools import POOLS, Pools, pool_of
 from roboirg.episodes.splits import get_episode

@@ -20,7 +20,7 @@ from wording_stand_ins import (
     train_goals,
 )
 
-from roboirg.cli import app as cli
+from roboirg import main as cli
 from roboirg.core.episode import COLORS, Goal
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.instruction_options import InstructionOptions

@@ -5,9 +5,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from roboirg.evaluation.grounding_set import dataset_export
-from roboirg.evaluation.grounding_set.dataset_export import export_grounding
-from roboirg.evaluation.grounding_set.grounding_item import PointTarget, encode_mask
+from roboirg.evaluation.grounding_set import question_set
+from roboirg.evaluation.grounding_set.grounding_item import PointTarget, encode_mask, write_items
 from roboirg.evaluation.grounding_set.item_builder import EpisodeMedia
 from roboirg.evaluation.grounding_set.media_store import PICTURES, VIDEOS, store_content
 from roboirg.evaluation.grounding_set.referents import find_candidates, find_referents
@@ -67,8 +66,9 @@ def make_study(folder, monkeypatch, *, people=5, **options):
     plan = plan.model_copy(update={"policies": (PEOPLE,)})
     study = ListeningStudy(plan=plan, people=people, **own).checked()
     write_listening_study(study, folder)
-    monkeypatch.setattr(dataset_export, "store_media", store_fake_media)
-    export_grounding(study.export_request(), folder / QUESTIONS, workers=0)
+    monkeypatch.setattr(question_set, "store_media", store_fake_media)
+    items = question_set.collect_items(study.export_request(), folder / QUESTIONS, workers=0)
+    write_items(items, folder / QUESTIONS)
     return study
 
 

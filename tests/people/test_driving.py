@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import sapien
 
-from roboirg.cli import app as cli
+from roboirg import main as cli
 from roboirg.core.observations import CAMERAS
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.people.drive_server import DriveServer

@@ -11,7 +11,7 @@ import pytest
 from study_fakes import Serving, make_study
 
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.grounding_set.dataset_export import EpisodeName, read_media
+from roboirg.evaluation.grounding_set.question_set import EpisodeName, read_media
 from roboirg.evaluation.people.answer_form import answer_form, answer_of
 from roboirg.evaluation.people.listening_session import QUESTIONS
 from roboirg.evaluation.people.listening_study import words_of

@@ -21,8 +21,8 @@ from typer.testing import CliRunner
 from wire_episode import INSTRUCTION, moment, video
 from wire_servers import unpack
 
-from roboirg.cli.app import app
 from roboirg.core.errors import PolicyConnectionError
+from roboirg.main import app
 from roboirg.policies import make_policy
 from roboirg.policies.protocols import protocols_by_scheme
 from roboirg.policies.remote.message_codec import pack

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from roboirg.cli.app import app
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.learning.listener_study import VARIANTS
+from roboirg.main import app
 from roboirg.policies.learned.labeled_views import LATER_STEP, class_of, look
 from roboirg.policies.loading import is_privileged, make_policy
 from roboirg.policies.planning.goal_schema import goal_schema

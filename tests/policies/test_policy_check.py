@@ -8,7 +8,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from roboirg.cli.policy_commands import check_policy as command
+from roboirg.cli.check_commands import check_policy as command
 from roboirg.core.observations import CAMERAS
 from roboirg.policies.checks.check_result import FAIL, NOTE, PASS, WARN
 from roboirg.policies.checks.synthetic_episodes import SyntheticEpisodes

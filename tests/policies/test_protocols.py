@@ -170,7 +170,7 @@ for scheme in schemes:
         raise AssertionError(scheme)
 print(*schemes)
 sys.argv[1:] = ["serve", "--help"]
-from roboirg.cli import main
+from roboirg.main import main
 main()
 """
     done = subprocess.run(

@@ -10,7 +10,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
-from roboirg.cli import app as cli
+from roboirg import main as cli
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.simulation import model_fetch, model_files
 from roboirg.simulation.model_fetch import WHEEL, download_resumably, fetch_model_files

@@ -1,5 +1,1 @@
-"""The ``roboirg`` command."""
-
-from roboirg.cli.app import main
-
-__all__ = ["main"]
+"""Commands of the benchmark and its runs, and the options that commands share."""

@@ -80,7 +80,7 @@ def export_demonstrations(
     dry_run: Annotated[bool, typer.Option(help="Estimate the size and record nothing.")] = False,
 ) -> None:
     """Export demonstrations for training, recorded once per episode, told in every setting."""
-    from roboirg.cli.language_commands import known_settings
+    from roboirg.cli.names import known_settings
     from roboirg.cli.progress_bar import progress_bars
     from roboirg.demonstrations.export_plan import ExportPlan
     from roboirg.demonstrations.export_run import run_export

@@ -59,13 +59,13 @@ def export_grounding(
     workers: Workers = None,
 ) -> None:
     """Export questions of grounding with pictures: Parquet, JSON lines, VLMEvalKit's TSV."""
-    from roboirg.cli.language_commands import known_name, known_settings, known_tasks
+    from roboirg.cli.names import known_name, known_settings, known_tasks
     from roboirg.cli.progress_bar import progress_bar
-    from roboirg.evaluation.grounding_set.dataset_export import (
+    from roboirg.evaluation.grounding_set.dataset_export import export_grounding
+    from roboirg.evaluation.grounding_set.question_set import (
         TABLE_FORMATS,
         EpisodeName,
         ExportRequest,
-        export_grounding,
     )
     from roboirg.evaluation.plan_parsing import parse_episodes, parse_names, parse_splits
     from roboirg.language import FORMS
@@ -164,7 +164,7 @@ def score_grounding(
 
 
 def _floors(text: str | None) -> tuple[str, ...]:
-    from roboirg.cli.language_commands import known_name
+    from roboirg.cli.names import known_name
     from roboirg.evaluation.grounding_set.answer_floors import FLOORS
     from roboirg.evaluation.plan_parsing import means_all, parse_names
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from roboirg.cli.export_commands import export_app
+from roboirg.cli.names import known_name, known_settings, known_tasks
 from roboirg.cli.options import (
     DEFAULT_WORDS,
     AnySplit,
@@ -22,7 +24,7 @@ from roboirg.cli.options import (
     check_output_file,
     spread,
 )
-from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.util.plain_text import counted
 
 if TYPE_CHECKING:
@@ -39,16 +41,8 @@ MOST_FAILURES = 10
 _LINE_EVERY = 200
 """Without a terminal, print a line after this many batches."""
 
-Name = TypeVar("Name", bound=str)
 
 language_app = typer.Typer(no_args_is_help=True, help="Count, validate and show the instructions.")
-export_app = typer.Typer(no_args_is_help=True, help="Export data for other programs.")
-
-
-@export_app.callback()
-def _export() -> None:
-    # With a callback, a single command keeps its name.
-    pass
 
 
 @export_app.command("instructions")
@@ -248,51 +242,6 @@ def _console() -> Console:
     if not console.is_terminal:
         console.width = max(console.width, MINIMUM_WIDTH)
     return console
-
-
-def known_tasks(text: str, wordings: str | None = None) -> tuple[str, ...]:
-    """Return the tasks that were typed; of all, those that open wordings have commands of.
-
-    Raises:
-        UnknownNameError: one of them does not exist.
-    """
-    from roboirg.core.word_pools import POOLS
-    from roboirg.evaluation.plan_parsing import means_all, parse_names
-    from roboirg.language.wordings.wording_store import find_wordings
-    from roboirg.tasks import find_tasks
-
-    names = find_tasks(parse_names("task", text))
-    if wordings is None or wordings in POOLS or not means_all(text):
-        return names
-    return tuple(name for name in names if name in find_wordings(wordings).tasks)
-
-
-def known_settings(text: str) -> tuple[str, ...]:
-    """Return the settings that were typed.
-
-    Raises:
-        UnknownNameError: one of them does not exist.
-    """
-    from roboirg.evaluation.plan_parsing import means_all, parse_names
-    from roboirg.language import setting_names
-
-    if means_all(text):
-        return setting_names()
-    return tuple(
-        known_name("setting", name, setting_names()) for name in parse_names("setting", text)
-    )
-
-
-def known_name(kind: str, name: str, known: Sequence[Name]) -> Name:
-    """Return a name if it is known.
-
-    Raises:
-        UnknownNameError: it is not.
-    """
-    for one in known:
-        if name == one:
-            return one
-    raise UnknownNameError(kind, name, known)
 
 
 wordings_app = typer.Typer(no_args_is_help=True, help="Use the commands of others.")

@@ -124,7 +124,7 @@ def learned_answers(
 
 
 def _plan(tasks: str, settings: str, words: str, without: str) -> TrainingPlan:
-    from roboirg.cli.language_commands import known_name, known_settings, known_tasks
+    from roboirg.cli.names import known_name, known_settings, known_tasks
     from roboirg.core.word_pools import POOLS
     from roboirg.policies.learned.learned_model import WITHOUTS
     from roboirg.policies.learned.listener_training import TrainingPlan

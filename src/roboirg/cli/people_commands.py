@@ -71,7 +71,8 @@ def plan(
 ) -> None:
     """Plan a study of listeners and draw its pictures; continues one that was interrupted."""
     from roboirg.cli.progress_bar import progress_bar
-    from roboirg.evaluation.grounding_set.dataset_export import export_grounding
+    from roboirg.evaluation.grounding_set.grounding_item import write_items
+    from roboirg.evaluation.grounding_set.question_set import collect_items
     from roboirg.evaluation.people.listening_session import QUESTIONS
     from roboirg.evaluation.people.listening_study import (
         CONSENT,
@@ -105,7 +106,8 @@ def plan(
     write_listening_study(study, folder)
     count = core_count() if workers is None else workers
     with progress_bar("episodes") as progress:
-        export_grounding(study.export_request(), folder / QUESTIONS, count, progress)
+        found = collect_items(study.export_request(), folder / QUESTIONS, count, progress)
+    write_items(found, folder / QUESTIONS)
     asked = study.questions(0)
     items = sum(one.kind == "item" for one in asked)
     typer.echo(

@@ -16,7 +16,6 @@ from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.util.connection_table import ConnectionLimits
 from roboirg.util.request_origin import LOOPBACK, LOOPBACK_NAMES
 
-FAILED = 2
 _STOPPED = {signal.SIGINT: 130, signal.SIGTERM: 143}
 _LIMITS = ConnectionLimits()
 
@@ -99,29 +98,6 @@ def serve(
     server.listening.serve_forever()
     # Only a signal ends it, and that ends the process.
     raise RoboIRGError(f"The server at {server.url} has stopped by itself.")
-
-
-def check_policy(
-    policy: PolicySpec,
-    seed: Annotated[int, typer.Option(help="Of the policy's random choices.")] = 0,
-    expert: Annotated[
-        bool,
-        typer.Option(help="Compare with an expert's episode, if the simulator is installed."),
-    ] = True,
-) -> None:
-    """Check a policy on synthetic episodes, and beside the scripted expert."""
-    from rich.console import Console
-
-    from roboirg.policies.checks.check_result import FAIL
-    from roboirg.policies.checks.expert_episode import record_expert
-    from roboirg.policies.policy_check import check_policy as check
-    from roboirg.policies.policy_check import print_check_results
-
-    add_working_directory()
-    results = check(policy, seed=seed, record_expert=record_expert if expert else None)
-    print_check_results(results, Console())
-    if any(result.verdict == FAIL for result in results):
-        raise typer.Exit(FAILED)
 
 
 def _stop(number: int, frame: FrameType | None) -> None:

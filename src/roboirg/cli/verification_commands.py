@@ -17,7 +17,7 @@ from roboirg.core.printable import printable
 from roboirg.util.plain_text import counted
 
 if TYPE_CHECKING:
-    from roboirg.analysis.stats.flips import RepeatedEpisode
+    from roboirg.analysis.board.repeats import RepeatedEpisode
     from roboirg.evaluation.verification.run_verification import Verification
 
 _MOST_SHOWN = 20
@@ -164,7 +164,7 @@ def repeat(
     workers: Workers = None,
 ) -> None:
     """Play a run's plan again with its policies, and print which verdicts changed."""
-    from roboirg.analysis.stats.flips import flips_by_cell, repeated_episodes, write_flips
+    from roboirg.analysis.board.repeats import flips_by_cell, repeated_episodes, write_flips
     from roboirg.cli.run_commands import play
     from roboirg.evaluation.executors.executor import choose_executor
     from roboirg.evaluation.plan import read_plan
@@ -192,7 +192,7 @@ def _print_flips(episodes: tuple[RepeatedEpisode, ...]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from roboirg.analysis.stats.flips import count_flips, flips_by_cell
+    from roboirg.analysis.board.repeats import count_flips, flips_by_cell
     from roboirg.analysis.stats.option_labels import options_label
 
     table = Table(title="verdicts, first and second time", title_justify="left")

@@ -9,14 +9,13 @@ import tempfile
 import time
 from pathlib import Path
 
-from roboirg.evaluation.executors.executor import InProcess, LocalProcesses
+from roboirg.evaluation.executors.executor import LocalProcesses
 from roboirg.evaluation.plan import Plan
 from roboirg.evaluation.plan_maker import make_plan
 from roboirg.evaluation.progress import SilentReporter
 from roboirg.evaluation.rollout import EpisodeRunner
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.runner import run_plan
-from roboirg.evaluation.verification.run_verification import verify_run
 from roboirg.records.record import EventRecord, Job, Record
 from roboirg.records.store import RECORDS_FILE, RecordStore
 
@@ -57,16 +56,6 @@ def resume_time() -> float:
     return time.perf_counter() - start
 
 
-def verify_time() -> float:
-    """Return seconds of processor time to verify an episode, the mean over policies and tasks."""
-    folder, count = _played_run()
-    start = time.process_time()
-    found = verify_run(folder)
-    if not found.holds or found.records != count:
-        raise AssertionError(f"{found.records} records of {count} were checked: {found.checks}")
-    return (time.process_time() - start) / count
-
-
 class _RecordClock(SilentReporter):
     """Notes the time of each record."""
 
@@ -85,16 +74,8 @@ def _unplayed_record(job: Job) -> Record:
     return make_record(job, result, started_at=utc_now())
 
 
-@functools.cache
-def _played_run() -> tuple[Path, int]:
-    """Return a run of the oracle, and of a policy that mostly plays to the limit, on all tasks."""
-    plan = make_plan(["oracle", "random"], settings="explicit", episodes="1")
-    folder = _temporary_folder()
-    summary = run_plan(plan, folder, EpisodeRunner(folder, plan=plan.fingerprint), InProcess())
-    return folder, summary.total
-
-
-def _temporary_folder() -> Path:
+def temporary_folder() -> Path:
+    """Return a new folder, which is removed when the process ends."""
     folder = Path(tempfile.mkdtemp(prefix="roboirg-bench-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder
@@ -110,7 +91,7 @@ def _many_records() -> tuple[Plan, Path]:
         episodes="50",
         policy_seeds=f"0-{MANY_RECORDS // 100 - 1}",
     )
-    folder = _temporary_folder()
+    folder = temporary_folder()
     lines: dict[tuple[int, str], bytes] = {}
     with (folder / RECORDS_FILE).open("wb") as file:
         for job in plan.jobs():

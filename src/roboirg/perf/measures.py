@@ -8,7 +8,6 @@ from functools import partial
 
 from roboirg.perf import (
     engine_costs,
-    export_rates,
     hosted_rates,
     large_run_costs,
     process_costs,
@@ -66,15 +65,12 @@ def _step_measures(table: Workload, video: Workload) -> tuple[Measure, ...]:
     stock_table = partial(step_times.stock_step, table)
     stock_video = partial(step_times.stock_step, video)
     eager, lazy = step_times.eager_step, step_times.lazy_step
-    exported = partial(export_rates.exported_step, table)
     rows: tuple[tuple[str, Timing, Timing, float], ...] = (
         ("eager step, over the table", partial(eager, table), stock_table, 7),
         ("eager step, as in videos", partial(eager, video), stock_video, 5),
         ("... light meshes, over the table", partial(eager, table, LIGHT), stock_table, 12),
         ("... light meshes, as in videos", partial(eager, video, LIGHT), stock_video, 10),
         ("lazy step, 16 to a picture pair", partial(lazy, table), stock_table, 70),
-        ("exported step, PNG, over the table", partial(exported, "png"), stock_table, 5),
-        ("... lossless video", partial(exported, "lossless-video"), stock_table, 5),
     )
     return tuple(Measure(name, ours, base, "stock", goal) for name, ours, base, goal in rows)
 
@@ -147,7 +143,6 @@ def _process_measures() -> tuple[Measure, ...]:
             50,
         ),
         Measure("resuming with 100,000 records", engine_costs.resume_time, None, "", 3, "s"),
-        Measure("verifying an episode", engine_costs.verify_time, None, "", 0.7, "s"),
         Measure("memory of a process", process_costs.process_memory, None, "", 0.5, "GiB"),
     )
 

@@ -65,7 +65,7 @@ def is_foreign(spec: str) -> bool:
     if kind == policy_specs.SYSTEM:
         name, _, query = rest.partition("?")
         return is_foreign(find_system(name, parse_query(spec, query)).policy)
-    return kind not in policy_specs.BUILDERS
+    return not policy_specs.comes_with_us(kind)
 
 
 def needs_host(spec: str) -> bool:

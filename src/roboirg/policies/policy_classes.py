@@ -18,6 +18,7 @@ from roboirg.policies.batch_policy import make_batched, takes_batches
 from roboirg.policies.policy_urls import is_url
 from roboirg.policies.protocols import protocols_by_scheme
 from roboirg.policies.requirements import REQUIREMENTS
+from roboirg.util.discovery import entry_names
 
 _MAX_SHOWN = 3
 
@@ -34,6 +35,9 @@ BUILTIN: Mapping[str, str] = {
 
 CHECKPOINTS: Mapping[str, str] = {"lerobot": "roboirg.policies.lerobot_policy:LeRobotPolicy"}
 """Policies of this process that a URL names, by its scheme; called with ``(url, seed=)``."""
+
+KINDS_GROUP = "roboirg.policy_kinds"
+"""Entry points of packages that add kinds of policies; our applications add theirs so, too."""
 
 
 def url_schemes() -> tuple[str, ...]:
@@ -171,14 +175,8 @@ def _describe_module(spec: str) -> str | None:
 
 def _examples() -> list[str]:
     urls = (f"{scheme}://…" for scheme in url_schemes())
-    return [
-        *urls,
-        "system:NAME",
-        "vlm-listener:PROVIDER",
-        "learned:PATH",
-        "people:FOLDER",
-        "recorded:RUN",
-    ]
+    kinds = (f"{kind}:…" for kind in entry_names(KINDS_GROUP))
+    return [*urls, "system:NAME", "vlm-listener:PROVIDER", *kinds]
 
 
 def _parameters(policy_class: type[Any]) -> Mapping[str, inspect.Parameter]:

@@ -49,6 +49,33 @@ def discover(package: ModuleType, attribute: str, kind: type[Thing], group: str)
     return found
 
 
+def entry_names(group: str, package: str | None = None) -> tuple[str, ...]:
+    """Return the names of the installed entry points of a group; nothing is imported.
+
+    Args:
+        group: of the entry points.
+        package: only those that name something in this package; None for all.
+    """
+    entries = _sorted_entry_points(group)
+    return tuple(
+        entry.name
+        for entry in entries
+        if package is None or entry.module.partition(".")[0] == package
+    )
+
+
+def find_entry(name: str, attribute: str, kind: type[Thing], group: str) -> Thing | None:
+    """Return what the entry point of a name defines; None if no package has one of that name.
+
+    Imports that one only. The other arguments are those of `discover`.
+
+    Raises:
+        InvalidValueError: it cannot be loaded, or is of another kind.
+    """
+    chosen = [entry for entry in _sorted_entry_points(group) if entry.name == name]
+    return next((_load(entry, attribute, kind, group) for entry in chosen), None)
+
+
 def discover_in_modules(package: ModuleType, attribute: str, kind: type[Thing]) -> list[Thing]:
     """Return what the modules of a package define, in the order of their names."""
     names = (f"{package.__name__}.{info.name}" for info in pkgutil.iter_modules(package.__path__))
@@ -60,21 +87,27 @@ def _from_entry_points(
     attribute: str, kind: type[Thing], group: str
 ) -> Iterator[tuple[importlib.metadata.EntryPoint, Thing]]:
     for entry in _sorted_entry_points(group):
-        where = f"The entry point {entry.name!r} ({entry.value}) of {_distribution(entry)}"
-        try:
-            thing = entry.load()
-        except Exception as error:
-            raise InvalidValueError(
-                f"{where} in the group {group!r} cannot be loaded: {type(error).__name__}: {error}"
-            ) from error
-        if isinstance(thing, ModuleType):
-            thing = getattr(thing, attribute, None)
-        if not isinstance(thing, kind):
-            raise InvalidValueError(
-                f"{where} in the group {group!r} is {thing!r}; it must be a {kind.__name__}, or a "
-                f"module with one as {attribute}."
-            )
-        yield entry, thing
+        yield entry, _load(entry, attribute, kind, group)
+
+
+def _load(
+    entry: importlib.metadata.EntryPoint, attribute: str, kind: type[Thing], group: str
+) -> Thing:
+    where = f"The entry point {entry.name!r} ({entry.value}) of {_distribution(entry)}"
+    try:
+        thing = entry.load()
+    except Exception as error:
+        raise InvalidValueError(
+            f"{where} in the group {group!r} cannot be loaded: {type(error).__name__}: {error}"
+        ) from error
+    if isinstance(thing, ModuleType):
+        thing = getattr(thing, attribute, None)
+    if not isinstance(thing, kind):
+        raise InvalidValueError(
+            f"{where} in the group {group!r} is {thing!r}; it must be a {kind.__name__}, or a "
+            f"module with one as {attribute}."
+        )
+    return thing
 
 
 def _take_name(

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import DEFAULT_DELIVERY, InstructionOptions
 from roboirg.records.record import options_of
+from roboirg.util.atomic_write import write_atomically
 
 ITEMS_FILE = "items.jsonl"
 
@@ -150,6 +151,17 @@ def decode_mask(counts: list[int], size: tuple[int, int]) -> Mask:
 def encode_items(items: list[GroundingItem]) -> bytes:
     """Return items as JSON lines."""
     return b"".join(_encoder().encode(item) + b"\n" for item in items)
+
+
+def write_items(items: list[GroundingItem], folder: Path) -> bytes:
+    """Write the items of a dataset into its folder; return the content of the file.
+
+    Raises:
+        InvalidValueError: the file cannot be written.
+    """
+    content = encode_items(items)
+    write_atomically(folder / ITEMS_FILE, content)
+    return content
 
 
 def decode_items(content: bytes, origin: Path) -> Iterator[GroundingItem]:

@@ -16,12 +16,12 @@ from typing import Any
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.grounding_set.dataset_export import EpisodeName, read_media
 from roboirg.evaluation.grounding_set.grounding_item import (
     ITEMS_FILE,
     GroundingItem,
     read_items,
 )
+from roboirg.evaluation.grounding_set.question_set import EpisodeName, read_media
 from roboirg.evaluation.people.answer_form import (
     FormAnswer,
     answer_of,

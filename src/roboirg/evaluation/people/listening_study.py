@@ -20,7 +20,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import DEFAULT_DELIVERY, InstructionOptions
 from roboirg.episodes.splits import SIZES
-from roboirg.evaluation.grounding_set.dataset_export import EpisodeName, ExportRequest
+from roboirg.evaluation.grounding_set.question_set import EpisodeName, ExportRequest
 from roboirg.evaluation.people.latin_square import balanced_square
 from roboirg.evaluation.plan import Plan
 from roboirg.language.settings import EXPLICIT, setting_names

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +10,7 @@ from roboirg.core.episode import Goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.policies.planning.goal_schema import goal_schema
+from roboirg.policies.planning.policy_specs import Build, PolicyKind
 from roboirg.policies.random_state import episode_policy_seed
 from roboirg.records.listener_answers import (
     PersonAnswered,
@@ -98,3 +100,13 @@ def study_version(folder: Path) -> str:
             f"{str(folder)!r} holds no study of listeners ({error.strerror}: {path}); make one "
             "with: roboirg listen plan."
         ) from error
+
+
+def _people(spec: str, name: str, options: Mapping[str, str]) -> Build:
+    if not name or options:
+        raise InvalidValueError(f"Policy {spec!r} is not people:FOLDER, the folder of a study.")
+    return lambda seed: PeopleListener(Path(name), seed)
+
+
+KIND = PolicyKind("people", _people)
+"""``people:FOLDER``: people name the goal, in a study of `roboirg listen`."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.actions import find_action_space
-from roboirg.core.errors import InvalidValueError
+from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.observations import Demonstration, Observation
+from roboirg.policies.planning.policy_specs import Build, PolicyKind
 from roboirg.records.action_log import read_actions
 from roboirg.records.record import Record
 from roboirg.records.store import read_records
@@ -98,3 +99,15 @@ def _joint_rows(env: RoboIRGEnv, folder: Path, digest: str) -> Iterator[NDArray[
     controller = make_controller(find_action_space(log.space), env.session.world.robot)
     for row in log.rows:
         yield from controller.trajectories(row)
+
+
+def _recorded(spec: str, name: str, options: Mapping[str, str]) -> Build:
+    for option in options.keys() - {"policy"}:
+        raise UnknownNameError("option of recorded:", option, ["policy"])
+    if not name:
+        raise InvalidValueError(f"Policy {spec!r} names no folder of a run.")
+    return lambda _seed: RecordedPolicy(Path(name), options.get("policy"))
+
+
+KIND = PolicyKind("recorded", _recorded)
+"""``recorded:RUN?policy=NAME``: the stored actions of a run."""

@@ -4,24 +4,25 @@
 | --- | --- |
 | ``system:NAME?server=host:port&vlm=URL`` | a system of the paper, or of a file |
 | ``vlm-listener:PROVIDER?model=NAME&base_url=URL`` | a model names the goal |
-| ``learned:PATH`` | a listener that `roboirg learn listener` trained names the goal |
-| ``people:FOLDER`` | people name the goal, in a study of `roboirg listen` |
-| ``recorded:RUN?policy=NAME`` | the stored actions of a run |
+
+Installed packages add kinds through entry points of the group ``roboirg.policy_kinds``: an entry
+point has the name of the kind, and names a `PolicyKind` or a module with one as ``KIND``.
 
 Values that contain ``&`` or ``#`` are percent-encoded.
 """
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.policies.base import Policy
 from roboirg.policies.option_checking import check_options
 from roboirg.policies.planning.models import ModelOptions
 from roboirg.policies.planning.vlm_listener import ListenerOptions, VLMListener
+from roboirg.policies.policy_classes import KINDS_GROUP
 from roboirg.policies.policy_urls import parse_query
 from roboirg.policies.requirements import (
     wanted_actions,
@@ -36,17 +37,28 @@ from roboirg.policies.requirements import (
     wanted_prompt_tokens,
     wanted_tokenizer,
 )
+from roboirg.util.discovery import entry_names, find_entry
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
 SYSTEM = "system"
 LISTENER = "vlm-listener"
-LEARNED = "learned"
-PEOPLE = "people"
-RECORDED = "recorded"
-
 Build = Callable[[int], Policy]
+"""Makes a policy from a seed, without network or the libraries of providers."""
+
+
+class PolicyKind(NamedTuple):
+    """One kind of spec.
+
+    Attributes:
+        name: what stands before the colon.
+        build: returns what makes the policies of a spec. It is called with the whole spec, with
+            what stands between the colon and the question mark, and with the options behind that.
+    """
+
+    name: str
+    build: Callable[[str, str, Mapping[str, str]], Build]
 
 
 class PolicyFactory:
@@ -98,10 +110,11 @@ def find_policy_factory(spec: str) -> PolicyFactory | None:
         InvalidValueError: an option is missing or has an invalid value.
     """
     kind, colon, rest = spec.partition(":")
-    if not colon or kind not in BUILDERS:
+    found = find_kind(kind) if colon else None
+    if found is None:
         return None
     name, _, query = rest.partition("?")
-    build = BUILDERS[kind](spec, name, parse_query(spec, query))
+    build = found.build(spec, name, parse_query(spec, query))
     sample = build(0)
     made = PrivilegedPolicyFactory if hasattr(sample, "attach") else PolicyFactory
     return made(spec, build, sample)
@@ -131,38 +144,21 @@ def _listener(_spec: str, name: str, options: Mapping[str, str]) -> Build:
     return lambda seed: VLMListener(checked, seed)
 
 
-def _learned(spec: str, name: str, options: Mapping[str, str]) -> Build:
-    from roboirg.policies.learned.learned_listener import LearnedListener
-
-    for option in options:
-        raise UnknownNameError(f"option of {LEARNED}:", option, [])
-    if not name:
-        raise InvalidValueError(f"Policy {spec!r} names no file.")
-    return lambda seed: LearnedListener(Path(name), seed)
+OURS = (PolicyKind(SYSTEM, _system), PolicyKind(LISTENER, _listener))
 
 
-def _people(spec: str, name: str, options: Mapping[str, str]) -> Build:
-    from roboirg.policies.builtin.people_listener import PeopleListener
+@functools.cache
+def find_kind(name: str) -> PolicyKind | None:
+    """Return the kind of a name; None if there is none. Other kinds are not imported.
 
-    if not name or options:
-        raise InvalidValueError(f"Policy {spec!r} is not people:FOLDER, the folder of a study.")
-    return lambda seed: PeopleListener(Path(name), seed)
-
-
-def _recorded(spec: str, name: str, options: Mapping[str, str]) -> Build:
-    from roboirg.policies.builtin.recorded_policy import RecordedPolicy
-
-    for option in options.keys() - {"policy"}:
-        raise UnknownNameError(f"option of {RECORDED}:", option, ["policy"])
-    if not name:
-        raise InvalidValueError(f"Policy {spec!r} names no folder of a run.")
-    return lambda _seed: RecordedPolicy(Path(name), options.get("policy"))
+    Raises:
+        InvalidValueError: the installed package that adds it cannot be loaded.
+    """
+    ours = {kind.name: kind for kind in OURS}
+    return ours.get(name) or find_entry(name, "KIND", PolicyKind, KINDS_GROUP)
 
 
-BUILDERS: Mapping[str, Callable[[str, str, Mapping[str, str]], Build]] = {
-    SYSTEM: _system,
-    LISTENER: _listener,
-    LEARNED: _learned,
-    PEOPLE: _people,
-    RECORDED: _recorded,
-}
+@functools.cache
+def comes_with_us(name: str) -> bool:
+    """Return whether a kind is our own code, and not that of another package."""
+    return name in entry_names(KINDS_GROUP, package="roboirg") or name in {one.name for one in OURS}

@@ -1,8 +1,8 @@
 """`roboirg doctor`: check that everything needed to play an episode is installed and works.
 
-This process imports nothing heavy. A child process (``python -m roboirg.doctor --frame``) tries the
-renderer, because a bad graphics driver can crash Python; a crash is then a failed check and does
-not end the report.
+This process imports nothing heavy. A child process (``python -m roboirg.cli.doctor --frame``) tries
+the renderer, because a bad graphics driver can crash Python; a crash is then a failed check and
+does not end the report.
 """
 
 from __future__ import annotations
@@ -209,7 +209,7 @@ def _check_rendering() -> tuple[Check, Check]:
 
 def _run_frame_process() -> tuple[int, str, str]:
     """Return the child's exit code, its output, and a description of what went wrong."""
-    command = [sys.executable, "-m", "roboirg.doctor", "--frame"]
+    command = [sys.executable, "-m", "roboirg.cli.doctor", "--frame"]
     try:
         child = subprocess.run(  # noqa: S603 - our own module in our own interpreter
             command, capture_output=True, text=True, check=False, timeout=FRAME_TIMEOUT

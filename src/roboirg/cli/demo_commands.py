@@ -1,0 +1,45 @@
+"""The command that shows what the benchmark does: ``roboirg demo``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from roboirg.cli import run_commands
+from roboirg.cli.options import (
+    Video,
+    Workers,
+)
+from roboirg.cli.run_commands import Out
+
+DEMO_POLICIES = ("oracle", "listener", "forgetful")
+
+
+def demo(
+    out: Out = "runs/demo",
+    episodes: Annotated[
+        str, typer.Option(help="all, 4 for the first four, or a list such as 0,3.")
+    ] = "2-2",
+    video: Video = "all",
+    workers: Workers = None,
+) -> None:
+    """Play three built-in policies on every task and setting, record videos, write a report."""
+    from roboirg.analysis.page.report import check_report_support
+    from roboirg.evaluation.executors.executor import choose_executor
+    from roboirg.evaluation.plan_maker import make_plan
+
+    folder = run_commands.folder_of(out)
+    plan = make_plan(DEMO_POLICIES, episodes=episodes, video=video)
+    check_report_support()
+    summary = run_commands.play(plan, folder, choose_executor(workers), retry=True)
+    run_commands.print_tables_of(folder, run_commands.planned_jobs(folder))
+    typer.echo(_write_page(folder, videos=True))
+    run_commands.report_problems(summary, folder)
+
+
+def _write_page(folder: Path, *, videos: bool) -> Path:
+    from roboirg.analysis.page.report import write_report
+
+    return write_report(folder, planned=run_commands.planned_jobs(folder), videos=videos)

@@ -1,0 +1,55 @@
+"""Names that were typed, as names of tasks, settings and the like."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeVar
+
+from roboirg.core.errors import UnknownNameError
+
+Name = TypeVar("Name", bound=str)
+
+
+def known_tasks(text: str, wordings: str | None = None) -> tuple[str, ...]:
+    """Return the tasks that were typed; of all, those that open wordings have commands of.
+
+    Raises:
+        UnknownNameError: one of them does not exist.
+    """
+    from roboirg.core.word_pools import POOLS
+    from roboirg.evaluation.plan_parsing import means_all, parse_names
+    from roboirg.language.wordings.wording_store import find_wordings
+    from roboirg.tasks import find_tasks
+
+    names = find_tasks(parse_names("task", text))
+    if wordings is None or wordings in POOLS or not means_all(text):
+        return names
+    return tuple(name for name in names if name in find_wordings(wordings).tasks)
+
+
+def known_settings(text: str) -> tuple[str, ...]:
+    """Return the settings that were typed.
+
+    Raises:
+        UnknownNameError: one of them does not exist.
+    """
+    from roboirg.evaluation.plan_parsing import means_all, parse_names
+    from roboirg.language import setting_names
+
+    if means_all(text):
+        return setting_names()
+    return tuple(
+        known_name("setting", name, setting_names()) for name in parse_names("setting", text)
+    )
+
+
+def known_name(kind: str, name: str, known: Sequence[Name]) -> Name:
+    """Return a name if it is known.
+
+    Raises:
+        UnknownNameError: it is not.
+    """
+    for one in known:
+        if name == one:
+            return one
+    raise UnknownNameError(kind, name, known)
