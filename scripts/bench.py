@@ -19,19 +19,19 @@ from pathlib import Path
 
 from rich.console import Console
 
+from roboirg.apps.bench.bench_runner import results_table, run_measures, write_results
+from roboirg.apps.bench.engine_costs import temporary_folder
+from roboirg.apps.bench.measures import Measure, measures
+from roboirg.apps.bench.step_times import stock_step
+from roboirg.apps.bench.workloads import Workload, over_the_table
+from roboirg.apps.demonstrations.trajectory import PictureCoding, TrajectoryFile
+from roboirg.apps.demonstrations.trajectory_recorder import PictureTracks, RecordingSpec
+from roboirg.apps.leaderboard.run_verification import verify_run
 from roboirg.core.observations import CAMERAS
-from roboirg.demonstrations.trajectory import PictureCoding, TrajectoryFile
-from roboirg.demonstrations.trajectory_recorder import PictureTracks, RecordingSpec
 from roboirg.evaluation.executors.executor import InProcess
 from roboirg.evaluation.plan_maker import make_plan
 from roboirg.evaluation.rollout import EpisodeRunner
 from roboirg.evaluation.runner import run_plan
-from roboirg.evaluation.verification.run_verification import verify_run
-from roboirg.perf.bench_runner import results_table, run_measures, write_results
-from roboirg.perf.engine_costs import temporary_folder
-from roboirg.perf.measures import Measure, measures
-from roboirg.perf.step_times import stock_step
-from roboirg.perf.workloads import Workload, over_the_table
 from roboirg.util.console_width import widen
 from roboirg.util.freed_memory import keep_freed_memory
 

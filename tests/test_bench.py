@@ -11,15 +11,15 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from roboirg.core.errors import InvalidValueError
-from roboirg.perf.bench_runner import (
+from roboirg.apps.bench.bench_runner import (
     markdown_table,
     read_figures,
     results_table,
     run_measures,
     write_results,
 )
-from roboirg.perf.measures import Measure
+from roboirg.apps.bench.measures import Measure
+from roboirg.core.errors import InvalidValueError
 
 ROOT = Path(__file__).parent.parent
 

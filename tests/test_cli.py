@@ -262,8 +262,8 @@ def test_failures_are_named_below_the_table(
 def test_splits_are_built_anew_for_what_is_named(
     roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    from roboirg.apps.split_search import seed_selection
     from roboirg.episodes.splits import shipped_splits, splits_text
-    from roboirg.evaluation.seed_search import seed_selection
 
     def find(slots, workers):
         assert workers == 0
@@ -306,7 +306,7 @@ def test_wrong_wishes_are_one_sentence(roboirg, words: tuple[str, ...], sentence
 def test_an_episode_is_shown(roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(
-        "roboirg.visualization.playthrough.draw_sheet", lambda _episode, path: f"success, in {path}"
+        "roboirg.apps.show.playthrough.draw_sheet", lambda _episode, path: f"success, in {path}"
     )
     said = roboirg("show", "VideoPlaceButton", "3", "--split", "val")
     assert (said.code, said.err) == (0, "")

@@ -11,9 +11,9 @@ import pytest
 from typer.testing import CliRunner
 
 from roboirg import main as cli
+from roboirg.apps.language_lab import card
+from roboirg.apps.language_lab.validation import RuleViolation, ValidationResults
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
-from roboirg.language import card
-from roboirg.language.validation import RuleViolation, ValidationResults
 
 HEAVY = ("sapien", "torch", "gymnasium", "toppra", "mani_skill", "cv2", "av")
 
@@ -165,7 +165,7 @@ def test_a_broken_rule_is_told_and_ends_with_a_sentence(monkeypatch: pytest.Monk
     found = ValidationResults(failures=[failure])
     found.texts["PickXtimes", "direct"] = 1
     monkeypatch.setattr(
-        "roboirg.language.validation.validation_run.validate_batch", lambda _batch: found
+        "roboirg.apps.language_lab.validation.validation_run.validate_batch", lambda _batch: found
     )
     words = ("--tasks", "PickXtimes", "--split", "none", "--seeds", "1", "--workers", "0")
     result = CliRunner().invoke(cli.app, ["language", "validate", *words])

@@ -4,15 +4,15 @@ import cv2
 import numpy as np
 import pytest
 
+from roboirg.apps.show.contact_sheet import SheetPanel, compose_sheet, evenly_spaced, write_png
+from roboirg.apps.show.episode_text import describe_motions, describe_video, fact_words
+from roboirg.apps.show.key_events import KeyEvents
+from roboirg.apps.show.playthrough import MAX_MOMENTS, MIN_MOMENTS, choose_moments, play_through
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Scene
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.motions import Away, Glow, Point, Shuttle, Swap, Vanish
 from roboirg.episodes.splits import get_episode
-from roboirg.visualization.contact_sheet import SheetPanel, compose_sheet, evenly_spaced, write_png
-from roboirg.visualization.episode_text import describe_motions, describe_video, fact_words
-from roboirg.visualization.key_events import KeyEvents
-from roboirg.visualization.playthrough import MAX_MOMENTS, MIN_MOMENTS, choose_moments, play_through
 
 
 def picture(value):

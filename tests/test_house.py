@@ -29,8 +29,8 @@ FORBIDDEN_IDENTIFIERS = {
 """A leading underscore makes no difference."""
 
 LENT = {
-    "src/roboirg/integrations/inspect_grounding.py": {"Sample"},
-    "src/roboirg/integrations/inspect/listener_task.py": {"Sample"},
+    "src/roboirg/apps/integrations/inspect/inspect_grounding.py": {"Sample"},
+    "src/roboirg/apps/integrations/inspect/listener_task.py": {"Sample"},
 }
 """Names of other packages' classes."""
 

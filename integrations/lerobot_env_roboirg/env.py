@@ -9,7 +9,7 @@ import json
 import os
 from typing import Any
 
-from roboirg.integrations.lerobot.vector import make_batch
+from roboirg.apps.integrations.lerobot.vector import make_batch
 
 
 def make_env(n_envs: int = 1, use_async_envs: bool = False, cfg: object = None) -> Any:  # noqa: ANN401, ARG001

@@ -6,33 +6,24 @@ Exit codes: 0 success; 2 invalid usage, or episodes ended in errors (one sentenc
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
 import sys
 from typing import Annotated
 
 import typer
 
+from roboirg import apps
 from roboirg.cli import (
-    check_commands,
     demo_commands,
-    demonstration_commands,
     episode_commands,
-    grounding_commands,
-    import_commands,
-    language_commands,
     look_commands,
-    people_commands,
     policy_commands,
     report_commands,
     run_commands,
-    show_commands,
-    split_commands,
-    verification_commands,
 )
-from roboirg.cli.bench_commands import bench
 from roboirg.cli.export_commands import export_app
-from roboirg.cli.learn_commands import learn_app
 from roboirg.cli.missing_extras import describe_missing
-from roboirg.cli.real_commands import real_app
 from roboirg.cli.run_commands import INTERRUPTED, USAGE_ERROR
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.printable import printable
@@ -57,15 +48,6 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-app.add_typer(language_commands.language_app, name="language")
-app.add_typer(export_app, name="export")
-app.add_typer(grounding_commands.score_app, name="score")
-app.add_typer(learn_app, name="learn")
-app.add_typer(real_app, name="real")
-app.add_typer(people_commands.listen_app, name="listen")
-app.add_typer(language_commands.wordings_app, name="wordings")
-app.command()(bench)
-
 
 def _print_version(wanted: bool) -> None:
     if wanted:
@@ -87,33 +69,32 @@ def _options(*, version: _Version = False) -> None:
     del version
 
 
-app.command()(run_commands.run)
-app.command()(run_commands.merge)
-app.command()(verification_commands.verify)
-app.command()(verification_commands.pack)
-app.command()(verification_commands.board)
-app.command()(verification_commands.repeat)
-app.command()(demonstration_commands.replay)
-app.command()(report_commands.report)
-app.command()(report_commands.view)
-app.command()(report_commands.tables)
-app.command()(report_commands.figures)
-app.command()(report_commands.compare)
-app.command()(import_commands.import_results)
-app.command()(people_commands.drive)
-app.command()(demo_commands.demo)
-app.command()(look_commands.doctor)
-app.command("fetch-models")(look_commands.fetch_models)
-app.command("tasks")(look_commands.list_tasks)
-app.command()(look_commands.instruct)
-app.command("build-splits")(split_commands.build_splits)
-app.command()(show_commands.show)
-app.command(cls=policy_commands.ProtocolHelpCommand)(policy_commands.serve)
-app.command("check-policy", cls=policy_commands.ProtocolHelpCommand)(check_commands.check_policy)
-export_app.command("grounding")(grounding_commands.export_grounding)
-export_app.command("episodes")(episode_commands.export_episodes)
-export_app.command("records")(run_commands.export_records)
-export_app.command("demonstrations")(demonstration_commands.export_demonstrations)
+def _add_commands() -> None:
+    """Add the commands of the core, then those of the applications that are installed."""
+    for command in (
+        run_commands.run,
+        demo_commands.demo,
+        look_commands.doctor,
+        look_commands.instruct,
+        run_commands.merge,
+        report_commands.report,
+        report_commands.view,
+        report_commands.tables,
+        report_commands.figures,
+        report_commands.compare,
+    ):
+        app.command()(command)
+    app.command("fetch-models")(look_commands.fetch_models)
+    app.command("tasks")(look_commands.list_tasks)
+    app.command(cls=policy_commands.ProtocolHelpCommand)(policy_commands.serve)
+    app.add_typer(export_app, name="export")
+    export_app.command("episodes")(episode_commands.export_episodes)
+    export_app.command("records")(run_commands.export_records)
+    for application in pkgutil.iter_modules(apps.__path__):
+        importlib.import_module(f"{apps.__name__}.{application.name}.commands").add_commands(app)
+
+
+_add_commands()
 
 
 def main() -> None:

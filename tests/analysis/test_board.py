@@ -8,15 +8,15 @@ from typing import Any
 
 import pytest
 
-from roboirg.analysis.board.board_page import read_packs, render_board, write_board
-from roboirg.analysis.board.board_rows import BoardRow, PackedRun, board_rows
-from roboirg.analysis.board.pack_checks import CHECKS_FILE, PackCheck, check_pack
 from roboirg.analysis.published import published_rows
+from roboirg.apps.leaderboard.board_page import read_packs, render_board, write_board
+from roboirg.apps.leaderboard.board_rows import BoardRow, PackedRun, board_rows
+from roboirg.apps.leaderboard.pack_checks import CHECKS_FILE, PackCheck, check_pack
+from roboirg.apps.leaderboard.packing import pack_run
 from roboirg.core.errors import InvalidValueError
 from roboirg.episodes.private_splits import SALT_VARIABLE, use_salt
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.language.settings import EXPLICIT
-from roboirg.records.packing import pack_run
 from roboirg.records.record import Job, Record
 from roboirg.records.store import RecordStore
 from roboirg.tasks import ALL, find_tasks
@@ -179,7 +179,7 @@ def test_checks_are_remembered_until_the_pack_changes(
     pack = tmp_path / "a.roboirg.zip"
     pack_run(store(tmp_path / "a", [record("p", "StopCube", 0, won=True)]), pack)
     first = check_pack(pack, sample=0.0, workers=0)
-    monkeypatch.setattr("roboirg.analysis.board.pack_checks.verify_run", None)
+    monkeypatch.setattr("roboirg.apps.leaderboard.pack_checks.verify_run", None)
     assert check_pack(pack, sample=0.0, workers=0) == first
     pack_run(store(tmp_path / "b", [record("q", "StopCube", 0, won=True)]), pack)
     with pytest.raises(TypeError):

@@ -7,17 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from roboirg.analysis.board.repeats import (
+from roboirg.analysis.stats.cells import gather
+from roboirg.analysis.stats.comparison import compare
+from roboirg.analysis.stats.comparison_text import sentences
+from roboirg.analysis.stats.flips import FLIPS_FILE, read_flips
+from roboirg.apps.leaderboard.repeats import (
     count_flips,
     flips_by_cell,
     repeated_episodes,
     told_arithmetic,
     write_flips,
 )
-from roboirg.analysis.stats.cells import gather
-from roboirg.analysis.stats.comparison import compare
-from roboirg.analysis.stats.comparison_text import sentences
-from roboirg.analysis.stats.flips import FLIPS_FILE, read_flips
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.records.action_log import ActionLog, write_actions

@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from roboirg.analysis.grounding_scores.answer_scores import (
+from roboirg.analysis.stats.chance import floor_level
+from roboirg.apps.grounding.answer_floors import FLOORS, floor_answers
+from roboirg.apps.grounding.answer_scores import (
     above_chance,
     hidden_fields,
     score_answers,
     score_rows,
 )
-from roboirg.analysis.grounding_scores.score_report import confusion_tables, report_text
-from roboirg.analysis.grounding_scores.score_tables import breakdown_tables, range_label
-from roboirg.analysis.stats.chance import floor_level
+from roboirg.apps.grounding.score_report import confusion_tables, report_text
+from roboirg.apps.grounding.score_tables import breakdown_tables, range_label
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.grounding_set.answer_file import Answer, read_answers, write_answers
-from roboirg.evaluation.grounding_set.answer_floors import FLOORS, floor_answers
 from roboirg.evaluation.grounding_set.grounding_item import (
     ITEMS_FILE,
     LETTERS,

@@ -1,8 +1,8 @@
 import pytest
 import synthetic_trajectories
 
-from roboirg.demonstrations import export_run
-from roboirg.demonstrations.export_plan import ExportPlan
+from roboirg.apps.demonstrations import export_run
+from roboirg.apps.demonstrations.export_plan import ExportPlan
 
 
 @pytest.fixture

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import synthetic_trajectories
 
-from roboirg.demonstrations import export_run
-from roboirg.demonstrations.export_plan import ExportPlan
+from roboirg.apps.demonstrations import export_run
+from roboirg.apps.demonstrations.export_plan import ExportPlan
 
 PLAN = ExportPlan(
     tasks=("PickXtimes", "VideoUnmask"),

@@ -4,10 +4,10 @@ import zipfile
 
 import numpy as np
 
+from roboirg.apps.demonstrations.trajectory import TrajectoryFacts, TrajectoryFile, stack_texts
+from roboirg.apps.demonstrations.trajectory_recorder import PictureTracks, _keep_facts
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.observations import CAMERAS
-from roboirg.demonstrations.trajectory import TrajectoryFacts, TrajectoryFile, stack_texts
-from roboirg.demonstrations.trajectory_recorder import PictureTracks, _keep_facts
 from roboirg.util.atomic_write import replacing
 
 STEPS = 6

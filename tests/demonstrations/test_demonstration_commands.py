@@ -5,8 +5,8 @@ import sys
 import pytest
 
 from roboirg import main as cli
-from roboirg.demonstrations import dataset_replay
-from roboirg.demonstrations.dataset_replay import ReplayResult
+from roboirg.apps.demonstrations import dataset_replay
+from roboirg.apps.demonstrations.dataset_replay import ReplayResult
 
 FEW = ("--tasks", "PickXtimes", "--episodes", "2", "--settings", "explicit,direct")
 

@@ -15,10 +15,10 @@ import pytest
 import synthetic_trajectories
 from pyarrow import parquet
 
+from roboirg.apps.demonstrations import export_run
+from roboirg.apps.demonstrations.dataset_reading import read_dataset
+from roboirg.apps.demonstrations.size_estimate import estimate_size
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.demonstrations import export_run
-from roboirg.demonstrations.dataset_reading import read_dataset
-from roboirg.demonstrations.size_estimate import estimate_size
 from roboirg.episodes.splits import get_episode
 
 HERE = Path(__file__).parent

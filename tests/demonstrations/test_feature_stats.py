@@ -6,14 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from roboirg.demonstrations.feature_stats import (
+from roboirg.apps.demonstrations.feature_stats import (
     PICTURE_PIXELS,
     QUANTILES,
     gather_vectors,
     picture_stats,
     vector_stats,
 )
-from roboirg.demonstrations.picture_coding import count_values
+from roboirg.apps.demonstrations.picture_coding import count_values
 
 FINITE = st.floats(-1e3, 1e3, width=32)
 

@@ -11,7 +11,7 @@ import synthetic_trajectories as synthetic
 from PIL import Image
 from pyarrow import parquet
 
-from roboirg.demonstrations.dataset_reading import read_dataset
+from roboirg.apps.demonstrations.dataset_reading import read_dataset
 from roboirg.episodes.splits import get_episode
 from roboirg.language import instruct
 

@@ -5,13 +5,13 @@ import zipfile
 import numpy as np
 import pytest
 
-from roboirg.demonstrations import export_run
-from roboirg.demonstrations.dataset_reading import read_dataset
-from roboirg.demonstrations.dataset_replay import replay
-from roboirg.demonstrations.export_plan import RecordingJob
-from roboirg.demonstrations.policy_choice import find_variation
-from roboirg.demonstrations.trajectory import PictureFile, load_trajectory
-from roboirg.demonstrations.trajectory_recorder import RecordingSpec, record_trajectory
+from roboirg.apps.demonstrations import export_run
+from roboirg.apps.demonstrations.dataset_reading import read_dataset
+from roboirg.apps.demonstrations.dataset_replay import replay
+from roboirg.apps.demonstrations.export_plan import RecordingJob
+from roboirg.apps.demonstrations.policy_choice import find_variation
+from roboirg.apps.demonstrations.trajectory import PictureFile, load_trajectory
+from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec, record_trajectory
 from roboirg.envs.factory import make
 from roboirg.episodes.splits import get_episode
 from roboirg.policies import make_policy, play

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import synthetic_trajectories as synthetic
 
-from roboirg.demonstrations.dataset_reading import read_dataset
+from roboirg.apps.demonstrations.dataset_reading import read_dataset
 from roboirg.episodes.splits import get_episode
 from roboirg.language import instruct
 

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 import synthetic_trajectories as synthetic
 
-from roboirg.core.errors import InvalidValueError
-from roboirg.demonstrations.picture_coding import VideoEncoder, encode_depth, encode_png
-from roboirg.demonstrations.trajectory import (
+from roboirg.apps.demonstrations.picture_coding import VideoEncoder, encode_depth, encode_png
+from roboirg.apps.demonstrations.trajectory import (
     PictureFile,
     drop_pictures,
     has_pictures,
     load_facts,
     load_trajectory,
 )
-from roboirg.demonstrations.trajectory_recorder import RecordingSpec, _with_pixels
+from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec, _with_pixels
+from roboirg.core.errors import InvalidValueError
 from roboirg.episodes.splits import get_episode
 
 

@@ -2,7 +2,7 @@
 
 import os
 
-from roboirg.evaluation.seed_search.seed_selection import Rejection
+from roboirg.apps.split_search.seed_selection import Rejection
 
 
 def take_the_third(slot, seed):

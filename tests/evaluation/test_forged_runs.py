@@ -18,17 +18,13 @@ import numpy as np
 import pytest
 from forgeries import FORGERIES, forge
 
+from roboirg.apps.leaderboard.record_check import LineToCheck, ReplayVerdict, check_line
+from roboirg.apps.leaderboard.run_verification import verify_run
 from roboirg.evaluation.executors.executor import Executor, InProcess, LocalProcesses
 from roboirg.evaluation.executors.ray_cluster import RayCluster
 from roboirg.evaluation.plan_maker import make_plan
 from roboirg.evaluation.rollout import EpisodeRunner
 from roboirg.evaluation.runner import run_plan
-from roboirg.evaluation.verification.record_check import (
-    LineToCheck,
-    ReplayVerdict,
-    check_line,
-)
-from roboirg.evaluation.verification.run_verification import verify_run
 from roboirg.records.store import RECORDS_FILE, read_records
 from roboirg.tasks import ALL, find_tasks
 

@@ -15,12 +15,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
+from roboirg.apps.grounding.dataset_export import export_grounding
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.episodes.splits import SIZES, get_episode
 from roboirg.evaluation.grounding_set import question_set
-from roboirg.evaluation.grounding_set.dataset_export import export_grounding
 from roboirg.evaluation.grounding_set.grounding_item import (
     LETTERS,
     PointTarget,

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from evaluation_fakes import fake_result
 
+from roboirg.apps.leaderboard.packing import MANIFEST, opened_run, pack_run, read_manifest
 from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.rollout_result import make_record
 from roboirg.records.action_log import ActionLog, write_actions
-from roboirg.records.packing import MANIFEST, opened_run, pack_run, read_manifest
 from roboirg.records.record import Job
 from roboirg.records.record_codec import StoreError
 from roboirg.records.store import RecordStore, read_records

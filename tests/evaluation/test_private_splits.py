@@ -15,6 +15,8 @@ from evaluation_fakes import FakePlay
 from typer.testing import CliRunner
 
 from roboirg.analysis.page.report import write_report
+from roboirg.apps.leaderboard.packing import pack_run
+from roboirg.apps.leaderboard.run_verification import verify_run
 from roboirg.core.errors import InvalidValueError, SceneRejectedError
 from roboirg.episodes.private_splits import (
     SALT_VARIABLE,
@@ -31,10 +33,8 @@ from roboirg.evaluation.executors.ray_cluster import RayCluster
 from roboirg.evaluation.plan_maker import make_plan
 from roboirg.evaluation.rollout import EpisodeRunner
 from roboirg.evaluation.runner import run_plan
-from roboirg.evaluation.verification.run_verification import verify_run
 from roboirg.main import app
 from roboirg.records.merging import merge_runs
-from roboirg.records.packing import pack_run
 from roboirg.records.store import read_records
 from roboirg.tasks import ALL, find_tasks
 

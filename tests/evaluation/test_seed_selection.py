@@ -8,10 +8,7 @@ import pytest
 from rich.console import Console
 from seed_selection_fakes import die, refuse, take_the_third
 
-from roboirg.core.episode import SPLITS
-from roboirg.core.errors import InvalidValueError, RoboIRGError, SceneRejectedError
-from roboirg.episodes.splits import SIZES, TaskSplits, get_episode, shipped_splits, slot_seed
-from roboirg.evaluation.seed_search.seed_selection import (
+from roboirg.apps.split_search.seed_selection import (
     ACCEPTANCE_SETTINGS,
     EpisodeSlot,
     Rejection,
@@ -24,7 +21,10 @@ from roboirg.evaluation.seed_search.seed_selection import (
     find_seeds,
     merge_splits,
 )
-from roboirg.evaluation.seed_search.seed_summary import cause_lines, follow_progress, print_summary
+from roboirg.apps.split_search.seed_summary import cause_lines, follow_progress, print_summary
+from roboirg.core.episode import SPLITS
+from roboirg.core.errors import InvalidValueError, RoboIRGError, SceneRejectedError
+from roboirg.episodes.splits import SIZES, TaskSplits, get_episode, shipped_splits, slot_seed
 from roboirg.language import expressible, find_refusals
 from roboirg.language.settings import all_settings, settings_of
 from roboirg.tasks import every_task, get_task

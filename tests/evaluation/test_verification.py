@@ -13,12 +13,12 @@ import pytest
 from forgeries import FORGERIES, Forgery, Lines, forge
 from typer.testing import CliRunner
 
+from roboirg.apps.leaderboard.record_check import ReplayVerdict
+from roboirg.apps.leaderboard.run_verification import verify_run
 from roboirg.evaluation.executors.executor import InProcess
 from roboirg.evaluation.plan_maker import make_plan
 from roboirg.evaluation.rollout import EpisodeRunner
 from roboirg.evaluation.runner import run_plan
-from roboirg.evaluation.verification.record_check import ReplayVerdict
-from roboirg.evaluation.verification.run_verification import verify_run
 from roboirg.main import app
 from roboirg.records.action_log import read_actions, write_actions
 from roboirg.records.merging import merge_runs

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from planning_fakes import fake_vlm, make_listener, stand_in
 
-from roboirg.analysis.grounding_scores.answer_scores import score_answers
+from roboirg.apps.grounding.answer_scores import score_answers
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.grounding_set.answer_file import Answer
@@ -128,7 +128,7 @@ def run_inspect(data, replies_of, logs, question="slots", **options):
     inspect_ai = pytest.importorskip("inspect_ai")
     from inspect_ai.model import ModelOutput, ModelUsage, get_model
 
-    from roboirg.integrations.inspect_grounding import roboirg_grounding
+    from roboirg.apps.integrations.inspect.inspect_grounding import roboirg_grounding
 
     def reply(messages, tools, tool_choice, config):
         found = ModelOutput.from_content("mockllm/model", replies_of(messages))
@@ -148,7 +148,7 @@ def run_inspect(data, replies_of, logs, question="slots", **options):
 
 def test_inspect_and_our_scores_agree(data, tmp_path):
     pytest.importorskip("inspect_ai")
-    from roboirg.integrations.inspect_grounding import log_answers
+    from roboirg.apps.integrations.inspect.inspect_grounding import log_answers
 
     by_question = {(item.said, item.slots_question): item.id for item in items()}
     tries = []
@@ -195,8 +195,8 @@ def test_inspect_asks_the_other_questions(data, tmp_path, question):
 
 def test_inspect_says_what_is_wrong(data):
     pytest.importorskip("inspect_ai")
+    from roboirg.apps.integrations.inspect.inspect_grounding import roboirg_grounding
     from roboirg.core.errors import InvalidValueError
-    from roboirg.integrations.inspect_grounding import roboirg_grounding
 
     with pytest.raises(InvalidValueError, match="no question 'poem'"):
         roboirg_grounding(data=str(data), question="poem")

@@ -7,8 +7,8 @@ import sqlite3
 import pytest
 from typer.testing import CliRunner
 
+from roboirg.apps.integrations.result_import import ImportOptions, import_results
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.integrations.result_import import ImportOptions, import_results
 from roboirg.main import app
 from roboirg.records.record import Job
 from roboirg.records.store import read_records

@@ -25,7 +25,7 @@ from replay_table import (
     SETTING,
 )
 
-from roboirg.integrations.vla_eval.step_benchmark import RoboIRGBenchmark
+from roboirg.apps.integrations.vla_eval.step_benchmark import RoboIRGBenchmark
 from roboirg.records.store import read_records
 
 pytestmark = pytest.mark.sim

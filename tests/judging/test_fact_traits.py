@@ -10,6 +10,7 @@ import pytest
 
 import roboirg
 from roboirg.analysis.page.details import event_text
+from roboirg.apps.show.episode_text import fact_words
 from roboirg.core import fact_traits
 from roboirg.core.conditions import Fact, Rule, facts_of
 from roboirg.core.episode import Primitive, Scene, SceneObject, Stage
@@ -21,7 +22,6 @@ from roboirg.judging import Judge
 from roboirg.judging.grounding_errors import classify_grounding_error
 from roboirg.records.record import EventRecord
 from roboirg.tasks import every_task
-from roboirg.visualization.episode_text import fact_words
 
 SOURCE = Path(roboirg.__file__).parent
 

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from roboirg.language import card, instruct, variants
+from roboirg.apps.language_lab import card
+from roboirg.language import instruct, variants
 
 PAGE = Path(__file__).parents[2] / "docs" / "language-card.md"
 

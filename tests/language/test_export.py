@@ -7,9 +7,10 @@ import json
 import pytest
 from language_variants import TASKS
 
+from roboirg.apps.language_lab import instruction_export
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.episodes.splits import get_episode, split_episodes
-from roboirg.language import FORMS, export, setting_names
+from roboirg.language import FORMS, setting_names
 from roboirg.language.instruction_row import row
 from roboirg.language.variants import instructions
 
@@ -79,8 +80,8 @@ def test_goals_are_the_episodes():
 
 
 def test_json_lines_are_the_rows():
-    data = export.encode(rows(), "jsonl")
-    assert data == export.encode(rows(), "jsonl")
+    data = instruction_export.encode(rows(), "jsonl")
+    assert data == instruction_export.encode(rows(), "jsonl")
     lines = data.decode().splitlines()
     assert [json.loads(line) for line in lines] == list(rows())
 
@@ -90,11 +91,11 @@ def test_arrow_reads_json_lines_and_parquet_alike():
     from pyarrow import json as arrow_json
     from pyarrow import parquet
 
-    data = export.encode(rows(), "parquet")
-    assert data == export.encode(rows(), "parquet")
+    data = instruction_export.encode(rows(), "parquet")
+    assert data == instruction_export.encode(rows(), "parquet")
     table = parquet.read_table(io.BytesIO(data))
     assert table.to_pylist() == list(rows())
-    inferred = arrow_json.read_json(io.BytesIO(export.encode(rows(), "jsonl")))
+    inferred = arrow_json.read_json(io.BytesIO(instruction_export.encode(rows(), "jsonl")))
     assert inferred.to_pylist() == list(rows())
     assert inferred.schema.names == table.schema.names
     for mine, theirs in zip(table.schema, inferred.schema, strict=True):
@@ -107,7 +108,7 @@ def test_parquet_has_its_types_whatever_is_in_it(settings):
     from pyarrow import parquet
 
     few = [one for one in rows() if one["setting"] in settings]
-    schema = parquet.read_schema(io.BytesIO(export.encode(few, "parquet")))
+    schema = parquet.read_schema(io.BytesIO(instruction_export.encode(few, "parquet")))
     assert str(schema.field("landmark_classes").type) == "list<element: int64>"
     assert str(schema.field("pattern").type) == "string"
     assert str(schema.field("episode").type) == "int64"
@@ -116,7 +117,7 @@ def test_parquet_has_its_types_whatever_is_in_it(settings):
 def test_pandas_reads_it(tmp_path):
     pandas = pytest.importorskip("pandas")
     path = tmp_path / "instructions.jsonl"
-    export.write_rows(rows(), path, "jsonl")
+    instruction_export.write_rows(rows(), path, "jsonl")
     frame = pandas.read_json(path, lines=True)
     assert list(frame.columns) == list(rows()[0])
     assert (frame.groupby("task").size() > 0).all()
@@ -125,15 +126,15 @@ def test_pandas_reads_it(tmp_path):
 
 def test_a_file_that_cannot_be_written_is_one_sentence(tmp_path):
     with pytest.raises(InvalidValueError, match="Cannot write"):
-        export.write_rows(rows()[:1], tmp_path / "nowhere" / "file.jsonl", "jsonl")
+        instruction_export.write_rows(rows()[:1], tmp_path / "nowhere" / "file.jsonl", "jsonl")
 
 
 def test_without_pyarrow_one_sentence_says_what_to_do(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
     monkeypatch.setitem(__import__("sys").modules, "pyarrow.parquet", None)
-    export.check_export_support("jsonl")
+    instruction_export.check_export_support("jsonl")
     with pytest.raises(MissingDependencyError, match=r"\[export\]"):
-        export.check_export_support("parquet")
+        instruction_export.check_export_support("parquet")
 
 
 def test_every_episode_is_there():

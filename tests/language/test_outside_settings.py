@@ -9,15 +9,23 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
+from roboirg.apps.language_lab import card, statistics_tables
+from roboirg.apps.language_lab.validation import (
+    Batch,
+    check_episode,
+    episode_checks,
+    validate_batch,
+)
+from roboirg.apps.language_lab.validation.validation_tables import validation_tables
+from roboirg.apps.show.episode_text import instructions_table
+from roboirg.apps.split_search import seed_selection
+from roboirg.apps.split_search.seed_selection import EpisodeSlot, check_words
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.episodes.splits import get_episode, split_episodes
 from roboirg.evaluation.plan_maker import make_plan
-from roboirg.evaluation.seed_search import seed_selection
-from roboirg.evaluation.seed_search.seed_selection import EpisodeSlot, check_words
 from roboirg.language import (
     FORMS,
-    card,
     expressible,
     expression_counts,
     expression_figure,
@@ -26,16 +34,12 @@ from roboirg.language import (
     instruct_with,
     setting_names,
     settings,
-    statistics_tables,
 )
 from roboirg.language.instruction_row import row
 from roboirg.language.setting import Setting
 from roboirg.language.settings import all_settings, direct
-from roboirg.language.validation import Batch, check_episode, episode_checks, validate_batch
-from roboirg.language.validation.validation_tables import validation_tables
 from roboirg.language.variants import all_variants, instructions
 from roboirg.tasks import all_tasks
-from roboirg.visualization.episode_text import instructions_table
 
 EPISODE = get_episode("PickXtimes", "test", 0)  # easy
 HARD = get_episode("PickXtimes", "test", 3)

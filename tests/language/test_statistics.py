@@ -7,15 +7,10 @@ import pytest
 from language_variants import TASKS
 from rich.console import Console
 
+from roboirg.apps.language_lab import corpus_statistics, statistics_tables
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.episodes.splits import split_episodes
-from roboirg.language import (
-    corpus_statistics,
-    expression_counts,
-    expression_figure,
-    setting_names,
-    statistics_tables,
-)
+from roboirg.language import expression_counts, expression_figure, setting_names
 from roboirg.language.settings import settings_of
 from roboirg.language.variants import instructions
 from roboirg.tasks import every_task

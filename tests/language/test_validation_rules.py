@@ -7,11 +7,7 @@ import pytest
 from language_variants import SPATIAL_TASKS, without_landmark
 from rich.console import Console
 
-from roboirg.core.episode import SPLITS
-from roboirg.core.errors import InvalidValueError
-from roboirg.episodes.splits import SIZES, get_episode, slot_seed
-from roboirg.language import Utterance, expressible, instruct, instruct_with, interpret
-from roboirg.language.validation import (
+from roboirg.apps.language_lab.validation import (
     RuleViolation,
     ValidationResults,
     batches,
@@ -19,13 +15,17 @@ from roboirg.language.validation import (
     pairing,
     validate,
 )
-from roboirg.language.validation.episode_checks import (
+from roboirg.apps.language_lab.validation.episode_checks import (
     leaking,
     not_needed,
     not_read_back,
     not_self_contained,
 )
-from roboirg.language.validation.validation_tables import validation_tables
+from roboirg.apps.language_lab.validation.validation_tables import validation_tables
+from roboirg.core.episode import SPLITS
+from roboirg.core.errors import InvalidValueError
+from roboirg.episodes.splits import SIZES, get_episode, slot_seed
+from roboirg.language import Utterance, expressible, instruct, instruct_with, interpret
 from roboirg.tasks import every_task, get_task
 from roboirg.util.plain_text import counted
 

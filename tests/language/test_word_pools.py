@@ -11,6 +11,7 @@ from language_variants import TASKS, split_episodes
 from typer.testing import CliRunner
 
 from roboirg import main as cli
+from roboirg.apps.language_lab.validation import Batch, validate_batch
 from roboirg.core.episode import SPLITS
 from roboirg.core.word_pools import POOLS, Pools, pool_of
 from roboirg.episodes.splits import get_episode
@@ -20,7 +21,6 @@ from roboirg.language import instruct, setting_names
 from roboirg.language.settings import all_settings
 from roboirg.language.slot_types.number import SAME_NUMBER
 from roboirg.language.templates import derivations, introductions, remarks
-from roboirg.language.validation import Batch, validate_batch
 from roboirg.language.variants import instructions
 from roboirg.tasks import all_tasks, every_task
 

@@ -9,6 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from wording_stand_ins import same_number, train_episodes
 
+from roboirg.apps.language_lab.robomme.wording_writer import wording_text
+from roboirg.apps.language_lab.validation import pairing
+from roboirg.apps.language_lab.validation.episode_checks import check_episode
+from roboirg.apps.language_lab.validation.leaks import find_leaks
+from roboirg.apps.language_lab.validation.pairing import unpaired
 from roboirg.core.episode import Goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
@@ -18,15 +23,10 @@ from roboirg.language.instruction_row import row
 from roboirg.language.phrases import plain
 from roboirg.language.request import InstructionSpec, UtteranceSpec
 from roboirg.language.settings import get_setting
-from roboirg.language.validation import pairing
-from roboirg.language.validation.episode_checks import check_episode
-from roboirg.language.validation.leaks import find_leaks
-from roboirg.language.validation.pairing import unpaired
 from roboirg.language.variants import instructions
 from roboirg.language.worded_command import StatedPhrase, TaskWordings, WordedCommand
 from roboirg.language.wordings.wording_file import parse_wordings, read_wordings
 from roboirg.language.wordings.wording_store import find_wordings, open_wordings, register_wordings
-from roboirg.language.wordings.wording_writer import wording_text
 from roboirg.tasks import get_task
 
 HAND = """\

@@ -21,17 +21,18 @@ from wording_stand_ins import (
 )
 
 from roboirg import main as cli
+from roboirg.apps.language_lab.robomme import goal_sentences, robomme_import
+from roboirg.apps.language_lab.robomme.template_search import find_templates
+from roboirg.apps.language_lab.robomme.wording_writer import wording_text
+from roboirg.apps.language_lab.validation.episode_checks import check_episode
 from roboirg.core.episode import COLORS, Goal
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import FORMS, Instruction, expressible, instruct_with, interpret
-from roboirg.language.validation.episode_checks import check_episode
 from roboirg.language.worded_command import TaskWordings, Wordings, goal_fields
-from roboirg.language.wordings import goal_sentences, robomme_import, wording_store
-from roboirg.language.wordings.template_search import find_templates
+from roboirg.language.wordings import wording_store
 from roboirg.language.wordings.wording_file import parse_wordings
 from roboirg.language.wordings.wording_store import register_wordings
-from roboirg.language.wordings.wording_writer import wording_text
 from roboirg.tasks import all_tasks, get_task
 
 

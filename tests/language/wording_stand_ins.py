@@ -6,11 +6,11 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
+from roboirg.apps.language_lab.robomme import goal_sentences
 from roboirg.core.episode import Episode, Goal
 from roboirg.episodes.published_episodes import published_episode
 from roboirg.language.instruction import Instruction
 from roboirg.language.slot_types.number import SAME_NUMBER
-from roboirg.language.wordings import goal_sentences
 from roboirg.tasks import all_tasks, get_task
 
 STYLES = ("sentences_in_words", "sentences_in_digits")

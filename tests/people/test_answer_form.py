@@ -5,10 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from roboirg.core.errors import InvalidValueError
-from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.grounding_set.referents import find_candidates
-from roboirg.evaluation.people.answer_form import (
+from roboirg.apps.people.answer_form import (
     FormAnswer,
     all_answers,
     answer_form,
@@ -16,6 +13,9 @@ from roboirg.evaluation.people.answer_form import (
     checked_answer,
     goal_of,
 )
+from roboirg.core.errors import InvalidValueError
+from roboirg.episodes.splits import get_episode
+from roboirg.evaluation.grounding_set.referents import find_candidates
 from roboirg.tasks import every_task, get_task
 
 

@@ -11,11 +11,11 @@ import pytest
 import sapien
 
 from roboirg import main as cli
+from roboirg.apps.people.drive_server import DriveServer
+from roboirg.apps.people.driving_policy import CARRY, LOWEST, DrivingPolicy
+from roboirg.apps.people.driving_session import DrivingSession, DrivingStoppedError
 from roboirg.core.observations import CAMERAS
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.people.drive_server import DriveServer
-from roboirg.evaluation.people.driving_policy import CARRY, LOWEST, DrivingPolicy
-from roboirg.evaluation.people.driving_session import DrivingSession, DrivingStoppedError
 from roboirg.language.settings import setting_names
 from roboirg.records.record import Job
 from roboirg.records.store import read_records

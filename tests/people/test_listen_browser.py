@@ -10,12 +10,12 @@ from contextlib import contextmanager
 import pytest
 from study_fakes import Serving, make_study
 
+from roboirg.apps.people.answer_form import answer_form, answer_of
+from roboirg.apps.people.listener_answers import AnswerUndone, read_events, standing_answers
+from roboirg.apps.people.listening_session import QUESTIONS
+from roboirg.apps.people.listening_study import words_of
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.grounding_set.question_set import EpisodeName, read_media
-from roboirg.evaluation.people.answer_form import answer_form, answer_of
-from roboirg.evaluation.people.listening_session import QUESTIONS
-from roboirg.evaluation.people.listening_study import words_of
-from roboirg.records.listener_answers import AnswerUndone, read_events, standing_answers
 from roboirg.records.store import read_records
 
 pytestmark = [pytest.mark.browser, pytest.mark.sim]

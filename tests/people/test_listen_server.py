@@ -16,24 +16,24 @@ import numpy as np
 import pytest
 from study_fakes import Serving, answer_all, draw_things, make_study, things_of
 
-from roboirg.core.errors import InvalidValueError
-from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.grounding_set.grounding_item import read_items
-from roboirg.evaluation.grounding_set.item_builder import EpisodeMedia
-from roboirg.evaluation.people.answer_form import all_answers, answer_of, goal_of
-from roboirg.evaluation.people.listening_session import ListeningSession, OutOfDateError
-from roboirg.evaluation.people.listening_study import words_of
-from roboirg.evaluation.people.people_run import answered_plan
-from roboirg.evaluation.people.question_view import view_question
-from roboirg.language.command_chance import is_right
-from roboirg.language.settings import setting_names
-from roboirg.records.listener_answers import (
+from roboirg.apps.people.answer_form import all_answers, answer_of, goal_of
+from roboirg.apps.people.listener_answers import (
     ANSWERS_FILE,
     AnswerLog,
     PersonJoined,
     read_events,
     standing_answers,
 )
+from roboirg.apps.people.listening_session import ListeningSession, OutOfDateError
+from roboirg.apps.people.listening_study import words_of
+from roboirg.apps.people.people_run import answered_plan
+from roboirg.apps.people.question_view import view_question
+from roboirg.core.errors import InvalidValueError
+from roboirg.episodes.splits import get_episode
+from roboirg.evaluation.grounding_set.grounding_item import read_items
+from roboirg.evaluation.grounding_set.item_builder import EpisodeMedia
+from roboirg.language.command_chance import is_right
+from roboirg.language.settings import setting_names
 from roboirg.records.store import StoreError
 from roboirg.tasks import every_task, get_task
 
@@ -250,7 +250,7 @@ def test_a_torn_line_is_put_aside(study):
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from roboirg.records.listener_answers import AnswerLog, PersonJoined
+from roboirg.apps.people.listener_answers import AnswerLog, PersonJoined
 with AnswerLog(Path(sys.argv[1])) as log:
     for number in range(1, 100):
         log.append(PersonJoined(person=number, code=str(number), consent="", at=""))

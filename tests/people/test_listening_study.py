@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
-from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.people.latin_square import balanced_square
-from roboirg.evaluation.people.listening_study import (
+from roboirg.apps.people.latin_square import balanced_square
+from roboirg.apps.people.listening_study import (
     PEOPLE,
     ListeningStudy,
     read_listening_study,
     write_listening_study,
 )
+from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.plan_maker import make_plan
 
 

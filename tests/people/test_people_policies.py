@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from study_fakes import answer_all, make_study
 
+from roboirg.apps.people.answer_form import FormAnswer, all_answers, answer_of, goal_of
+from roboirg.apps.people.listening_session import ListeningSession
+from roboirg.apps.people.people_run import answered_plan
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.people.answer_form import FormAnswer, all_answers, answer_of, goal_of
-from roboirg.evaluation.people.listening_session import ListeningSession
-from roboirg.evaluation.people.people_run import answered_plan
 from roboirg.evaluation.rollout import EpisodeRunner
 from roboirg.policies.loading import is_privileged, load_policy_class, make_policy, policy_version
 from roboirg.records.record import Job

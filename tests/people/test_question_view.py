@@ -4,12 +4,12 @@ import cv2
 import numpy as np
 import pytest
 
+from roboirg.apps.people.answer_form import answer_form
+from roboirg.apps.people.question_view import MARGIN, outlines
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.grounding_set.grounding_item import decode_mask
 from roboirg.evaluation.grounding_set.referents import find_candidates
 from roboirg.evaluation.grounding_set.seen_scene import look_at_episode
-from roboirg.evaluation.people.answer_form import answer_form
-from roboirg.evaluation.people.question_view import MARGIN, outlines
 
 
 def polygon(text):

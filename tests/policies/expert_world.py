@@ -11,8 +11,8 @@ from functools import cache
 
 import numpy as np
 
+from roboirg.apps.policy_check.expert_episode import ExpertEpisode, ExpertMoment
 from roboirg.core.actions import JOINT_HIGH, JOINT_LOW
-from roboirg.policies.checks.expert_episode import ExpertEpisode, ExpertMoment
 from roboirg.policies.requirements import wanted_history
 
 MOMENTS, ROWS, SIDE, LATENT = 20, 16, 8, 4

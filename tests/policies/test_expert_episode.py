@@ -6,11 +6,11 @@ import itertools
 import numpy as np
 import pytest
 
+from roboirg.apps.policy_check.check_result import FAIL, NOTE, PASS, WARN
+from roboirg.apps.policy_check.expert_episode import MAX_ROWS, ExpertEpisode, record_expert
+from roboirg.apps.policy_check.policy_check import check_policy
 from roboirg.core.episode import ROBOT_BASE
 from roboirg.core.errors import RenderDeviceError
-from roboirg.policies.checks.check_result import FAIL, NOTE, PASS, WARN
-from roboirg.policies.checks.expert_episode import MAX_ROWS, ExpertEpisode, record_expert
-from roboirg.policies.policy_check import check_policy
 
 pytestmark = pytest.mark.sim
 ROWS = 16

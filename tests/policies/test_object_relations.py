@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboirg.core.episode import ROBOT_BASE
-from roboirg.policies.learned.object_relations import (
+from roboirg.apps.learned_listener.object_relations import (
     SeenObjects,
     TablePlane,
     fit_plane,
@@ -14,6 +13,7 @@ from roboirg.policies.learned.object_relations import (
     relate,
     relation_count,
 )
+from roboirg.core.episode import ROBOT_BASE
 
 CLASSES = ("button", "container", "cube blue", "cube red")
 CORNERS = np.array([(x, y) for x in (-0.3, 0.2) for y in (-0.4, 0.3)])

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from expert_world import HONEST, REST, ROWS, Honest, OneByOne, pixels, record
 
-from roboirg.policies.checks.check_result import FAIL, NOTE, PASS, WARN
-from roboirg.policies.policy_check import check_policy
+from roboirg.apps.policy_check.check_result import FAIL, NOTE, PASS, WARN
+from roboirg.apps.policy_check.policy_check import check_policy
 
 PLANTED = []
 

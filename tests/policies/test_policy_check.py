@@ -8,11 +8,11 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from roboirg.cli.check_commands import check_policy as command
+from roboirg.apps.policy_check.check_result import FAIL, NOTE, PASS, WARN
+from roboirg.apps.policy_check.commands import check_policy as command
+from roboirg.apps.policy_check.policy_check import check_policy
+from roboirg.apps.policy_check.synthetic_episodes import SyntheticEpisodes
 from roboirg.core.observations import CAMERAS
-from roboirg.policies.checks.check_result import FAIL, NOTE, PASS, WARN
-from roboirg.policies.checks.synthetic_episodes import SyntheticEpisodes
-from roboirg.policies.policy_check import check_policy
 
 
 class Sound:

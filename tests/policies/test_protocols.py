@@ -15,10 +15,10 @@ from wire_episode import INSTRUCTION, moment, video
 from wire_servers import ChallengeServer, unpack
 
 import roboirg
+from roboirg.apps.policy_check.policy_check import check_policy
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.policy_environment import env_requirements, make_env
 from roboirg.policies import make_policy, play, protocols
-from roboirg.policies.policy_check import check_policy
 from roboirg.policies.policy_classes import url_schemes
 from roboirg.policies.protocols import all_protocols, protocols_by_scheme
 from roboirg.policies.remote.endpoints import RemoteOptions

@@ -12,9 +12,9 @@ from expert_world import record
 from planning_fakes import fake_vlm
 from wire_servers import CHUNK, MmeVlaServer
 
-from roboirg.policies.checks.check_result import FAIL, NOTE, PASS, WARN
+from roboirg.apps.policy_check.check_result import FAIL, NOTE, PASS, WARN
+from roboirg.apps.policy_check.policy_check import check_policy
 from roboirg.policies.planning.systems import all_systems
-from roboirg.policies.policy_check import check_policy
 
 REMEMBER = {"TTT-Expert", "FrameS-Modul"}
 REPLIES = {

@@ -9,10 +9,10 @@ from wire_episode import INSTRUCTION, moment, video
 from wire_servers import VlaEvalServer
 
 import roboirg
+from roboirg.apps.policy_check.policy_check import check_policy
 from roboirg.core.errors import InvalidValueError, PolicyReplyError, PolicyTimeoutError
 from roboirg.policies import make_policy, play
 from roboirg.policies.loading import server_version
-from roboirg.policies.policy_check import check_policy
 from roboirg.policies.remote.message_codec import TEXT_KEYS, CodecError, pack, unpack
 
 

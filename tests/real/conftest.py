@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from roboirg.real.study.study_plan import make_study, write_study
+from roboirg.apps.real.study.study_plan import make_study, write_study
 
 HERE = Path(__file__).parent
 if str(HERE) not in sys.path:

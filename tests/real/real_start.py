@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
-CLI = "import sys; from roboirg.cli.real_commands import real_app; real_app(sys.argv[1:])"
+CLI = "import sys; from roboirg.apps.real.commands import real_app; real_app(sys.argv[1:])"
 
 STARTED = []
 

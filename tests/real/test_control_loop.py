@@ -10,16 +10,16 @@ import time
 import numpy as np
 import pytest
 
+from roboirg.apps.real.control.clock import RealClock
+from roboirg.apps.real.control.control_loop import ControlLoop
+from roboirg.apps.real.control.limits import Limits
+from roboirg.apps.real.control.policy_workers import PolicyProcess, PolicyThread
+from roboirg.apps.real.control.robot import COMMAND_RATE
+from roboirg.apps.real.control.twin import Twin
+from roboirg.apps.real.study.study_plan import make_study
+from roboirg.apps.real.study.study_run import Study
+from roboirg.apps.real.study.trial_log import TrialLog
 from roboirg.core.errors import InvalidValueError
-from roboirg.real.control.clock import RealClock
-from roboirg.real.control.control_loop import ControlLoop
-from roboirg.real.control.limits import Limits
-from roboirg.real.control.policy_workers import PolicyProcess, PolicyThread
-from roboirg.real.control.robot import COMMAND_RATE
-from roboirg.real.control.twin import Twin
-from roboirg.real.study.study_plan import make_study
-from roboirg.real.study.study_run import Study
-from roboirg.real.study.trial_log import TrialLog
 from roboirg.records.record import Job
 
 pytestmark = pytest.mark.sim

@@ -4,14 +4,19 @@ import lab_arm
 import numpy as np
 import pytest
 
+from roboirg.apps.real.control.lerobot_arm import (
+    LeRobotArm,
+    LeRobotArmOptions,
+    center_square,
+    make_arm,
+)
+from roboirg.apps.real.control.limits import Limits
+from roboirg.apps.real.control.robot import JudgingRobot
+from roboirg.apps.real.control.robot_loading import make_robot
+from roboirg.apps.real.study.study_plan import make_study
+from roboirg.apps.real.study.study_run import Study, select_scorer
+from roboirg.apps.real.study.trial_log import TrialLog
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.real.control.lerobot_arm import LeRobotArm, LeRobotArmOptions, center_square, make_arm
-from roboirg.real.control.limits import Limits
-from roboirg.real.control.robot import JudgingRobot
-from roboirg.real.control.robot_loading import make_robot
-from roboirg.real.study.study_plan import make_study
-from roboirg.real.study.study_run import Study, select_scorer
-from roboirg.real.study.trial_log import TrialLog
 
 WATCHING, STILL = "faulty_policies:Watcher", "faulty_policies:Still"
 # A busy machine is slow: what is tested here is not how quick it is.

@@ -11,20 +11,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from roboirg import language
-from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.language.settings import setting_names
-from roboirg.real.pages.arrangement_svg import draw_svg
-from roboirg.real.pages.trial_sheet import _pages, write_sheet
-from roboirg.real.study.arrangement_shapes import Shape, scene_shapes, square_corners
-from roboirg.real.study.counterbalancing import (
+from roboirg.apps.real.pages.arrangement_svg import draw_svg
+from roboirg.apps.real.pages.trial_sheet import _pages, write_sheet
+from roboirg.apps.real.study.arrangement_shapes import Shape, scene_shapes, square_corners
+from roboirg.apps.real.study.counterbalancing import (
     Arrangement,
     counterbalanced_order,
     read_arrangement,
 )
-from roboirg.real.study.failure_choices import failure_choices
-from roboirg.real.study.plan_csv import demonstrations_csv, trials_csv
-from roboirg.real.study.study_plan import StudyPlan, make_study, read_study, write_study
-from roboirg.real.study.study_run import Study
+from roboirg.apps.real.study.failure_choices import failure_choices
+from roboirg.apps.real.study.plan_csv import demonstrations_csv, trials_csv
+from roboirg.apps.real.study.study_plan import StudyPlan, make_study, read_study, write_study
+from roboirg.apps.real.study.study_run import Study
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.language.settings import setting_names
 
 TASKS = ("PutInBox", "PickByCount")
 SETTINGS = setting_names()

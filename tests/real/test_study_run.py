@@ -11,11 +11,11 @@ from real_start import start
 
 from roboirg.analysis.stats.cells import gather
 from roboirg.analysis.tables.paper_tables import make_table
-from roboirg.real.control.interruption import Interruption
-from roboirg.real.pages.study_figure import bar_series, write_figure
-from roboirg.real.study.failure_choices import failure_choices
-from roboirg.real.study.study_plan import read_study
-from roboirg.real.study.trial_log import TrialLog, trial_metadata
+from roboirg.apps.real.control.interruption import Interruption
+from roboirg.apps.real.pages.study_figure import bar_series, write_figure
+from roboirg.apps.real.study.failure_choices import failure_choices
+from roboirg.apps.real.study.study_plan import read_study
+from roboirg.apps.real.study.trial_log import TrialLog, trial_metadata
 from roboirg.records.store import read_records, read_results
 
 pytestmark = pytest.mark.sim
@@ -125,7 +125,7 @@ def test_scored_in_a_browser_it_is_the_table_that_the_judge_would_have_given(bro
 
 
 def test_two_loops_do_not_share_a_robot(study):
-    from roboirg.real.study.study_run import lock_robot
+    from roboirg.apps.real.study.study_run import lock_robot
 
     with lock_robot(study):
         process = start("run", study)

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
+from roboirg.apps.real.control.clock import VirtualClock
+from roboirg.apps.real.control.kinematics import end_effector_pose, tool_pose
+from roboirg.apps.real.control.limits import Limits
+from roboirg.apps.real.control.robot import CAMERA_RATE, JudgingRobot
+from roboirg.apps.real.control.twin import Twin
+from roboirg.apps.real.study.study_plan import make_study
+from roboirg.apps.real.study.study_run import Study
 from roboirg.evaluation.rollout import EpisodeRunner
-from roboirg.real.control.clock import VirtualClock
-from roboirg.real.control.kinematics import end_effector_pose, tool_pose
-from roboirg.real.control.limits import Limits
-from roboirg.real.control.robot import CAMERA_RATE, JudgingRobot
-from roboirg.real.control.twin import Twin
-from roboirg.real.study.study_plan import make_study
-from roboirg.real.study.study_run import Study
 from roboirg.records.record import NON_DETERMINISTIC_FIELDS
 
 pytestmark = pytest.mark.sim

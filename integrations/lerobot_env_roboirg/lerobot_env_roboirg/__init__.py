@@ -1,5 +1,5 @@
 """Registers RoboIRGBench with LeRobot, which imports this module by the distribution's name."""
 
-from roboirg.integrations.lerobot import register
+from roboirg.apps.integrations.lerobot import register
 
 register()

@@ -1,1 +1,0 @@
-"""A leaderboard page made of packed runs."""

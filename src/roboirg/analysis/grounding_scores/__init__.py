@@ -1,1 +1,0 @@
-"""Scores of answers to the grounding dataset."""

@@ -1,1 +1,0 @@
-"""What a study of listeners shows beside their success: agreement, time, attention."""

@@ -1,0 +1,1 @@
+"""How fast this machine is, compared with the floor and the stock path."""

@@ -1,0 +1,1 @@
+"""Demonstrations for training: recorded once, written in the trainers' formats, replayed."""

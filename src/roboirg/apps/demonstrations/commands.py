@@ -1,0 +1,195 @@
+"""Commands for demonstrations: ``roboirg export demonstrations`` and ``roboirg replay``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, cast
+
+import typer
+
+from roboirg.cli.export_commands import export_app
+from roboirg.cli.options import (
+    DEFAULT_WORDS,
+    Forms,
+    Settings,
+    Split,
+    Tasks,
+    WordChoices,
+    Workers,
+    check_output_file,
+    spread,
+)
+from roboirg.util.plain_text import counted
+
+if TYPE_CHECKING:
+    from roboirg.apps.demonstrations.export_plan import ExportPlan
+
+
+@spread
+def export_demonstrations(
+    out: Annotated[Path, typer.Option(help="Folder of the data set.")],
+    format: Annotated[  # noqa: A002
+        str, typer.Option(help="lerobot-v3, lerobot-v2.1 or robomme-hdf5.")
+    ] = "lerobot-v3",
+    split: Split = "train",
+    tasks: Tasks = "all",
+    episodes: Annotated[
+        str, typer.Option(help="all, 4 for the first four, or a list such as 0,3,5-9.")
+    ] = "all",
+    settings: Settings = "all",
+    forms: Forms = "implicit",
+    words: WordChoices = DEFAULT_WORDS,
+    delivery: Annotated[
+        str, typer.Option(help="prompt, or turns: in language columns and the table of episodes.")
+    ] = "prompt",
+    pictures: Annotated[
+        str, typer.Option(help="png or lossless-video, both without loss; lossy-video; or none.")
+    ] = "png",
+    video: Annotated[
+        str | None,
+        typer.Option(
+            help="Frames of the video: none, prefix (marked), or sidecar (a data set beside).  "
+            "(none; of robomme-hdf5 prefix)"
+        ),
+    ] = None,
+    names: Annotated[
+        str | None,
+        typer.Option(help="Names of the features: lerobot or openpi.  (by format)"),
+    ] = None,
+    actions: Annotated[
+        str, typer.Option(help="Further descriptions of actions: delta, pose, or both; or none.")
+    ] = "none",
+    variations: Annotated[
+        int, typer.Option(help="Trajectories per episode; all but the first vary.")
+    ] = 1,
+    policy: Annotated[
+        str, typer.Option(help="Who moves the robot; the words change nothing for the oracle.")
+    ] = "oracle",
+    outcomes: Annotated[str, typer.Option(help="successes or all.")] = "successes",
+    language_columns: Annotated[
+        bool,
+        typer.Option(
+            "--language-columns",
+            help="Add LeRobot's language columns; LeRobot 0.6 or later reads them.",
+        ),
+    ] = False,
+    trajectories: Annotated[
+        Path | None,
+        typer.Option(help="Folder that keeps recorded trajectories for further exports."),
+    ] = None,
+    workers: Workers = None,
+    dry_run: Annotated[bool, typer.Option(help="Estimate the size and record nothing.")] = False,
+) -> None:
+    """Export demonstrations for training, recorded once per episode, told in every setting."""
+    from roboirg.apps.demonstrations.export_plan import ExportPlan
+    from roboirg.apps.demonstrations.export_run import run_export
+    from roboirg.apps.demonstrations.size_estimate import size_text
+    from roboirg.cli.names import known_settings
+    from roboirg.cli.progress_bar import progress_bars
+    from roboirg.evaluation.plan_parsing import means_all, parse_episodes, parse_names
+    from roboirg.language import FORMS
+    from roboirg.policies import load_policy_class
+    from roboirg.tasks import find_tasks
+    from roboirg.util.processor import core_count
+
+    load_policy_class(policy)
+    # `validated` checks the names that are cast.
+    plan = ExportPlan(
+        tasks=tuple(find_tasks(parse_names("task", tasks))),
+        split=split,
+        episodes=parse_episodes(episodes, split),
+        settings=known_settings(settings),
+        forms=FORMS if means_all(forms) else parse_names("form", forms),
+        options=words.instruction_options(delivery),
+        format=cast("Any", format),
+        pictures=cast("Any", pictures),
+        video=cast("Any", video or _default_video(format)),
+        names=cast("Any", names or _default_names(format, pictures)),
+        extra_actions=cast("Any", () if actions == "none" else parse_names("action", actions)),
+        variations=variations,
+        policy=policy,
+        outcomes=cast("Any", outcomes),
+        language_columns=language_columns,
+    ).validated()
+    _print_estimate(plan)
+    if dry_run:
+        return
+    count = core_count() if workers is None else workers
+    with progress_bars() as show:
+
+        def report(stage: str, done: int, total: int, size: int) -> None:
+            show(stage, done, total, size_text(size) if size else "")
+
+        summary = run_export(plan, out, count, report, trajectories)
+    ends = ", ".join(f"{number} {status}" for status, number in summary.statuses.items())
+    typer.echo(
+        f"{counted(summary.episodes, 'episode')}, {size_text(summary.size)}: {out} "
+        f"(trajectories: {ends})"
+    )
+
+
+def _default_video(format_name: str) -> str:
+    """Return how the video is treated unless the user says so."""
+    return "prefix" if format_name == "robomme-hdf5" else "none"
+
+
+def _default_names(format_name: str, pictures: str) -> str:
+    """Return openpi's names for the format with pictures in tables that only openpi reads."""
+    return "openpi" if (format_name, pictures) == ("lerobot-v2.1", "png") else "lerobot"
+
+
+def _print_estimate(plan: ExportPlan) -> None:
+    from roboirg.apps.demonstrations.size_estimate import estimate_size, size_text
+
+    estimate = estimate_size(plan)
+    typer.echo(
+        f"{counted(estimate.trajectories, 'trajectory', 'trajectories')}, "
+        f"{counted(estimate.episodes, 'episode')}, about {estimate.frames:,} frames and "
+        f"{size_text(estimate.size)}",
+        err=True,
+    )
+
+
+def replay(
+    dataset: Annotated[
+        Path,
+        typer.Argument(help="Folder of an export, or of RoboMME's HDF5 files, or such a file."),
+    ],
+    workers: Workers = None,
+    log: Annotated[
+        Path | None,
+        typer.Option(help="File with a line for each result; what is in it is not replayed again."),
+    ] = None,
+) -> None:
+    """Execute the actions of a data set in the simulator, and compare states and verdicts."""
+    from collections import Counter
+
+    from roboirg.apps.demonstrations.dataset_replay import TOLERANCE, replay_dataset
+    from roboirg.util.processor import core_count
+
+    if log is not None:
+        check_output_file(log)
+    count, largest = Counter[str](), 0.0
+    for one in replay_dataset(dataset, core_count() if workers is None else workers, log):
+        count["trajectories"] += 1
+        count["same verdict"] += one.status == one.recorded_status
+        count["agree"] += one.agrees
+        largest = max(largest, one.final)
+        if not one.agrees:
+            typer.echo(
+                f"{one.name}: {one.status} after {one.steps} of {one.recorded_steps} steps "
+                f"(recorded: {one.recorded_status}); final state differs by {one.final:.2g}, "
+                f"any by at most {one.largest:.2g}"
+            )
+    typer.echo(
+        f"{counted(count['trajectories'], 'trajectory', 'trajectories')}: {count['same verdict']} "
+        f"with the same verdict, {count['agree']} also with a final state within {TOLERANCE:g} "
+        f"(largest difference {largest:.2g})"
+    )
+    if count["agree"] < count["trajectories"]:
+        raise typer.Exit(2)
+
+
+def add_commands(app: typer.Typer) -> None:
+    export_app.command("demonstrations")(export_demonstrations)
+    app.command()(replay)

@@ -1,0 +1,158 @@
+"""The data card: what a data set holds, and the lines that train from it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.apps.demonstrations.dataset_part import DatasetPart
+from roboirg.apps.demonstrations.export_plan import ExportPlan
+from roboirg.apps.demonstrations.formats.training_lines import training_text
+from roboirg.apps.demonstrations.picture_coding import FRAME_RATE, LOSSY_QUALITY
+from roboirg.apps.demonstrations.trajectory import TrajectoryFacts, load_facts
+from roboirg.core.episode import ENVIRONMENT_VERSION
+from roboirg.core.version import __version__
+from roboirg.core.word_pools import pool_of
+from roboirg.language import LANGUAGE_VERSION
+
+_BAR = 40
+_BINS = 12
+
+
+def card_text(
+    plan: ExportPlan, parts: Sequence[DatasetPart], facts: Sequence[TrajectoryFacts], root: Path
+) -> str:
+    """Return the card of a data set as Markdown, with the head that Hugging Face reads.
+
+    Args:
+        plan: what is exported.
+        parts: of the data set.
+        facts: of all trajectories, those that are left out, too.
+        root: folder of the data set.
+    """
+    lengths = list(_lengths(parts))
+    rows = np.repeat([length for length, *_ in lengths], [count for *_, count in lengths])
+    lines = [
+        "---",
+        "license: apache-2.0",
+        "task_categories: [robotics]",
+        "tags: [LeRobot, RoboIRGBench]",
+        "---",
+        "",
+        "# Demonstrations of RoboIRGBench",
+        "",
+        _head_line(plan),
+        "",
+        *_count_lines(plan, lengths, rows, facts),
+        "",
+        "## Lengths",
+        "",
+        "```",
+        *_histogram(rows),
+        "```",
+        "",
+        "## Content",
+        "",
+        *_content_lines(plan, facts),
+        "",
+        "## Training",
+        "",
+        training_text(plan, root),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _head_line(plan: ExportPlan) -> str:
+    pool = pool_of(plan.split, plan.options.wordings)
+    return (
+        f"Split {plan.split}, format {plan.format}, written by roboirg {__version__} (environment "
+        f"{ENVIRONMENT_VERSION}, language {LANGUAGE_VERSION}, wordings of the pool {pool!r}). "
+        f"{FRAME_RATE} frames per second, one per control step."
+    )
+
+
+def _lengths(parts: Sequence[DatasetPart]) -> Iterator[tuple[int, str, int]]:
+    """Yield frames, task and number of instructions of each trajectory."""
+    for part in parts:
+        for episode in part.episodes:
+            facts = load_facts(episode.path)
+            yield len(part.columns.rows(facts)), facts.task, len(episode.texts)
+
+
+def _count_lines(
+    plan: ExportPlan,
+    lengths: Sequence[tuple[int, str, int]],
+    rows: NDArray[np.int64],
+    facts: Sequence[TrajectoryFacts],
+) -> Iterator[str]:
+    yield "| task | trajectories | episodes | frames |"
+    yield "| --- | --- | --- | --- |"
+    for task in dict.fromkeys(task for _, task, _ in lengths):
+        own = [(length, count) for length, name, count in lengths if name == task]
+        episodes, frames = sum(count for _, count in own), sum(a * b for a, b in own)
+        yield f"| {task} | {len(own)} | {episodes} | {frames} |"
+    yield f"| all | {len(lengths)} | {len(rows)} | {int(rows.sum())} |"
+    yield ""
+    words = ", ".join(plan.settings)
+    yield (
+        f"Settings: {words}; forms: {', '.join(plan.forms)}. Each trajectory is told once in each "
+        "of them that can express it; `meta/demonstrations.parquet` says which episode is which."
+    )
+    ends = Counter(one.status for one in facts)
+    yield f"Trajectories by outcome: {', '.join(f'{n} {status}' for status, n in ends.items())}."
+
+
+def _histogram(rows: NDArray[np.int64]) -> Iterator[str]:
+    counts, edges = np.histogram(rows, bins=_BINS)
+    for count, low, high in zip(counts, edges, edges[1:], strict=False):
+        bar = "#" * round(_BAR * count / counts.max())
+        yield f"{low:7.0f} to {high:5.0f} frames {count:6d} {bar}".rstrip()
+
+
+def _content_lines(plan: ExportPlan, facts: Sequence[TrajectoryFacts]) -> Iterator[str]:
+    yield (
+        "State: seven joint angles (rad) and the first finger (m). Action: absolute joint targets "
+        "(rad) and the gripper, +1 open to -1 closed; exactly what was executed."
+    )
+    if plan.video == "prefix":
+        yield "Frames of the video come before the policy's, with `is_video_demo`."
+    elif plan.video == "sidecar":
+        yield "Frames of the videos are in the data set `demonstration_videos` beside this one."
+    else:
+        yield "Frames of the videos are left out."
+    if plan.pictures == "none":
+        yield "There are no pictures."
+    elif plan.pictures == "png":
+        yield "Pictures are stored without loss, as PNG."
+    elif plan.pictures == "lossless-video":
+        yield "Pictures are stored without loss, as H.264 in RGB; every one was compared."
+    else:
+        yield from _error_lines(facts)
+
+
+def _error_lines(facts: Sequence[TrajectoryFacts]) -> Iterator[str]:
+    yield (
+        f"Pictures are lossy: H.264, yuv420p, constant rate factor {LOSSY_QUALITY}. Measured on "
+        "every frame, of 255:"
+    )
+    for camera in ("front", "wrist"):
+        errors = [
+            (one.rows, error)
+            for one in facts
+            for name, error in one.picture_error.items()
+            if name.startswith(camera)
+        ]
+        if not errors:
+            continue
+        weights = [rows for rows, _ in errors]
+        mean = np.average([error["mean"] for _, error in errors], weights=weights)
+        largest = max(error["largest"] for _, error in errors)
+        worst = min(error["psnr"] for _, error in errors)
+        yield (
+            f"- {camera}: mean error {mean:.2f}, largest {largest:.0f}, lowest PSNR of a "
+            f"trajectory {worst:.1f} dB"
+        )

@@ -1,0 +1,158 @@
+"""Parts of a data set, each written at once from recorded trajectories."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+from roboirg.apps.demonstrations.export_plan import ORACLE, ExportPlan, TaskText
+from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedText
+from roboirg.apps.demonstrations.trajectory import (
+    Trajectory,
+    TrajectoryFacts,
+    load_facts,
+    load_trajectory,
+)
+
+CHUNK_SIZE = 1000
+"""Files in a folder."""
+
+
+class RecordedEpisode(NamedTuple):
+    """A trajectory and the instructions that are told with it.
+
+    Attributes:
+        path: of the trajectory's file.
+        texts: with their places in the data set.
+    """
+
+    path: Path
+    texts: tuple[PlacedText, ...]
+
+
+@dataclass(frozen=True)
+class DatasetPart:
+    """What is written at once; a part that is complete is never written again.
+
+    Attributes:
+        number: of the part in its data set.
+        root: folder of the data set.
+        columns: of its frames.
+        episodes: of the part.
+    """
+
+    number: int
+    root: Path
+    columns: FrameColumns
+    episodes: tuple[RecordedEpisode, ...]
+
+    @property
+    def place(self) -> tuple[int, int]:
+        """Numbers of the folder and of the file in it."""
+        return divmod(self.number, CHUNK_SIZE)
+
+
+class DatasetWriter(Protocol):
+    """Writes one format; a module for each is one."""
+
+    def make_parts(
+        self,
+        plan: ExportPlan,
+        root: Path,
+        recorded: Sequence[RecordedTexts],
+        *,
+        is_video: bool = False,
+    ) -> list[DatasetPart]:
+        """Return the parts of the data set, or of the videos' frames, in order."""
+
+    def write_part(self, part: DatasetPart) -> None:
+        """Write the frames of a part; runs in a worker process."""
+
+    def finish(self, plan: ExportPlan, root: Path, parts: Sequence[DatasetPart]) -> None:
+        """Write what describes all parts; its last file makes the data set readable."""
+
+
+class RecordedTexts(NamedTuple):
+    """A trajectory and its instructions, which have no place yet."""
+
+    path: Path
+    texts: tuple[TaskText, ...]
+
+
+def place_texts(columns: FrameColumns, recorded: Sequence[RecordedTexts]) -> list[RecordedEpisode]:
+    """Give every instruction its place; trajectories without frames are left out."""
+    texts: dict[str, int] = {}
+    episode_index = first_index = 0
+    placed = []
+    for path, said in recorded:
+        length = len(columns.rows(load_facts(path)))
+        if not length:
+            continue
+        own = []
+        for words in said:
+            task_index = texts.setdefault(words.text, len(texts))
+            own.append(PlacedText(words, episode_index, first_index, task_index))
+            episode_index, first_index = episode_index + 1, first_index + length
+        placed.append(RecordedEpisode(path, tuple(own)))
+    return placed
+
+
+def all_texts(parts: Sequence[DatasetPart]) -> list[str]:
+    """Return all texts in the order of their indices."""
+    found = {
+        one.task_index: one.words.text
+        for part in parts
+        for episode in part.episodes
+        for one in episode.texts
+    }
+    return [found[index] for index in range(len(found))]
+
+
+def read_episodes(
+    parts: Sequence[DatasetPart],
+) -> Iterator[tuple[DatasetPart, RecordedEpisode, Trajectory]]:
+    """Yield every trajectory of the parts, without pictures."""
+    for part in parts:
+        for episode in part.episodes:
+            yield part, episode, load_trajectory(episode.path)
+
+
+def episode_row(trajectory: Trajectory, placed: PlacedText, length: int) -> dict[str, Any]:
+    """Return the row of an episode in the table of facts beside the data set."""
+    facts = trajectory.facts
+    words = placed.words
+    options = words.options._asdict() | {"stages": list(words.options.stages)}
+    return {
+        "episode_index": placed.episode_index,
+        "from_index": placed.first_index,
+        "length": length,
+        "video_length": facts.video_length,
+        "steps": facts.steps,
+        "status": facts.status,
+        "cause": facts.cause,
+        "policy": facts.policy,
+        "variation": facts.variation,
+        "trajectory": _trajectory_name(facts, options),
+        "final_state": [
+            *trajectory.joint_positions[-1].tolist(),
+            *trajectory.gripper[-1].tolist(),
+        ],
+        "demonstration_source": facts.demonstration_source,
+        "environment_version": facts.environment_version,
+        **{key: value for key, value in options.items() if key in _OPTIONS},
+        **words.facts,
+    }
+
+
+def _trajectory_name(facts: TrajectoryFacts, options: Mapping[str, Any]) -> str:
+    """Return a name that all instructions of a trajectory share; only the oracle's has several."""
+    name = f"{facts.task}/{facts.split}/{facts.episode}/{facts.variation}"
+    return name if facts.policy == ORACLE else f"{name}/{options['setting']}-{options['form']}"
+
+
+_OPTIONS = ("delivery",)
+"""Options that a row of the instructions lacks."""
+EPISODE_TABLE = "meta/demonstrations.parquet"
+"""Path of the table of facts in a data set."""

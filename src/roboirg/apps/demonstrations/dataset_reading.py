@@ -1,0 +1,173 @@
+"""Read the states and actions of a data set, whatever its format, without its pictures."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.apps.demonstrations.dataset_part import EPISODE_TABLE
+from roboirg.apps.demonstrations.formats.robomme_hdf5 import SHARED_FOLDER, check_hdf5_support
+from roboirg.apps.demonstrations.parquet_tables import read_rows
+from roboirg.core.errors import InvalidValueError
+from roboirg.util.parquet_support import check_parquet_support
+
+_STATES, _ACTIONS = ("observation.state", "state"), ("action", "actions")
+_HDF5_NAME = re.compile(r"record_dataset_(\w+)\.h5")
+_JOINTS = 7
+
+
+@dataclass(frozen=True, eq=False)
+class ReplayableTrajectory:
+    """What a data set says of one trajectory.
+
+    Attributes:
+        name: of the trajectory, for messages.
+        task: name of the task.
+        seed: of the scene.
+        split: of the episode; None if the data set does not say, as RoboMME's.
+        index: of the episode in the split; None likewise.
+        actions: (n, 8) that the policy executed.
+        states: (n, 8) after each of the actions: joints (rad) and the first finger (m).
+        final_state: (9,) joints and both fingers at the end; None if the data set does not say.
+        status: how it ended; RoboMME's are successes.
+    """
+
+    name: str
+    task: str
+    seed: int
+    split: str | None
+    index: int | None
+    actions: NDArray[np.float64]
+    states: NDArray[np.float64]
+    final_state: NDArray[np.float64] | None
+    status: str
+
+
+def read_dataset(path: Path) -> Iterator[ReplayableTrajectory]:
+    """Yield every trajectory of a data set once, whatever the number of its instructions.
+
+    Args:
+        path: folder of an export, or of RoboMME's HDF5 files, or one of these files.
+
+    Raises:
+        InvalidValueError: the path holds no data set that can be read.
+        MissingDependencyError: a package is not installed.
+    """
+    if path.is_file() and _HDF5_NAME.fullmatch(path.name):
+        return _read_hdf5([path])
+    info = path / "meta/info.json"
+    if info.is_file() and (path / EPISODE_TABLE).is_file():
+        check_parquet_support()
+        return _read_tables(path, json.loads(info.read_text(encoding="utf-8")))
+    files = _hdf5_files(path)
+    if not files:
+        raise InvalidValueError(
+            f"{str(path)!r} holds no data set: neither a complete export of ours nor RoboMME's "
+            "files record_dataset_TASK.h5."
+        )
+    return _read_hdf5(files)
+
+
+def _hdf5_files(folder: Path) -> list[Path]:
+    """Return the HDF5 files that hold time steps, not links to them."""
+    for place in (folder, folder / SHARED_FOLDER):
+        files = sorted(one for one in place.glob("*.h5") if _HDF5_NAME.fullmatch(one.name))
+        if files:
+            return files
+    return []
+
+
+def _read_tables(root: Path, info: Mapping[str, Any]) -> Iterator[ReplayableTrajectory]:
+    from pyarrow import parquet
+
+    seen: set[str] = set()
+    places = _data_files(root, info)
+    state = next(name for name in _STATES if name in info["features"])
+    action = next(name for name in _ACTIONS if name in info["features"])
+    for row in read_rows(root / EPISODE_TABLE):
+        if row["trajectory"] in seen:
+            continue
+        seen.add(row["trajectory"])
+        number = row["episode_index"]
+        columns = [state, action, "episode_index", "is_video_demo"]
+        table = parquet.read_table(places[number], columns=columns)
+        own = np.asarray(table["episode_index"]) == number
+        own &= ~np.asarray(table["is_video_demo"])
+        states = np.array(table[state].to_pylist())[own]
+        final = np.array(row["final_state"])
+        yield ReplayableTrajectory(
+            name=row["trajectory"],
+            task=row["task"],
+            seed=row["seed"],
+            split=row["split"],
+            index=row["episode"],
+            actions=np.array(table[action].to_pylist(), dtype=np.float64)[own],
+            states=np.concatenate([states[1:], final[None, : _JOINTS + 1]]),
+            final_state=final,
+            status=row["status"],
+        )
+
+
+def _data_files(root: Path, info: Mapping[str, Any]) -> Mapping[int, Path]:
+    """Return the file of frames of each episode."""
+    pattern = info["data_path"]
+    if info["codebase_version"] != "v3.0":
+        size = info["chunks_size"]
+        return {
+            number: root / pattern.format(episode_chunk=number // size, episode_index=number)
+            for number in range(info["total_episodes"])
+        }
+    found = {}
+    for path in sorted((root / "meta/episodes").glob("*/*.parquet")):
+        for row in read_rows(path):
+            place = {"chunk_index": row["data/chunk_index"], "file_index": row["data/file_index"]}
+            found[row["episode_index"]] = root / pattern.format(**place)
+    return found
+
+
+def _read_hdf5(files: list[Path]) -> Iterator[ReplayableTrajectory]:
+    check_hdf5_support()
+    import h5py
+
+    for path in files:
+        found = _HDF5_NAME.fullmatch(path.name)
+        task = found[1] if found else ""
+        with h5py.File(path, "r") as file:
+            for name in sorted(file, key=_number):
+                yield _read_hdf5_episode(file[name], task, name)
+
+
+def _read_hdf5_episode(group: Any, task: str, name: str) -> ReplayableTrajectory:  # noqa: ANN401
+    actions, states, final = [], [], None
+    for step in sorted((one for one in group if one.startswith("timestep_")), key=_number):
+        entry = group[step]
+        action = entry["action/joint_action"][()]
+        if bool(entry["info/is_video_demo"][()]) or np.asarray(action).dtype.kind != "f":
+            continue  # frames without an action hold a text
+        joints, fingers = entry["obs/joint_state"][()], entry["obs/gripper_state"][()]
+        actions.append(np.asarray(action, dtype=np.float64))
+        states.append(np.append(joints, fingers[0]).astype(np.float64))
+        final = np.append(joints, fingers).astype(np.float64)
+    return ReplayableTrajectory(
+        name=f"{task}/{name}",
+        task=task,
+        seed=int(group["setup/seed"][()]),
+        split=None,
+        index=None,
+        actions=np.array(actions).reshape(-1, _JOINTS + 1),
+        states=np.array(states).reshape(-1, _JOINTS + 1),
+        final_state=final,
+        status="success",
+    )
+
+
+def _number(name: str) -> int:
+    """Return the number at the end of a group's name."""
+    return int(name.rpartition("_")[2])

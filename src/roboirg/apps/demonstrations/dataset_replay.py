@@ -1,0 +1,151 @@
+"""Replay a data set: execute its actions in the simulator and compare states and verdicts."""
+
+from __future__ import annotations
+
+import functools
+import json
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.apps.demonstrations.dataset_reading import ReplayableTrajectory, read_dataset
+from roboirg.core.episode import SPLITS, Episode
+from roboirg.core.errors import InvalidValueError
+from roboirg.envs.factory import make
+from roboirg.episodes.splits import SIZES, get_episode
+from roboirg.util.parallel_map import parallel_map
+
+TOLERANCE = 1e-4
+"""Largest difference (rad, m) of states that count as equal."""
+
+
+@dataclass(frozen=True)
+class ReplayResult:
+    """What the replay of a trajectory gave.
+
+    Attributes:
+        name: of the trajectory.
+        task: name of the task.
+        status: how the replay ended.
+        recorded_status: how the trajectory ended.
+        steps: executed actions.
+        recorded_steps: actions of the trajectory.
+        largest: difference of a joint (rad) or finger (m) after any action.
+        final: difference after the last action; not a number if there is nothing to compare.
+    """
+
+    name: str
+    task: str
+    status: str
+    recorded_status: str
+    steps: int
+    recorded_steps: int
+    largest: float
+    final: float
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the verdict is the same and the final state within 1e-4."""
+        return self.status == self.recorded_status and self.final <= TOLERANCE
+
+
+def replay_dataset(path: Path, workers: int, log: Path | None = None) -> Iterator[ReplayResult]:
+    """Replay every trajectory of a data set, and yield the results as they come.
+
+    Args:
+        path: see `read_dataset`.
+        workers: processes; 0 uses this one.
+        log: gets a line for each result; what is in it already is not replayed again.
+
+    Raises:
+        InvalidValueError: the path holds no data set, or one of episodes that do not exist here;
+            or the log is of another data set, or no log.
+        MissingDependencyError: a package is not installed.
+    """
+    trajectories = list(read_dataset(path))
+    known = {} if log is None else _read_log(log)
+    strange = known.keys() - {one.name for one in trajectories}
+    if strange:
+        raise InvalidValueError(f"{log} has {min(strange)!r}, which {path} does not have.")
+    yield from known.values()
+    missing = [one for one in trajectories if one.name not in known]
+    for _, result in parallel_map(replay, missing, workers):
+        if log is not None:
+            with log.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(asdict(result)) + "\n")
+        yield result
+
+
+def _read_log(path: Path) -> dict[str, ReplayResult]:
+    """Return the results of a log by name; a last line that was cut off is removed."""
+    if not path.exists():
+        return {}
+    content = path.read_text(encoding="utf-8")
+    whole, _, rest = content.rpartition("\n")
+    if rest:
+        path.write_text(f"{whole}\n" if whole else "", encoding="utf-8")
+    try:
+        results = [ReplayResult(**json.loads(line)) for line in whole.splitlines()]
+    except (TypeError, json.JSONDecodeError) as error:
+        raise InvalidValueError(f"{path} is no log of `roboirg replay`: {error}.") from error
+    return {one.name: one for one in results}
+
+
+def replay(recorded: ReplayableTrajectory) -> ReplayResult:
+    """Execute the actions of a trajectory in its episode."""
+    env = make(_find_episode(recorded), cameras=())
+    try:
+        env.reset()
+        steps, largest, final = 0, 0.0, float("nan")
+        for action, expected in zip(recorded.actions, recorded.states, strict=True):
+            observation, *_ = env.step(action)
+            steps += 1
+            state = np.append(observation["joint_positions"], observation["gripper"])
+            largest = max(largest, _difference(state[:-1], expected))
+            if env.status != "ongoing":
+                break
+        if steps and recorded.final_state is not None:
+            final = _difference(state, recorded.final_state)
+        status = "failure" if env.status == "ongoing" else env.status
+    finally:
+        env.close()
+    return ReplayResult(
+        recorded.name,
+        recorded.task,
+        status,
+        recorded.status,
+        steps,
+        len(recorded.actions),
+        largest,
+        final,
+    )
+
+
+def _difference(one: NDArray[np.floating[Any]], other: NDArray[np.floating[Any]]) -> float:
+    return float(np.abs(one.astype(np.float64) - other).max())
+
+
+def _find_episode(recorded: ReplayableTrajectory) -> Episode:
+    """Return the episode of a trajectory; RoboMME's are found by their seeds."""
+    if recorded.split is not None and recorded.index is not None:
+        return get_episode(recorded.task, recorded.split, recorded.index)
+    place = _places(recorded.task).get(recorded.seed)
+    if place is None:
+        raise InvalidValueError(
+            f"{recorded.name} has the seed {recorded.seed}; no episode of {recorded.task} has it."
+        )
+    return get_episode(recorded.task, *place)
+
+
+@functools.cache
+def _places(task: str) -> dict[int, tuple[str, int]]:
+    """Return split and index of each seed of a task."""
+    return {
+        get_episode(task, split, index).seed: (split, index)
+        for split in SPLITS
+        for index in range(SIZES[split])
+    }

@@ -1,0 +1,243 @@
+"""What an export holds: episodes, words, formats and pictures."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, get_args
+
+from roboirg.apps.demonstrations.trajectory import SUFFIX, TRAJECTORY_VERSION, PictureCoding
+from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec
+from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.episodes.splits import get_episode
+from roboirg.language import FORMS, LANGUAGE_VERSION
+from roboirg.language.generator import instruct_with
+from roboirg.language.instruction_row import row
+from roboirg.language.settings import all_settings
+from roboirg.language.variants import instructions
+from roboirg.util.short_hash import short_hash
+
+FormatName = Literal["lerobot-v3", "lerobot-v2.1", "robomme-hdf5"]
+VideoMode = Literal["none", "prefix", "sidecar"]
+KeyNames = Literal["lerobot", "openpi"]
+ExtraAction = Literal["delta", "pose"]
+Outcomes = Literal["successes", "all"]
+
+FORMATS: tuple[FormatName, ...] = get_args(FormatName)
+VIDEO_MODES: tuple[VideoMode, ...] = get_args(VideoMode)
+KEY_NAMES: tuple[KeyNames, ...] = get_args(KeyNames)
+EXTRA_ACTIONS: tuple[ExtraAction, ...] = get_args(ExtraAction)
+PICTURE_CODINGS: tuple[PictureCoding, ...] = get_args(PictureCoding)
+OUTCOMES: tuple[Outcomes, ...] = get_args(Outcomes)
+ORACLE = "oracle"
+
+
+@dataclass(frozen=True)
+class ExportPlan:
+    """What is exported.
+
+    Attributes:
+        tasks: names, in order.
+        split: of the episodes.
+        episodes: positions in the split.
+        settings: names.
+        forms: implicit, resolved or both.
+        options: all other options of the words.
+        format: of the data set.
+        pictures: how they are stored.
+        video: frames of the video: left out, before the policy's frames, or in a data set beside.
+        names: of the features: LeRobot's or openpi's.
+        extra_actions: further descriptions of each action.
+        variations: trajectories per episode; all but the first vary.
+        policy: who moves the robot.
+        outcomes: whether failures are exported too.
+        language_columns: whether the data set has LeRobot's language columns.
+    """
+
+    tasks: tuple[str, ...]
+    split: str
+    episodes: tuple[int, ...]
+    settings: tuple[str, ...]
+    forms: tuple[str, ...] = ("implicit",)
+    options: InstructionOptions = InstructionOptions()  # noqa: RUF009 - immutable
+    format: FormatName = "lerobot-v3"
+    pictures: PictureCoding = "png"
+    video: VideoMode = "none"
+    names: KeyNames = "lerobot"
+    extra_actions: tuple[ExtraAction, ...] = ()
+    variations: int = 1
+    policy: str = ORACLE
+    outcomes: Outcomes = "successes"
+    language_columns: bool = False
+
+    def validated(self) -> ExportPlan:
+        """Return this plan if its values are known and go together.
+
+        Raises:
+            UnknownNameError: a name does not exist.
+            InvalidValueError: a value or a combination is not possible.
+        """
+        for kind, value, known in (
+            ("format", self.format, FORMATS),
+            ("way to store pictures", self.pictures, PICTURE_CODINGS),
+            ("way to treat the video", self.video, VIDEO_MODES),
+            ("set of names", self.names, KEY_NAMES),
+            ("choice of outcomes", self.outcomes, OUTCOMES),
+            *(("form", form, FORMS) for form in self.forms),
+            *(("description of actions", one, EXTRA_ACTIONS) for one in self.extra_actions),
+        ):
+            if value not in known:
+                raise UnknownNameError(kind, value, known)
+        if self.variations < 1:
+            raise InvalidValueError(f"variations is {self.variations}; it must be at least 1.")
+        if self.variations > 1 and self.policy != ORACLE:
+            raise InvalidValueError(
+                f"variations is {self.variations}, but only the oracle varies, and the policy is "
+                f"{self.policy!r}."
+            )
+        if self.language_columns and self.format != "lerobot-v3":
+            raise InvalidValueError(
+                f"Language columns belong to the format 'lerobot-v3'; this is {self.format!r}."
+            )
+        if self.format == "robomme-hdf5":
+            self._check_hdf5()
+        return self
+
+    def _check_hdf5(self) -> None:
+        if self.pictures != "png":
+            raise InvalidValueError(
+                f"The format 'robomme-hdf5' holds lossless pictures; it has no {self.pictures!r}."
+            )
+        if self.video == "sidecar":
+            raise InvalidValueError(
+                "The format 'robomme-hdf5' has the video's frames before the policy's: ask for "
+                "--video prefix, or none."
+            )
+        if self.variations > 1:
+            raise InvalidValueError(
+                f"The format 'robomme-hdf5' has one trajectory per episode, not {self.variations}."
+            )
+
+    @property
+    def recording(self) -> RecordingSpec:
+        """What the trajectories must hold."""
+        is_video_apart = self.video == "sidecar" and self.pictures != "png"
+        has_depth = self.format == "robomme-hdf5"
+        return RecordingSpec(self.pictures, self.video != "none", is_video_apart, has_depth)
+
+    def fingerprint(self) -> str:
+        """Return a hash of everything that determines the data set."""
+        versions = [LANGUAGE_VERSION, ENVIRONMENT_VERSION, TRAJECTORY_VERSION]
+        text = json.dumps([asdict(self), versions])
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+class TaskText(NamedTuple):
+    """One instruction of an episode.
+
+    Attributes:
+        options: that select it.
+        text: the prompt.
+        facts: of the instruction, as a row of `roboirg export instructions`.
+    """
+
+    options: InstructionOptions
+    text: str
+    facts: dict[str, Any]
+
+
+class RecordingJob(NamedTuple):
+    """One trajectory to record.
+
+    Attributes:
+        task: name of the task.
+        split: of the episode.
+        number: of the episode.
+        variation: number of the variation.
+        policy: who moves the robot.
+        options: what it is told; None for the oracle, whose way the words do not change.
+        spec: what the trajectory holds.
+    """
+
+    task: str
+    split: str
+    number: int
+    variation: int
+    policy: str
+    options: InstructionOptions | None
+    spec: RecordingSpec
+
+    @property
+    def episode(self) -> Episode:
+        """The episode."""
+        return get_episode(self.task, self.split, self.number)
+
+    @property
+    def file_name(self) -> str:
+        """Name of the trajectory's file, which tells all that it depends on."""
+        said = ""
+        if self.options is not None:
+            said = f"-{short_hash(self.policy)}-{self.options.setting}-{self.options.form}"
+        spec: list[str] = [self.spec.coding]
+        spec += ["video"] * self.spec.video + ["apart"] * self.spec.is_video_apart
+        spec += ["depth"] * self.spec.depth
+        name = f"{self.task}-{self.split}-{self.number:05d}-{self.variation:03d}{said}"
+        return f"{name}-{'-'.join(spec)}{SUFFIX}"
+
+    def path(self, folder: Path) -> Path:
+        """Return the path of the trajectory's file."""
+        return folder / self.file_name
+
+
+def plan_episodes(plan: ExportPlan) -> Iterator[Episode]:
+    """Yield the episodes of a plan, in order."""
+    for task in plan.tasks:
+        for index in plan.episodes:
+            yield get_episode(task, plan.split, index)
+
+
+def recording_jobs(plan: ExportPlan) -> list[tuple[RecordingJob, tuple[TaskText, ...]]]:
+    """Return the trajectories of a plan in the order of the data set, with their instructions.
+
+    Raises:
+        InvalidValueError: no setting can express any of the episodes.
+    """
+    jobs: list[tuple[RecordingJob, tuple[TaskText, ...]]] = []
+    for episode in plan_episodes(plan):
+        said = texts_of(plan, episode)
+        if not said:
+            continue
+        job = RecordingJob(
+            episode.task, episode.split, episode.index, 0, plan.policy, None, plan.recording
+        )
+        if plan.policy != ORACLE:
+            jobs += [(job._replace(options=one.options), (one,)) for one in said]
+            continue
+        jobs += [(job._replace(variation=number), said) for number in range(plan.variations)]
+    if not jobs:
+        raise InvalidValueError(f"None of these tasks has the setting {', '.join(plan.settings)}.")
+    return jobs
+
+
+def texts_of(plan: ExportPlan, episode: Episode) -> tuple[TaskText, ...]:
+    """Return the instructions of an episode; an explicit one is its own resolved form."""
+    found = instructions([episode], plan.settings, plan.forms, plan.options)
+    explicit = instruct_with(episode, _explicit_words(plan.options)).text
+    said = []
+    for _, one in found:
+        is_repeated = one.form == "resolved" and "implicit" in plan.forms
+        if is_repeated and not all_settings()[one.setting].implicit:
+            continue
+        options = plan.options._replace(setting=one.setting, form=one.form)
+        said.append(TaskText(options, one.text, row(episode, one) | {"explicit": explicit}))
+    return tuple(said)
+
+
+def _explicit_words(options: InstructionOptions) -> InstructionOptions:
+    """Return options for the explicit instruction in the same wordings."""
+    return InstructionOptions(wordings=options.wordings)

@@ -1,0 +1,316 @@
+"""Run an export: record what is missing, write the parts, then what describes them.
+
+All work is resumable: trajectories and parts appear under their names only when they are complete,
+and what makes the data set readable is written last.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import functools
+import json
+import os
+import shutil
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from roboirg.apps.demonstrations import data_card
+from roboirg.apps.demonstrations.dataset_part import DatasetPart, DatasetWriter, RecordedTexts
+from roboirg.apps.demonstrations.export_plan import (
+    ExportPlan,
+    FormatName,
+    RecordingJob,
+    TaskText,
+    recording_jobs,
+)
+from roboirg.apps.demonstrations.formats import lerobot_v3, lerobot_v21, robomme_hdf5
+from roboirg.apps.demonstrations.formats.robomme_hdf5 import check_hdf5_support
+from roboirg.apps.demonstrations.policy_choice import choose_policy
+from roboirg.apps.demonstrations.trajectory import (
+    TrajectoryFacts,
+    drop_pictures,
+    has_pictures,
+    load_facts,
+)
+from roboirg.apps.demonstrations.trajectory_recorder import record_trajectory
+from roboirg.core.episode import ENVIRONMENT_VERSION
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.version import __version__
+from roboirg.util.atomic_write import write_atomically
+from roboirg.util.parallel_map import parallel_map
+from roboirg.util.parquet_support import check_parquet_support
+
+WORK_FOLDER = ".export"
+VIDEO_DATASET = "demonstration_videos"
+"""Folder of the data set of the videos' frames."""
+EXPORT_FILE = "meta/export.json"
+"""What was exported, with its fingerprint; written when everything else is complete."""
+
+WRITERS: Mapping[FormatName, DatasetWriter] = {
+    "lerobot-v3": lerobot_v3,
+    "lerobot-v2.1": lerobot_v21,
+    "robomme-hdf5": robomme_hdf5,
+}
+
+Report = Callable[[str, int, int, int], None]
+"""Called with the kind of work, how much is done, how much there is, and bytes on the disk."""
+Jobs = Sequence[tuple[RecordingJob, tuple[TaskText, ...]]]
+
+
+class ExportSummary(NamedTuple):
+    """What an export did.
+
+    Attributes:
+        recorded: trajectories recorded by this call.
+        statuses: how many trajectories ended how.
+        episodes: in the data set.
+        size: of the data set, bytes.
+    """
+
+    recorded: int
+    statuses: Mapping[str, int]
+    episodes: int
+    size: int
+
+
+def check_support(plan: ExportPlan) -> None:
+    """Check early that the plan's format can be written.
+
+    Raises:
+        MissingDependencyError: a package is not installed.
+    """
+    check_parquet_support()
+    if plan.format == "robomme-hdf5":
+        check_hdf5_support()
+
+
+def run_export(
+    plan: ExportPlan,
+    out: Path,
+    workers: int,
+    report: Report,
+    trajectories: Path | None = None,
+) -> ExportSummary:
+    """Export a plan into a folder, or continue an export that was stopped.
+
+    Args:
+        plan: what to export.
+        out: folder of the data set, new or of the same plan.
+        workers: processes; 0 uses this one.
+        report: told the progress.
+        trajectories: folder that keeps the recorded trajectories, for other formats and settings;
+            None for one in `out` that is deleted at the end.
+
+    Raises:
+        InvalidValueError: the folder holds something else, another export uses it, or no
+            trajectory can be exported.
+        MissingDependencyError: a package is not installed.
+    """
+    check_support(plan)
+    with _opened(plan, out) as work:
+        folder = work / "trajectories" if trajectories is None else trajectories
+        folder.mkdir(parents=True, exist_ok=True)
+        jobs = recording_jobs(plan)
+        parts_folder = work / "parts"
+        missing = [
+            job
+            for job, _ in jobs
+            if not _is_usable(plan, job, folder, may_lack_pictures=parts_folder.exists())
+        ]
+        _record(plan, missing, len(jobs), folder, workers, report)
+        facts = [load_facts(job.path(folder)) for job, _ in jobs]
+        kept = [
+            RecordedTexts(job.path(folder), said)
+            for (job, said), one in zip(jobs, facts, strict=True)
+            if _is_wanted(plan, one)
+        ]
+        if not kept:
+            raise InvalidValueError(
+                f"None of the {len(jobs)} trajectories is a success; ask for --outcomes all."
+            )
+        datasets = _datasets(plan, out, kept)
+        _write_parts(datasets, parts_folder, workers, report, keep=trajectories is not None)
+        episodes = _finish(plan, out, datasets, facts)
+    statuses = Counter(one.status for one in facts)
+    return ExportSummary(len(missing), statuses, episodes, folder_size(out))
+
+
+@contextlib.contextmanager
+def _opened(plan: ExportPlan, out: Path) -> Iterator[Path]:
+    """Yield the folder for unfinished work, which is deleted when the block ends without error."""
+    work = out / WORK_FOLDER
+    written = _read_fingerprint(out / EXPORT_FILE)
+    if written is not None and not work.exists():
+        raise InvalidValueError(
+            f"{str(out)!r} holds a complete export already; choose another folder."
+        )
+    if out.exists() and not work.exists() and any(out.iterdir()):
+        raise InvalidValueError(
+            f"{str(out)!r} is not empty and no export that was stopped; choose another folder."
+        )
+    work.mkdir(parents=True, exist_ok=True)
+    lock = os.open(work / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise InvalidValueError(f"Another export writes to {str(out)!r}.") from error
+        started = work / "plan.json"
+        before = _read_fingerprint(started)
+        if before not in (None, plan.fingerprint()):
+            raise InvalidValueError(
+                f"The export in {str(out)!r} was started with other options or another version; "
+                "give the same ones, or choose another folder."
+            )
+        write_atomically(started, json.dumps({"fingerprint": plan.fingerprint()}))
+        _remove_partial_files(out)
+        yield work
+        shutil.rmtree(work)
+    finally:
+        os.close(lock)
+
+
+def _read_fingerprint(path: Path) -> str | None:
+    try:
+        return str(json.loads(path.read_text(encoding="utf-8"))["fingerprint"])
+    except (OSError, ValueError, KeyError):
+        return None
+
+
+def _remove_partial_files(out: Path) -> None:
+    """Delete what a killed export left under temporary names."""
+    for path in out.rglob(".*.part"):
+        path.unlink(missing_ok=True)
+
+
+def _record(
+    plan: ExportPlan,
+    missing: Sequence[RecordingJob],
+    total: int,
+    folder: Path,
+    workers: int,
+    report: Report,
+) -> None:
+    """Record the trajectories that are missing."""
+    done, size = total - len(missing), folder_size(folder)
+    report("record", done, total, size)
+    work = functools.partial(_record_job, folder, only_successes=plan.outcomes == "successes")
+    for job, _ in parallel_map(work, missing, workers):
+        done, size = done + 1, size + job.path(folder).stat().st_size
+        report("record", done, total, size)
+
+
+def _record_job(folder: Path, job: RecordingJob, *, only_successes: bool) -> None:
+    record_trajectory(
+        job.episode,
+        choose_policy(job),
+        job.path(folder),
+        job.spec,
+        options=job.options,
+        policy_name=job.policy,
+        variation=job.variation,
+        only_successes=only_successes,
+    )
+
+
+def _is_usable(
+    plan: ExportPlan, job: RecordingJob, folder: Path, *, may_lack_pictures: bool
+) -> bool:
+    """Return whether a trajectory need not be recorded.
+
+    Args:
+        plan: the plan.
+        job: the trajectory.
+        folder: of the trajectories.
+        may_lack_pictures: whether parts are being written: a trajectory then loses its pictures as
+            soon as they have been.
+    """
+    path = job.path(folder)
+    if not path.exists():
+        return False
+    facts = load_facts(path)
+    if facts.environment_version != ENVIRONMENT_VERSION:
+        return False
+    may_lack_pictures |= plan.pictures == "none"
+    return may_lack_pictures or has_pictures(path) or not _is_wanted(plan, facts)
+
+
+def _is_wanted(plan: ExportPlan, facts: TrajectoryFacts) -> bool:
+    return plan.outcomes == "all" or facts.status == "success"
+
+
+@dataclass(frozen=True)
+class _Dataset:
+    """One data set of an export: the main one, or that of the videos' frames."""
+
+    root: Path
+    parts: Sequence[DatasetPart]
+
+
+def _datasets(plan: ExportPlan, out: Path, kept: Sequence[RecordedTexts]) -> list[_Dataset]:
+    make = WRITERS[plan.format].make_parts
+    found = []
+    if plan.video == "sidecar":
+        root = out / VIDEO_DATASET
+        found.append(_Dataset(root, make(plan, root, kept, is_video=True)))
+    found.append(_Dataset(out, make(plan, out, kept)))
+    return [one for one in found if one.parts]
+
+
+def _write_parts(
+    datasets: Sequence[_Dataset], folder: Path, workers: int, report: Report, *, keep: bool
+) -> None:
+    """Write the parts that are missing; pictures that are no longer needed are deleted."""
+    parts = [part for dataset in datasets for part in dataset.parts]
+    folder.mkdir(exist_ok=True)
+    missing = [part for part in parts if not _mark(folder, part).exists()]
+    done = len(parts) - len(missing)
+    report("write", done, len(parts), 0)
+    uses = Counter(one.path for part in missing for one in part.episodes)
+    for part, _ in parallel_map(_write_part, missing, workers):
+        write_atomically(_mark(folder, part), "")
+        done += 1
+        report("write", done, len(parts), 0)
+        for one in () if keep else part.episodes:
+            uses[one.path] -= 1
+            if not uses[one.path]:
+                drop_pictures(one.path)
+
+
+def _mark(folder: Path, part: DatasetPart) -> Path:
+    """Return the file whose existence says that a part is complete."""
+    kind = "video" if part.columns.is_video_part else "main"
+    return folder / f"{kind}-{part.number:06d}"
+
+
+def _write_part(part: DatasetPart) -> None:
+    WRITERS[part.columns.plan.format].write_part(part)
+
+
+def _finish(
+    plan: ExportPlan,
+    out: Path,
+    datasets: Sequence[_Dataset],
+    facts: Sequence[TrajectoryFacts],
+) -> int:
+    """Write what describes the data sets, the main one last. Returns its number of episodes."""
+    for dataset in datasets:
+        card = data_card.card_text(plan, dataset.parts, facts, dataset.root)
+        write_atomically(dataset.root / "README.md", card)
+        WRITERS[plan.format].finish(plan, dataset.root, dataset.parts)
+    content = {"fingerprint": plan.fingerprint(), "roboirg": __version__, "format": plan.format}
+    write_atomically(out / EXPORT_FILE, json.dumps(content, indent=2) + "\n")
+    return sum(len(one.texts) for part in datasets[-1].parts for one in part.episodes)
+
+
+def folder_size(folder: Path) -> int:
+    """Return the size of all files in a folder, bytes, without unfinished work."""
+    return sum(
+        path.stat().st_size
+        for path in folder.rglob("*")
+        if path.is_file() and WORK_FOLDER not in path.relative_to(folder).parts
+    )

@@ -1,0 +1,1 @@
+"""The file formats of trainers, one file each."""

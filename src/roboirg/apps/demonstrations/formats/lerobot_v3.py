@@ -1,0 +1,275 @@
+"""Write LeRobot's format, version 3.0: a file of frames and one per camera for each trajectory."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.apps.demonstrations import language_columns
+from roboirg.apps.demonstrations.dataset_part import (
+    CHUNK_SIZE,
+    EPISODE_TABLE,
+    DatasetPart,
+    RecordedEpisode,
+    RecordedTexts,
+    all_texts,
+    episode_row,
+    place_texts,
+    read_episodes,
+)
+from roboirg.apps.demonstrations.export_plan import ExportPlan
+from roboirg.apps.demonstrations.feature_stats import FeatureStats, vector_stats
+from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedText, video_path
+from roboirg.apps.demonstrations.parquet_tables import (
+    number_column,
+    picture_column,
+    text_column,
+    write_frames,
+    write_rows,
+)
+from roboirg.apps.demonstrations.picture_coding import FRAME_RATE
+from roboirg.apps.demonstrations.trajectory import PictureFile, Trajectory, load_trajectory
+from roboirg.core.observations import CAMERAS
+from roboirg.util.atomic_write import write_atomically
+
+INFO = "meta/info.json"
+ROBOT = "panda"
+_DATA = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
+_VIDEO = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
+
+
+def make_parts(
+    plan: ExportPlan, root: Path, recorded: Sequence[RecordedTexts], *, is_video: bool = False
+) -> list[DatasetPart]:
+    """Return a part for each trajectory."""
+    columns = FrameColumns(plan, is_video)
+    return [
+        DatasetPart(number, root, columns, (episode,))
+        for number, episode in enumerate(place_texts(columns, recorded))
+    ]
+
+
+def write_part(part: DatasetPart) -> None:
+    """Write the frames and videos of one trajectory."""
+    (episode,), columns = part.episodes, part.columns
+    trajectory = load_trajectory(episode.path)
+    chunk, file = part.place
+    if columns.has_videos:
+        with zipfile.ZipFile(trajectory.path) as archive:
+            for camera in CAMERAS:
+                path = video_path(part.root, columns.keys[camera], chunk, file)
+                path.parent.mkdir(parents=True, exist_ok=True)
+                write_atomically(path, PictureFile(archive).video(columns.video(camera)))
+    shared = frame_columns(columns, trajectory)
+    length = len(columns.rows(trajectory.facts))
+    own = [own_columns(columns, trajectory, placed, length) for placed in episode.texts]
+    pictures = [] if columns.has_videos else [columns.keys[one] for one in columns.cameras]
+    order = [name for name in info_features(columns) if name in shared or name in own[0]]
+    path = part.root / _DATA.format(chunk_index=chunk, file_index=file)
+    write_frames(path, order, shared, own, pictures)
+
+
+def frame_columns(columns: FrameColumns, trajectory: Trajectory) -> dict[str, Any]:
+    """Return the columns of a trajectory's frames that every instruction shares."""
+    found = {name: number_column(one) for name, one in columns.numbers(trajectory).items()}
+    found |= {name: text_column(one) for name, one in columns.texts(trajectory).items()}
+    if not columns.has_videos:
+        pictures = columns.pictures(trajectory)
+        found |= {name: picture_column(one) for name, one in pictures.items()}
+    return found
+
+
+def own_columns(
+    columns: FrameColumns, trajectory: Trajectory, placed: PlacedText, length: int
+) -> dict[str, Any]:
+    """Return the columns that differ between the instructions of a trajectory."""
+    found = columns.indices(placed, length)
+    own = {name: number_column(one) for name, one in found.items()}
+    if columns.plan.language_columns:
+        own |= language_columns.language_arrays(columns, trajectory, placed)
+    return own
+
+
+def info_features(columns: FrameColumns) -> dict[str, dict[str, Any]]:
+    """Return the features of a data set of version 3."""
+    found = columns.features()
+    if columns.plan.language_columns:
+        found |= language_columns.LANGUAGE_FEATURES
+    return found
+
+
+def finish(plan: ExportPlan, root: Path, parts: Sequence[DatasetPart]) -> None:
+    """Write the metadata; ``info.json``, without which nothing reads the data set, comes last."""
+    del plan
+    columns = parts[0].columns
+    stats = _StatsCollector(columns)
+    episodes, facts = [], []
+    for part, episode, trajectory in read_episodes(parts):
+        for placed in episode.texts:
+            own = stats.add(trajectory, placed)
+            length = len(columns.rows(trajectory.facts))
+            episodes.append(_episode_entry(part, placed, length) | _flat(own))
+            facts.append(episode_row(trajectory, placed, length))
+    texts = all_texts(parts)
+    write_rows(root / "meta/episodes/chunk-000/file-000.parquet", episodes)
+    _write_tasks(root / "meta/tasks.parquet", texts)
+    write_rows(root / EPISODE_TABLE, facts)
+    write_json(root / "meta/stats.json", stats.result())
+    write_json(root / INFO, _info(columns, parts, texts))
+
+
+class _StatsCollector:
+    """Collects the statistics of single episodes and of all."""
+
+    def __init__(self, columns: FrameColumns) -> None:
+        self._columns = columns
+        self._numbers: defaultdict[str, list[NDArray[Any]]] = defaultdict(list)
+        self._counts: dict[str, NDArray[np.int64]] = {}
+        self._last: tuple[Path, dict[str, FeatureStats]] | None = None
+
+    def add(self, trajectory: Trajectory, placed: PlacedText) -> dict[str, FeatureStats]:
+        """Add an episode; returns its own statistics."""
+        shared = self._columns.numbers(trajectory)
+        counts = self._columns.picture_counts(trajectory)
+        indices = self._columns.indices(placed, len(next(iter(shared.values()))))
+        for name, values in (shared | indices).items():
+            self._numbers[name].append(values)
+        for name, one in counts.items():
+            self._counts[name] = self._counts.get(name, 0) + one
+        if self._last is None or self._last[0] != trajectory.path:
+            stats = self._columns.stats({name: [one] for name, one in shared.items()}, counts)
+            self._last = trajectory.path, stats
+        return self._last[1] | {name: vector_stats(one) for name, one in indices.items()}
+
+    def result(self) -> dict[str, FeatureStats]:
+        """Return the statistics of all episodes."""
+        return self._columns.stats(self._numbers, self._counts)
+
+
+def episode_stats(
+    columns: FrameColumns, trajectory: Trajectory, placed: PlacedText
+) -> dict[str, FeatureStats]:
+    """Return the statistics of one episode."""
+    return _StatsCollector(columns).add(trajectory, placed)
+
+
+def total_stats(parts: Sequence[DatasetPart]) -> dict[str, FeatureStats]:
+    """Return the statistics of all frames."""
+    collector = _StatsCollector(parts[0].columns)
+    for _, episode, trajectory in read_episodes(parts):
+        for placed in episode.texts:
+            collector.add(trajectory, placed)
+    return collector.result()
+
+
+def _episode_entry(part: DatasetPart, placed: PlacedText, length: int) -> dict[str, Any]:
+    chunk, file = part.place
+    entry: dict[str, Any] = {
+        "episode_index": placed.episode_index,
+        "tasks": [placed.words.text],
+        "length": length,
+        "data/chunk_index": chunk,
+        "data/file_index": file,
+        "dataset_from_index": placed.first_index,
+        "dataset_to_index": placed.first_index + length,
+    }
+    for camera in CAMERAS if part.columns.has_videos else ():
+        key = f"videos/{part.columns.keys[camera]}"
+        entry[f"{key}/chunk_index"], entry[f"{key}/file_index"] = chunk, file
+        entry[f"{key}/from_timestamp"] = 0.0
+        entry[f"{key}/to_timestamp"] = length / FRAME_RATE
+    return entry | {"meta/episodes/chunk_index": 0, "meta/episodes/file_index": 0}
+
+
+def _flat(stats: Mapping[str, FeatureStats]) -> dict[str, Any]:
+    return {
+        f"stats/{feature}/{name}": value
+        for feature, one in stats.items()
+        for name, value in one.items()
+    }
+
+
+def _write_tasks(path: Path, texts: Sequence[str]) -> None:
+    """Write the texts as pandas does with them as the index, which LeRobot expects."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    from roboirg.util.atomic_write import replacing
+
+    table = pa.table({"task_index": pa.array(range(len(texts)), pa.int64()), "task": list(texts)})
+    described = {
+        "index_columns": ["task"],
+        "column_indexes": [
+            {
+                "name": None,
+                "field_name": None,
+                "pandas_type": "unicode",
+                "numpy_type": "object",
+                "metadata": {"encoding": "UTF-8"},
+            }
+        ],
+        "columns": [
+            {
+                "name": "task_index",
+                "field_name": "task_index",
+                "pandas_type": "int64",
+                "numpy_type": "int64",
+                "metadata": None,
+            },
+            {
+                "name": "task",
+                "field_name": "task",
+                "pandas_type": "unicode",
+                "numpy_type": "object",
+                "metadata": None,
+            },
+        ],
+        "creator": {"library": "pyarrow", "version": pa.__version__},
+        "pandas_version": "2.0.0",
+    }
+    table = table.replace_schema_metadata({"pandas": json.dumps(described)})
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as part:
+        parquet.write_table(table, part)
+
+
+def _info(
+    columns: FrameColumns, parts: Sequence[DatasetPart], texts: Sequence[str]
+) -> dict[str, Any]:
+    last = parts[-1].episodes[-1]
+    count, frames = count_frames(columns, last)
+    return {
+        "codebase_version": "v3.0",
+        "robot_type": ROBOT,
+        "total_episodes": count,
+        "total_frames": frames,
+        "total_tasks": len(texts),
+        "chunks_size": CHUNK_SIZE,
+        "data_files_size_in_mb": 100,
+        "video_files_size_in_mb": 200,
+        "fps": FRAME_RATE,
+        "splits": {"train": f"0:{count}"},
+        "data_path": _DATA,
+        "video_path": _VIDEO if columns.has_videos else None,
+        "features": info_features(columns),
+    }
+
+
+def count_frames(columns: FrameColumns, last: RecordedEpisode) -> tuple[int, int]:
+    """Return the numbers of episodes and frames of a data set, given what comes last in it."""
+    placed = last.texts[-1]
+    length = len(columns.rows(load_trajectory(last.path).facts))
+    return placed.episode_index + 1, placed.first_index + length
+
+
+def write_json(path: Path, content: object) -> None:
+    """Write JSON, atomically."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_atomically(path, json.dumps(content, indent=2) + "\n")

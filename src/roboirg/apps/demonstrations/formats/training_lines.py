@@ -1,0 +1,122 @@
+"""Ready lines for the trainers that read a data set."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from roboirg.apps.demonstrations.export_plan import ExportPlan
+
+_LEROBOT = """\
+```sh
+lerobot-train --dataset.repo_id=local/roboirg --dataset.root={root} \\
+    --policy.type=act --policy.push_to_hub=false --policy.device=cuda \\
+    --policy.pretrained_backbone_weights=null --dataset.use_imagenet_stats=false \\
+    --batch_size=64 --steps=20000 --wandb.enable=false --output_dir=outputs/act
+roboirg run --policy 'act=lerobot://outputs/act/checkpoints/last/pretrained_model?device=cuda' \\
+    --tasks {task} --out runs/act
+```
+
+ACT and Diffusion Policy of LeRobot do not read the instruction: train them on one task at a time.
+The weights of ACT's ResNet are not downloaded with `null`.
+"""
+
+_OPENPI = """\
+openpi reads this data set with the LeRobot that it pins. Save the following as
+`roboirg_config.py` beside openpi's `scripts/`, and start training through it:
+
+```python
+import dataclasses
+import pathlib
+import runpy
+import sys
+
+import openpi.models.pi0_config as pi0_config
+import openpi.policies.libero_policy as libero_policy
+import openpi.training.config as configs
+import openpi.training.weight_loaders as weight_loaders
+import openpi.transforms as transforms
+
+
+@dataclasses.dataclass(frozen=True)
+class RoboIRGData(configs.DataConfigFactory):
+    def create(self, assets_dirs: pathlib.Path, model_config):
+        repack = transforms.Group(inputs=[transforms.RepackTransform({{
+            "observation/image": "{front}", "observation/wrist_image": "{wrist}",
+            "observation/state": "{state}", "actions": "{action}", "prompt": "prompt"}})])
+        data = transforms.Group(
+            inputs=[libero_policy.LiberoInputs(model_type=model_config.model_type)],
+            outputs=[FirstEight()])
+        mask = transforms.make_bool_mask(7, -1)
+        data = data.push(inputs=[transforms.DeltaActions(mask)],
+                         outputs=[transforms.AbsoluteActions(mask)])
+        return dataclasses.replace(
+            self.create_base_config(assets_dirs, model_config), repack_transforms=repack,
+            data_transforms=data,
+            model_transforms=configs.ModelTransformFactory()(model_config),
+            action_sequence_keys=("{action}",))
+
+
+@dataclasses.dataclass(frozen=True)
+class FirstEight(transforms.DataTransformFn):
+    def __call__(self, data):
+        return {{"actions": data["actions"][..., :8]}}
+
+
+configs._CONFIGS_DICT["pi05_roboirg"] = configs.TrainConfig(
+    name="pi05_roboirg",
+    model=pi0_config.Pi0Config(pi05=True, action_horizon=20, max_token_len=160),
+    data=RoboIRGData(repo_id="roboirg", base_config=configs.DataConfig(prompt_from_task=True)),
+    weight_loader=weight_loaders.CheckpointWeightLoader(
+        "gs://openpi-assets/checkpoints/pi05_base/params"),
+    num_train_steps=80_000, batch_size=64)
+runpy.run_path(sys.argv.pop(1), run_name="__main__")
+```
+
+```sh
+export HF_LEROBOT_HOME={parent}   # the folder above this one, which must be named `roboirg`
+python roboirg_config.py scripts/compute_norm_stats.py --config-name pi05_roboirg
+python roboirg_config.py scripts/train.py pi05_roboirg --exp-name first
+```
+
+The configuration follows the shape of openpi's own; it has not been run here, because openpi needs
+a GPU and packages from git. GR00T reads `meta/modality.json`; it needs videos, so export with
+`--pictures lossless-video` or `lossy-video`.
+"""
+
+_MME_VLA = """\
+```sh
+python scripts/build_dataset.py --raw_data_path {root}
+```
+
+is MME-VLA's builder; it reads these files as RoboMME's own. `waypoint_action` is all NaN,
+`choice_action` empty and `available_multi_choices` an empty list: our oracle does not act in these
+spaces. Recording ends with the success, so that no time step `is_completed`.
+"""
+
+
+def training_text(plan: ExportPlan, root: Path) -> str:
+    """Return what to do with a data set, as Markdown.
+
+    Args:
+        plan: what is exported.
+        root: folder of the data set.
+    """
+    from roboirg.apps.demonstrations.frame_columns import FrameColumns
+
+    place = root.resolve()
+    if plan.format == "robomme-hdf5":
+        return _MME_VLA.format(root=place)
+    if plan.format == "lerobot-v2.1":
+        return _OPENPI.format(parent=place.parent, **FrameColumns(plan).keys)
+    text = _LEROBOT.format(root=place, task=plan.tasks[0])
+    if plan.names == "openpi":
+        keys = FrameColumns(plan).keys
+        renamed = {
+            keys["front"]: "observation.images.front",
+            keys["wrist"]: "observation.images.wrist",
+            keys["state"]: "observation.state",
+            keys["action"]: "action",
+        }
+        pairs = ", ".join(f'"{old}": "{new}"' for old, new in renamed.items())
+        text += f"\nAdd `--rename_map='{{{pairs}}}'` to the first line.\n"
+    return text

@@ -1,0 +1,215 @@
+"""The columns of a data set's frames, for both versions of LeRobot's format."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.apps.demonstrations.export_plan import ExportPlan, TaskText
+from roboirg.apps.demonstrations.feature_stats import FeatureStats, gather_vectors, picture_stats
+from roboirg.apps.demonstrations.picture_coding import FRAME_RATE, video_format
+from roboirg.apps.demonstrations.trajectory import PictureFile, Trajectory, TrajectoryFacts
+from roboirg.apps.demonstrations.trajectory_recorder import video_name
+from roboirg.core.observations import CAMERAS
+
+JOINTS = [f"joint_{number}" for number in range(1, 8)]
+_POSE = ["x", "y", "z", "roll", "pitch", "yaw", "gripper"]
+_KEYS: Mapping[str, Mapping[str, str]] = {
+    "lerobot": {
+        "front": "observation.images.front",
+        "wrist": "observation.images.wrist",
+        "state": "observation.state",
+        "action": "action",
+    },
+    "openpi": {
+        "front": "image",
+        "wrist": "wrist_image",
+        "state": "state",
+        "action": "actions",
+    },
+}
+_VECTORS = {"float32": np.float32, "bool": np.bool_, "int64": np.int64}
+_SIZE = 256
+
+
+class PlacedText(NamedTuple):
+    """An instruction at its place in a data set.
+
+    Attributes:
+        words: the instruction.
+        episode_index: of its episode in the data set.
+        first_index: index of its first frame among all frames.
+        task_index: of its text among all texts.
+    """
+
+    words: TaskText
+    episode_index: int
+    first_index: int
+    task_index: int
+
+
+@dataclass(frozen=True)
+class FrameColumns:
+    """Names and contents of the columns of one data set.
+
+    Args:
+        plan: what is exported.
+        is_video_part: whether this is the data set of the videos' frames, beside the main one.
+    """
+
+    plan: ExportPlan
+    is_video_part: bool = False
+
+    @property
+    def keys(self) -> Mapping[str, str]:
+        """Names of the columns of ``front``, ``wrist``, ``state`` and ``action``."""
+        return _KEYS[self.plan.names]
+
+    @property
+    def has_videos(self) -> bool:
+        """Whether pictures are in videos, not in the table."""
+        return self.plan.pictures not in ("png", "none")
+
+    @property
+    def cameras(self) -> tuple[str, ...]:
+        """Cameras whose pictures are stored."""
+        return () if self.plan.pictures == "none" else CAMERAS
+
+    def rows(self, facts: TrajectoryFacts) -> range:
+        """Return the rows of a trajectory that are frames; the next row has a frame's action."""
+        if self.is_video_part:
+            return range(facts.video_length)
+        first = 0 if self.plan.video == "prefix" else facts.video_length
+        return range(first, facts.video_length + facts.steps)
+
+    def video(self, camera: str) -> str:
+        """Return the name of a camera's video in a trajectory's file."""
+        if self.plan.video != "sidecar":
+            return video_name(camera)
+        return video_name(camera, "demonstration" if self.is_video_part else "policy")
+
+    def features(self) -> dict[str, dict[str, Any]]:
+        """Return what ``info.json`` says of each column."""
+        found = {self.keys[camera]: self._picture_feature() for camera in self.cameras}
+        found[self.keys["state"]] = _feature("float32", [*JOINTS, "gripper"])
+        found[self.keys["action"]] = _feature("float32", [*JOINTS, "gripper"])
+        if "delta" in self.plan.extra_actions:
+            found["delta_action"] = _feature("float32", [*JOINTS, "gripper"])
+        if "pose" in self.plan.extra_actions:
+            found["pose_action"] = _feature("float32", _POSE)
+        found["next.reward"] = _feature("float32", ["reward"])
+        found["next.done"] = _feature("bool", ["done"])
+        found["next.success"] = _feature("bool", ["success"])
+        found["is_video_demo"] = _feature("bool", ["is_video_demo"])
+        found["subgoal"] = _feature("string", ["subgoal"])
+        found["grounded_subgoal"] = _feature("string", ["grounded_subgoal"])
+        found["timestamp"] = _feature("float32", ["s"])
+        for name in ("frame_index", "episode_index", "index", "task_index"):
+            found[name] = _feature("int64", [name])
+        return found
+
+    def _picture_feature(self) -> dict[str, Any]:
+        feature: dict[str, Any] = {
+            "dtype": "video" if self.has_videos else "image",
+            "shape": [_SIZE, _SIZE, 3],
+            "names": ["height", "width", "channel"],
+        }
+        if self.has_videos:
+            feature["info"] = {
+                "video.fps": FRAME_RATE,
+                "video.codec": "h264",
+                "video.pix_fmt": video_format(self.plan.pictures),
+                "video.height": _SIZE,
+                "video.width": _SIZE,
+                "video.channels": 3,
+                "video.is_depth_map": False,
+                "is_depth_map": False,
+                "has_audio": False,
+            }
+        return feature
+
+    def numbers(self, trajectory: Trajectory) -> dict[str, NDArray[Any]]:
+        """Return the columns of numbers that do not depend on the instruction, (frames, size)."""
+        facts, rows = trajectory.facts, np.array(self.rows(trajectory.facts), dtype=np.int64)
+        actions = trajectory.actions[rows + 1].astype(np.float32)
+        columns: dict[str, NDArray[Any]] = {
+            self.keys["state"]: trajectory.state[rows],
+            self.keys["action"]: actions,
+        }
+        if "delta" in self.plan.extra_actions:
+            moved = actions[:, :7] - trajectory.joint_positions[rows]
+            columns["delta_action"] = np.column_stack([moved, actions[:, 7]])
+        if "pose" in self.plan.extra_actions:
+            columns["pose_action"] = trajectory.pose_actions[rows + 1].astype(np.float32)
+        is_last = rows == facts.video_length + facts.steps - 1
+        is_success = is_last & (facts.status == "success")
+        columns["next.reward"] = is_success.astype(np.float32)[:, None]
+        columns["next.done"] = is_last[:, None]
+        columns["next.success"] = is_success[:, None]
+        columns["is_video_demo"] = (rows < facts.video_length)[:, None]
+        frames = np.arange(len(rows), dtype=np.int64)
+        columns["timestamp"] = (frames / FRAME_RATE).astype(np.float32)[:, None]
+        columns["frame_index"] = frames[:, None]
+        return columns
+
+    def indices(self, placed: PlacedText, length: int) -> dict[str, NDArray[np.int64]]:
+        """Return the columns of indices of one instruction, (frames, 1)."""
+        return {
+            "episode_index": np.full((length, 1), placed.episode_index, dtype=np.int64),
+            "index": np.arange(placed.first_index, placed.first_index + length)[:, None],
+            "task_index": np.full((length, 1), placed.task_index, dtype=np.int64),
+        }
+
+    def texts(self, trajectory: Trajectory) -> dict[str, list[str]]:
+        """Return the columns of texts: what the robot does in the frame's action."""
+        rows = self.rows(trajectory.facts)
+        chosen = slice(rows.start + 1, rows.stop + 1)
+        return {
+            "subgoal": trajectory.subgoals[chosen].tolist(),
+            "grounded_subgoal": trajectory.grounded_subgoals[chosen].tolist(),
+        }
+
+    def pictures(self, trajectory: Trajectory) -> dict[str, list[bytes]]:
+        """Return the columns of PNGs."""
+        rows = self.rows(trajectory.facts)
+        with zipfile.ZipFile(trajectory.path) as archive:
+            file = PictureFile(archive)
+            return {
+                self.keys[camera]: [file.encoded(camera, row) for row in rows]
+                for camera in self.cameras
+            }
+
+    def picture_counts(self, trajectory: Trajectory) -> dict[str, NDArray[np.int64]]:
+        """Return how often each value occurs in the frames of each camera's column."""
+        if self.is_video_part:
+            parts = slice(0, 1)
+        else:
+            parts = slice(0, 2) if self.plan.video == "prefix" else slice(1, 2)
+        return {
+            self.keys[camera]: trajectory.histograms[camera][parts].sum(axis=0)
+            for camera in self.cameras
+        }
+
+    def stats(
+        self,
+        numbers: Mapping[str, list[NDArray[Any]]],
+        counts: Mapping[str, NDArray[np.int64]],
+    ) -> dict[str, FeatureStats]:
+        """Return the statistics of all columns but texts."""
+        found = {name: picture_stats(one) for name, one in counts.items()}
+        return found | {name: gather_vectors(parts) for name, parts in numbers.items()}
+
+
+def _feature(dtype: str, names: list[str]) -> dict[str, Any]:
+    return {"dtype": dtype, "shape": [len(names)], "names": names}
+
+
+def video_path(root: Path, key: str, chunk: int, file: int) -> Path:
+    """Return the path of a video in version 3 of the format."""
+    return root / "videos" / key / f"chunk-{chunk:03d}" / f"file-{file:03d}.mp4"

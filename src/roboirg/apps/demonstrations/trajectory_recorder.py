@@ -1,0 +1,350 @@
+"""Record one episode as a trajectory: pictures, states, actions and subgoals of every step."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.apps.demonstrations.picture_coding import (
+    VideoEncoder,
+    count_values,
+    encode_depth,
+    encode_png,
+)
+from roboirg.apps.demonstrations.trajectory import (
+    PictureCoding,
+    TrajectoryFacts,
+    TrajectoryFile,
+    picture_name,
+    stack_texts,
+)
+from roboirg.core.actions import ARM_JOINTS, check_chunk
+from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
+from roboirg.core.errors import InvalidValueError, MotionPlanningError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.observations import CAMERAS
+from roboirg.envs.factory import make
+from roboirg.policies.base import Policy, PrivilegedPolicy, tell_policy
+from roboirg.policies.requirements import wanted_actions
+from roboirg.util.atomic_write import replacing
+
+if TYPE_CHECKING:
+    from roboirg.envs.environment import RoboIRGEnv
+
+_PIXEL = re.compile(r" at <\d+, \d+>")
+_VIDEO_PARTS = ("demonstration", "policy")
+
+
+class RecordingSpec(NamedTuple):
+    """What a trajectory holds.
+
+    Attributes:
+        coding: how pictures are stored; with ``none`` nothing is drawn, and no subgoal has a pixel.
+        video: whether the pictures of the video are stored.
+        is_video_apart: whether a stored MP4 holds the video and the policy's part in two files.
+        depth: whether depth and calibration are stored.
+    """
+
+    coding: PictureCoding = "png"
+    video: bool = False
+    is_video_apart: bool = False
+    depth: bool = False
+
+
+@dataclass
+class _Rows:
+    """What is collected while the policy acts; see `Trajectory`."""
+
+    observations: list[Mapping[str, Any]] = field(default_factory=list)
+    actions: list[NDArray[np.float64]] = field(default_factory=list)
+    subgoals: list[str] = field(default_factory=list)
+    online: list[str] = field(default_factory=list)
+
+
+class PictureTracks:
+    """Encodes the pictures of both cameras in the order of rows."""
+
+    def __init__(self, file: TrajectoryFile, spec: RecordingSpec) -> None:
+        self._file, self._spec = file, spec
+        self._rows = 0
+        self._encoders: dict[tuple[str, str], VideoEncoder] = {}
+        self.histograms = {camera: np.zeros((2, 3, 256), np.int64) for camera in CAMERAS}
+        self._uncounted: tuple[Mapping[str, Any], int] | None = None
+
+    def add(self, pictures: Mapping[str, Any], *, is_video: bool) -> None:
+        """Add the pictures of a row: ``front_rgb`` and so on."""
+        if self._spec.coding == "none":
+            return
+        self._count_last()
+        self._uncounted = pictures, int(not is_video)
+        part = _VIDEO_PARTS[not is_video] if self._spec.is_video_apart else ""
+        for camera in CAMERAS:
+            picture = pictures[f"{camera}_rgb"]
+            if self._spec.coding == "png":
+                self._file.add_file(picture_name(camera, self._rows), encode_png(picture))
+            else:
+                key = camera, part
+                if key not in self._encoders:
+                    self._encoders[key] = VideoEncoder(self._spec.coding)
+                self._encoders[key].add(picture)
+            if self._spec.depth:
+                name = picture_name(f"{camera}_depth", self._rows)
+                self._file.add_file(name, encode_depth(pictures[f"{camera}_depth"]))
+        self._rows += 1
+
+    def _count_last(self) -> None:
+        """Count the values of the row before; the last row of all is never counted."""
+        if self._uncounted is not None:
+            pictures, part = self._uncounted
+            for camera in CAMERAS:
+                self.histograms[camera][part] += count_values(pictures[f"{camera}_rgb"])
+
+    def finish(self) -> dict[str, dict[str, float]]:
+        """Store the videos; returns the errors of lossy ones by name."""
+        errors = {}
+        for (camera, part), encoder in self._encoders.items():
+            name = video_name(camera, part)
+            self._file.add_file(name, encoder.finish())
+            if self._spec.coding == "lossy-video":
+                errors[name] = encoder.error
+        return errors
+
+
+def video_name(camera: str, part: str = "") -> str:
+    """Return the name of a camera's video: of all rows, or of ``demonstration`` or ``policy``."""
+    return f"{camera}_{part}.mp4" if part else f"{camera}.mp4"
+
+
+def record_trajectory(
+    episode: Episode,
+    policy: Policy,
+    path: Path,
+    spec: RecordingSpec,
+    *,
+    options: InstructionOptions | None = None,
+    policy_name: str = "oracle",
+    variation: int = 0,
+    only_successes: bool = True,
+) -> TrajectoryFacts:
+    """Play an episode and write its trajectory; the file appears whole or not at all.
+
+    Actions are rounded to float32 before they are executed, so that a data set holds exactly what
+    was executed.
+
+    Args:
+        episode: the episode.
+        policy: moves the robot, by joint angles.
+        path: file to write.
+        spec: what it holds.
+        options: what the policy is told; None for the explicit instruction.
+        policy_name: name of the policy.
+        variation: number of the variation.
+        only_successes: leave out the pictures of an episode that is no success.
+
+    Raises:
+        InvalidValueError: the policy has another action space; or the file cannot be written.
+    """
+    if wanted_actions(policy).name != "joint_angle":
+        raise InvalidValueError(
+            f"Policy {policy_name!r} acts in {wanted_actions(policy).name!r}; demonstrations hold "
+            "joint angles, so it must act in 'joint_angle'."
+        )
+    said, is_drawn = options or InstructionOptions(), spec.coding != "none"
+    env = make(
+        episode,
+        **said._asdict(),
+        cameras=CAMERAS if is_drawn or policy_name != "oracle" else (),
+        depth=spec.depth,
+        calibration=spec.depth,
+        grounded=is_drawn,
+        demonstration_frames="none" if policy_name == "oracle" else "all",
+    )
+    try:
+        with replacing(path) as part:
+            with zipfile.ZipFile(part, "w") as archive:
+                recorder = _Recorder(env, policy, spec, TrajectoryFile(archive))
+                facts = recorder.record(policy_name, variation)
+            if only_successes and facts.status != "success":
+                _keep_facts(part, facts)
+    finally:
+        env.close()
+    return facts
+
+
+def _keep_facts(part: Path, facts: TrajectoryFacts) -> None:
+    with zipfile.ZipFile(part, "w") as archive:
+        TrajectoryFile(archive).finish(facts, {})
+
+
+class _Recorder:
+    """Records one episode."""
+
+    def __init__(
+        self, env: RoboIRGEnv, policy: Policy, spec: RecordingSpec, file: TrajectoryFile
+    ) -> None:
+        self._env, self._policy, self._spec, self._file = env, policy, spec, file
+        self._tracks = PictureTracks(file, spec)
+        self._rows = _Rows()
+        self._video: list[Mapping[str, Any]] = []
+        self._video_session: object = None
+
+    def record(self, policy_name: str, variation: int) -> TrajectoryFacts:
+        """Play the episode and store what happens."""
+        if self._spec.video and self._spec.coding != "none":
+            self._env.set_frame_hook(self._see_video)
+        observation, info = self._env.reset()
+        self._start(observation, info)
+        cause = self._play(observation, info)
+        facts = self._facts(policy_name, variation, info, cause)
+        self._file.finish(facts, self._arrays(info))
+        return facts
+
+    def _see_video(self, env: RoboIRGEnv, is_demonstration: bool) -> None:
+        """Encode the pictures of the video while it is played."""
+        if not is_demonstration:
+            return
+        if self._video_session not in (None, env.session):
+            raise InvalidValueError(
+                f"The recorded demonstration of {env.episode.key} does not play to its end here."
+            )
+        self._video_session = env.session
+        cameras = env.session.world.cameras
+        pictures: dict[str, Any] = {
+            f"{name}_rgb": picture for name, picture in cameras.pictures(CAMERAS).items()
+        }
+        if self._spec.depth:
+            pictures |= {f"{name}_depth": cameras.depth(name) for name in CAMERAS}
+        self._tracks.add(pictures, is_video=True)
+
+    def _start(self, observation: dict[str, Any], info: dict[str, Any]) -> None:
+        """Store the policy's first observation, which follows a step at home."""
+        from roboirg.simulation.physics_settings import HOME_ACTION
+
+        if isinstance(self._policy, PrivilegedPolicy):
+            self._policy.attach(self._env)
+        self._policy.reset(observation["instruction"], info["demonstration"])
+        self._add_row(HOME_ACTION, observation, self._env.subgoal, self._env.subgoal)
+
+    def _play(self, observation: Any, info: dict[str, Any]) -> str:  # noqa: ANN401
+        """Play to the end. Returns the cause of a failure."""
+        while info["status"] == "ongoing":
+            try:
+                chunk = check_chunk(self._policy.act(observation))
+            except MotionPlanningError as error:
+                return str(error)
+            heard: list[Mapping[str, Any]] = []
+            for exact in chunk:
+                action = exact.astype(np.float32).astype(np.float64)
+                observation, *_, info = self._env.step(action)
+                heard += info["heard"]
+                online = self._env.subgoal
+                stage = getattr(self._policy, "stage", None)
+                doing = online if stage is None else stage.subgoal
+                self._add_row(action, observation, doing, online)
+                if info["status"] != "ongoing":
+                    break
+            tell_policy(self._policy, heard)
+        return str(info["cause"] or "")
+
+    def _add_row(
+        self, action: NDArray[np.float64], observation: Mapping[str, Any], doing: str, online: str
+    ) -> None:
+        rows = self._rows
+        self._tracks.add(observation, is_video=False)
+        kept = {key: value for key, value in observation.items() if not _is_picture(key)}
+        rows.observations.append(kept)
+        rows.actions.append(action)
+        rows.subgoals.append(doing)
+        rows.online.append(online)
+
+    def _facts(
+        self, policy_name: str, variation: int, info: Mapping[str, Any], cause: str
+    ) -> TrajectoryFacts:
+        episode, status = self._env.episode, self._env.status
+        return TrajectoryFacts(
+            task=episode.task,
+            split=episode.split,
+            episode=episode.index,
+            seed=episode.seed,
+            difficulty=episode.difficulty,
+            variation=variation,
+            policy=policy_name,
+            status="failure" if status == "ongoing" else status,
+            cause=cause,
+            video_length=info["demonstration"].length if self._spec.video else 0,
+            steps=len(self._rows.actions) - 1,
+            demonstration_source=info["demonstration_source"],
+            environment_version=ENVIRONMENT_VERSION,
+            coding=self._spec.coding,
+            depth=self._spec.depth,
+            picture_error=self._tracks.finish(),
+        )
+
+    def _arrays(self, info: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
+        """Return the arrays of a trajectory, the video's rows first."""
+        rows, video = self._rows, info["demonstration"]
+        length = video.length if self._spec.video else 0
+        names = ["joint_positions", "gripper", "end_effector"]
+        names += [f"{camera}_extrinsic" for camera in CAMERAS if self._spec.depth]
+        arrays = {
+            name: np.concatenate(
+                [video[name][:length], np.stack([one[name] for one in rows.observations])]
+            )
+            for name in names
+        }
+        for name in [f"{camera}_intrinsic" for camera in CAMERAS if self._spec.depth]:
+            arrays[name] = rows.observations[0][name]
+        arrays["actions"] = np.concatenate([video.actions[:length], rows.actions])
+        arrays["pose_actions"] = self._pose_actions(arrays["actions"])
+        seen = list(info["demonstration_subgoals"][:length])
+        online = [*seen, *rows.online]
+        doing = [*seen, *_with_pixels(rows.subgoals, rows.online)]
+        arrays["grounded_online_subgoals"] = stack_texts(online)
+        arrays["online_subgoals"] = stack_texts([without_pixel(text) for text in online])
+        arrays["grounded_subgoals"] = stack_texts(doing)
+        arrays["subgoals"] = stack_texts([without_pixel(text) for text in doing])
+        for camera, counts in self._tracks.histograms.items():
+            arrays[f"{camera}_histogram"] = counts
+        return arrays
+
+    def _pose_actions(self, actions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the tool's pose at the joint targets of each action, with unwrapped angles."""
+        from roboirg.simulation.expert.motion_planning import MotionPlanner
+
+        planner = MotionPlanner(self._env.session.world.robot)
+        poses = [planner.forward_kinematics(action[:ARM_JOINTS]) for action in actions]
+        angles = np.unwrap([pose.rotation.as_euler("xyz") for pose in poses], axis=0)
+        positions = np.stack([pose.position for pose in poses])
+        return np.column_stack([positions, angles, actions[:, ARM_JOINTS]])
+
+
+def _is_picture(key: str) -> bool:
+    return key.endswith(("_rgb", "_depth"))
+
+
+def without_pixel(subgoal: str) -> str:
+    """Return a grounded subgoal without its pixel."""
+    return _PIXEL.sub("", subgoal)
+
+
+def _with_pixels(templates: list[str], online: list[str]) -> list[str]:
+    """Fill the pixels into subgoals, as the judge's view of the same subgoal found them.
+
+    Args:
+        templates: subgoals, with ``{at}`` where the pixel goes, row by row.
+        online: grounded subgoals of the stages that were due, row by row.
+    """
+    latest: dict[str, str] = {}
+    filled = []
+    for template, due in zip(templates, online, strict=True):
+        latest[without_pixel(due)] = due
+        simple = without_pixel(template.replace("{at} ", "").replace(" {at}", ""))
+        filled.append(latest.get(simple, simple))
+    return filled

@@ -1,0 +1,199 @@
+"""Commands of the grounding dataset: ``roboirg export grounding``, ``roboirg score grounding``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from roboirg.cli.export_commands import export_app
+from roboirg.cli.options import (
+    DEFAULT_WORDS,
+    AnySplit,
+    Forms,
+    Settings,
+    Tasks,
+    WordChoices,
+    Workers,
+    spread,
+)
+from roboirg.core.errors import InvalidValueError
+from roboirg.util.plain_text import counted
+
+if TYPE_CHECKING:
+    from roboirg.apps.grounding.answer_scores import GroundingScore
+
+# Heavy modules are imported inside the commands, so that --help is fast.
+
+score_app = typer.Typer(no_args_is_help=True, help="Score answers of models.")
+
+
+@score_app.callback()
+def _score() -> None:
+    # With a callback, a single command keeps its name.
+    pass
+
+
+@spread
+def export_grounding(
+    out: Annotated[Path, typer.Option(help="Folder for the dataset; continued if interrupted.")],
+    split: AnySplit = "test",
+    tasks: Tasks = "all",
+    settings: Settings = "all",
+    forms: Forms = "implicit",
+    episodes: Annotated[
+        str, typer.Option(help="all, 4 for the first four, or a list such as 0,3,5-9.")
+    ] = "all",
+    variants: Annotated[
+        bool, typer.Option(help="Add every combination of the options below.")
+    ] = False,
+    words: WordChoices = DEFAULT_WORDS,
+    frames: Annotated[int, typer.Option(min=1, help="Most frames of a video as pictures.")] = 16,
+    frames_every: Annotated[
+        int, typer.Option(min=1, help="Control steps between two frames of a video.")
+    ] = 8,
+    formats: Annotated[
+        str, typer.Option(help="Tables beside the JSON lines: parquet, tsv, both, or none.")
+    ] = "parquet,tsv",
+    workers: Workers = None,
+) -> None:
+    """Export questions of grounding with pictures: Parquet, JSON lines, VLMEvalKit's TSV."""
+    from roboirg.apps.grounding.dataset_export import export_grounding
+    from roboirg.cli.names import known_name, known_settings, known_tasks
+    from roboirg.cli.progress_bar import progress_bar
+    from roboirg.evaluation.grounding_set.question_set import (
+        TABLE_FORMATS,
+        EpisodeName,
+        ExportRequest,
+    )
+    from roboirg.evaluation.plan_parsing import parse_episodes, parse_names, parse_splits
+    from roboirg.language import FORMS
+    from roboirg.language.generator import check_options
+    from roboirg.util.parquet_support import check_parquet_support
+    from roboirg.util.processor import core_count
+
+    tables = () if formats.strip().lower() == "none" else parse_names("format", formats)
+    kinds = tuple(known_name("format", one, TABLE_FORMATS) for one in tables)
+    if "parquet" in kinds:
+        check_parquet_support()
+    options = words.instruction_options()
+    check_options(options)
+    request = ExportRequest(
+        episodes=tuple(
+            EpisodeName(task, one, index)
+            for task in known_tasks(tasks, options.wordings)
+            for one in parse_splits(split)
+            for index in parse_episodes(episodes, one)
+        ),
+        settings=known_settings(settings),
+        forms=tuple(known_name("form", one, FORMS) for one in parse_names("form", forms)),
+        options=options,
+        every_variant=variants,
+        frames=frames,
+        frames_every=frames_every,
+        wordings=words.wordings,
+        formats=kinds,
+    )
+    count = core_count() if workers is None else workers
+    with progress_bar("episodes") as progress:
+        facts = export_grounding(request, out, count, progress)
+    typer.echo(
+        f"{counted(facts.items, 'item')}, {counted(facts.pictures, 'picture')}, "
+        f"{counted(facts.videos, 'video')}, {facts.size / 2**20:.1f} MiB: {out}\n"
+        f"sha256 {facts.sha256}"
+    )
+
+
+@score_app.command("grounding")
+def score_grounding(
+    data: Annotated[Path, typer.Option(help="Folder of the dataset.")],
+    answers: Annotated[
+        list[Path] | None,
+        typer.Argument(help="Files of answers; the model's name is the file's.", metavar="ANSWERS"),
+    ] = None,
+    floor: Annotated[
+        str | None,
+        typer.Option(
+            help="Add floors, separated by commas: oracle, chance, command, first-mention, "
+            "last-mention, elimination, surface, words-explicit, words-setting, or all."
+        ),
+    ] = None,
+    write_floors: Annotated[
+        Path | None, typer.Option(help="Folder to write the floors' answers to.")
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option(help="File for a report in Markdown, with confusions.")
+    ] = None,
+) -> None:
+    """Score answers to the grounding dataset; two files are also compared."""
+    from rich.console import Console
+
+    from roboirg.analysis.tables.rendering.terminal import renderable
+    from roboirg.apps.grounding.answer_floors import floor_answers
+    from roboirg.apps.grounding.answer_scores import score_answers
+    from roboirg.apps.grounding.score_report import report_text
+    from roboirg.apps.grounding.score_tables import score_table
+    from roboirg.evaluation.grounding_set.answer_file import read_answers, write_answers
+    from roboirg.evaluation.grounding_set.grounding_item import read_items
+    from roboirg.util.atomic_write import write_atomically
+
+    names = _floors(floor)
+    if not answers and not names:
+        raise InvalidValueError("There is nothing to score: give files of answers, or --floor.")
+    items = read_items(data)
+    scores = [
+        one
+        for path in answers or ()
+        for one in score_answers(items, read_answers(path, items), path.stem)
+    ]
+    compared = _comparisons(scores) if len(answers or ()) == 2 else []  # noqa: PLR2004
+    for name in names:
+        found = list(floor_answers(name, items))
+        if write_floors is not None:
+            write_floors.mkdir(parents=True, exist_ok=True)
+            write_answers(write_floors / f"{name}.jsonl", found)
+        scores += score_answers(items, found, name)
+    console = Console()
+    console.print(renderable(score_table(scores), console))
+    for sentence in compared:
+        console.print(sentence, highlight=False, markup=False)
+    if report is not None:
+        write_atomically(report, report_text(scores, data, report))
+        typer.echo(report)
+
+
+def _floors(text: str | None) -> tuple[str, ...]:
+    from roboirg.apps.grounding.answer_floors import FLOORS
+    from roboirg.cli.names import known_name
+    from roboirg.evaluation.plan_parsing import means_all, parse_names
+
+    if text is None:
+        return ()
+    if means_all(text):
+        return FLOORS
+    return tuple(known_name("floor", one, FLOORS) for one in parse_names("floor", text))
+
+
+def _comparisons(scores: Sequence[GroundingScore]) -> list[str]:
+    """Return the paired comparison of two models in each kind of question that both answered."""
+    import numpy as np
+
+    from roboirg.analysis.stats.comparison import compare
+    from roboirg.analysis.stats.comparison_text import sentences
+    from roboirg.analysis.stats.intervals import SEED
+
+    found: list[str] = []
+    for place, first in enumerate(scores):
+        for second in scores[place + 1 :]:
+            if first.kind == second.kind:
+                names = f"{first.name} ({first.kind})", f"{second.name} ({second.kind})"
+                result = compare(first.cells, second.cells, np.random.default_rng(SEED))
+                found += ["", *sentences(result, *names)]
+    return found
+
+
+def add_commands(app: typer.Typer) -> None:
+    export_app.command("grounding")(export_grounding)
+    app.add_typer(score_app, name="score")

@@ -1,0 +1,190 @@
+"""The items as tables: Parquet with pictures, and the TSV of VLMEvalKit."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import io
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from roboirg.evaluation.grounding_set.grounding_item import LETTERS, GroundingItem
+from roboirg.policies.planning.prompts import load_prompts
+from roboirg.util.atomic_write import replacing, write_atomically
+from roboirg.util.parquet_support import check_parquet_support
+
+DATA = "data"
+TSV_FOLDER = "vlmevalkit"
+ROWS_PER_GROUP = 256
+_DICTIONARY_LIMIT = 1 << 30
+"""Bytes of a column's distinct values in a row group: so that each picture is stored once in it."""
+
+PICTURE_COLUMNS = ("picture", "frames")
+_NUMBERS = ("episode", "distractors", "video_steps", "words_back", "environment_version")
+_FLOATS = ("command_chance", "meters")
+_TEXT_LISTS = (
+    "turns", "choices", "answers", "goals", "choice_answers", "hidden_slots", "expressions",
+)  # fmt: skip
+
+
+def write_parquet(items: Sequence[GroundingItem], folder: Path, split: str) -> Path:
+    """Write the items of a split with their pictures inside, for pandas and `datasets`.
+
+    Pictures are columns of the type Image of `datasets`, which loads the file without options.
+
+    Raises:
+        MissingDependencyError: pyarrow is not installed.
+        InvalidValueError: the file cannot be written.
+    """
+    check_parquet_support()
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    schema = _arrow_schema()
+    path = folder / DATA / f"{split}-00000-of-00001.parquet"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    contents: dict[str, bytes] = {}
+    dictionaries = ["picture.bytes", "frames.list.element.bytes", *schema.names]
+    with (
+        replacing(path) as part,
+        parquet.ParquetWriter(
+            part,
+            schema,
+            compression="zstd",
+            use_dictionary=dictionaries,
+            dictionary_pagesize_limit=_DICTIONARY_LIMIT,
+        ) as writer,
+    ):
+        for start in range(0, len(items), ROWS_PER_GROUP):
+            rows = [_row(one, folder, contents) for one in items[start : start + ROWS_PER_GROUP]]
+            writer.write_table(pa.Table.from_pylist(rows, schema=schema))
+    return path
+
+
+def write_tsv(items: Sequence[GroundingItem], folder: Path, split: str) -> Path:
+    """Write the choice questions of a split as VLMEvalKit reads them.
+
+    An item with the pictures of an earlier one names that one in their place, as the format allows.
+
+    Raises:
+        InvalidValueError: the file cannot be written.
+    """
+    questions = load_prompts("grounding_questions")
+    path = folder / TSV_FOLDER / f"roboirg_grounding_{split}.tsv"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    text = io.StringIO()
+    columns = (
+        "index", "image", "image_path", "question", *LETTERS, "answer", "category", "l2-category",
+        "split", "id",
+    )  # fmt: skip
+    writer = csv.DictWriter(text, columns, delimiter="\t", lineterminator="\n")
+    writer.writeheader()
+    first: dict[tuple[str, ...], int] = {}
+    for index, item in enumerate(items):
+        pictures = (*item.frames, item.picture)
+        seen = first.setdefault(pictures, index)
+        writer.writerow(
+            {
+                "index": index,
+                "image": _images(pictures, folder) if seen == index else seen,
+                "image_path": _listed([Path(one).name for one in pictures]),
+                "question": "\n".join(
+                    (
+                        item.system,
+                        item.said,
+                        _pictures_note(len(item.frames), item.shown),
+                        questions.fill("choice_alone"),
+                    )
+                ),
+                **dict(zip(LETTERS, item.choices, strict=False)),
+                "answer": item.choice,
+                "category": item.setting,
+                "l2-category": item.task,
+                "split": split,
+                "id": item.id,
+            }
+        )
+    write_atomically(path, text.getvalue())
+    return path
+
+
+def _pictures_note(frames: int, shown: str) -> str:
+    """Return which of the pictures, which all stand before the text, is what."""
+    if not frames:
+        return f"{shown} The picture shows the table as it is now."
+    return f"{shown} the first {frames} pictures. The last picture shows the table as it is now."
+
+
+def _images(pictures: Sequence[str], folder: Path) -> str:
+    return _listed([base64.b64encode((folder / one).read_bytes()).decode() for one in pictures])
+
+
+def _listed(values: Sequence[str]) -> str:
+    """Return one value as it is, several as a list."""
+    return values[0] if len(values) == 1 else repr(list(values))
+
+
+def _row(item: GroundingItem, folder: Path, contents: dict[str, bytes]) -> dict[str, Any]:
+    row: dict[str, Any] = msgspec.to_builtins(item)
+
+    def picture(path: str) -> Mapping[str, Any]:
+        if path not in contents:
+            contents[path] = (folder / path).read_bytes()
+        return {"bytes": contents[path], "path": path}
+
+    row["picture"], row["frames"] = picture(item.picture), list(map(picture, item.frames))
+    return row
+
+
+def _arrow_schema() -> Any:  # noqa: ANN401 - pyarrow ships no types
+    import pyarrow as pa
+
+    text, number = pa.string(), pa.int64()
+    picture = pa.struct([("bytes", pa.binary()), ("path", text)])
+    point = pa.struct(
+        [
+            ("kind", text),
+            ("picture", text),
+            ("x", number),
+            ("y", number),
+            ("size", pa.list_(number)),
+            ("counts", pa.list_(number)),
+        ]
+    )
+    special = {
+        **dict.fromkeys(_NUMBERS, number),
+        **dict.fromkeys(_FLOATS, pa.float64()),
+        **dict.fromkeys(_TEXT_LISTS, pa.list_(text)),
+        "stages": pa.list_(number),
+        "picture": picture,
+        "frames": pa.list_(picture),
+        "points": pa.list_(point),
+        "points_in_order": pa.bool_(),
+    }
+    schema = pa.schema(
+        [(name, special.get(name, text)) for name in GroundingItem.__struct_fields__]
+    )
+    return schema.with_metadata({"huggingface": json.dumps(_features(schema))})
+
+
+def _features(schema: Any) -> dict[str, Any]:  # noqa: ANN401 - pyarrow ships no types
+    """Return the description of the columns that `datasets` reads."""
+    image = {"_type": "Image"}
+    found = {field.name: _feature(field.type) for field in schema}
+    found |= {"picture": image, "frames": {"feature": image, "_type": "List"}}
+    return {"info": {"features": found}}
+
+
+def _feature(kind: Any) -> Any:  # noqa: ANN401 - pyarrow ships no types
+    import pyarrow as pa
+
+    if pa.types.is_list(kind):
+        return {"feature": _feature(kind.value_type), "_type": "List"}
+    if pa.types.is_struct(kind):
+        return {field.name: _feature(field.type) for field in kind}
+    name = "float64" if pa.types.is_floating(kind) else str(kind)
+    return {"dtype": name, "_type": "Value"}

@@ -1,0 +1,173 @@
+"""Tables of scores: each set of options, and gaps by kind of words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import pairwise
+
+from roboirg.analysis.stats.breakdowns import Breakdown, InstructionKey, Labels
+from roboirg.analysis.stats.intervals import Interval
+from roboirg.analysis.stats.option_labels import options_label
+from roboirg.analysis.stats.rates import p_text, points
+from roboirg.analysis.tables.breakdown_table import make_breakdown_table
+from roboirg.analysis.tables.table import NOT_APPLICABLE, Column, Entry, Row, Table
+from roboirg.apps.grounding.answer_scores import GroundingScore, ScoreRow, score_rows
+from roboirg.evaluation.grounding_set.grounding_item import GroundingItem
+from roboirg.util.plain_text import counted
+
+COLUMNS = tuple(
+    map(
+        Column,
+        (
+            "items", "right", "95 % interval", "random", "above random", "command", "hidden slots",
+            "gap", "p",
+        ),
+    )
+)  # fmt: skip
+WORDS_BACK_EDGES = (0, 5, 10, 15, 20, 30)
+METERS_EDGES = (0.0, 0.4, 0.45, 0.5, 0.55)
+QUESTIONS = {"slots": "slots", "choice": "choices", "points": "points"}
+
+ItemLabels = Callable[[GroundingItem], Sequence[str]]
+
+
+def score_table(scores: Iterable[GroundingScore]) -> Table:
+    """Return a table with a row for each model, kind of question and set of options."""
+    scores = tuple(scores)
+    return Table(
+        key="grounding",
+        title="Grounding",
+        heads=("model and question", "setting"),
+        columns=COLUMNS,
+        rows=tuple(
+            Row(
+                f"{score.name}, {QUESTIONS[score.kind]}",
+                options_label(row.summary.options),
+                "ours",
+                _entries(row),
+            )
+            for score in scores
+            for row in score_rows(score)
+        ),
+        notes=tuple(_notes(scores)),
+    )
+
+
+def breakdown_tables(score: GroundingScore) -> Iterator[Table]:
+    """Yield the gaps to explicit by pattern, expression, and distance of what is meant."""
+    for breakdown, labels_of in _BREAKDOWNS:
+        labels = _labels(score, labels_of)
+        if any(labels.values()):
+            yield make_breakdown_table(breakdown, score.cells, labels)
+
+
+def _entries(row: ScoreRow) -> tuple[Entry, ...]:
+    summary = row.summary
+    gap, p_holm = summary.gap, summary.p_holm
+    words = (
+        str(summary.trials),
+        _percent(None if summary.rate is None else float(summary.rate)),
+        _interval(summary.interval),
+        _percent(row.chance),
+        _percent(row.corrected),
+        _percent(row.command_chance),
+        _percent(row.hidden),
+        NOT_APPLICABLE if gap is None else points(gap.value, 1),
+        NOT_APPLICABLE if p_holm is None else p_text(p_holm).removeprefix("p ").removeprefix("= "),
+    )
+    return tuple(Entry(word=word) for word in words)
+
+
+def _notes(scores: Sequence[GroundingScore]) -> Iterator[str]:
+    yield (
+        "In percent, as means over tasks. Random: random goals of the scene, letters or pixels. "
+        "Above random: 0 is random, 100 all right. Command: a guess among the goals that fit the "
+        "command alone. Hidden slots: those that the command leaves to its context, each counted "
+        "once. Gap: points to explicit on the same episodes, with the p-value of the exact paired "
+        "test after Holm's correction."
+    )
+    for score in scores:
+        name = f"{score.name}, {QUESTIONS[score.kind]}"
+        if score.unparsed:
+            replies = counted(score.unparsed, "reply", "replies")
+            yield f"{name}: {replies} without an answer, counted as wrong."
+        if score.missing:
+            yield f"{name}: {counted(score.missing, 'item')} not answered, and in no rate."
+
+
+def _percent(rate: float | None) -> str:
+    return NOT_APPLICABLE if rate is None else f"{100 * rate:.1f}".replace("-", "−")
+
+
+def _interval(interval: Interval | None) -> str:
+    return NOT_APPLICABLE if interval is None else " to ".join(map(_percent, interval))
+
+
+def _labels(score: GroundingScore, labels_of: ItemLabels) -> Labels:
+    run = next(iter(score.cells)).policy_run
+    if run.versions is None:
+        return {}
+    return {
+        InstructionKey(
+            item.task,
+            item.split,
+            item.episode,
+            item.options,
+            run.conditions.wordings,
+            run.versions.language,
+            run.versions.environment,
+        ): tuple(labels_of(item))
+        for item, _ in score.judged
+    }
+
+
+def range_label(value: float, edges: Sequence[float], unit: str) -> str:
+    """Return the range between two edges in which a value lies, with its unit."""
+    for low, high in pairwise(edges):
+        if low <= value < high:
+            return f"{low:g} to below {high:g} {unit}"
+    return f"{edges[-1]:g} {unit} or more"
+
+
+def _distance_labels(item: GroundingItem) -> Sequence[str]:
+    if item.words_back is None:
+        return ()
+    return (range_label(item.words_back, WORDS_BACK_EDGES, "words"),)
+
+
+_BREAKDOWNS: tuple[tuple[Breakdown, ItemLabels], ...] = tuple(
+    # The labels are found from items, not from records.
+    (Breakdown(name, title, lambda _record: (), note), labels_of)
+    for name, title, note, labels_of in (
+        (
+            "pattern",
+            "reasoning pattern",
+            "Each episode counts in its main pattern.",
+            lambda item: () if item.pattern is None else (item.pattern,),
+        ),
+        (
+            "expression",
+            "referring expression",
+            "An episode counts in each class of expression that its command has.",
+            lambda item: item.expressions,
+        ),
+        (
+            "slots",
+            "hidden slots",
+            "Names of the slots that the command leaves to its context.",
+            lambda item: item.hidden_slots,
+        ),
+        (
+            "words_back",
+            "distance in words",
+            "Words between the farthest referring expression of the command and its value.",
+            _distance_labels,
+        ),
+        (
+            "meters",
+            "distance from the camera",
+            "Of the first thing that is meant.",
+            lambda item: (range_label(item.meters, METERS_EDGES, "m"),),
+        ),
+    )
+)

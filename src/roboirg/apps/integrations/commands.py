@@ -1,0 +1,51 @@
+"""Command that makes records of other harnesses' results."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.util.plain_text import counted
+
+
+def import_results(
+    harness: Annotated[str, typer.Argument(help="lerobot, vla-eval, inspect or jsonl.")],
+    file: Annotated[
+        Path,
+        typer.Argument(
+            help="eval_info.json, recording-ID.sqlite, a log as JSON, or an episode per line."
+        ),
+    ],
+    out: Annotated[Path, typer.Option(help="Folder for the records.")],
+    policy: Annotated[str, typer.Option(help="Name of the policy in tables.")],
+    seed: Annotated[int, typer.Option(help="Seed that lerobot-eval was given.")] = 1000,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="FIELD=VALUE of all records, such as rival=drawn; repeatable."),
+    ] = None,
+) -> None:
+    """Make records of the results of another harness, for tables, compare and report."""
+    from roboirg.apps.integrations.result_import import ImportOptions
+    from roboirg.apps.integrations.result_import import import_results as write_records
+
+    fields = dict(map(_field, set_ or []))
+    count = write_records(harness, file, out, ImportOptions(policy, seed, fields))
+    typer.echo(f"{counted(count, 'record')} in {out}")
+
+
+def _field(text: str) -> tuple[str, str]:
+    from roboirg.records.record import IDENTITY
+
+    name, sign, value = text.partition("=")
+    if not sign:
+        raise InvalidValueError(f"--set {text!r} has no value; write FIELD=VALUE.")
+    if name not in IDENTITY:
+        raise UnknownNameError("field", name, IDENTITY)
+    return name, value
+
+
+def add_commands(app: typer.Typer) -> None:
+    app.command()(import_results)

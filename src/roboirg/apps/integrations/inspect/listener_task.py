@@ -1,0 +1,212 @@
+"""The VLM listener as a task of Inspect: its model names the goal, the expert executes it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import anyio
+from inspect_ai import Task, task
+from inspect_ai.dataset import MemoryDataset, Sample
+from inspect_ai.model import (
+    ChatMessage,
+    ChatMessageAssistant,
+    ChatMessageSystem,
+    ChatMessageUser,
+    Content,
+    ContentImage,
+    ContentText,
+    GenerateConfig,
+    Model,
+    ModelOutput,
+    ResponseSchema,
+    get_model,
+)
+from inspect_ai.scorer import Score, Scorer, Target, accuracy, grouped, scorer, stderr
+from inspect_ai.solver import Generate, Solver, TaskState, solver
+from inspect_ai.util import JSONSchema
+
+from roboirg.apps.integrations.inspect.episode_process import SPEC, ModelRequest, play
+from roboirg.core.episode import ENVIRONMENT_VERSION
+from roboirg.core.errors import RoboIRGError
+from roboirg.core.instruction_options import DEFAULT_DELIVERY, DEFAULT_REASONING, DEFAULT_RIVAL
+from roboirg.episodes.splits import split_size
+from roboirg.policies.planning.models import ModelOptions
+from roboirg.policies.planning.vlm_listener import ListenerOptions
+from roboirg.records.record import DEFAULT_MAX_STEPS, Job
+from roboirg.tasks import find_tasks
+from roboirg.util.child_process import ChildExit, ChildProcess
+
+RECORD = "record"
+"""Under this key the metadata of a score hold our record."""
+SUCCESS = "success"
+VIA = "http://inspect"
+"""Address of the model in records: it is Inspect that knows the real one."""
+
+
+@task  # type: ignore[untyped-decorator] # Inspect is not installed where this is checked
+def listener(
+    setting: str = "contextual",
+    tasks: str | list[str] = "all",
+    split: str = "test",
+    episodes: int = 50,
+    rival: str = DEFAULT_RIVAL,
+    reasoning: str = DEFAULT_REASONING,
+    delivery: str = DEFAULT_DELIVERY,
+    max_steps: int = DEFAULT_MAX_STEPS,
+    frames: int = 16,
+    think: bool = False,
+    structured: bool = True,
+) -> Task:
+    """Instructions whose goal a vision-language model names and the scripted expert executes.
+
+    Args:
+        setting: explicit, direct, reasoning, contextual or spatial.
+        tasks: names of tasks or suites, separated by commas, or a list of them.
+        split: train, val, test or random.
+        episodes: number of episodes of each task, from 0 on.
+        rival: none or drawn.
+        reasoning: plain or open.
+        delivery: prompt or turns.
+        max_steps: control steps of an episode.
+        frames: most pictures of the video.
+        think: whether the answer begins with a field in which the model may think.
+        structured: whether to send the JSON schema of the answer.
+    """
+    count = min(episodes, split_size(split))
+    jobs = [
+        Job(
+            policy="vlm-listener", spec=SPEC, task=name, split=split, episode=index,
+            setting=setting, rival=rival, reasoning=reasoning, delivery=delivery,
+            max_steps=max_steps,
+        )
+        for name in find_tasks(tasks.split(",") if isinstance(tasks, str) else tasks)
+        for index in range(count)
+    ]  # fmt: skip
+    return Task(
+        dataset=MemoryDataset([_sample(job) for job in jobs], name="roboirg"),
+        solver=play_with_model(frames=frames, think=think, structured=structured),
+        scorer=grounds_reference(),
+        version=ENVIRONMENT_VERSION,
+    )
+
+
+def _sample(job: Job) -> Sample:
+    from roboirg.evaluation.job_instruction import instruct_job
+
+    return Sample(
+        input=instruct_job(job).text,
+        target=SUCCESS,
+        id=f"{job.task}-{job.setting}-{job.episode:03d}",
+        metadata={"task": job.task, "setting": job.setting, "job": job.model_dump(mode="json")},
+    )
+
+
+@solver  # type: ignore[untyped-decorator]
+def play_with_model(frames: int = 16, think: bool = False, structured: bool = True) -> Solver:
+    """Play the sample's episode in a process of its own and ask the evaluated model there.
+
+    Args:
+        frames: most pictures of the video.
+        think: whether the answer begins with a field in which the model may think.
+        structured: whether to send the JSON schema of the answer.
+    """
+
+    async def solve(state: TaskState, generate: Generate) -> TaskState:  # noqa: ARG001
+        model = get_model()
+        options = ListenerOptions(
+            model=ModelOptions(
+                model=str(model), base_url=VIA, structured=structured, clip_frames=frames
+            ),
+            frames=frames,
+            reasoning=think,
+        )
+        job = Job.model_validate(state.metadata["job"])
+        job = job.model_copy(update={"policy": f"vlm-listener:inspect?model={model}"})
+        record = await _play(model, job, options, state)
+        if record["outcome"] == "error":
+            raise RoboIRGError(record["cause"])  # Inspect counts errors apart
+        state.store.set(RECORD, record)
+        goal = record["policy_metadata"].get("understood")
+        state.output = ModelOutput.from_content(str(model), json.dumps(goal))
+        return state
+
+    return solve
+
+
+async def _play(
+    model: Model, job: Job, options: ListenerOptions, state: TaskState
+) -> dict[str, Any]:
+    """Return the record of an episode."""
+    # The kernel ends the child with the thread that started it, so that must be this one.
+    child = ChildProcess.spawn(play, job, options)
+    try:
+        while True:
+            said = await anyio.to_thread.run_sync(child.receive, abandon_on_cancel=True)
+            if isinstance(said, ChildExit):
+                raise RoboIRGError(f"The process of {state.sample_id} was lost: {said}.")
+            if not isinstance(said, ModelRequest):
+                record: dict[str, Any] = json.loads(said)
+                return record
+            reply = await _ask(model, said, options, state)
+            await anyio.to_thread.run_sync(child.send, reply)
+    finally:
+        child.end()
+
+
+async def _ask(
+    model: Model, request: ModelRequest, options: ListenerOptions, state: TaskState
+) -> tuple[str, int, int]:
+    """Return the text of the model's reply and its tokens."""
+    config = GenerateConfig()
+    if request.schema is not None and options.model.structured:
+        schema = JSONSchema.model_validate(request.schema)
+        config = GenerateConfig(response_schema=ResponseSchema(name="answer", json_schema=schema))
+    messages = [_message(one) for one in request.messages]
+    output = await model.generate(messages, config=config)
+    state.messages = [*messages, *([output.message] if output.choices else [])]
+    usage = output.usage
+    return (
+        output.completion,
+        usage.input_tokens if usage else 0,
+        usage.output_tokens if usage else 0,
+    )
+
+
+def _message(message: dict[str, Any]) -> ChatMessage:
+    content = message["content"]
+    if message["role"] == "system":
+        return ChatMessageSystem(content=content)
+    if message["role"] == "assistant":
+        return ChatMessageAssistant(content=content)
+    return ChatMessageUser(content=list(_contents(content)))
+
+
+def _contents(pieces: list[dict[str, Any]]) -> Iterator[Content]:
+    for piece in pieces:
+        if piece["type"] == "text":
+            yield ContentText(text=piece["text"])
+        else:
+            yield ContentImage(image=piece["image_url"]["url"])
+
+
+@scorer(  # type: ignore[untyped-decorator]
+    metrics=[accuracy(), stderr(), grouped(accuracy(), "task"), grouped(accuracy(), "setting")]
+)
+def grounds_reference() -> Scorer:
+    """Score 1 if the episode succeeded, else 0; the explanation says why it failed."""
+
+    async def score(state: TaskState, target: Target) -> Score:  # noqa: ARG001
+        record = state.store.get(RECORD)
+        if record is None:
+            return Score(value=0, explanation="The episode was not played.")
+        attribution = record["attribution"] or {}
+        return Score(
+            value=int(record["outcome"] == SUCCESS),
+            answer=state.output.completion,
+            explanation=record["cause"] or SUCCESS,
+            metadata={"failure": attribution.get("failure"), RECORD: record},
+        )
+
+    return score

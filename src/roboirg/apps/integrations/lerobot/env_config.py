@@ -1,0 +1,121 @@
+"""The environment's configuration in LeRobot, from 0.6 on: ``lerobot-eval --env.type=roboirg``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from gymnasium.vector import VectorEnv
+from lerobot.configs import FeatureType, PolicyFeature
+from lerobot.envs.configs import EnvConfig
+from lerobot.envs.utils import _LazyAsyncVectorEnv
+
+from roboirg.apps.integrations.lerobot.sub_environment import STATE_SIZE, LeRobotSubEnvironment
+from roboirg.apps.integrations.lerobot.vector import make_batch, sub_environments
+from roboirg.core.actions import find_action_space
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import (
+    DEFAULT_DELIVERY,
+    DEFAULT_DISTRACTOR,
+    DEFAULT_FRAME,
+    DEFAULT_REASONING,
+    DEFAULT_RIVAL,
+)
+from roboirg.core.observations import CAMERAS
+from roboirg.envs.env_settings import MAX_STEPS
+
+_PICTURE = (256, 256, 3)
+
+
+@EnvConfig.register_subclass("roboirg")
+@dataclass
+class RoboIRGEnvConfig(EnvConfig):  # type: ignore[misc] # LeRobot has no types
+    """Options of ``--env.type=roboirg``; those not named here are as in `roboirg.make`.
+
+    Attributes:
+        task: names of tasks, separated by commas; each becomes a group of results, called
+            ``task-setting-split``.
+        cameras: likewise of cameras.
+        video: none, stream or key, as in `LeRobotSubEnvironment`.
+        video_frames: frames of the video in the key.
+        episode_length: control steps that a policy has.
+        features: what a policy may see, by the environment's names.
+        features_map: LeRobot's names for them.
+    """
+
+    task: str = "PickXtimes"
+    setting: str = "explicit"
+    form: str = "implicit"
+    split: str = "test"
+    actions: str = "joint_angle"
+    cameras: str = ",".join(CAMERAS)
+    distractor: str = DEFAULT_DISTRACTOR
+    frame: str = DEFAULT_FRAME
+    delivery: str = DEFAULT_DELIVERY
+    rival: str = DEFAULT_RIVAL
+    reasoning: str = DEFAULT_REASONING
+    meshes: str = "faithful"
+    video: str = "none"
+    video_frames: int = 16
+    fps: int = 20
+    episode_length: int = MAX_STEPS
+    features: dict[str, PolicyFeature] = field(default_factory=dict)
+    features_map: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Declare the features."""
+        size = find_action_space(self.actions).size
+        self.features |= {
+            "action": PolicyFeature(type=FeatureType.ACTION, shape=(size,)),
+            "agent_pos": PolicyFeature(type=FeatureType.STATE, shape=(STATE_SIZE,)),
+        }
+        self.features_map |= {"action": "action", "agent_pos": "observation.state"}
+        for camera in _split(self.cameras):
+            picture = PolicyFeature(type=FeatureType.VISUAL, shape=_PICTURE)
+            self.features[f"pixels/{camera}"] = picture
+            self.features_map[f"pixels/{camera}"] = f"observation.images.{camera}"
+
+    @property
+    def gym_kwargs(self) -> dict[str, Any]:
+        """Keyword arguments of `LeRobotSubEnvironment`."""
+        names = (
+            "setting", "form", "split", "actions", "distractor", "frame", "delivery", "rival",
+            "reasoning", "meshes", "video", "video_frames",
+        )  # fmt: skip
+        chosen = {name: getattr(self, name) for name in names}
+        return {**chosen, "cameras": _split(self.cameras), "max_steps": self.episode_length}
+
+    def create_envs(
+        self, n_envs: int, use_async_envs: bool = True
+    ) -> dict[str, dict[int, VectorEnv[Any, Any, Any]]]:
+        """Return a vector environment for each task.
+
+        Raises:
+            UnknownNameError: there is no such task, or an option's value does not exist.
+            InvalidValueError: a number is out of range, or the combination is not defined.
+        """
+        tasks = _split(self.task)
+        if not tasks:
+            raise InvalidValueError("--env.task names no task.")
+        return {
+            f"{task}-{self.setting}-{self.split}": {0: self._create(task, n_envs, use_async_envs)}
+            for task in tasks
+        }
+
+    def _create(self, task: str, n_envs: int, use_async: bool) -> VectorEnv[Any, Any, Any]:
+        """Return the vector environment of a task; its processes start when it is first used."""
+        options = self.gym_kwargs
+        one = LeRobotSubEnvironment(task, **options)  # checks the options; builds no world
+        if not use_async or n_envs == 1:
+            return make_batch(task, n_envs, False, options)
+        lazy: VectorEnv[Any, Any, Any] = _LazyAsyncVectorEnv(
+            sub_environments(task, n_envs, options),
+            one.observation_space,
+            one.action_space,
+            one.metadata,
+        )
+        return lazy
+
+
+def _split(names: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in names.split(",") if name.strip())

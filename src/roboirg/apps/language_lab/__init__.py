@@ -1,0 +1,1 @@
+"""The instructions examined: validation, statistics, the card, exports, and others' sentences."""

@@ -1,0 +1,288 @@
+"""Commands for instructions: ``roboirg language`` and ``roboirg export``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from roboirg.cli.export_commands import export_app
+from roboirg.cli.names import known_name, known_settings, known_tasks
+from roboirg.cli.options import (
+    DEFAULT_WORDS,
+    AnySplit,
+    Forms,
+    Reasoning,
+    Rival,
+    Settings,
+    Tasks,
+    WordChoices,
+    Wordings,
+    Workers,
+    check_output_file,
+    spread,
+)
+from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.util.plain_text import counted
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from roboirg.apps.language_lab.validation import Batch, ValidationResults
+
+# Heavy modules are imported inside the commands, so that --help is fast.
+
+MINIMUM_WIDTH = 150
+"""Columns of output that is not a terminal."""
+MOST_FAILURES = 10
+"""Most broken rules to print."""
+_LINE_EVERY = 200
+"""Without a terminal, print a line after this many batches."""
+
+
+language_app = typer.Typer(no_args_is_help=True, help="Count, validate and show the instructions.")
+
+
+@spread
+def export_instructions(
+    out: Annotated[Path, typer.Option(help="File to write.")],
+    format: Annotated[str, typer.Option(help="File format: jsonl or parquet.")] = "jsonl",  # noqa: A002
+    split: AnySplit = "test",
+    tasks: Tasks = "all",
+    settings: Settings = "all",
+    forms: Forms = "implicit,resolved",
+    words: WordChoices = DEFAULT_WORDS,
+) -> None:
+    """Export a row per episode, setting and form (columns: see docs/language.md)."""
+    from roboirg.apps.language_lab.instruction_export import (
+        EXPORT_FORMATS,
+        check_export_support,
+        write_rows,
+    )
+    from roboirg.episodes.splits import split_episodes
+    from roboirg.evaluation.plan_parsing import parse_names, parse_splits
+    from roboirg.language import FORMS
+    from roboirg.language.instruction_row import row
+    from roboirg.language.variants import instructions
+
+    kind = known_name("format", format, EXPORT_FORMATS)
+    check_export_support(kind)
+    check_output_file(out)
+    options = words.instruction_options()
+    names, chosen = known_tasks(tasks, options.wordings), known_settings(settings)
+    spoken = [known_name("form", one, FORMS) for one in parse_names("form", forms)]
+    episodes = list(split_episodes(names, parse_splits(split)))
+    said = instructions(episodes, chosen, spoken, options)
+    rows = [row(episode, instruction) for episode, instruction in said]
+    if not rows:
+        raise InvalidValueError(f"None of these tasks has the setting {', '.join(chosen)}.")
+    write_rows(rows, out, kind)
+    typer.echo(f"{counted(len(rows), 'instruction')} of {counted(len(episodes), 'episode')}: {out}")
+
+
+@language_app.command()
+def stats(
+    split: AnySplit = "test",
+    tasks: Tasks = "all",
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for a figure of the referring expressions, as PNG and SVG."),
+    ] = None,
+    rival: Rival = "none",
+    reasoning: Reasoning = "plain",
+) -> None:
+    """Count words, referring expressions, patterns, relations and landmarks."""
+    from roboirg.apps.language_lab.statistics_tables import overview_tables
+    from roboirg.core.instruction_options import InstructionOptions
+    from roboirg.episodes.splits import split_episodes
+    from roboirg.evaluation.plan_parsing import parse_splits
+    from roboirg.language.expression_figure import write_figure
+    from roboirg.language.variants import instructions
+    from roboirg.util.figure_files import check_figure_support
+
+    if out is not None:
+        check_figure_support()
+    names, wanted = known_tasks(tasks), parse_splits(split)
+    episodes = split_episodes(names, wanted)
+    options = InstructionOptions(rival=rival, reasoning=reasoning)
+    said = [one for _, one in instructions(episodes, known_settings("all"), ("implicit",), options)]
+    console = _console()
+    for table in overview_tables(said):
+        console.print(table)
+    if out is not None:
+        label = "all splits" if len(wanted) > 1 else f"{wanted[0]} split"
+        title = f"Referring expressions by setting, {label} (each counted once per scene)"
+        name = f"expressions-{wanted[0] if len(wanted) == 1 else 'all'}"
+        for path in write_figure(said, out, name, title):
+            typer.echo(path)
+
+
+@language_app.command("validate")
+def validate_instructions(
+    seeds: Annotated[
+        int, typer.Option(help="Random scenes for each task, beyond the splits.")
+    ] = 100,
+    tasks: Tasks = "all",
+    split: Annotated[str, typer.Option(help="train, val, test, all or none.")] = "all",
+    wordings: Wordings = None,
+    workers: Workers = None,
+) -> None:
+    """Read all instructions back and check their rules; exit code 2 if one is broken."""
+    from roboirg.apps.language_lab.validation import ValidationResults, batches, validate
+    from roboirg.apps.language_lab.validation.validation_tables import validation_tables
+    from roboirg.evaluation.plan_parsing import parse_splits
+    from roboirg.language.wordings.wording_store import open_wordings
+    from roboirg.util.processor import core_count
+
+    names = known_tasks(tasks, open_wordings(wordings))
+    wanted = () if split.strip().lower() == "none" else parse_splits(split)
+    work = batches(names, wanted, seeds, wordings)
+    count = core_count() if workers is None else workers
+    found = ValidationResults()
+    for results in _with_progress(validate(work, count), work):
+        found.add(results)
+    console = _console()
+    for table in validation_tables(found):
+        console.print(table)
+    for failure in found.failures[:MOST_FAILURES]:
+        where = f"{failure.episode}, seed {failure.seed}, {failure.setting}"
+        console.print(f"{failure.rule}: {where}: {failure.words}", markup=False)
+    if found.failures:
+        texts = found.texts.total()
+        broken = counted(len(found.failures), "broken rule")
+        raise RoboIRGError(f"Found {broken} in {counted(texts, 'text')}.")
+
+
+@language_app.command()
+def card(
+    out: Annotated[Path | None, typer.Option(help="Write to this file instead of stdout.")] = None,
+) -> None:
+    """Write the language card: an example of every variant, in Markdown."""
+    from roboirg.apps.language_lab.card import language_card
+    from roboirg.util.atomic_write import write_atomically
+
+    if out is None:
+        typer.echo(language_card(), nl=False)
+    else:
+        write_atomically(out, language_card())
+
+
+@language_app.command("shortcuts")
+@spread
+def score_shortcuts(
+    split: Annotated[str, typer.Option(help="train, val, test, all or none.")] = "test",
+    seeds: Annotated[int, typer.Option(help="Random scenes for each task, beyond the split.")] = 0,
+    tasks: Tasks = "all",
+    settings: Settings = "all",
+    form: Annotated[str, typer.Option(help="implicit or resolved.")] = "implicit",
+    words: WordChoices = DEFAULT_WORDS,
+    distractors: Annotated[int, typer.Option(help="Number of distractors.")] = 1,
+    by: Annotated[
+        str | None, typer.Option(help="A row for each pattern or task of a setting.")
+    ] = None,
+    learned: Annotated[
+        bool, typer.Option(help="Add floors learned from the words of the train split (a minute).")
+    ] = False,
+) -> None:
+    """Score rules that see the words only, beside chance: how much needs no understanding."""
+    from roboirg.evaluation.plan_parsing import parse_splits
+    from roboirg.language import FORMS
+    from roboirg.language.shortcuts.learned_floor import check_learning_support
+    from roboirg.language.shortcuts.shortcut_scores import GROUPINGS
+    from roboirg.language.shortcuts.shortcut_tables import (
+        TRAINING_SPLIT,
+        shortcut_rows,
+        shortcut_table,
+    )
+
+    splits = () if split.strip().lower() == "none" else parse_splits(split)
+    grouping = None if by is None else known_name("row", by, GROUPINGS)
+    if learned:
+        check_learning_support()
+        if TRAINING_SPLIT in splits:
+            raise InvalidValueError(
+                f"--learned learns from the split {TRAINING_SPLIT}, so --split {split} would test "
+                "it on what it has seen; ask for val or test."
+            )
+    options = words.instruction_options()._replace(
+        form=known_name("form", form, FORMS), distractors=distractors
+    )
+    names, chosen = known_tasks(tasks, options.wordings), known_settings(settings)
+    rows = shortcut_rows(names, splits, chosen, options, seeds=seeds, by=grouping, learned=learned)
+    if not rows:
+        raise InvalidValueError(
+            f"There is nothing to score: no episode of {', '.join(names)} in {', '.join(chosen)}."
+        )
+    source = [*splits, *([f"{seeds:,} random scenes per task"] if seeds else [])]
+    title = f"Shortcuts, {options.form} form, {' and '.join(source)}"
+    _console().print(shortcut_table(rows, title, grouping))
+
+
+def _with_progress(
+    found: Iterable[tuple[Batch, ValidationResults]], work: Sequence[Batch]
+) -> Iterable[ValidationResults]:
+    """Yield the results; show progress as a bar, or as lines without a terminal."""
+    from rich.progress import Progress
+
+    from roboirg.util.console_width import progress_console
+
+    console = progress_console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("episodes", total=sum(batch.size for batch in work))
+        for number, (batch, results) in enumerate(found, start=1):
+            bar.advance(task, batch.size)
+            if not console.is_terminal and number % _LINE_EVERY == 0:
+                console.print(f"{number} of {len(work)} batches", highlight=False)
+            yield results
+
+
+def _console() -> Console:
+    from rich.console import Console
+
+    console = Console()
+    if not console.is_terminal:
+        console.width = max(console.width, MINIMUM_WIDTH)
+    return console
+
+
+wordings_app = typer.Typer(no_args_is_help=True, help="Use the commands of others.")
+
+
+@wordings_app.callback()
+def _wordings() -> None:
+    # With a callback, a single command keeps its name.
+    pass
+
+
+@wordings_app.command("import-robomme")
+def import_robomme(
+    path: Annotated[Path, typer.Argument(help="Folder of a clone of RoboMME's repository.")],
+    out: Annotated[Path, typer.Option(help="Wording file to write, TOML.")],
+    name: Annotated[str, typer.Option(help="Name of the wordings, for records.")] = "robomme",
+) -> None:
+    """Make a wording file of RoboMME's sentences; exit code 2 if one cannot be read back."""
+    from roboirg.apps.language_lab.robomme.robomme_import import import_robomme as make_wordings
+    from roboirg.apps.language_lab.robomme.robomme_import import summary
+    from roboirg.util.atomic_write import write_atomically
+
+    check_output_file(out)
+    found = make_wordings(path, name)
+    for task, case, reason in found.refused:
+        typer.echo(f"Refused {task} ({case}): {reason}", err=True)
+    if found.wordings is None:
+        raise RoboIRGError(f"No sentence of {str(path)!r} can be used; {out} was not written.")
+    write_atomically(out, found.text)
+    for line in summary(found.wordings):
+        typer.echo(line)
+    typer.echo(f"Wrote {found.wordings.identity}: {out}")
+    if found.refused:
+        count = counted(len(found.refused), "template")
+        raise RoboIRGError(f"{count} could not be read back; {out} has the rest.")
+
+
+def add_commands(app: typer.Typer) -> None:
+    export_app.command("instructions")(export_instructions)
+    app.add_typer(language_app, name="language")
+    app.add_typer(wordings_app, name="wordings")

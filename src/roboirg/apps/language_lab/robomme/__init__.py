@@ -1,0 +1,1 @@
+"""RoboMME's sentences as a wording file."""

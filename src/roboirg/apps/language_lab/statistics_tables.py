@@ -1,0 +1,96 @@
+"""Tables of instruction statistics for the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from rich.table import Table
+
+from roboirg.apps.language_lab import corpus_statistics
+from roboirg.language.expression_counts import ClassCounts, expression_counts, expression_order
+from roboirg.language.instruction import Instruction
+from roboirg.language.settings import setting_names
+from roboirg.language.templates import open_reasoning
+from roboirg.language.templates.derivations import COUNTED_STEPS, RELATIONS, STEPS
+from roboirg.language.token_counts import SHORT_LIMIT, USUAL_LIMIT
+from roboirg.tasks import every_task
+
+
+def overview_tables(instructions: Sequence[Instruction]) -> Iterator[Table]:
+    """Yield tables of lengths, expressions, patterns, relations and landmark classes."""
+    yield _lengths(corpus_statistics.word_counts(instructions))
+    yield _tokens(corpus_statistics.token_counts(instructions))
+    yield expression_table(expression_counts(instructions))
+    by_task = (
+        ("Reasoning patterns (scenes)", corpus_statistics.pattern_counts(instructions), None),
+        ("Relations (scenes)", corpus_statistics.relation_counts(instructions), _RELATIONS),
+        ("Landmark classes (targets)", corpus_statistics.landmark_counts(instructions), None),
+        ("Rivals (scenes), by reference", corpus_statistics.rival_counts(instructions), None),
+    )
+    for title, counts, order in by_task:
+        if counts:
+            yield _count_table(title, "task", counts, [*every_task()], order or _found(counts))
+
+
+_RELATIONS = [
+    *(one.name for one in (*RELATIONS, *COUNTED_STEPS, *STEPS)),
+    "neighbor",
+    *(
+        f"{one.name}, {step}"
+        for step in ("total", "difference")
+        for one in open_reasoning.TWO_STEP_RELATIONS
+    ),
+    *(one.words for one in open_reasoning.COMPARATIVES.everything),
+    "favorite",
+    "not the favorite",
+]
+
+
+def expression_table(counts: ClassCounts) -> Table:
+    """Return the number of scenes with each class of referring expression, by setting."""
+    classes = expression_order(counts)
+    title = "Referring expressions (each once per scene)"
+    return _count_table(title, "setting", counts, setting_names(), classes)
+
+
+def _lengths(lengths: Mapping[str, corpus_statistics.Lengths]) -> Table:
+    table = _table("Words per instruction", "setting", ("mean", "fewest", "most"))
+    for setting in setting_names():
+        if setting in lengths:
+            one = lengths[setting]
+            table.add_row(setting, f"{one.mean:.1f}", str(one.shortest), str(one.longest))
+    return table
+
+
+def _tokens(counts: Mapping[str, corpus_statistics.TokenCounts]) -> Table:
+    columns = ("median", "most", f"over {SHORT_LIMIT}", f"over {USUAL_LIMIT}")
+    table = _table("Tokens per instruction (vocabulary of 32,000)", "setting", columns)
+    for setting in setting_names():
+        if setting in counts:
+            one = counts[setting]
+            shares = (f"{one.over_short:.1%}", f"{one.over_usual:.1%}")
+            table.add_row(setting, f"{one.median:.0f}", str(one.longest), *shares)
+    return table
+
+
+def _count_table(
+    title: str, kind: str, counts: ClassCounts, rows: Sequence[str], columns: Sequence[str]
+) -> Table:
+    used = [name for name in columns if any(name in one for one in counts.values())]
+    table = _table(title, kind, used)
+    for name in rows:
+        if name in counts:
+            table.add_row(name, *(str(counts[name].get(column, "")) for column in used))
+    return table
+
+
+def _found(counts: ClassCounts) -> list[str]:
+    return sorted({name for one in counts.values() for name in one})
+
+
+def _table(title: str, first: str, numbers: Sequence[str]) -> Table:
+    table = Table(title=title, title_justify="left", title_style="bold")
+    table.add_column(first)
+    for name in numbers:
+        table.add_column(name, justify="right")
+    return table

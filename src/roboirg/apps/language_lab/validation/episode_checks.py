@@ -1,0 +1,148 @@
+"""Check every instruction of one episode with the independent interpreter."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator
+
+from roboirg.apps.language_lab.validation.leaks import find_leaks
+from roboirg.apps.language_lab.validation.necessity import only_candidate
+from roboirg.apps.language_lab.validation.pairing import unpaired
+from roboirg.apps.language_lab.validation.validation_results import (
+    CommandGroup,
+    Refusal,
+    Rule,
+    RuleViolation,
+    SceneGroup,
+    ValidationResults,
+)
+from roboirg.core.episode import Episode
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.language.generator import expressible, find_refusal, instruct_with
+from roboirg.language.instruction import Instruction
+from roboirg.language.interpreter import Interpretation, interpret
+from roboirg.language.setting import Setting
+from roboirg.language.settings import ACCEPTANCE_SETTINGS, all_settings, settings_of
+from roboirg.language.variants import expressible_options
+from roboirg.tasks import get_task
+
+Read = Callable[[str], Interpretation]
+"""Interprets a text in the scene at hand."""
+Violation = tuple[Rule, str]
+"""A rule and the words that break it."""
+
+
+def check_episode(
+    episode: Episode, *, must_be_expressible: bool = False, wordings: str | None = None
+) -> ValidationResults:
+    """Check all rules on all instructions of an episode.
+
+    Args:
+        episode: of a split or not.
+        must_be_expressible: whether the refusal of a setting that selects seeds is a violation.
+        wordings: identity of an open wording file; None for our own words.
+    """
+    results = ValidationResults()
+    # Texts repeat (stages 1 and 5 are the direct ones): read each once.
+    read = functools.cache(lambda text: interpret(text, episode.scene, episode.task))
+    commands: dict[str, set[str]] = {}
+    for options in expressible_options(episode, wordings):
+        setting = options.setting
+        instruction = instruct_with(episode, options)
+        results.texts[episode.task, setting] += 1
+        violations = list(not_read_back(instruction, episode, read))
+        if options.form == "implicit" and all_settings()[setting].implicit:
+            known = commands.setdefault(setting, set())
+            if instruction.command not in known:
+                exception = only_candidate(episode, instruction)
+                if not known:
+                    _count_command(instruction, episode, results, exception=exception)
+                known.add(instruction.command)
+                violations += not_needed(instruction, episode, read, exception=exception)
+                violations += leaking(instruction, episode)
+        else:
+            violations += not_self_contained(instruction, episode, read)
+        _add_violations(results, episode, setting, violations)
+    for setting, words in unpaired(episode, expressible(episode, wordings=wordings), wordings):
+        _add_violations(results, episode, setting, [("pairing", words)])
+    for setting in settings_of(get_task(episode.task)):
+        _count_refusals(all_settings()[setting], episode, results)
+        reason = find_refusal(episode, InstructionOptions(setting))
+        if reason is not None and must_be_expressible and setting in ACCEPTANCE_SETTINGS:
+            _add_violations(results, episode, setting, [("expressible", reason)])
+    return results
+
+
+def not_read_back(instruction: Instruction, episode: Episode, read: Read) -> Iterator[Violation]:
+    """Yield the prompt unless it reads as exactly the goal and is understood to the end."""
+    found = read(instruction.text)
+    if found.goals != (episode.goal,) or found.not_understood:
+        yield "read back", instruction.text
+
+
+def not_self_contained(
+    instruction: Instruction, episode: Episode, read: Read
+) -> Iterator[Violation]:
+    """Yield an explicit or resolved command that does not read as the goal on its own."""
+    found = read(instruction.command)
+    if found.goals != (episode.goal,) or found.not_understood:
+        yield "self-contained", instruction.command
+
+
+def not_needed(
+    instruction: Instruction, episode: Episode, read: Read, *, exception: bool
+) -> Iterator[Violation]:
+    """Yield an implicit command that gives the goal on its own, or contradicts it.
+
+    Args:
+        instruction: of an implicit form.
+        episode: its episode.
+        read: the interpreter.
+        exception: whether the scene leaves one candidate; the command must then give the goal.
+    """
+    goals = read(instruction.command).goals
+    if episode.goal not in goals or (len(goals) == 1) != exception:
+        yield "necessity", instruction.command
+
+
+def leaking(instruction: Instruction, episode: Episode) -> Iterator[Violation]:
+    """Yield an implicit command that contains a hidden value."""
+    words = find_leaks(instruction, episode.goal)
+    if words:
+        yield "no leak", f"{', '.join(sorted(words))} in: {instruction.command}"
+
+
+def _count_command(
+    instruction: Instruction, episode: Episode, results: ValidationResults, *, exception: bool
+) -> None:
+    pattern = instruction.metadata["pattern"]
+    group = CommandGroup(
+        task=episode.task,
+        setting=instruction.setting,
+        pattern=None if pattern is None else str(pattern),
+        difficulty=episode.difficulty,
+    )
+    results.commands[group] += 1
+    results.exceptions[group] += exception
+
+
+def _count_refusals(setting: Setting, episode: Episode, results: ValidationResults) -> None:
+    if not setting.may_refuse:
+        return
+    for changes in setting.variants:
+        variant = ", ".join(str(value) for value in changes.values())
+        group = SceneGroup(episode.task, setting.name, variant, episode.difficulty)
+        reason = find_refusal(episode, InstructionOptions(setting.name)._replace(**changes))
+        results.scenes[group] += 1
+        results.refused[group] += reason is not None
+        if reason is not None:
+            results.reasons[Refusal(setting.name, reason)] += 1
+
+
+def _add_violations(
+    results: ValidationResults, episode: Episode, setting: str, violations: list[Violation]
+) -> None:
+    results.failures += [
+        RuleViolation(rule, episode.task, setting, episode.key, episode.seed, words)
+        for rule, words in violations
+    ]

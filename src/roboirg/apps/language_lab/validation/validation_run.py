@@ -1,0 +1,89 @@
+"""Validate many episodes, in batches and in processes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from roboirg.apps.language_lab.validation.episode_checks import check_episode
+from roboirg.apps.language_lab.validation.validation_results import ValidationResults
+from roboirg.core.episode import SPLITS, Split
+from roboirg.core.errors import InvalidValueError
+from roboirg.episodes.splits import SIZES, get_episode
+from roboirg.language.wordings.wording_store import open_wordings
+from roboirg.util.parallel_map import parallel_map
+
+BATCH = 50
+"""Maximum size of a batch, in episodes."""
+
+
+class Batch(NamedTuple):
+    """Consecutive episodes.
+
+    Attributes:
+        task: name of the task.
+        split: name of the split.
+        first: index of the first episode.
+        size: number of episodes.
+        wordings: path of a wording file; None for our own words.
+    """
+
+    task: str
+    split: Split
+    first: int
+    size: int
+    wordings: str | None = None
+
+
+def batches(
+    tasks: Sequence[str], splits: Sequence[Split], seeds: int, wordings: str | None = None
+) -> tuple[Batch, ...]:
+    """Return batches of all episodes of the splits and of random ones.
+
+    Args:
+        tasks: names.
+        splits: names.
+        seeds: number of random episodes for each task.
+        wordings: path of a wording file; None for our own words.
+
+    Raises:
+        InvalidValueError: the number is negative, or there is nothing to validate.
+    """
+    if seeds < 0:
+        raise InvalidValueError(f"The number of random seeds is {seeds}; it must be at least 0.")
+    amounts = [(split, SIZES[split]) for split in splits]
+    amounts.append(("random", seeds))
+    found = tuple(
+        Batch(task, split, first, min(BATCH, amount - first), wordings)
+        for task in tasks
+        for split, amount in amounts
+        for first in range(0, amount, BATCH)
+    )
+    if not found:
+        raise InvalidValueError("There is nothing to validate: no split and no random seed.")
+    return found
+
+
+def validate_batch(batch: Batch) -> ValidationResults:
+    """Check the episodes of a batch."""
+    results = ValidationResults()
+    identity = open_wordings(batch.wordings)
+    for index in range(batch.first, batch.first + batch.size):
+        episode = get_episode(batch.task, batch.split, index)
+        expected = batch.split in SPLITS
+        results.add(check_episode(episode, must_be_expressible=expected, wordings=identity))
+    return results
+
+
+def validate(work: Sequence[Batch], workers: int) -> Iterator[tuple[Batch, ValidationResults]]:
+    """Yield every batch with its results, in the order of completion.
+
+    Args:
+        work: the batches.
+        workers: number of processes; 0 for this one.
+
+    Raises:
+        InvalidValueError: the number of workers is negative.
+        RoboIRGError: a process died.
+    """
+    return parallel_map(validate_batch, work, workers)

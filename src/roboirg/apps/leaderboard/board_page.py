@@ -1,0 +1,126 @@
+"""The leaderboard page: one self-contained HTML file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from roboirg.analysis.page.report import check_report_support
+from roboirg.analysis.stats.option_labels import setting_sort_key
+from roboirg.apps.leaderboard.board_rows import BoardRate, BoardRow, PackedRun, board_rows
+from roboirg.apps.leaderboard.pack_checks import check_pack, read_check
+from roboirg.apps.leaderboard.packing import PACK_SUFFIX, opened_run
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.version import __version__
+from roboirg.evaluation.plan import read_plans
+from roboirg.records.store import read_results
+from roboirg.util.atomic_write import write_atomically
+from roboirg.util.page_templates import template_environment
+
+BOARD_FILE = "board.html"
+_TEMPLATE = "board.html.j2"
+
+
+class _Cell(NamedTuple):
+    """A rate as the page shows it, with the number by which the column is sorted."""
+
+    text: str
+    order: float
+    interval: str = ""
+    note: str = ""
+    is_top: bool = False
+
+
+def read_packs(
+    folder: Path,
+    *,
+    sample: float | None = None,
+    workers: int = 0,
+    progress: Callable[[int, int], object] | None = None,
+) -> tuple[PackedRun, ...]:
+    """Read all packed runs of a folder.
+
+    Args:
+        folder: of the packs.
+        sample: share of the episodes to play again where that was not done before; None to check
+            nothing.
+        workers: number of processes that play.
+        progress: is called with the number of packs that were read, and of all.
+
+    Raises:
+        InvalidValueError: there are none.
+        StoreError: one of them cannot be read, and nothing was to be checked.
+    """
+    paths = sorted(folder.glob(f"*{PACK_SUFFIX}"))
+    if not paths:
+        raise InvalidValueError(
+            f"There are no packed runs (*{PACK_SUFFIX}) in {folder}; make them with `roboirg pack`."
+        )
+    packs = []
+    for count, path in enumerate(paths, start=1):
+        check = read_check(path)
+        if sample is not None:
+            check = check_pack(path, sample=sample, workers=workers)
+        if check is None or check.records:  # else it could not even be opened
+            with opened_run(path) as run:
+                results = read_results(run)
+                planned = [job for plan in read_plans(run) for job in plan.drawable_jobs()]
+            packs.append(PackedRun(_name(path), results, planned, check))
+        else:
+            packs.append(PackedRun(_name(path), (), (), check))
+        if progress is not None:
+            progress(count, len(paths))
+    return tuple(packs)
+
+
+def write_board(runs: Sequence[PackedRun], out: Path) -> None:
+    """Write the page of packed runs.
+
+    Raises:
+        MissingDependencyError: Jinja is not installed.
+        InvalidValueError: the file cannot be written.
+    """
+    write_atomically(out, render_board(runs))
+
+
+def render_board(runs: Sequence[PackedRun]) -> str:
+    """Return the page of packed runs.
+
+    Raises:
+        MissingDependencyError: Jinja is not installed.
+    """
+    check_report_support()
+    environment = template_environment("roboirg.apps.leaderboard")
+    rows = board_rows(runs)
+    public = {(name, False) for row in rows for name in row.rates}
+    private = {(name, True) for row in rows if row.private for name in row.private.rates}
+    columns = sorted(public | private, key=lambda one: (setting_sort_key(one[0]), one[1]))
+    return environment.get_template(_TEMPLATE).render(
+        version=__version__,
+        columns=columns,
+        rows=[(row, [_cell(_rate(row, *column)) for column in columns]) for row in rows],
+        conditions=sorted({row.conditions for row in rows}),
+        unreadable=[run for run in runs if not run.results],
+    )
+
+
+def _rate(row: BoardRow, setting: str, is_private: bool) -> BoardRate | None:
+    shown = row.private if is_private else row
+    return None if shown is None else shown.rates.get(setting)
+
+
+def _cell(rate: BoardRate | None) -> _Cell:
+    if rate is None:
+        return _Cell("–", -1.0)
+    notes = []
+    if rate.tasks < rate.of:
+        notes.append(f"{rate.tasks} of {rate.of} tasks")
+    if not rate.is_complete:
+        notes.append("incomplete")
+    interval = "" if rate.interval is None else "–".join(f"{end:.1f}" for end in rate.interval)
+    return _Cell(f"{rate.percent:.1f}", rate.percent, interval, ", ".join(notes), rate.is_top)
+
+
+def _name(path: Path) -> str:
+    return path.name.removesuffix(PACK_SUFFIX)

@@ -1,0 +1,225 @@
+"""Commands for results that others can check."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from roboirg.cli.import_path import add_working_directory
+from roboirg.cli.options import Salt, Workers, check_output_file
+from roboirg.cli.progress_bar import progress_bar
+from roboirg.cli.run_commands import USAGE_ERROR, Folder, folder_of, report_problems
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.printable import printable
+from roboirg.util.plain_text import counted
+
+if TYPE_CHECKING:
+    from roboirg.apps.leaderboard.repeats import RepeatedEpisode
+    from roboirg.apps.leaderboard.run_verification import Verification
+
+_MOST_SHOWN = 20
+
+RunOrPack = Annotated[str, typer.Argument(help="Output folder of a run, or its packed file.")]
+SampleShare = Annotated[str, typer.Option(help="Share of the episodes whose actions are played.")]
+SampleSeed = Annotated[
+    int | None, typer.Option(help="Draw the same sample again; another one each time without it.")
+]
+
+
+def verify(
+    run: RunOrPack,
+    sample: SampleShare = "100%",
+    sample_seed: SampleSeed = None,
+    salt: Salt = None,
+    workers: Workers = None,
+) -> None:
+    """Play the actions of a run again and check its records; exit code 2 if one does not hold."""
+    from roboirg.apps.leaderboard.packing import opened_run
+    from roboirg.apps.leaderboard.run_verification import verify_run
+    from roboirg.util.processor import core_count
+
+    _take_salt(salt)
+    with opened_run(folder_of(run)) as folder, progress_bar("records") as show:
+        found = verify_run(
+            folder,
+            sample=_share(sample),
+            seed=sample_seed,
+            workers=core_count() if workers is None else workers,
+            progress=show,
+        )
+    _print(found)
+    if not found.holds:
+        sys.exit(USAGE_ERROR)
+
+
+def pack(
+    run: Folder,
+    out: Annotated[Path, typer.Option(help="File to write, such as mine.roboirg.zip.")],
+    videos: Annotated[bool, typer.Option(help="Include the videos.")] = False,
+    logs: Annotated[bool, typer.Option(help="Include what policies printed.")] = False,
+) -> None:
+    """Pack records, plan and actions of a run into one file for others to check."""
+    from roboirg.apps.leaderboard.packing import pack_run
+
+    check_output_file(out)
+    manifest = pack_run(folder_of(run), out, videos=videos, logs=logs)
+    size = out.stat().st_size / 1e6
+    typer.echo(f"{counted(manifest.records, 'record')}, {size:.1f} MB: {out}")
+
+
+def board(
+    folder: Annotated[str, typer.Argument(help="Folder of packed runs.", metavar="DIR")],
+    out: Annotated[Path | None, typer.Option(help="Page to write.  (DIR/board.html)")] = None,
+    verify_share: Annotated[
+        str | None,
+        typer.Option(
+            "--verify", help="Share of the episodes to play again where not done yet, such as 5%."
+        ),
+    ] = None,
+    salt: Salt = None,
+    workers: Workers = None,
+) -> None:
+    """Make a leaderboard page of packed runs: verified, privileged, comparable or not."""
+    from roboirg.analysis.page.report import check_report_support
+    from roboirg.apps.leaderboard.board_page import BOARD_FILE, read_packs, write_board
+    from roboirg.util.processor import core_count
+
+    check_report_support()
+    _take_salt(salt)
+    path = folder_of(folder)
+    with progress_bar("packed runs") as show:
+        packs = read_packs(
+            path,
+            sample=None if verify_share is None else _share(verify_share),
+            workers=core_count() if workers is None else workers,
+            progress=show,
+        )
+    page = out or path / BOARD_FILE
+    write_board(packs, page)
+    typer.echo(f"{counted(len(packs), 'packed run')}: {page}")
+
+
+def _take_salt(salt: str | None) -> None:
+    from roboirg.episodes.private_splits import use_salt
+
+    if salt is not None:
+        use_salt(salt)
+
+
+def _share(text: str) -> float:
+    """Return a share such as 5% or 0.05.
+
+    Raises:
+        InvalidValueError: it is no number.
+    """
+    number = text.strip().removesuffix("%")
+    try:
+        return float(number) / (100 if "%" in text else 1)
+    except ValueError:
+        raise InvalidValueError(f"--sample is {text!r}; give a share such as 5%.") from None
+
+
+def _print(found: Verification) -> None:
+    from roboirg.apps.leaderboard.record_check import TOLERANCE, ReplayVerdict
+
+    played = found.records - found.verdicts[ReplayVerdict.NOT_REPLAYED]
+    typer.echo(f"{counted(found.records, 'record')}; the actions of {played:,} were played again.")
+    typer.echo(f"End states equal bit for bit: {found.verdicts[ReplayVerdict.EXACT]:,}.")
+    if tolerant := found.verdicts[ReplayVerdict.TOLERANT]:
+        typer.echo(
+            f"End states from other processors equal within {TOLERANCE:g} (m, rad, s): "
+            f"{tolerant:,}; the largest difference is {found.deviation:.1g}."
+        )
+    if found.errors:
+        typer.echo(
+            f"{counted(found.errors, 'record')} of errors: whether a policy raised cannot be "
+            "played again, and the rates leave them out."
+        )
+    for note in found.notes:
+        typer.echo(note)
+    for check in found.checks[:_MOST_SHOWN]:
+        for sentence in check.findings:
+            typer.echo(f"does not hold: {check.slug}: {printable(sentence)}")
+    _print_some("has no record", found.missing)
+    _print_some("has several verdicts", found.doubled)
+    if len(found.checks) > _MOST_SHOWN:
+        typer.echo(f"… and {len(found.checks) - _MOST_SHOWN:,} more records.")
+    wrong = len(found.checks) + len(found.missing) + len(found.doubled)
+    typer.echo("All of it holds." if found.holds else f"{counted(wrong, 'thing')} do not hold.")
+
+
+def _print_some(what: str, slugs: tuple[str, ...]) -> None:
+    for slug in slugs[:_MOST_SHOWN]:
+        typer.echo(f"{what}: {printable(slug)}")
+    if len(slugs) > _MOST_SHOWN:
+        typer.echo(f"… and {len(slugs) - _MOST_SHOWN:,} more.")
+
+
+def repeat(
+    run: Folder,
+    out: Annotated[str, typer.Option(help="Folder of the repetition; the same again to resume.")],
+    workers: Workers = None,
+) -> None:
+    """Play a run's plan again with its policies, and print which verdicts changed."""
+    from roboirg.apps.leaderboard.repeats import flips_by_cell, repeated_episodes, write_flips
+    from roboirg.cli.run_commands import play
+    from roboirg.evaluation.executors.executor import choose_executor
+    from roboirg.evaluation.plan import read_plan
+
+    folder, target = folder_of(run), folder_of(out)
+    if folder.resolve() == target.resolve():
+        raise InvalidValueError(f"{out} is the run itself; choose another --out.")
+    plan = read_plan(folder)
+    if plan is None:
+        raise InvalidValueError(
+            f"{run} has no plan.json that can be read, so it cannot be repeated."
+        )
+    add_working_directory()
+    summary = play(
+        plan.checked(), target, choose_executor(workers, plan.episode_timeout_s), retry=True
+    )
+    found = repeated_episodes(folder, target)
+    _print_flips(found)
+    for where in (folder, target):
+        write_flips(flips_by_cell(found), where)
+    report_problems(summary, target)
+
+
+def _print_flips(episodes: tuple[RepeatedEpisode, ...]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from roboirg.analysis.stats.option_labels import options_label
+    from roboirg.apps.leaderboard.repeats import count_flips, flips_by_cell
+
+    table = Table(title="verdicts, first and second time", title_justify="left")
+    for name in ("policy", "setting"):
+        table.add_column(name)
+    for name in ("✓✓", "✗✗", "✓✗", "✗✓", "other actions", "errors"):
+        table.add_column(name, justify="right")
+    for (policy, options), one in flips_by_cell(episodes).items():
+        counts = (one.both, one.neither, one.lost, one.gained, one.acted_differently, one.errors)
+        table.add_row(policy, options_label(options), *map(str, counts))
+    Console().print(table)
+    for changed in [one for one in episodes if one.is_flip][:_MOST_SHOWN]:
+        where = (
+            ""
+            if changed.differs_at is None
+            else f"; actions differ from number {changed.differs_at} on"
+        )
+        typer.echo(f"{changed.slug}: {' then '.join(changed.outcomes)}{where}")
+    for policy, (before, now) in dict.fromkeys((one.policy, one.arithmetic) for one in episodes):
+        if before != now:
+            typer.echo(printable(f"{policy}: first {before or 'untold'}; then {now or 'untold'}."))
+        elif now:
+            typer.echo(printable(f"{policy}: {now}, both times."))
+    found = count_flips(episodes)
+    typer.echo(f"{found.flips:,} of {counted(found.verdicts, 'verdict')} changed.")
+
+
+def add_commands(app: typer.Typer) -> None:
+    for command in (verify, pack, board, repeat):
+        app.command()(command)

@@ -1,0 +1,172 @@
+"""Compare a record with what its actions and this version of the benchmark lead to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from enum import StrEnum
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from roboirg.apps.leaderboard.action_replay import replay, unplayed
+from roboirg.core.episode import ENVIRONMENT_VERSION
+from roboirg.core.errors import RoboIRGError
+from roboirg.language import LANGUAGE_VERSION
+from roboirg.records.action_log import ActionLog, read_actions
+from roboirg.records.record import Record
+from roboirg.records.record_codec import read_line
+from roboirg.records.store import RECORDS_FILE
+
+TOLERANCE = 0.02
+"""Largest difference of an end state, in m, rad and s, that is granted to a record from another
+family of processors: ten times the largest on an emulated one. Events and steps must be equal."""
+
+WORD_FIELDS = ("seed", "difficulty", "mentions", "command", "goal", "metadata")
+"""Fields that follow from the job alone."""
+
+PLAYED_FIELDS = (
+    "outcome",
+    "error",
+    "cause",
+    "attribution",
+    "steps",
+    "demonstration_steps",
+    "demonstration_source",
+    "events",
+    "instruction",
+)
+"""Fields that follow from the job and the actions."""
+
+_MOST_SHOWN = 160
+
+
+class ReplayVerdict(StrEnum):
+    """How the end of an episode compares with the record's.
+
+    Attributes:
+        EXACT: equal, bit for bit.
+        TOLERANT: equal but for `TOLERANCE`, and the record is from a processor of another family,
+            or does not tell.
+        DIFFERENT: not equal.
+        NOT_REPLAYED: not in the sample, or an error that kept no actions.
+    """
+
+    EXACT = "exact"
+    TOLERANT = "tolerant"
+    DIFFERENT = "different"
+    NOT_REPLAYED = "not replayed"
+
+
+class RecordCheck(NamedTuple):
+    """Result of checking one record.
+
+    Attributes:
+        slug: of the record's job.
+        findings: what does not hold, one sentence each.
+        replayed: how its end compares.
+        deviation: largest difference of the end state, in m, rad and s.
+    """
+
+    slug: str
+    findings: tuple[str, ...]
+    replayed: ReplayVerdict = ReplayVerdict.NOT_REPLAYED
+    deviation: float = 0.0
+
+
+class LineToCheck(NamedTuple):
+    """A line of a records file, and whether its actions are played."""
+
+    number: int
+    line: bytes
+    play: bool
+
+
+def check_line(one: LineToCheck, folder: Path) -> RecordCheck:
+    """Check one record of a run's folder.
+
+    Raises:
+        StoreError: the line is not a record.
+    """
+    record = read_line(one.line, folder / RECORDS_FILE, one.number)
+    try:
+        return _check(record, folder, play=one.play)
+    except RoboIRGError as error:
+        return RecordCheck(record.slug, (str(error),))
+
+
+def _check(record: Record, folder: Path, *, play: bool) -> RecordCheck:
+    if findings := [*_versions(record)]:
+        return RecordCheck(record.slug, tuple(findings))
+    log = None if record.action_log is None else read_actions(folder, record.action_log)
+    if log is not None and play:
+        again, played = replay(record, log)
+    else:
+        again, played = unplayed(record), None
+    findings = [*_differences(record, again, WORD_FIELDS), *_words(record, again)]
+    if log is None and record.outcome != "error":
+        findings.append("Its actions were not kept, so the verdict cannot be checked.")
+    if log is None or not play:
+        return RecordCheck(record.slug, tuple(findings))
+    findings += _differences(record, again, PLAYED_FIELDS)
+    verdict, deviation = _compare_ends(record, again, log, played)
+    if verdict is ReplayVerdict.DIFFERENT:
+        findings.append(f"end_state: played again, it differs by {deviation:.2g} (m, rad, s).")
+    if played is None or not _same_answers(played, log):
+        findings.append("actions: some of them come after the end of the episode.")
+    return RecordCheck(record.slug, tuple(findings), verdict, deviation)
+
+
+def _same_answers(played: ActionLog, log: ActionLog) -> bool:
+    return len(played.rows) == len(log.rows) and np.array_equal(played.requests, log.requests)
+
+
+def _versions(record: Record) -> Iterator[str]:
+    """Yield why the record cannot be checked by this version of the benchmark."""
+    for what, value, here in (
+        ("environment", record.environment_version, ENVIRONMENT_VERSION),
+        ("language", record.language_version, str(LANGUAGE_VERSION)),
+    ):
+        if value != here:
+            yield f"{what}_version: the record says {value}; this roboirg checks {here}."
+
+
+def _words(record: Record, told: Record) -> Iterator[str]:
+    """Yield where the utterances differ; the steps at which they were heard are not compared."""
+    said = [(one.stage, one.text) for one in record.instruction]
+    right = [(one.stage, one.text) for one in told.instruction]
+    if said != right:
+        yield _difference("instruction", tuple(said), tuple(right))
+
+
+def _differences(record: Record, again: Record, fields: tuple[str, ...]) -> Iterator[str]:
+    for name in fields:
+        value, right = getattr(record, name), getattr(again, name)
+        if value != right:
+            yield _difference(name, value, right)
+
+
+def _difference(name: str, value: object, right: object) -> str:
+    return f"{name}: the record says {_short(value)}; it should be {_short(right)}."
+
+
+def _short(value: object) -> str:
+    if isinstance(value, tuple) and len(value) > 1:
+        return f"{len(value)} entries, the last {_short(value[-1])}"
+    text = repr(value)
+    return text if len(text) <= _MOST_SHOWN else f"{text[:_MOST_SHOWN]}…"
+
+
+def _compare_ends(
+    record: Record, again: Record, log: ActionLog, played: ActionLog | None
+) -> tuple[ReplayVerdict, float]:
+    """Return how the ends compare, and their largest difference."""
+    if played is None or played.end_state.shape != log.end_state.shape:
+        return ReplayVerdict.DIFFERENT, float("inf")
+    deviation = float(np.max(np.abs(played.end_state - log.end_state), initial=0.0))
+    if deviation == 0.0:
+        same = record.end_state == again.end_state
+        return ReplayVerdict.EXACT if same else ReplayVerdict.DIFFERENT, 0.0
+    elsewhere = record.processor != again.processor
+    within = deviation <= TOLERANCE and record.end_state != again.end_state
+    return ReplayVerdict.TOLERANT if elsewhere and within else ReplayVerdict.DIFFERENT, deviation

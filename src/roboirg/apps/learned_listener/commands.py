@@ -1,0 +1,154 @@
+"""Commands of the listener that learns: ``roboirg learn``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+import typer
+
+from roboirg.cli.options import Settings, Tasks, Workers, check_output_file, spread
+from roboirg.core.errors import InvalidValueError
+from roboirg.util.plain_text import counted
+
+if TYPE_CHECKING:
+    from roboirg.apps.learned_listener.listener_training import TrainingPlan
+
+# Heavy modules are imported inside the commands, so that --help is fast.
+
+learn_app = typer.Typer(no_args_is_help=True, help="Train a listener, and let it answer.")
+
+_Words = Annotated[str, typer.Option(help="Pool of words: train or test.")]
+_Rivals = Annotated[bool, typer.Option("--rivals", help="Also hear instructions with a rival.")]
+_Without = Annotated[
+    str, typer.Option(help="What it does not get: none, pictures, video or words.")
+]
+
+
+class TrainingChoices(NamedTuple):
+    """Options of a training; a parameter of commands, see `spread`."""
+
+    scenes: Annotated[
+        int, typer.Option(min=0, help="Random scenes of each task beyond the train split.")
+    ] = 300
+    goals: Annotated[
+        int, typer.Option(min=1, help="Goals of each scene that are told by place.")
+    ] = 4
+    detector_epochs: Annotated[int, typer.Option(min=1, help="Passes over the pictures.")] = 6
+    reader_epochs: Annotated[int, typer.Option(min=1, help="Passes over the instructions.")] = 12
+    seed: Annotated[int, typer.Option(help="Of initial weights and order.")] = 0
+
+
+_DEFAULT_TRAINING = TrainingChoices()
+
+
+@learn_app.command("listener")
+@spread
+def learn_listener(
+    out: Annotated[Path, typer.Option(help="File for what it has learned.")],
+    tasks: Tasks = "all",
+    settings: Settings = "all",
+    words: _Words = "train",
+    rivals: _Rivals = False,
+    training: TrainingChoices = _DEFAULT_TRAINING,
+    without: _Without = "none",
+    workers: Workers = None,
+) -> None:
+    """Train a listener on the train split: pictures with free labels, then instructions."""
+    from roboirg.apps.learned_listener.learned_listener import check_learn_support
+    from roboirg.util.processor import core_count
+
+    check_learn_support()
+    from roboirg.apps.learned_listener.learned_model import save_model
+    from roboirg.apps.learned_listener.listener_training import train_listener
+
+    check_output_file(out)
+    plan = _plan(tasks, settings, words, without)._replace(rivals=rivals, **training._asdict())
+    count = core_count() if workers is None else workers
+    save_model(train_listener(plan, count, _print_tenths()), out)
+    typer.echo(f"{out}, {out.stat().st_size / 2**20:.1f} MiB")
+
+
+@learn_app.command("study")
+@spread
+def learn_study(
+    out: Annotated[Path, typer.Option(help="Folder for listeners, tables and figure.")],
+    tasks: Tasks = "all",
+    words: _Words = "train",
+    training: TrainingChoices = _DEFAULT_TRAINING,
+    workers: Workers = None,
+) -> None:
+    """Train listeners that get or lack settings, video, pictures or words, and compare them."""
+    from roboirg.apps.learned_listener.learned_listener import check_learn_support
+    from roboirg.util.processor import core_count
+
+    check_learn_support()
+    from roboirg.apps.learned_listener.listener_study import run_study
+    from roboirg.apps.learned_listener.study_report import (
+        save_study_figure,
+        study_cells,
+        study_text,
+    )
+
+    if out.exists() and not out.is_dir():
+        raise InvalidValueError(f"{str(out)!r} is a file; --out needs a folder.")
+    out.mkdir(parents=True, exist_ok=True)
+    plan = _plan(tasks, "all", words, "none")._replace(**training._asdict())
+    count = core_count() if workers is None else workers
+    cells = study_cells(run_study(plan, out, count, _print_tenths()))
+    page = out / "study.md"
+    page.write_text(study_text(cells, {"words": words, **training._asdict()}), encoding="utf-8")
+    save_study_figure(cells, out)
+    typer.echo(str(page))
+
+
+@learn_app.command("answers")
+def learned_answers(
+    model: Annotated[Path, typer.Argument(help="What was learned.", metavar="PATH")],
+    data: Annotated[Path, typer.Option(help="Folder of a grounding dataset.")],
+    out: Annotated[Path, typer.Option(help="File for the answers.")],
+) -> None:
+    """Let a trained listener answer the grounding dataset, for roboirg score grounding."""
+    from roboirg.apps.learned_listener.learned_answers import learned_answers as answers_of
+    from roboirg.apps.learned_listener.learned_listener import check_learn_support
+    from roboirg.evaluation.grounding_set.answer_file import write_answers
+    from roboirg.evaluation.grounding_set.grounding_item import read_items
+
+    check_learn_support()
+    from roboirg.apps.learned_listener.learned_model import load_model
+
+    items, learned = read_items(data), load_model(model)
+    write_answers(out, answers_of(learned, items, data))
+    typer.echo(f"{counted(len(items), 'answer')}: {out}")
+
+
+def _plan(tasks: str, settings: str, words: str, without: str) -> TrainingPlan:
+    from roboirg.apps.learned_listener.learned_model import WITHOUTS
+    from roboirg.apps.learned_listener.listener_training import TrainingPlan
+    from roboirg.cli.names import known_name, known_settings, known_tasks
+    from roboirg.core.word_pools import POOLS
+
+    return TrainingPlan(
+        known_tasks(tasks),
+        known_settings(settings),
+        words=known_name("pool of words", words, POOLS),
+        without=known_name("variant", without, WITHOUTS),
+    )
+
+
+def _print_tenths() -> Callable[[str, int, int], None]:
+    """Return a function that prints progress whenever another tenth is done."""
+    shown: dict[str, int] = {}
+
+    def progress(stage: str, done: int, total: int) -> None:
+        tenth = 10 * done // total
+        if shown.get(stage) != tenth:
+            shown[stage] = tenth
+            typer.echo(f"{stage}: {done} of {total}", err=True)
+
+    return progress
+
+
+def add_commands(app: typer.Typer) -> None:
+    app.add_typer(learn_app, name="learn")

@@ -1,0 +1,77 @@
+"""The policy: what has been learned names the goal, and the scripted expert executes it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from roboirg.core.episode import Goal
+from roboirg.core.extras import extra_needed
+from roboirg.core.observations import FRONT, Demonstration
+from roboirg.policies.builtin.scripted import ScriptedPolicy
+from roboirg.tasks import get_task
+
+if TYPE_CHECKING:
+    from roboirg.apps.learned_listener.learned_model import LearnedModel
+    from roboirg.envs.environment import RoboIRGEnv
+
+FRAMES_EVERY = 8
+"""Control steps between the frames of the video that it gets."""
+
+
+class LearnedListener(ScriptedPolicy):
+    """Executes the goal that a trained listener understands.
+
+    It gets the words, the video and the first picture; only the hands are privileged. If the scene
+    does not have the goal, it holds still.
+
+    Raises:
+        InvalidValueError: the file is no trained listener.
+        MissingDependencyError: PyTorch is not installed.
+    """
+
+    cameras = (FRONT,)
+    demonstration_frames = FRAMES_EVERY
+
+    def __init__(self, path: Path, seed: int = 0) -> None:
+        super().__init__(seed)
+        check_learn_support()
+        from roboirg.apps.learned_listener.learned_model import file_version, load_model
+
+        self.version = file_version(path)
+        self.understood: Goal | None = None
+        self._model: LearnedModel = load_model(path)
+        self._demonstration: Demonstration = {}
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """How it was trained, and the goal that it understood."""
+        goal = self.understood
+        understood = None if goal is None else dict(goal.as_mapping())
+        return {"trained": self._model.about, "understood": understood}
+
+    def reset(self, instruction: str, demonstration: Demonstration) -> None:
+        """Understand the instruction, or first hear the rest of it."""
+        self._demonstration, self.understood = demonstration, None
+        super().reset(instruction, demonstration)
+
+    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
+        """Return the goal that is understood; None if the scene does not have it."""
+        from roboirg.apps.learned_listener.learned_model import pictures_to_see
+
+        task, scene = env.episode.task, env.episode.scene
+        frames = self._demonstration.get(f"{FRONT}_rgb", ())
+        pictures = pictures_to_see(env.picture(FRONT), frames, FRAMES_EVERY)
+        self._demonstration = {}
+        self.understood = self._model.understand(task, instruction, pictures)
+        return self.understood if self.understood in get_task(task).goals(scene) else None
+
+
+def check_learn_support() -> None:
+    """Check early that PyTorch is there.
+
+    Raises:
+        MissingDependencyError: it is not installed.
+    """
+    with extra_needed("A listener that learns needs PyTorch", "learn"):
+        import torch  # noqa: F401 - an extra, and slow to import

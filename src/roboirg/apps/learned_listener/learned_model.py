@@ -1,0 +1,169 @@
+"""What a listener has learned: a detector and a reader, in one file of plain tensors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, get_args
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from roboirg.apps.learned_listener.detector_net import DetectorNet
+from roboirg.apps.learned_listener.labeled_views import LATER_STEP
+from roboirg.apps.learned_listener.listener_net import ListenerInput, ListenerNet, Vocabulary
+from roboirg.apps.learned_listener.object_relations import (
+    ObjectsInView,
+    TablePlane,
+    nothing_of,
+    relate,
+)
+from roboirg.core.episode import Goal
+from roboirg.core.errors import InvalidValueError
+from roboirg.policies.planning.goal_schema import goal_schema
+from roboirg.util.short_hash import short_hash
+
+FORMAT = "roboirg-listener-2"
+Without = Literal["none", "pictures", "video", "words"]
+WITHOUTS: tuple[Without, ...] = get_args(Without)
+"""What a variant does not get; the words are then empty.
+
+Without the video, nothing is seen of a scene that has one.
+"""
+
+Pixels = NDArray[np.uint8]
+
+
+class LearnedModel(NamedTuple):
+    """A trained listener.
+
+    Attributes:
+        vocabulary: what it can name.
+        detector: finds objects.
+        plane: of the table in the picture.
+        reader: scores goals.
+        without: what it does not get.
+        about: how it was trained, for records.
+    """
+
+    vocabulary: Vocabulary
+    detector: DetectorNet
+    plane: TablePlane
+    reader: ListenerNet
+    without: Without
+    about: dict[str, Any]
+
+    def understand(self, task: str, text: str, pictures: Sequence[Pixels]) -> Goal:
+        """Return the best goal of a task for an instruction.
+
+        Args:
+            task: name of the task.
+            text: everything that was said.
+            pictures: those of `pictures_to_see`.
+
+        Raises:
+            InvalidValueError: it was not trained on the task.
+        """
+        return self.understand_seen(task, text, self.see(pictures))
+
+    def understand_seen(self, task: str, text: str, seen: ObjectsInView) -> Goal:
+        """Return the best goal of a task for an instruction, of a scene that has been seen.
+
+        Raises:
+            InvalidValueError: it was not trained on the task.
+        """
+        if task not in self.vocabulary.tasks:
+            raise InvalidValueError(
+                f"This listener was not trained on {task}, but on "
+                f"{', '.join(self.vocabulary.tasks)}."
+            )
+        with torch.no_grad():
+            (scores,) = self.reader([self.hide(ListenerInput(task, text, seen))])
+        return list(goal_schema(task).goals.values())[int(scores.argmax())]
+
+    def see(self, pictures: Sequence[Pixels]) -> ObjectsInView:
+        """Return the objects of pictures."""
+        return relate(self.detector.find(pictures), self.plane, self.vocabulary.classes)
+
+    def hide(self, given: ListenerInput) -> ListenerInput:
+        """Return an input without what this listener does not get."""
+        return hide(given, self.without)
+
+
+def hide(given: ListenerInput, without: Without) -> ListenerInput:
+    """Return an input without pictures, video or words."""
+    if without == "pictures" or (without == "video" and given.seen.looks > 1):
+        return given._replace(seen=nothing_of(given.seen))
+    return given._replace(text="") if without == "words" else given
+
+
+def pictures_to_see(first: Pixels, frames: Sequence[Pixels] | Pixels, every: int) -> list[Pixels]:
+    """Return the pictures that a listener looks at.
+
+    Of a video, its first frame and one two seconds later; without one, the first picture.
+
+    Args:
+        first: at the start of the policy's turn.
+        frames: of the video; may be empty.
+        every: control steps between two frames.
+    """
+    if not len(frames):
+        return [first]
+    return [frames[0], frames[min(LATER_STEP // every, len(frames) - 1)]]
+
+
+def save_model(model: LearnedModel, path: Path) -> None:
+    """Write a trained listener.
+
+    Raises:
+        InvalidValueError: the file cannot be written.
+    """
+    content = {
+        "format": FORMAT,
+        "vocabulary": {name: list(value) for name, value in model.vocabulary._asdict().items()},
+        "detector": model.detector.state_dict(),
+        "plane": {name: torch.from_numpy(one) for name, one in model.plane._asdict().items()},
+        "reader": model.reader.state_dict(),
+        "without": model.without,
+        "about": model.about,
+    }
+    try:
+        torch.save(content, path)
+    except (OSError, RuntimeError) as error:
+        raise InvalidValueError(f"Cannot write {path}: {error}.") from error
+
+
+def load_model(path: Path) -> LearnedModel:
+    """Return a trained listener; nothing of the file is executed.
+
+    Raises:
+        InvalidValueError: the file is none.
+    """
+    try:
+        content = torch.load(path, weights_only=True, map_location="cpu")
+        if content.get("format") != FORMAT:
+            raise InvalidValueError(f"its format is {content.get('format')!r}, not {FORMAT!r}")
+        held = {name: tuple(value) for name, value in content["vocabulary"].items()}
+        vocabulary = Vocabulary(**held)
+        plane = TablePlane(**{name: one.numpy() for name, one in content["plane"].items()})
+        detector, reader = DetectorNet(len(vocabulary.classes)), ListenerNet(vocabulary)
+        detector.load_state_dict(content["detector"])
+        reader.load_state_dict(content["reader"])
+    except Exception as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InvalidValueError(f"{str(path)!r} is no trained listener ({reason}).") from error
+    detector.eval()
+    reader.eval()
+    return LearnedModel(vocabulary, detector, plane, reader, content["without"], content["about"])
+
+
+def file_version(path: Path) -> str:
+    """Return a fingerprint of a trained listener's file."""
+    try:
+        return short_hash(path.read_bytes())
+    except OSError as error:
+        raise InvalidValueError(
+            f"The trained listener {str(path)!r} cannot be read ({error.strerror}); make one with: "
+            "roboirg learn listener --out PATH."
+        ) from error

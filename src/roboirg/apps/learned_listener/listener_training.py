@@ -1,0 +1,344 @@
+"""Train a listener: the detector on labeled pictures, then the reader on instructions."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, Generic, NamedTuple, TypeVar
+
+import numpy as np
+import torch
+from torch import nn
+from torch.nn import functional
+
+from roboirg.apps.learned_listener.detector_net import SIZE, DetectorNet, detector_loss
+from roboirg.apps.learned_listener.labeled_views import LabeledView, look
+from roboirg.apps.learned_listener.learned_model import LearnedModel, Without, hide
+from roboirg.apps.learned_listener.listener_net import (
+    ListenerInput,
+    ListenerNet,
+    Vocabulary,
+    make_vocabulary,
+)
+from roboirg.apps.learned_listener.object_relations import (
+    ObjectsInView,
+    SeenObjects,
+    TablePlane,
+    fit_plane,
+    relate,
+)
+from roboirg.core.episode import Episode, Split
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import RIVALS, InstructionOptions
+from roboirg.core.word_pools import PoolName
+from roboirg.episodes.splits import SIZES, get_episode
+from roboirg.language import FORMS, LANGUAGE_VERSION
+from roboirg.language.instruction import Instruction
+from roboirg.language.settings import all_settings, settings_of
+from roboirg.language.variants import instructions, settings_with_rivals
+from roboirg.policies.planning.goal_schema import goal_schema
+from roboirg.tasks import get_task, with_goal
+from roboirg.util.parallel_map import parallel_map
+
+TRAINING_SPLIT: Split = "train"
+BATCH = 32
+DETECTOR_RATE, READER_RATE = 1e-2, 1e-3
+FORGOTTEN_WORDS = 0.05
+"""Share of the words that are unknown in training, so that new ones do no harm."""
+
+_NO_PICTURE = np.zeros((0, 0, 3), np.uint8)
+
+Progress = Callable[[str, int, int], None]
+One = TypeVar("One")
+
+
+class TrainingPlan(NamedTuple):
+    """How a listener is trained.
+
+    Attributes:
+        tasks: names of tasks.
+        settings: names of settings whose instructions it hears.
+        words: the pool of words.
+        rivals: whether it also hears instructions with a rival, where there are some.
+        scenes: random scenes of each task beyond the train split.
+        goals: goals of each scene that are told by place, where there is the most to learn. In
+            other settings only the episode's own is.
+        detector_epochs: passes over all pictures of the train split.
+        reader_epochs: passes over all instructions.
+        without: what it does not get.
+        seed: of initial weights and order.
+    """
+
+    tasks: tuple[str, ...]
+    settings: tuple[str, ...]
+    words: PoolName = "train"
+    rivals: bool = False
+    scenes: int = 300
+    goals: int = 4
+    detector_epochs: int = 6
+    reader_epochs: int = 12
+    without: Without = "none"
+    seed: int = 0
+
+
+class SeenEpisodes(NamedTuple):
+    """Scenes with what a trained detector sees of them, for any number of listeners.
+
+    Attributes:
+        episodes: all of them.
+        seen: the objects, by the episode's key.
+        classes: of objects, in the order of their numbers.
+        detector: finds objects.
+        plane: of the table.
+    """
+
+    episodes: tuple[Episode, ...]
+    seen: Mapping[str, ObjectsInView]
+    classes: tuple[str, ...]
+    detector: DetectorNet
+    plane: TablePlane
+
+
+class _Lesson(NamedTuple):
+    """An instruction with the number of its goal among those of the task."""
+
+    given: ListenerInput
+    goal: int
+
+
+def train_listener(plan: TrainingPlan, workers: int, progress: Progress) -> LearnedModel:
+    """Return a listener that has learned from the train split and random scenes.
+
+    Args:
+        plan: how.
+        workers: processes that draw pictures; 0 uses this one.
+        progress: called with a stage, what is done of it, and all of it.
+
+    Raises:
+        InvalidValueError: no task has one of the settings.
+    """
+    check_settings(plan)
+    return teach(see_episodes(plan, workers, progress), plan, progress)
+
+
+def check_settings(plan: TrainingPlan) -> None:
+    """Raise unless some task has one of the settings.
+
+    Raises:
+        InvalidValueError: none has.
+    """
+    if not any(set(plan.settings) & set(settings_of(get_task(task))) for task in plan.tasks):
+        raise InvalidValueError(f"None of these tasks has the setting {', '.join(plan.settings)}.")
+
+
+def see_episodes(plan: TrainingPlan, workers: int, progress: Progress) -> SeenEpisodes:
+    """Train a detector on the pictures of the train split, and look at all episodes.
+
+    Of random scenes only the labels are kept: they stand for what the detector would find.
+
+    Args:
+        plan: which tasks, how many scenes and passes.
+        workers: processes that draw pictures; 0 uses this one.
+        progress: called with a stage, what is done of it, and all of it.
+    """
+    torch.manual_seed(plan.seed)
+    episodes = tuple(_episodes(plan))
+    views: dict[str, tuple[LabeledView, ...]] = {}
+    for episode, own in parallel_map(_look, episodes, workers):
+        views[episode.key] = own
+        progress("pictures", len(views), len(episodes))
+    every = [view for episode in episodes for view in views[episode.key]]
+    classes = tuple(sorted({name for view in every for name in view.names}))
+    plane = fit_plane(
+        np.concatenate([view.centers for view in every]) / SIZE,
+        np.concatenate([view.positions for view in every]),
+    )
+    detector = _train_detector([one for one in every if one.picture.size], classes, plan, progress)
+    seen = {
+        key: relate(_seen(own, detector, classes), plane, classes) for key, own in views.items()
+    }
+    return SeenEpisodes(episodes, seen, classes, detector, plane)
+
+
+def teach(scenes: SeenEpisodes, plan: TrainingPlan, progress: Progress) -> LearnedModel:
+    """Return a listener that has learned to read the instructions of scenes.
+
+    Args:
+        scenes: seen before.
+        plan: which settings and words, how many passes, and what it does not get.
+        progress: called with a stage, what is done of it, and all of it.
+    """
+    torch.manual_seed(plan.seed)
+    told = [(episode, instruction.text) for episode, instruction in _instructions(scenes, plan)]
+    vocabulary = make_vocabulary((text for _, text in told), scenes.classes, plan.tasks)
+    lessons = [
+        _lesson(ListenerInput(episode.task, text, scenes.seen[episode.key]), episode, plan)
+        for episode, text in told
+    ]
+    reader = _train_reader(lessons, vocabulary, plan, progress)
+    about: dict[str, Any] = {**plan._asdict(), "language_version": LANGUAGE_VERSION}
+    about |= {"tasks": list(plan.tasks), "settings": list(plan.settings)}
+    return LearnedModel(vocabulary, scenes.detector, scenes.plane, reader, plan.without, about)
+
+
+def _instructions(
+    scenes: SeenEpisodes, plan: TrainingPlan
+) -> Iterator[tuple[Episode, Instruction]]:
+    options = InstructionOptions(wordings=plan.words)
+    by_place = [name for name in plan.settings if "frame" in all_settings()[name].reads]
+    others = [name for name in plan.settings if name not in by_place]
+    yield from instructions(scenes.episodes, others, FORMS[:1], options)
+    yield from instructions(_with_goals(scenes.episodes, plan), by_place, FORMS[:1], options)
+    if plan.rivals:
+        with_rivals = [name for name in plan.settings if name in settings_with_rivals()]
+        options = options._replace(rival=RIVALS[-1])
+        yield from instructions(scenes.episodes, with_rivals, FORMS[:1], options)
+
+
+def _with_goals(episodes: Iterable[Episode], plan: TrainingPlan) -> Iterator[Episode]:
+    """Yield each episode, and again with other goals of its scene."""
+    rng = random.Random(plan.seed)
+    for episode in episodes:
+        yield episode
+        goals = get_task(episode.task).goals(episode.scene)
+        others = [goal for goal in goals if goal != episode.goal]
+        for goal in rng.sample(others, min(plan.goals - 1, len(others))):
+            yield with_goal(episode, goal)
+
+
+def _look(episode: Episode) -> tuple[LabeledView, ...]:
+    """Return the labeled pictures of an episode; of a random scene only the labels."""
+    views = look(episode)
+    if episode.split == TRAINING_SPLIT:
+        return views
+    return tuple(view._replace(picture=_NO_PICTURE) for view in views)
+
+
+def _seen(
+    views: Sequence[LabeledView], detector: DetectorNet, classes: Sequence[str]
+) -> list[SeenObjects]:
+    if all(view.picture.size for view in views):
+        found: list[SeenObjects] = detector.find([view.picture for view in views])
+        return found
+    numbers = {name: number for number, name in enumerate(classes)}
+    return [
+        SeenObjects(
+            np.array([numbers[name] for name in view.names], np.int64),
+            view.centers / np.float32(SIZE),
+        )
+        for view in views
+    ]
+
+
+def _train_detector(
+    shown: Sequence[LabeledView], classes: Sequence[str], plan: TrainingPlan, progress: Progress
+) -> DetectorNet:
+    detector, rng = DetectorNet(len(classes)), random.Random(plan.seed)
+    epochs = plan.detector_epochs
+    trainer = _Trainer[LabeledView](
+        detector,
+        lambda batch: detector_loss(detector, batch, classes),
+        DETECTOR_RATE,
+        epochs * _batch_count(shown),
+    )
+    for epoch in range(epochs):
+        trainer.run(_batches(shown, rng))
+        progress("detector", epoch + 1, epochs)
+    detector.eval()
+    return detector
+
+
+def _train_reader(
+    lessons: Sequence[_Lesson], vocabulary: Vocabulary, plan: TrainingPlan, progress: Progress
+) -> ListenerNet:
+    reader, rng = ListenerNet(vocabulary), random.Random(plan.seed)
+    trainer = _Trainer[_Lesson](
+        reader,
+        lambda batch: _reader_loss(reader, batch),
+        READER_RATE,
+        plan.reader_epochs * _batch_count(lessons),
+    )
+    for epoch in range(plan.reader_epochs):
+        trainer.run(_even_batches([_forget(one, rng) for one in lessons], rng))
+        progress("reader", epoch + 1, plan.reader_epochs)
+    reader.eval()
+    return reader
+
+
+def _episodes(plan: TrainingPlan) -> Iterator[Episode]:
+    for task in plan.tasks:
+        yield from (
+            get_episode(task, TRAINING_SPLIT, place) for place in range(SIZES[TRAINING_SPLIT])
+        )
+        yield from (get_episode(task, "random", place) for place in range(plan.scenes))
+
+
+def _lesson(given: ListenerInput, episode: Episode, plan: TrainingPlan) -> _Lesson:
+    schema = goal_schema(episode.task)
+    goal = list(schema.goals).index(schema.answers[episode.goal])
+    return _Lesson(hide(given, plan.without), goal)
+
+
+def _forget(lesson: _Lesson, rng: random.Random) -> _Lesson:
+    """Return a lesson in which some words have become unknown ones."""
+    words = lesson.given.text.split()
+    kept = ["…" if rng.random() < FORGOTTEN_WORDS else word for word in words]
+    return lesson._replace(given=lesson.given._replace(text=" ".join(kept)))
+
+
+def _reader_loss(net: ListenerNet, batch: Sequence[_Lesson]) -> torch.Tensor:
+    scores = net([one.given for one in batch])
+    losses = [
+        functional.cross_entropy(own[None], torch.tensor([one.goal]))
+        for own, one in zip(scores, batch, strict=True)
+    ]
+    return torch.stack(losses).mean()
+
+
+def _batch_count(lessons: Sequence[object]) -> int:
+    return math.ceil(len(lessons) / BATCH)
+
+
+def _batches(lessons: Sequence[One], rng: random.Random) -> Iterator[list[One]]:
+    mixed = rng.sample(lessons, len(lessons))
+    for start in range(0, len(mixed), BATCH):
+        yield mixed[start : start + BATCH]
+
+
+def _even_batches(lessons: Sequence[_Lesson], rng: random.Random) -> Iterator[list[_Lesson]]:
+    """Yield batches of lessons that are about equally long, which wastes no time on padding."""
+    mixed = sorted(rng.sample(lessons, len(lessons)), key=_length)
+    batches = [mixed[start : start + BATCH] for start in range(0, len(mixed), BATCH)]
+    yield from rng.sample(batches, len(batches))
+
+
+def _length(lesson: _Lesson) -> int:
+    return lesson.given.text.count(" ")
+
+
+class _Trainer(Generic[One]):
+    """Trains a network with AdamW; the rate falls to zero along a cosine."""
+
+    def __init__(
+        self,
+        net: nn.Module,
+        loss_of: Callable[[Sequence[One]], torch.Tensor],
+        rate: float,
+        steps: int,
+    ) -> None:
+        self._net, self._loss_of = net, loss_of
+        self._optimizer = torch.optim.AdamW(net.parameters(), lr=rate, weight_decay=0.01)
+        self._schedule = torch.optim.lr_scheduler.OneCycleLR(
+            self._optimizer, rate, total_steps=max(steps, 1), pct_start=0.1
+        )
+
+    def run(self, batches: Iterable[Sequence[One]]) -> None:
+        """Take a step for each batch."""
+        self._net.train()
+        for batch in batches:
+            self._optimizer.zero_grad()
+            self._loss_of(batch).backward()
+            nn.utils.clip_grad_norm_(self._net.parameters(), 1.0)
+            self._optimizer.step()
+            self._schedule.step()

@@ -1,0 +1,1 @@
+"""People as listeners and as policies: pages of a study, what people answered, the arm driven."""

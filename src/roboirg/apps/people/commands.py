@@ -1,0 +1,245 @@
+"""Commands for people: ``roboirg listen`` and ``roboirg drive``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from roboirg.cli import run_commands
+from roboirg.cli.options import (
+    DEFAULT_WORDS,
+    Settings,
+    Split,
+    Tasks,
+    WordChoices,
+    Workers,
+    spread,
+)
+from roboirg.core.errors import InvalidValueError
+from roboirg.util.plain_text import counted
+
+if TYPE_CHECKING:
+    from roboirg.util.keyed_pages import KeyedPageServer
+
+# Heavy modules are imported inside the commands, so that --help is fast.
+
+listen_app = typer.Typer(
+    no_args_is_help=True, help="Ask people what is meant; the oracle's hands play their answers."
+)
+
+Study = Annotated[Path, typer.Argument(help="Folder of the study.")]
+Host = Annotated[str, typer.Option(help="Address to listen at; 0.0.0.0 for other machines, too.")]
+Port = Annotated[int, typer.Option(help="Port to listen at; 0 for any free port.")]
+AllowHost = Annotated[
+    list[str] | None,
+    typer.Option(help="Further name under which browsers reach this machine; repeatable."),
+]
+Delivery = Annotated[
+    str, typer.Option(help="prompt: all words at once; turns: one utterance after another.")
+]
+
+
+@listen_app.command()
+@spread
+def plan(
+    folder: Study,
+    people: Annotated[
+        int, typer.Option(help="How many people; best a multiple of the number of settings.")
+    ],
+    tasks: Tasks = "all",
+    settings: Settings = "all",
+    form: Annotated[str, typer.Option(help="implicit or resolved.")] = "implicit",
+    split: Split = "test",
+    episodes: Annotated[
+        str, typer.Option(help="all, 4 for the first four, or a list such as 0,3,5-9.")
+    ] = "4",
+    delivery: Delivery = "prompt",
+    words: WordChoices = DEFAULT_WORDS,
+    practice: Annotated[int, typer.Option(help="Practice questions for each task.")] = 1,
+    checks: Annotated[int, typer.Option(help="Attention checks for each person.")] = 2,
+    seed: Annotated[int, typer.Option(help="Seed of the order of the episodes.")] = 0,
+    frames_every: Annotated[
+        int, typer.Option(help="Control steps between two frames of a video.")
+    ] = 4,
+    consent: Annotated[
+        Path | None, typer.Option(help="Text file that people agree to, instead of ours.")
+    ] = None,
+    workers: Workers = None,
+) -> None:
+    """Plan a study of listeners and draw its pictures; continues one that was interrupted."""
+    from roboirg.apps.people.listening_session import QUESTIONS
+    from roboirg.apps.people.listening_study import (
+        CONSENT,
+        PEOPLE,
+        ListeningStudy,
+        write_listening_study,
+    )
+    from roboirg.cli.progress_bar import progress_bar
+    from roboirg.evaluation.grounding_set.grounding_item import write_items
+    from roboirg.evaluation.grounding_set.question_set import collect_items
+    from roboirg.evaluation.plan_maker import make_plan
+    from roboirg.util.processor import core_count
+
+    # The policy can be checked only when its answers are there; the oracle stands in for it.
+    made = make_plan(
+        [f"{PEOPLE}=oracle"],
+        tasks=tasks,
+        settings=settings,
+        forms=form,
+        split=split,
+        episodes=episodes,
+        delivery=delivery,
+        **words._asdict(),
+    )
+    study = ListeningStudy(
+        plan=made.model_copy(update={"policies": (PEOPLE,)}),
+        people=people,
+        practice=practice,
+        checks=checks,
+        seed=seed,
+        frames_every=frames_every,
+        consent=CONSENT if consent is None else _read_text(consent),
+    ).checked()
+    write_listening_study(study, folder)
+    count = core_count() if workers is None else workers
+    with progress_bar("episodes") as progress:
+        found = collect_items(study.export_request(), folder / QUESTIONS, count, progress)
+    write_items(found, folder / QUESTIONS)
+    asked = study.questions(0)
+    items = sum(one.kind == "item" for one in asked)
+    typer.echo(
+        f"{counted(people, 'person', 'people')} with {counted(items, 'question')} each, "
+        f"{len(asked) - items} for practice and checks: {folder}\n"
+        f"Serve it: roboirg listen serve {folder}"
+    )
+
+
+@listen_app.command("serve")
+def serve_study(
+    folder: Study,
+    host: Host = "127.0.0.1",
+    port: Port = 0,
+    allow_host: AllowHost = None,
+    people: Annotated[
+        int | None,
+        typer.Option(min=1, help="How many may take part, if not as many as planned."),
+    ] = None,
+) -> None:
+    """Serve the page of a study; every answer is on the disk before the next question comes."""
+    from roboirg.apps.people.listen_server import ListenServer
+
+    server = ListenServer(folder, host, port, allow_host or (), people)
+    _serve(server, "Press Ctrl-C to stop; all answers are stored.")
+
+
+@listen_app.command("play")
+def play_answers(folder: Study, workers: Workers = None) -> None:
+    """Play what people answered with the oracle's hands; records are in FOLDER/run."""
+    from roboirg.apps.people.people_run import RUN, answered_plan
+    from roboirg.evaluation.executors.executor import choose_executor
+
+    made, out = answered_plan(folder), folder.absolute() / RUN
+    summary = run_commands.play(made, out, choose_executor(workers), retry=True)
+    run_commands.print_tables_of(out, made.jobs())
+    _print_listeners(folder)
+    run_commands.report_problems(summary, out)
+
+
+@listen_app.command("table")
+def print_listeners(folder: Study) -> None:
+    """Print how far people agree, how long they take, and whether they pay attention."""
+    _print_listeners(folder)
+
+
+def _print_listeners(folder: Path) -> None:
+    from rich.console import Console
+
+    from roboirg.analysis.tables.rendering.terminal import renderable
+    from roboirg.apps.people.listener_answers import read_events
+    from roboirg.apps.people.listener_tables import person_table, setting_table
+    from roboirg.apps.people.listening_study import read_listening_study
+    from roboirg.util.console_width import widen
+
+    read_listening_study(folder)
+    events = read_events(folder)
+    if not events:
+        raise InvalidValueError(f"No question of {str(folder)!r} was answered yet.")
+    console = Console()
+    widen(console)
+    for table in (setting_table(events), person_table(events)):
+        console.print(renderable(table, console))
+
+
+def _serve(server: KeyedPageServer, words: str) -> None:
+    """Serve until Ctrl-C."""
+    typer.echo(f"Open {server.url}")
+    if server.host in ("0.0.0.0", "::"):  # noqa: S104 - a comparison
+        typer.echo("From other machines: the same address with this machine's name.")
+    typer.echo(words)
+    sys.stdout.flush()
+    try:
+        server.serve_forever()
+    except KeyboardInterrupt:
+        sys.exit(run_commands.INTERRUPTED)
+    finally:
+        server.server_close()
+
+
+def _read_text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidValueError(f"The text {str(path)!r} cannot be read ({error}).") from error
+
+
+@spread
+def drive(
+    task: Annotated[str, typer.Argument(help="Name of the task.")],
+    episode: Annotated[int, typer.Argument(help="Position in the split, from 0.")],
+    setting: Annotated[str, typer.Option(help="Setting of the words.")] = "explicit",
+    form: Annotated[str, typer.Option(help="implicit or resolved.")] = "implicit",
+    split: Split = "test",
+    delivery: Delivery = "prompt",
+    words: WordChoices = DEFAULT_WORDS,
+    max_steps: Annotated[int, typer.Option(help="Limit in control steps, 20 per second.")] = 1300,
+    out: run_commands.Out = "runs/driven",
+    name: Annotated[str, typer.Option(help="Name of the policy in the records.")] = "person",
+    host: Host = "127.0.0.1",
+    port: Port = 0,
+    allow_host: AllowHost = None,
+) -> None:
+    """Drive an episode in the browser, by mouse, touch or keyboard; stores its record."""
+    from roboirg.apps.people.drive_server import DriveServer
+    from roboirg.apps.people.driving_run import DRIVER
+    from roboirg.envs.factory import check_simulator
+    from roboirg.evaluation.plan_maker import make_plan
+
+    # The plan checks the words as those of a run; a person is no policy that can be loaded.
+    made = make_plan(
+        [f"{DRIVER}=oracle"],
+        tasks=task,
+        settings=setting,
+        forms=form,
+        split=split,
+        episodes=f"{episode},",
+        delivery=delivery,
+        **words._asdict(),
+        max_steps=max_steps,
+    )
+    check_simulator()
+    jobs = made.jobs()
+    if len(jobs) != 1:
+        raise InvalidValueError(
+            f"One task, one setting and one form are driven at a time; these are {len(jobs)} jobs."
+        )
+    job = jobs[0].model_copy(update={"policy": name, "spec": None})
+    server = DriveServer(job, run_commands.folder_of(out), host, port, allow_host or ())
+    _serve(server, f"Press Ctrl-C to stop; the records of episodes that ended are in {out}.")
+
+
+def add_commands(app: typer.Typer) -> None:
+    app.add_typer(listen_app, name="listen")
+    app.command()(drive)

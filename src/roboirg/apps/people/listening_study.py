@@ -1,0 +1,257 @@
+"""A study of people as listeners: who is asked what, in which order.
+
+Every person sees every episode once. In which setting follows from a balanced Latin square, so that
+as many people as there are settings answer each episode once in each of them: together they are one
+seed of the policy ``people``.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from roboirg.apps.people.latin_square import balanced_square
+from roboirg.apps.people.people_listener import STUDY_FILE
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import DEFAULT_DELIVERY, InstructionOptions
+from roboirg.episodes.splits import SIZES
+from roboirg.evaluation.grounding_set.question_set import EpisodeName, ExportRequest
+from roboirg.evaluation.plan import Plan
+from roboirg.language.settings import EXPLICIT, setting_names
+from roboirg.records.record import Job
+from roboirg.util.atomic_write import write_atomically
+
+PEOPLE = "people"
+"""Name of the policy in records."""
+TRAINING: Literal["train"] = "train"
+"""Split of practice and checks."""
+
+QuestionKind = Literal["practice", "check", "item"]
+
+CONSENT = """\
+You are shown a table with a robot arm, sometimes a short video first, and what was said to the
+robot. You say what is meant: you point at things in the picture and choose numbers.
+
+Taking part is voluntary. You may stop at any time by closing the page, and you need give no
+reason.
+
+What is stored: your answers, how long each of them took, how often you watched a video, and date
+and time. No name, no address and nothing about your browser or computer is stored.
+"""
+"""Text that a person agrees to, unless the study has one of its own."""
+
+
+class PersonQuestion(NamedTuple):
+    """One question to one person.
+
+    Attributes:
+        kind: practice, which is explained afterwards; check, whether the person pays attention; or
+            item, which counts.
+        job: the episode and its words; of an item the job of the answer's record.
+    """
+
+    kind: QuestionKind
+    job: Job
+
+
+class ListeningStudy(BaseModel):
+    """What a study asks.
+
+    Attributes:
+        plan: episodes and words; its one policy is `PEOPLE`, with as many seeds as needed.
+        people: how many take part.
+        practice: practice questions for each task.
+        checks: attention checks.
+        seed: of the order of the episodes, which is the same for all people.
+        frames_every: control steps between two frames of a video.
+        consent: text that people agree to, paragraphs separated by empty lines.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    plan: Plan
+    people: int
+    practice: int = 1
+    checks: int = 2
+    seed: int = 0
+    frames_every: int = 4
+    consent: str = CONSENT
+
+    def checked(self) -> ListeningStudy:
+        """Return this study if it can be carried out.
+
+        Raises:
+            InvalidValueError: a number is out of range, or a person would be asked about an
+                episode twice.
+        """
+        for name, least in (
+            ("people", 1),
+            ("practice", 0),
+            ("checks", 0),
+            ("frames_every", 1),
+            ("seed", 0),
+        ):
+            if getattr(self, name) < least:
+                raise InvalidValueError(
+                    f"{name} is {getattr(self, name)}; it must be at least {least}."
+                )
+        if len(self.plan.forms) > 1 or len(self.plan.stages) > 1:
+            raise InvalidValueError("A study has one form and one set of stages.")
+        if self.plan.split == TRAINING:
+            raise InvalidValueError(
+                f"Practice and checks are episodes of the split {TRAINING!r}; choose another one."
+            )
+        if self.practice + self.checks > SIZES[TRAINING]:
+            raise InvalidValueError(
+                f"{self.practice} practice questions and {self.checks} checks are more than the "
+                f"{SIZES[TRAINING]} episodes they are taken from."
+            )
+        if not self.consent.strip():
+            raise InvalidValueError("The text that people agree to is empty.")
+        return self
+
+    def questions(self, place: int) -> tuple[PersonQuestion, ...]:
+        """Return the questions of the person at a place, in order.
+
+        Args:
+            place: number of people who joined before.
+        """
+        items = self._items(place)
+        checks = self._checks()
+        found = [PersonQuestion("practice", job) for job in self._practice()]
+        for number, item in enumerate(items, start=1):
+            found.append(PersonQuestion("item", item))
+            # Evenly spaced, none at the very end.
+            due = number * (len(checks) + 1) // len(items)
+            before = (number - 1) * (len(checks) + 1) // len(items)
+            found += (PersonQuestion("check", job) for job in checks[before:due])
+        return tuple(found)
+
+    def export_request(self) -> ExportRequest:
+        """Return the dataset with the words and pictures of all questions."""
+        plan = self.plan
+        episodes = [EpisodeName(task, plan.split, one) for task, one in self._cells]
+        training = [*self._practice(), *self._checks()]
+        episodes += [EpisodeName(job.task, TRAINING, job.episode) for job in training]
+        named = setting_names() if plan.settings == "all" else plan.settings
+        return ExportRequest(
+            episodes=tuple(dict.fromkeys(episodes)),
+            settings=tuple(dict.fromkeys((EXPLICIT, *named))),
+            forms=plan.forms,
+            options=InstructionOptions(
+                stages=plan.stages[0],
+                distractor=plan.distractor,
+                distractors=plan.distractors,
+                frame=plan.frame,
+                wordings=plan.wordings_identity,
+                rival=plan.rival,
+                reasoning=plan.reasoning,
+            ),
+            frames_every=self.frames_every,
+            wordings=plan.wordings,
+            formats=(),
+        )
+
+    @functools.cached_property
+    def _cells(self) -> dict[tuple[str, int], list[Job]]:
+        """The jobs of each task and episode, one for each setting."""
+        plan = self.plan.model_copy(update={"policy_seeds": (0,)})
+        cells: dict[tuple[str, int], list[Job]] = {}
+        for job in plan.jobs():
+            cells.setdefault((job.task, job.episode), []).append(job)
+        return cells
+
+    def _items(self, place: int) -> list[Job]:
+        cells = list(self._cells.values())
+        order = np.random.default_rng(self.seed).permutation(len(cells))
+        # Tasks with as many settings share a square, so that each person gets all equally often.
+        columns: Counter[int] = Counter()
+        found = []
+        for jobs in (cells[cell] for cell in order.tolist()):
+            found.append(_assign(jobs, place, columns[len(jobs)]))
+            columns[len(jobs)] += 1
+        return found
+
+    def _practice(self) -> Iterator[Job]:
+        for index, task in itertools.product(range(self.practice), self.plan.tasks):
+            yield self._training_job(task, index)
+
+    def _checks(self) -> list[Job]:
+        tasks = itertools.cycle(self.plan.tasks)
+        return [
+            self._training_job(task, self.practice + number)
+            for number, task in zip(range(self.checks), tasks, strict=False)
+        ]
+
+    def _training_job(self, task: str, index: int) -> Job:
+        plan = self.plan
+        return Job(
+            policy=PEOPLE,
+            task=task,
+            split=TRAINING,
+            episode=index,
+            setting=EXPLICIT,
+            wordings=plan.wordings_identity,
+            wordings_file=plan.wordings,
+        )
+
+
+def _assign(jobs: list[Job], place: int, column: int) -> Job:
+    """Return the job of a cell that the person at a place gets as question number `column`."""
+    square = balanced_square(len(jobs))
+    chosen = [square[one % len(square)][column % len(jobs)] for one in range(place + 1)]
+    earlier = chosen[:-1].count(chosen[-1])
+    return jobs[chosen[-1]].model_copy(update={"policy_seed": earlier})
+
+
+def words_of(job: Job) -> tuple[str, str, int, InstructionOptions]:
+    """Return what the words of a job depend on, as of an item of the dataset."""
+    return job.task, job.split, job.episode, job.options._replace(delivery=DEFAULT_DELIVERY)
+
+
+def write_listening_study(study: ListeningStudy, folder: Path) -> None:
+    """Write a study into its folder, which may hold the same study already.
+
+    Raises:
+        InvalidValueError: the folder holds something else, or cannot be written.
+    """
+    path = folder / STUDY_FILE
+    if path.exists():
+        if read_listening_study(folder) != study:
+            raise InvalidValueError(
+                f"{str(folder)!r} holds a study of other questions; give the same options, or "
+                "choose another folder."
+            )
+        return
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InvalidValueError(f"{str(folder)!r} is not an empty folder; choose another one.")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InvalidValueError(f"Cannot write {folder}: {error.strerror or error}.") from error
+    write_atomically(path, study.model_dump_json(indent=2) + "\n")
+
+
+def read_listening_study(folder: Path) -> ListeningStudy:
+    """Read the study of a folder.
+
+    Raises:
+        InvalidValueError: there is none, or it is of another version.
+    """
+    path = folder / STUDY_FILE
+    try:
+        return ListeningStudy.model_validate_json(path.read_bytes())
+    except OSError as error:
+        raise InvalidValueError(
+            f"{str(folder)!r} holds no study of listeners ({error.strerror}: {path}); make one "
+            "with: roboirg listen plan."
+        ) from error
+    except ValidationError as error:
+        raise InvalidValueError(f"{path} is no study of this version ({error}).") from error

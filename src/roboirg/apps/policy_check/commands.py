@@ -1,0 +1,38 @@
+"""The command that checks a policy: ``roboirg check-policy``."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from roboirg.cli.import_path import add_working_directory
+from roboirg.cli.policy_commands import PolicySpec, ProtocolHelpCommand
+from roboirg.cli.run_commands import USAGE_ERROR
+
+
+def check_policy(
+    policy: PolicySpec,
+    seed: Annotated[int, typer.Option(help="Of the policy's random choices.")] = 0,
+    expert: Annotated[
+        bool,
+        typer.Option(help="Compare with an expert's episode, if the simulator is installed."),
+    ] = True,
+) -> None:
+    """Check a policy on synthetic episodes, and beside the scripted expert."""
+    from rich.console import Console
+
+    from roboirg.apps.policy_check.check_result import FAIL
+    from roboirg.apps.policy_check.expert_episode import record_expert
+    from roboirg.apps.policy_check.policy_check import check_policy as check
+    from roboirg.apps.policy_check.policy_check import print_check_results
+
+    add_working_directory()
+    results = check(policy, seed=seed, record_expert=record_expert if expert else None)
+    print_check_results(results, Console())
+    if any(result.verdict == FAIL for result in results):
+        raise typer.Exit(USAGE_ERROR)
+
+
+def add_commands(app: typer.Typer) -> None:
+    app.command("check-policy", cls=ProtocolHelpCommand)(check_policy)

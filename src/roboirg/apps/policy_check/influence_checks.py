@@ -1,0 +1,229 @@
+"""Checks of what changes a policy's answers: words, pictures, state, video.
+
+Answers are compared bit by bit, so that a finding is certain as far as it was asked. A policy of
+which two equal episodes differ cannot be checked so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from roboirg.apps.policy_check.check_result import NOTE, PASS, WARN, CheckResult
+from roboirg.apps.policy_check.policy_player import SECOND, VIDEO_STEPS, PolicyPlayer, are_equal
+from roboirg.apps.policy_check.synthetic_episodes import SyntheticEpisode
+from roboirg.policies.requirements import (
+    wanted_cameras,
+    wanted_demonstration_frames,
+    wanted_depth,
+    wanted_prompt_tokens,
+)
+
+STATE_FIELDS = ("joint_positions", "gripper", "end_effector")
+OTHER_COMMANDS = (
+    "Pick up the green cube and put it into the bin three times.",
+    "Stop the cube when it reaches the target for the second time.",
+)
+MAX_WORDS = 48
+"""The longest instructions of the test split have 47 words (spatial) and 46 (contextual)."""
+_REMARKS = (
+    "The table was set up this morning and all of its things are in place. "
+    "There is a lamp on the left and a clock on the wall behind you. "
+    "We had a good day so far and there is a lot of time for this work."
+)
+_ENDS = "Now press the button that is red.", "Now press the button that is blue."
+"""Differ in the last word."""
+_UNLIKE_ENDS = (
+    "Now take all of the cubes out of the bin and stop for a while.",
+    "Press the third button two times, then follow the line to the end.",
+)
+_ROOM = MAX_WORDS - len(_ENDS[0].split())
+_MAX_TOKENS_PER_WORD = 3
+
+
+def check_constant(player: PolicyPlayer) -> Iterator[CheckResult]:
+    """Check that not every action is the same one, and that answers follow the observations."""
+    rollouts = player.first_rollout, player.expected
+    rows = np.concatenate([chunk for rollout in rollouts for chunk in rollout.chunks])
+    player.constant = bool((rows == rows[0]).all())
+    if player.constant:
+        yield CheckResult(
+            "constant",
+            WARN,
+            f"All {len(rows)} actions of two episodes are the same one; usually the model's output "
+            "is not read, or a server answers with a placeholder.",
+        )
+    elif all(_repeats(rollout.chunks) for rollout in rollouts):
+        yield CheckResult(
+            "repetition",
+            WARN,
+            "Every answer of an episode is the first one again although all it sees has changed; "
+            "usually a chunk is kept and never computed anew. Clear it once its actions are given.",
+        )
+
+
+def _repeats(chunks: Sequence[np.ndarray[tuple[int, ...], np.dtype[np.float64]]]) -> bool:
+    return all(np.array_equal(chunk, chunks[0]) for chunk in chunks)
+
+
+def check_language(player: PolicyPlayer) -> Iterator[CheckResult]:
+    """Check that the instruction changes the answers."""
+    name = "language"
+    if not _can_compare(player):
+        yield from _not_checked(player, name)
+        return
+    if any(_changes(player, name, instruction=words) for words in OTHER_COMMANDS):
+        yield CheckResult(name, PASS, "Other instructions have other actions.")
+        yield from check_prompt_end(player)
+    else:
+        yield CheckResult(
+            name,
+            WARN,
+            f"{len(OTHER_COMMANDS) + 1} instructions have the same actions, bit for bit; usually "
+            "the words do not reach the model. Check the prompt's name in the request, and that "
+            "reset() keeps the instruction.",
+        )
+
+
+def check_prompt_end(player: PolicyPlayer) -> Iterator[CheckResult]:
+    """Check that the end of an instruction as long as the benchmark's is read."""
+    name = "prompt end"
+    if not _reads_end(player, 0):
+        # Its answers do not tell the two commands apart, wherever they stand.
+        return
+    if _reads_end(player, _ROOM):
+        yield CheckResult(name, PASS, f"The last words of {MAX_WORDS} change the actions.")
+        return
+    heard, lost = 0, _ROOM
+    while lost - heard > 1:
+        middle = (heard + lost) // 2
+        heard, lost = (middle, lost) if _reads_end(player, middle) else (heard, middle)
+    if _reads_end(player, _ROOM, _UNLIKE_ENDS):
+        # It hears the end, but one word there is too little to change an answer.
+        return
+    declared = wanted_prompt_tokens(player.policy)
+    words = len(_long_prompt(lost, _ENDS[0]).split())
+    if declared is not None and words * _MAX_TOKENS_PER_WORD >= declared:
+        yield CheckResult(
+            name,
+            NOTE,
+            f"The last of {words} words changes nothing, as it declares {declared} tokens.",
+        )
+        return
+    yield CheckResult(
+        name,
+        WARN,
+        f"The last of {words} words changes nothing: the prompt is cut, and the command stands at "
+        f"its end. Instructions have up to {MAX_WORDS} words; raise the model's limit of tokens, "
+        "or declare it as prompt_tokens.",
+    )
+
+
+def check_pictures(player: PolicyPlayer) -> Iterator[CheckResult]:
+    """Check that the pictures of each camera that it asks for change the answers."""
+    name, cameras = "pictures", wanted_cameras(player.policy)
+    if not cameras:
+        return
+    if not _can_compare(player):
+        yield from _not_checked(player, name)
+        return
+    depth = wanted_depth(player.policy)
+    ignored = [
+        camera
+        for camera in cameras
+        if not _changes(
+            player, name, fields=[f"{camera}_rgb", *([f"{camera}_depth"] if depth else [])]
+        )
+    ]
+    if not ignored:
+        yield CheckResult(name, PASS, f"Those of {' and '.join(cameras)} change the actions.")
+        return
+    which = " and ".join(ignored)
+    seen = f"Other pictures of {which} have the same actions, bit for bit"
+    if len(ignored) < len(cameras) and _changes_with_video(player, name, ignored):
+        yield CheckResult(name, NOTE, f"{seen}; those in the video change them.")
+        return
+    yield CheckResult(
+        name,
+        WARN,
+        f"{seen}; usually what it sees now does not reach the model, or one camera's pictures are "
+        "given twice. If it does not need a camera, take it out of `cameras`, which saves "
+        "rendering.",
+    )
+
+
+def check_state(player: PolicyPlayer) -> Iterator[CheckResult]:
+    """Note whether joints, fingers and tool change the answers."""
+    name = "state"
+    if not _can_compare(player):
+        return
+    if _changes(player, name, fields=STATE_FIELDS):
+        yield CheckResult(name, PASS, "Joints, fingers or tool change the actions.")
+    else:
+        yield CheckResult(
+            name,
+            NOTE,
+            "Joints, fingers and tool change nothing; right for a model of pictures alone, wrong "
+            "if it was trained with the robot's state.",
+        )
+
+
+def check_video(player: PolicyPlayer) -> Iterator[CheckResult]:
+    """Note whether the demonstration changes the answers of a policy that asks for its frames."""
+    name = "video"
+    if not _can_compare(player) or wanted_demonstration_frames(player.policy) == "none":
+        return
+    if _changes_with_video(player, name, wanted_cameras(player.policy), STATE_FIELDS):
+        yield CheckResult(name, PASS, "Another video has other actions.")
+    else:
+        yield CheckResult(
+            name,
+            NOTE,
+            "Another video has the same actions, bit for bit; if it needs none, "
+            'demonstration_frames = "none" saves time, else it is lost on the way.',
+        )
+
+
+def _can_compare(player: PolicyPlayer) -> bool:
+    return player.repeatable and not player.constant
+
+
+def _not_checked(player: PolicyPlayer, name: str) -> Iterator[CheckResult]:
+    if not player.constant:  # which is said already
+        yield CheckResult(name, NOTE, "Not checked: equal episodes differ.")
+
+
+def _changes(
+    player: PolicyPlayer, check: str, *, instruction: str = SECOND, fields: Sequence[str] = ()
+) -> bool:
+    """Return whether the answers change with the words, or with fields of all observations."""
+    first = player.make_episodes(changed=fields).episode(instruction, VIDEO_STEPS).first
+    episode = player.with_video._replace(instruction=instruction, first=first)
+    return not are_equal(player.expected, player.play(check, episode, changed=fields))
+
+
+def _changes_with_video(
+    player: PolicyPlayer, check: str, cameras: Sequence[str], fields: Sequence[str] = ()
+) -> bool:
+    """Return whether the answers change with the video's pictures of cameras, and its fields."""
+    changed = (*fields, *(f"{camera}_rgb" for camera in cameras))
+    other = player.make_episodes(changed=changed).episode(SECOND, VIDEO_STEPS)
+    episode = player.with_video._replace(demonstration=other.demonstration)
+    return not are_equal(player.expected, player.play(check, episode))
+
+
+def _reads_end(player: PolicyPlayer, remarks: int, ends: Sequence[str] = _ENDS) -> bool:
+    """Return whether the end changes the answers, behind a number of words of remarks."""
+    one, other = (
+        player.play("prompt end", _episode(player, _long_prompt(remarks, end))) for end in ends
+    )
+    return not are_equal(one, other)
+
+
+def _long_prompt(remarks: int, end: str) -> str:
+    return " ".join([*_REMARKS.split()[:remarks], end])
+
+
+def _episode(player: PolicyPlayer, instruction: str) -> SyntheticEpisode:
+    return player.make_episodes().episode(instruction, 0)

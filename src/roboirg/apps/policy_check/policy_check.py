@@ -1,0 +1,125 @@
+"""Check that a policy keeps the contract and its conventions, on synthetic episodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+from roboirg.apps.policy_check.action_checks import check_joint_targets, check_joint_units
+from roboirg.apps.policy_check.check_result import (
+    FAIL,
+    NOTE,
+    PASS,
+    WARN,
+    CheckAbortedError,
+    CheckResult,
+)
+from roboirg.apps.policy_check.contract_checks import (
+    check_acting,
+    check_acting_after_video,
+    check_broken_sensors,
+    check_determinism,
+    check_hearing,
+    check_inputs,
+    check_loading,
+    check_requirements,
+    check_reset,
+    check_turns,
+)
+from roboirg.apps.policy_check.expert_checks import check_expert
+from roboirg.apps.policy_check.expert_episode import RecordExpert
+from roboirg.apps.policy_check.influence_checks import (
+    check_constant,
+    check_language,
+    check_pictures,
+    check_state,
+    check_video,
+)
+from roboirg.apps.policy_check.policy_player import PolicyPlayer
+from roboirg.policies.base import Policy
+from roboirg.util.plain_text import counted
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+Check = Callable[[PolicyPlayer], Iterator[CheckResult]]
+
+CHECKS: tuple[Check, ...] = (
+    check_loading,
+    check_requirements,
+    check_acting,
+    check_acting_after_video,
+    check_constant,
+    check_joint_units,
+    check_inputs,
+    check_determinism,
+    check_reset,
+    check_turns,
+    check_hearing,
+    check_language,
+    check_pictures,
+    check_state,
+    check_video,
+)
+"""In order; each may rely on what those before it found out."""
+LAST_CHECKS: tuple[Check, ...] = (check_joint_targets, check_broken_sensors)
+"""After the comparison with the expert."""
+
+
+def check_policy(
+    policy: str | Policy, *, seed: int = 0, record_expert: RecordExpert | None = None
+) -> list[CheckResult]:
+    """Check a policy on synthetic episodes, and beside the scripted expert.
+
+    Args:
+        policy: a spec as for `roboirg.policies.make_policy`, or an object, which is reset wherever
+            a spec would give a fresh object.
+        seed: of the policy and of the synthetic episodes.
+        record_expert: returns an episode of the expert, as
+            `roboirg.apps.policy_check.expert_episode.record_expert` does with the simulator; None
+            to compare with none.
+
+    Returns:
+        The results in the order of the checks, which end at the first that makes others
+        impossible.
+
+    Raises:
+        MissingDependencyError: a library that the policy needs is not installed.
+    """
+    results: list[CheckResult] = []
+    player = PolicyPlayer(policy, seed)
+    try:
+        for check in CHECKS:
+            results.extend(check(player))
+        results.extend(check_expert(player, record_expert))
+        for check in LAST_CHECKS:
+            results.extend(check(player))
+    except CheckAbortedError as error:
+        results.append(CheckResult(*error.args))
+    finally:
+        player.close()
+    return results
+
+
+def print_check_results(results: list[CheckResult], console: Console) -> None:
+    """Print a table of results, and how many checks failed or warn."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    from roboirg.core.printable import printable
+
+    styles = {PASS: "green", FAIL: "bold red", WARN: "bold yellow", NOTE: "yellow"}
+    table = Table(box=None, pad_edge=False)
+    for heading in ("check", "", "result"):
+        table.add_column(heading)
+    for result in results:
+        table.add_row(
+            result.check,
+            f"[{styles[result.verdict]}]{result.verdict}[/]",
+            escape(printable(result.message)),
+        )
+    console.print(table, highlight=False)
+    failed, warned = (sum(one.verdict == verdict for one in results) for verdict in (FAIL, WARN))
+    checks = counted(len(results), "check")
+    summary = f"{failed} of {checks} failed" if failed else f"{checks}, none failed"
+    console.print(f"{summary}, {counted(warned, 'warning')}." if warned else f"{summary}.")

@@ -1,0 +1,201 @@
+"""Asks a policy in synthetic episodes, and keeps what several checks need to know about it."""
+
+from __future__ import annotations
+
+import copy
+import time
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.apps.policy_check.check_result import FAIL, CheckAbortedError, describe_error
+from roboirg.apps.policy_check.synthetic_episodes import SyntheticEpisode, SyntheticEpisodes
+from roboirg.core.actions import JOINT_ANGLE, ActionSpace, check_chunk
+from roboirg.core.observations import Demonstration, Observation
+from roboirg.policies.base import Policy, close_policy
+from roboirg.policies.loading import make_policy
+from roboirg.policies.policy_urls import is_url
+
+CALLS = 3
+"""Calls of `act` in a synthetic episode."""
+VIDEO_STEPS = 40
+FIRST, SECOND = "Put the red cube on the target.", "Press the second button from the left."
+
+MakeEpisodes = Callable[..., SyntheticEpisodes]
+"""Returns synthetic episodes as the policy requires them; see `SyntheticEpisodes` for `changed`."""
+
+
+class SyntheticRollout(NamedTuple):
+    """The policy's actions in a synthetic episode, and the time of each call.
+
+    Attributes:
+        chunks: (n, size) each.
+        seconds: of each call.
+        dtype: of the last answer.
+    """
+
+    chunks: list[NDArray[np.float64]]
+    seconds: list[float]
+    dtype: str
+
+
+class PolicyPlayer:
+    """Makes a policy and asks it; episodes depend on the seed alone.
+
+    Args:
+        source: a spec, or an object, which is reset wherever a spec would give a fresh object.
+        seed: of the policy and of the synthetic episodes.
+
+    Attributes:
+        space: action space.
+        make_episodes: makes synthetic episodes.
+        repeatable: whether two equal episodes had equal actions; set by a check.
+        constant: whether every action was the same one; set by a check.
+        explained: whether it is known why targets are not where they should be; set by checks.
+    """
+
+    def __init__(self, source: str | Policy, seed: int) -> None:
+        self.source, self.seed = source, seed
+        self.space: ActionSpace = JOINT_ANGLE
+        self.make_episodes: MakeEpisodes = SyntheticEpisodes
+        self.repeatable = self.constant = self.explained = False
+        self._policy: Policy | None = None
+
+    @property
+    def policy(self) -> Policy:
+        """The policy that was made or asked last."""
+        return self._policy if self._policy is not None else self.make_fresh()
+
+    @property
+    def is_local(self) -> bool:
+        """Whether the policy runs in this process, so that any input reaches it."""
+        return not isinstance(self.source, str) or not (
+            is_url(self.source) or self.source.startswith("system:")
+        )
+
+    @cached_property
+    def without_video(self) -> SyntheticEpisode:
+        """An episode without a video."""
+        return self.make_episodes().episode(FIRST, 0)
+
+    @cached_property
+    def with_video(self) -> SyntheticEpisode:
+        """An episode with a video."""
+        return self.make_episodes().episode(SECOND, VIDEO_STEPS)
+
+    @cached_property
+    def first_rollout(self) -> SyntheticRollout:
+        """The rollout of the episode without a video."""
+        return self.play("acts without a video", self.without_video)
+
+    @cached_property
+    def expected(self) -> SyntheticRollout:
+        """The rollout of the episode with a video, played first by a fresh policy."""
+        return self.play("acts with a video", self.with_video)
+
+    def play(
+        self,
+        check: str,
+        episode: SyntheticEpisode,
+        *,
+        fresh: bool = True,
+        changed: Sequence[str] = (),
+        calls: int = CALLS,
+    ) -> SyntheticRollout:
+        """Play some calls of a copy of an episode, which the policy may change.
+
+        Args:
+            check: that is under way.
+            episode: its inputs.
+            fresh: whether to make the policy anew, if it is a spec.
+            changed: fields of later observations that are drawn differently.
+            calls: of `act`.
+
+        Raises:
+            CheckAbortedError: the policy raised, or gave no actions.
+        """
+        return self.play_in_place(
+            check, copy.deepcopy(episode), fresh=fresh, changed=changed, calls=calls
+        )
+
+    def play_in_place(
+        self,
+        check: str,
+        episode: SyntheticEpisode,
+        *,
+        fresh: bool = True,
+        changed: Sequence[str] = (),
+        calls: int = CALLS,
+    ) -> SyntheticRollout:
+        """Play some calls of an episode itself; see `play`."""
+        policy = self.reset(check, episode, fresh=fresh)
+        episodes, observation = self.make_episodes(changed=changed), episode.first
+        rollout = SyntheticRollout([], [], "")
+        for _ in range(calls):
+            start = time.perf_counter()
+            try:
+                actions = policy.act(observation)
+                seconds = time.perf_counter() - start
+                chunk = check_chunk(actions, self.space)
+            except Exception as error:
+                raise CheckAbortedError(check, FAIL, f"act(): {describe_error(error)}") from error
+            # A copy: a policy may reuse its array.
+            rollout.chunks.append(chunk.copy())
+            rollout.seconds.append(seconds)
+            rollout = rollout._replace(dtype=str(np.asarray(actions).dtype))
+            observation = episodes.after(episode, len(chunk))
+        return rollout
+
+    def ask(
+        self, instruction: str, demonstration: Demonstration, observations: Sequence[Observation]
+    ) -> list[NDArray[np.float64]]:
+        """Return a fresh policy's answers to given observations; its errors are not caught."""
+        policy = self.make_fresh()
+        policy.reset(instruction, demonstration)
+        return [
+            check_chunk(policy.act(copy.deepcopy(one)), self.space).copy() for one in observations
+        ]
+
+    def reset(self, check: str, episode: SyntheticEpisode, *, fresh: bool = True) -> Policy:
+        """Begin an episode.
+
+        Raises:
+            CheckAbortedError: the policy raised.
+        """
+        try:
+            policy = self.make_fresh() if fresh or self._policy is None else self._policy
+            policy.reset(episode.instruction, episode.demonstration)
+        except Exception as error:
+            raise CheckAbortedError(check, FAIL, f"reset(): {describe_error(error)}") from error
+        return policy
+
+    def make_fresh(self) -> Policy:
+        """Return a fresh policy, or the object; the one before is closed."""
+        self.close()
+        source = self.source
+        self._policy = make_policy(source, self.seed) if isinstance(source, str) else source
+        return self._policy
+
+    def close(self) -> None:
+        """Close the policy."""
+        policy, self._policy = self._policy, None
+        close_policy(policy)
+
+
+def are_equal(one: SyntheticRollout, other: SyntheticRollout) -> bool:
+    """Return whether two rollouts have the same actions, bit for bit."""
+    return len(one.chunks) == len(other.chunks) and all(
+        np.array_equal(first, second)
+        for first, second in zip(one.chunks, other.chunks, strict=True)
+    )
+
+
+def describe_difference(one: SyntheticRollout, other: SyntheticRollout) -> str:
+    """Return the largest difference of two rollouts, in words."""
+    pairs = list(zip(one.chunks, other.chunks, strict=True))
+    if any(first.shape != second.shape for first, second in pairs):
+        return "the number of actions"
+    return f"{max(float(np.abs(first - second).max()) for first, second in pairs):.3g}"

@@ -1,0 +1,67 @@
+"""Write a plan as CSV, for spreadsheets and for labs with their own control software."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Mapping
+
+from roboirg.apps.real.study.counterbalancing import read_arrangement
+from roboirg.apps.real.study.study_plan import PlannedDemonstration, PlannedTrial, StudyPlan
+from roboirg.apps.real.study.trial_text import describe_positions, spoken_turns
+
+TRIALS_FILE, DEMONSTRATIONS_FILE = "trials.csv", "demonstrations.csv"
+_ARRANGEMENT = ("target_color", "target_side", "left_color", "repeats")
+
+
+def trials_csv(plan: StudyPlan) -> str:
+    """Return a row for each trial, in order. The rows name the policies, unlike the sheet."""
+    return _csv_text(
+        {
+            "position": number,
+            "trial": trial.name,
+            "block": trial.block,
+            "policy": trial.job.policy,
+            "task": trial.job.task,
+            "setting": trial.job.setting,
+            "split": trial.job.split,
+            "episode": trial.job.episode,
+            **_common_columns(trial),
+        }
+        for number, trial in enumerate(plan.trials, 1)
+    )
+
+
+def demonstrations_csv(plan: StudyPlan) -> str:
+    """Return a row for each demonstration, in order."""
+    return _csv_text(
+        {
+            "position": number,
+            "demonstration": one.name,
+            "task": one.task,
+            "split": one.episode.split,
+            "episode": one.number,
+            **_common_columns(one),
+        }
+        for number, one in enumerate(plan.demonstrations, 1)
+    )
+
+
+def _common_columns(planned: PlannedTrial | PlannedDemonstration) -> dict[str, object]:
+    arrangement = read_arrangement(planned.episode)
+    factors = (arrangement.color, arrangement.side, arrangement.left, arrangement.repeats or "")
+    return {
+        **dict(zip(_ARRANGEMENT, factors, strict=True)),
+        "places": "; ".join(describe_positions(planned)),
+        "instruction": " ".join(spoken_turns(planned)),
+    }
+
+
+def _csv_text(rows: Iterable[Mapping[str, object]]) -> str:
+    table = list(rows)
+    out = io.StringIO()
+    if table:
+        writer = csv.DictWriter(out, list(table[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(table)
+    return out.getvalue()

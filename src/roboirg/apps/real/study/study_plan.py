@@ -1,0 +1,282 @@
+"""The plan of a study: all trials and demonstrations in order.
+
+A block is one arrangement. It has one trial of every condition (a policy and a setting), in a
+random order. So drift (light, grip, the operator) affects all conditions equally, and comparisons
+are between neighbors. The seed decides the orders and nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from roboirg.apps.real.study.counterbalancing import counterbalanced_episodes, target_kind
+from roboirg.core.episode import Episode
+from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
+from roboirg.episodes.splits import get_episode
+from roboirg.evaluation.plan_parsing import name_and_spec
+from roboirg.language.settings import setting_names, settings_of
+from roboirg.records.record import DEFAULT_MAX_STEPS, Job
+from roboirg.tasks import get_task
+from roboirg.util.atomic_write import write_atomically
+from roboirg.util.short_hash import short_hash
+
+PLAN_FILE = "plan.json"
+TRIAL_SPLIT = "val"
+"""The smallest of the three splits with all eight arrangements of PickByCount."""
+DEMONSTRATION_SPLIT = "train"
+DEFAULT_TRIALS = 10
+"""Trials per task, setting and policy (paper)."""
+DEFAULT_DEMONSTRATIONS = 50
+"""Demonstrations per task, with explicit instructions only (paper)."""
+LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+
+
+class _StudyModel(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class PlannedTrial(_StudyModel):
+    """One trial.
+
+    Attributes:
+        name: unique in the plan and independent of the seed. It holds the policy's letter instead
+            of its name, so that the operator can be blind to the policy.
+        block: number of its block, from 1.
+        job: to play; it identifies the trial's record.
+    """
+
+    name: str
+    block: int
+    job: Job
+
+    @property
+    def identity(self) -> Job:
+        """The job without the policy's spec."""
+        return self.job.model_copy(update={"spec": None})
+
+    @property
+    def episode(self) -> Episode:
+        """The arrangement and the goal."""
+        return get_episode(self.job.task, self.job.split, self.job.episode)
+
+
+class PlannedDemonstration(_StudyModel):
+    """One demonstration for fine-tuning, in the explicit setting.
+
+    Attributes:
+        name: unique in the plan.
+        task: name of the task.
+        number: of the episode in the split of demonstrations.
+    """
+
+    name: str
+    task: str
+    number: int
+
+    @property
+    def episode(self) -> Episode:
+        """The arrangement and the goal."""
+        return get_episode(self.task, DEMONSTRATION_SPLIT, self.number)
+
+
+class StudyPlan(_StudyModel):
+    """All trials and demonstrations of a study, in order.
+
+    Attributes:
+        version: of the format.
+        seed: of the orders.
+        policies: names in the order of their letters, A first.
+        trials: in order.
+        demonstrations: in order.
+    """
+
+    version: Literal[1] = 1
+    kind: Literal["real"] = "real"
+    seed: int
+    policies: tuple[str, ...]
+    trials: tuple[PlannedTrial, ...]
+    demonstrations: tuple[PlannedDemonstration, ...] = ()
+
+    @property
+    def fingerprint(self) -> str:
+        """Digest that identifies the plan."""
+        return short_hash(self.model_dump_json())
+
+    def trial(self, name: str) -> PlannedTrial:
+        """Return the trial of that name.
+
+        Raises:
+            UnknownNameError: the plan has no such trial.
+        """
+        for trial in self.trials:
+            if trial.name == name:
+                return trial
+        raise UnknownNameError("trial", name, [trial.name for trial in self.trials[:3]] + ["…"])
+
+
+def make_study(
+    policies: Sequence[str],
+    *,
+    tasks: Sequence[str],
+    settings: Sequence[str] | None = None,
+    trials: int = DEFAULT_TRIALS,
+    demonstrations: int = DEFAULT_DEMONSTRATIONS,
+    seed: int = 0,
+    split: str = TRIAL_SPLIT,
+    max_steps: int = DEFAULT_MAX_STEPS,
+) -> StudyPlan:
+    """Return a balanced plan in a random order.
+
+    Args:
+        policies: specs, ``NAME=SPEC``, or labels of policies that other software runs.
+        tasks: for a real robot.
+        settings: of the instructions; None for all settings that the tasks share.
+        trials: arrangements per task; each policy meets each of them in every setting.
+        demonstrations: per task.
+        seed: of the orders.
+        split: of the episodes of the trials.
+        max_steps: largest number of control periods of a trial.
+
+    Raises:
+        UnknownNameError: a task, setting or split does not exist.
+        InvalidValueError: a number is out of range, or a name is given twice.
+    """
+    named = [name_and_spec(policy) for policy in policies]
+    names = [name for name, _ in named]
+    settings = _shared_settings(tasks) if settings is None else settings
+    _check(names, tasks, settings, trials, demonstrations, seed, max_steps)
+    rng = np.random.default_rng(seed)
+    chosen = {task: counterbalanced_episodes(task, split, trials) for task in tasks}
+    conditions = list(product(settings, range(len(named))))
+    planned: list[PlannedTrial] = []
+    for block, (task, episode) in enumerate(_blocks(chosen, rng), 1):
+        for index in rng.permutation(len(conditions)):
+            setting, policy = conditions[index]
+            name, spec = named[policy]
+            job = Job(
+                policy=name,
+                spec=None if spec == name else spec,
+                task=task,
+                split=split,
+                episode=episode,
+                setting=setting,
+                max_steps=max_steps,
+            )
+            trial_name = f"{task}-{episode:02d}-{setting}-{LETTERS[policy]}"
+            planned.append(PlannedTrial(name=trial_name, block=block, job=job))
+    return StudyPlan(
+        seed=seed,
+        policies=tuple(names),
+        trials=tuple(planned),
+        demonstrations=_demonstrations(tasks, demonstrations, rng),
+    )
+
+
+def write_study(plan: StudyPlan, folder: Path) -> Path:
+    """Write ``plan.json`` atomically; returns its path.
+
+    Raises:
+        InvalidValueError: the folder holds another plan.
+        StoreError: the file cannot be written.
+    """
+    path = folder / PLAN_FILE
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InvalidValueError(f"Cannot write to {folder}: {error.strerror}.") from error
+    if path.exists() and read_study(folder) != plan:
+        raise InvalidValueError(
+            f"{folder} holds another plan; repeat its options, or choose another --out."
+        )
+    write_atomically(path, plan.model_dump_json(indent=1) + "\n")
+    return path
+
+
+def read_study(folder: Path) -> StudyPlan:
+    """Read the plan of a folder.
+
+    Raises:
+        InvalidValueError: the folder has no plan, or the plan is not for a real robot.
+    """
+    path = folder / PLAN_FILE
+    try:
+        return StudyPlan.model_validate_json(path.read_bytes())
+    except OSError as error:
+        raise InvalidValueError(
+            f"There is no plan in {folder} ({error.strerror}); make one with roboirg real plan."
+        ) from error
+    except (ValidationError, RoboIRGError) as error:
+        raise InvalidValueError(
+            f"{path} is not the plan of a real-robot study; make one with roboirg real plan."
+        ) from error
+
+
+def _blocks(
+    chosen: Mapping[str, Sequence[int]], rng: np.random.Generator
+) -> Iterator[tuple[str, int]]:
+    """Yield the task and episode of each block: tasks alternate, their episodes in random order."""
+    tasks = list(chosen)
+    drawn = {task: rng.permutation(chosen[task]) for task in tasks}
+    for position in range(len(drawn[tasks[0]])):
+        for index in rng.permutation(len(tasks)):
+            yield tasks[index], int(drawn[tasks[index]][position])
+
+
+def _demonstrations(
+    tasks: Sequence[str], count: int, rng: np.random.Generator
+) -> tuple[PlannedDemonstration, ...]:
+    """Return the demonstrations: tasks alternate, their episodes in random order."""
+    drawn = {
+        task: rng.permutation(counterbalanced_episodes(task, DEMONSTRATION_SPLIT, count))
+        for task in tasks
+    }
+    numbered = [(task, int(drawn[task][index])) for index in range(count) for task in tasks]
+    return tuple(
+        PlannedDemonstration(name=f"demo-{task}-{number:02d}", task=task, number=number)
+        for task, number in numbered
+    )
+
+
+def _shared_settings(tasks: Sequence[str]) -> tuple[str, ...]:
+    """Return the settings that all tasks have, in the registry's order."""
+    available = [settings_of(get_task(task)) for task in tasks]
+    return tuple(name for name in setting_names() if all(name in names for names in available))
+
+
+def _check(
+    policies: Sequence[str],
+    tasks: Sequence[str],
+    settings: Sequence[str],
+    trials: int,
+    demonstrations: int,
+    seed: int,
+    max_steps: int,
+) -> None:
+    for kind, names in (("policy", policies), ("task", tasks), ("setting", settings)):
+        if not names:
+            raise InvalidValueError(f"No {kind} was given.")
+        repeated = [name for name in names if list(names).count(name) > 1]
+        if repeated:
+            raise InvalidValueError(f"The {kind} {repeated[0]!r} is given twice.")
+    if len(policies) > len(LETTERS):
+        raise InvalidValueError(f"{len(policies)} policies are too many; at most {len(LETTERS)}.")
+    for name, value, minimum in (
+        ("trials", trials, 1),
+        ("demonstrations", demonstrations, 0),
+        ("seed", seed, 0),
+        ("max_steps", max_steps, 1),
+    ):
+        if value < minimum:
+            raise InvalidValueError(f"{name} is {value}; it must be at least {minimum}.")
+    for task in tasks:
+        target_kind(task)
+        for setting in settings:
+            available = settings_of(get_task(task))
+            if setting not in available:
+                raise UnknownNameError(f"setting of {task}", setting, available)

@@ -1,0 +1,270 @@
+"""Run a study on a robot: all open trials of the plan, in order."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, get_args
+
+import numpy as np
+
+from roboirg.apps.real.control.control_loop import ControlLoop
+from roboirg.apps.real.control.limits import Limits
+from roboirg.apps.real.control.policy_workers import PolicyProcess, PolicyThread
+from roboirg.apps.real.control.robot import JudgingRobot, Robot
+from roboirg.apps.real.study.study_plan import PlannedTrial, StudyPlan
+from roboirg.apps.real.study.trial_log import UNSCORED, TrialLog
+from roboirg.core.actions import JOINT_ANGLE
+from roboirg.core.episode import ENVIRONMENT_VERSION
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.instruction_options import DEFAULT_DELIVERY
+from roboirg.evaluation.job_instruction import instruct_job
+from roboirg.evaluation.plan_parsing import name_and_spec
+from roboirg.evaluation.policy_descriptions import describe_policy
+from roboirg.evaluation.rollout_result import make_record, utc_now
+from roboirg.language import LANGUAGE_VERSION
+from roboirg.policies.loading import is_privileged, load_policy_class
+from roboirg.policies.requirements import wanted_actions, wanted_cameras, wanted_history
+from roboirg.records.record import Job, Record
+
+ROBOT_LOCK = ".robot.lock"
+
+Scorer = Literal["judge", "operator"]
+
+
+def _never() -> bool:
+    return False
+
+
+@dataclass
+class Study:
+    """Plays the trials of a plan.
+
+    Attributes:
+        plan: of the study.
+        folder: of the records.
+        robot: connected and closed here.
+        limits: of commands and times.
+        scorer: the robot's own judge, or an operator on the page.
+        stop_requested: returns whether the operator has ended the present trial.
+        on_record: called with every trial and its record.
+    """
+
+    plan: StudyPlan
+    folder: Path
+    robot: Robot
+    limits: Limits = field(default_factory=Limits)
+    scorer: Scorer = "operator"
+    stop_requested: Callable[[], bool] = _never
+    on_record: Callable[[PlannedTrial, Record], None] = lambda _trial, _record: None
+    _workers: dict[str, PolicyThread] = field(default_factory=dict)
+
+    def run(self, policies: Sequence[str] = (), *, retry_errors: bool = True) -> tuple[Record, ...]:
+        """Play the open trials; an error ends its own trial only.
+
+        Args:
+            policies: names in the plan of the policies to play, or ``NAME=SPEC`` for another spec
+                than the plan's; empty for all.
+            retry_errors: whether to play trials again that ended in an error or are void.
+
+        Returns:
+            The records of the trials that were played.
+
+        Raises:
+            UnknownNameError: a policy is not in the plan.
+            InvalidValueError: a policy cannot act on this robot, another process uses it, or a
+                trial's instruction is to be delivered in turns.
+            StoreError: records cannot be read or written.
+        """
+        _check_delivery(self.plan)
+        specs = self._selected_specs(policies)
+        cameras = {name: self._check_policy(spec or name) for name, spec in specs.items()}
+        trial_log = TrialLog.read(self.plan, self.folder)
+        _check_versions(trial_log, specs)
+        to_play = ("open", "error", "void") if retry_errors else ("open",)
+        trials = [
+            trial.model_copy(
+                update={"job": trial.job.model_copy(update={"spec": specs[trial.job.policy]})}
+            )
+            for trial in self.plan.trials
+            if trial.job.policy in specs and trial_log.state(trial.name) in to_play
+        ]
+        with lock_robot(self.folder):
+            try:
+                self.robot.connect()
+                return tuple(self._play(trial, cameras, trial_log) for trial in trials)
+            finally:
+                for worker in self._workers.values():
+                    worker.close()
+                self._workers.clear()
+                self.robot.close()
+
+    def _play(
+        self, trial: PlannedTrial, cameras: Mapping[str, tuple[str, ...]], trial_log: TrialLog
+    ) -> Record:
+        """Play one trial and store its record."""
+        job, started_at, start = trial.job, utc_now(), time.monotonic()
+        worker = self._worker(job)
+        loop = ControlLoop(
+            self.robot, worker, self.limits, cameras[job.policy], self.stop_requested
+        )
+        result = loop.play(job, job.policy_spec, policy_seed(trial), instruct_job(job).text)
+        if result.error is not None:
+            # The worker may be dead or still busy: the next trial gets a new one.
+            worker.close()
+            del self._workers[job.policy]
+        metadata: dict[str, object] = {
+            "robot": self.robot.name, "held": loop.held, "overruns": loop.overruns,
+            "rate": self.robot.rate,
+        }  # fmt: skip
+        record = make_record(
+            job, result, started_at=started_at, duration_s=round(time.monotonic() - start, 3)
+        )
+        if result.error is None and self.scorer == "operator":
+            if isinstance(self.robot, JudgingRobot):
+                found = record.attribution
+                metadata["judge"] = {
+                    "outcome": record.outcome,
+                    "failure": None if found is None else found.failure,
+                }
+            record = _without_verdict(record)
+        stored = trial_log.add(trial, record, metadata)
+        self.on_record(trial, stored)
+        return stored
+
+    def _worker(self, job: Job) -> PolicyThread:
+        if job.policy not in self._workers:
+            privileged = is_privileged(job.policy_spec)
+            self._workers[job.policy] = PolicyThread() if privileged else PolicyProcess()
+        return self._workers[job.policy]
+
+    def _selected_specs(self, policies: Sequence[str]) -> dict[str, str | None]:
+        """Return the spec of each policy to play by its name; None where the name is the spec."""
+        planned = {trial.job.policy: trial.job.spec for trial in self.plan.trials}
+        specs: dict[str, str | None] = {}
+        for name, spec in map(name_and_spec, policies or self.plan.policies):
+            if name not in planned:
+                raise UnknownNameError("policy in the plan", name, planned)
+            specs[name] = planned[name] if spec == name else spec
+        return specs
+
+    def _check_policy(self, spec: str) -> tuple[str, ...]:
+        """Check that a policy can act on this robot, and return the cameras that it uses."""
+        found = load_policy_class(spec)
+        if wanted_actions(found) != JOINT_ANGLE:
+            raise InvalidValueError(
+                f"Policy {spec!r} acts in {wanted_actions(found).name!r}; the control loop "
+                f"supports {JOINT_ANGLE.name!r} only."
+            )
+        if wanted_history(found) is not None:
+            raise InvalidValueError(
+                f"Policy {spec!r} requires observe_every={wanted_history(found)}; the control loop "
+                "gives one observation for each chunk."
+            )
+        if is_privileged(spec) and not isinstance(self.robot, JudgingRobot):
+            raise InvalidValueError(
+                f"Policy {spec!r} reads the simulator's state, which only the twin has; play it "
+                "with --robot twin."
+            )
+        return wanted_cameras(found)
+
+
+def _check_delivery(plan: StudyPlan) -> None:
+    """Raise if an instruction is to be delivered in turns."""
+    for trial in plan.trials:
+        if trial.job.delivery != DEFAULT_DELIVERY:
+            raise InvalidValueError(
+                f"Trial {trial.name!r} has delivery={trial.job.delivery!r}; in a study with a "
+                f"robot the whole instruction is given at once ({DEFAULT_DELIVERY!r})."
+            )
+
+
+def select_scorer(name: str, robot: Robot) -> Scorer:
+    """Return who scores the trials on a robot.
+
+    Args:
+        name: judge or operator; empty for the robot's judge if it has one.
+        robot: of the study.
+
+    Raises:
+        UnknownNameError: the name is neither judge nor operator.
+        InvalidValueError: the robot has no judge.
+    """
+    has_judge = isinstance(robot, JudgingRobot)
+    if not name:
+        return "judge" if has_judge else "operator"
+    for scorer in get_args(Scorer):
+        if name == scorer:
+            if scorer == "judge" and not has_judge:
+                raise InvalidValueError(
+                    f"The robot {robot.name!r} cannot judge; score its trials with "
+                    "roboirg real score."
+                )
+            found: Scorer = scorer
+            return found
+    raise UnknownNameError("scorer", name, get_args(Scorer))
+
+
+def policy_seed(trial: PlannedTrial) -> int:
+    """Return the policy's seed in a trial, the same as in simulation."""
+    seeds = np.random.SeedSequence((trial.job.policy_seed, trial.episode.seed))
+    return int(seeds.generate_state(1)[0])
+
+
+def _check_versions(trial_log: TrialLog, policies: Mapping[str, str | None]) -> None:
+    """Refuse to mix two versions of a policy, the language or the environment."""
+    now = {
+        name: describe_policy(spec or name, again=True).version for name, spec in policies.items()
+    }
+    for trial in trial_log.plan.trials:
+        record = trial_log.newest(trial.name)
+        if record is None or record.policy not in now:
+            continue
+        for name, stored, current in (
+            ("the policy", record.policy_version, now[record.policy]),
+            ("the language", record.language_version, str(LANGUAGE_VERSION)),
+            ("the environment", record.environment_version, ENVIRONMENT_VERSION),
+        ):
+            if stored != current:
+                raise InvalidValueError(
+                    f"{trial_log.folder} holds {trial.name} with {name} in version {stored}, which "
+                    f"is {current} now; make a plan in another folder."
+                )
+
+
+@contextmanager
+def lock_robot(folder: Path) -> Iterator[None]:
+    """Lock the robot of a study, which only one process at a time may command.
+
+    Raises:
+        InvalidValueError: another process holds the lock.
+    """
+    descriptor = os.open(folder / ROBOT_LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InvalidValueError(
+                f"Another process plays the study in {folder}; wait for it or stop it."
+            ) from None
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _without_verdict(record: Record) -> Record:
+    """Return a record that waits for the operator's verdict, without what the judge saw."""
+    return record.model_copy(
+        update={
+            "outcome": "error",
+            "error": "infrastructure",
+            "cause": UNSCORED,
+            "attribution": None,
+            "events": (),
+        }
+    )

@@ -1,1 +1,0 @@
-"""Demonstrations for training: recorded once per episode, written in the trainers' formats."""

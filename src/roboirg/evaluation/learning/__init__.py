@@ -1,1 +1,0 @@
-"""Listeners that learn, compared: what words, settings, pictures and video bring."""

@@ -1,1 +1,0 @@
-"""People as listeners and as policies: studies, pages, and the answers that are kept."""

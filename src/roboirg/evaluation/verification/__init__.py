@@ -1,1 +1,0 @@
-"""Check the records of a run: play their actions again, without the policy."""

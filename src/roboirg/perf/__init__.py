@@ -1,1 +1,0 @@
-"""Performance of this machine, compared with the floor and the stock path."""

@@ -1,1 +1,0 @@
-"""A listener that learns: words and pictures to slots, without privileged facts. Needs PyTorch."""
