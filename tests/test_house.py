@@ -35,9 +35,11 @@ LENT = {
 """Names of other packages' classes."""
 
 SPOKEN = (
+    "src/roboirg/language/open_reasoning/open_templates.py",
+    "src/roboirg/language/rivals/rival_templates.py",
     "src/roboirg/language/templates/",
-    "src/roboirg/policies/planning/prompts/grounding_questions.toml",
-    "src/roboirg/policies/planning/prompts/listener.toml",
+    "src/roboirg/policies/vlm/prompts/grounding_questions.toml",
+    "src/roboirg/policies/vlm/prompts/listener.toml",
 )
 """Words that are said to robots and models are data: changing them would change results."""
 FORBIDDEN_PROSE = ("whoever", "nobody", "somebody", "anybody", "so many", "so often", "while due")

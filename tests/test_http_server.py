@@ -14,7 +14,7 @@ from roboirg.analysis.page.page_server import PageServer
 from roboirg.apps.real.pages.score_server import ScoreServer
 from roboirg.apps.real.study.study_plan import make_study, write_study
 from roboirg.core.errors import InvalidValueError
-from roboirg.policies.serving.policy_server import open_server
+from roboirg.policies.policy_server import open_server
 from roboirg.util.connection_table import ConnectionLimits
 from roboirg.util.http_server import LoopbackRequestHandler, LoopbackServer
 

@@ -14,11 +14,11 @@ from roboirg.analysis.stats.chance import FLOORS, chance_level, floor_level
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.job_instruction import instruct_job
 from roboirg.language.settings import settings_of
-from roboirg.language.shortcuts import SURFACE_RULES
 from roboirg.language.variants import all_variants
 from roboirg.policies import make_policy
 from roboirg.policies.builtin.listeners import ForgetfulPolicy
 from roboirg.records.record import Job
+from roboirg.shortcuts import SURFACE_RULES
 from roboirg.tasks import all_tasks, get_task
 
 DOCS = Path(__file__).parents[2] / "docs" / "statistics.md"

@@ -15,7 +15,7 @@ from roboirg.analysis.results import Results
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.evaluation.plan import Plan, read_plan
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
-from roboirg.policies.local_policies import is_local, spec_of
+from roboirg.policies.by_name.local_policies import is_local, spec_of
 from roboirg.records.record import Job, Record
 from roboirg.records.store import read_records
 

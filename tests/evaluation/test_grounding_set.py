@@ -39,11 +39,11 @@ from roboirg.evaluation.grounding_set.question_set import EpisodeName, ExportReq
 from roboirg.evaluation.grounding_set.referents import find_referents, pointed_kinds
 from roboirg.evaluation.grounding_set.seen_scene import nearest_to_center
 from roboirg.language import FORMS, instruct, setting_names
-from roboirg.language.interpreter import interpret
 from roboirg.language.settings import all_settings
 from roboirg.main import app
-from roboirg.policies.planning.goal_schema import goal_schema
-from roboirg.policies.planning.prompts import load_prompts
+from roboirg.policies.vlm.goal_schema import goal_schema
+from roboirg.policies.vlm.prompts import load_prompts
+from roboirg.reader import interpret
 from roboirg.tasks import all_tasks, get_task
 
 BENCHMARK = [name for name, task in all_tasks().items() if task.suite != "real"]

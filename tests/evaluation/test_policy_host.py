@@ -28,8 +28,8 @@ from roboirg.evaluation.hosting.payload import BLOCK_SIZE, pack_payload, unpack_
 from roboirg.evaluation.plan import Plan
 from roboirg.evaluation.policy_descriptions import describe_policy
 from roboirg.evaluation.runner import run_plan
-from roboirg.policies.loading import is_foreign, needs_host
-from roboirg.policies.requirements import wanted_cameras, wanted_history
+from roboirg.policies.by_name.loading import is_foreign, needs_host
+from roboirg.policies.contract.requirements import wanted_cameras, wanted_history
 from roboirg.records.record import Job, Record
 from roboirg.records.store import RECORDS_FILE, read_contents, read_records
 

@@ -29,7 +29,7 @@ from roboirg.evaluation.prompt_shares import (
 )
 from roboirg.evaluation.rollout import EpisodeRunner
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
-from roboirg.policies.planning.systems import all_systems
+from roboirg.policies.by_name.systems import all_systems
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit, most_tokens
 from roboirg.records.record import IDENTITY, Job, Record
 from roboirg.records.store import read_records

@@ -15,8 +15,8 @@ from roboirg.evaluation.plan_maker import make_plan
 from roboirg.evaluation.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.runner import run_plan
 from roboirg.policies import make_policy
-from roboirg.policies.loading import server_version
-from roboirg.policies.planning.hierarchical_policy import HierarchicalPolicy
+from roboirg.policies.by_name.loading import server_version
+from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 from roboirg.records.merging import merge_runs
 from roboirg.records.record import Job, Record
 from roboirg.records.store import RecordStore, StoreError, read_records, read_results

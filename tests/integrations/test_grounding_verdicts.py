@@ -20,9 +20,9 @@ from roboirg.evaluation.grounding_set.item_builder import (
 )
 from roboirg.evaluation.grounding_set.media_store import store_content
 from roboirg.language import setting_names
-from roboirg.language.command_chance import is_right
-from roboirg.policies.planning.goal_schema import goal_schema
-from roboirg.policies.planning.vlm_listener import NotUnderstoodError
+from roboirg.policies.vlm.goal_schema import goal_schema
+from roboirg.policies.vlm.vlm_listener import NotUnderstoodError
+from roboirg.shortcuts.command_chance import is_right
 from roboirg.tasks import all_tasks
 from roboirg.util.media import Picture, encode_png
 

@@ -26,7 +26,7 @@ from replay_table import (
 
 from roboirg.episodes.splits import get_episode
 from roboirg.language import instruct
-from roboirg.policies.planning.goal_schema import goal_schema
+from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.records.store import read_records
 
 pytestmark = pytest.mark.sim

@@ -1,4 +1,4 @@
-"""The interpreter is independent, reads sentences of other people, and accepts any text."""
+"""The reader is independent, reads sentences of other people, and accepts any text."""
 
 import ast
 import itertools
@@ -9,16 +9,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from language_variants import first_episodes
 
+from roboirg import reader
 from roboirg.core.episode import COLORS, Goal, Point, Scene, SceneObject
 from roboirg.core.errors import UnknownNameError
 from roboirg.episodes.splits import get_episode
-from roboirg.language import expressible, instruct, interpret, interpreter
-from roboirg.language.interpreter.places import DirectionalPlace, RelativePlace, read_places
-from roboirg.language.interpreter.tokens import split_sentences
+from roboirg.language import expressible, instruct
 from roboirg.language.settings import settings_of
+from roboirg.reader import interpret
+from roboirg.reader.places import DirectionalPlace, RelativePlace, read_places
+from roboirg.reader.tokens import split_sentences
 from roboirg.tasks import every_task, get_task
 
-FOLDER = Path(interpreter.__file__).parent
+FOLDER = Path(reader.__file__).parent
 EPISODES = {task: tuple(first_episodes(task, "train", 8)) for task in every_task()}
 PICK = get_episode("PickXtimes", "test", 2).scene
 UNMASK = get_episode("VideoUnmask", "test", 0).scene
@@ -29,7 +31,7 @@ ALLOWED = (
     "roboirg.core.conditions",
     "roboirg.core.motions",
     "roboirg.tasks",
-    "roboirg.language.interpreter",
+    "roboirg.reader",
 )
 """The scene as data, and the goals that a task can have."""
 

@@ -10,10 +10,11 @@ from language_variants import TASKS, first_episodes
 
 from roboirg.core.episode import Goal
 from roboirg.episodes.splits import get_episode
-from roboirg.language import instruct, interpret
-from roboirg.language.interpreter.tokens import FILLERS, split_sentences
-from roboirg.language.interpreter.vocabulary import is_known
+from roboirg.language import instruct
 from roboirg.language.settings import settings_of
+from roboirg.reader import interpret
+from roboirg.reader.tokens import FILLERS, split_sentences
+from roboirg.reader.vocabulary import is_known
 from roboirg.tasks import get_task
 
 PICK = get_episode("PickXtimes", "test", 2).scene

@@ -10,7 +10,7 @@ from language_variants import first_episodes
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import COLORS, Goal, Point, Scene, SceneObject
 from roboirg.core.motions import Away, Swap
-from roboirg.language import interpret
+from roboirg.reader import interpret
 from roboirg.tasks import get_task
 
 

@@ -13,9 +13,7 @@ from roboirg.core.episode import COLORS, SPLITS, Point, Scene, SceneObject
 from roboirg.core.motions import Away
 from roboirg.core.word_pools import POOLS
 from roboirg.episodes.published_episodes import published_episode
-from roboirg.language import FORMS, expressible, instruct, interpret
-from roboirg.language.interpreter.places import find_objects, read_places
-from roboirg.language.interpreter.tokens import split_sentences
+from roboirg.language import FORMS, expressible, instruct
 from roboirg.language.landmarks import (
     FRAMES,
     MARGIN,
@@ -24,6 +22,9 @@ from roboirg.language.landmarks import (
     landmarks,
     selectors,
 )
+from roboirg.reader import interpret
+from roboirg.reader.places import find_objects, read_places
+from roboirg.reader.tokens import split_sentences
 from roboirg.tasks import get_task
 
 GRID = st.integers(-17, 17).map(lambda step: step / 100)

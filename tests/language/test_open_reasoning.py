@@ -14,17 +14,14 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import POOLS
 from roboirg.episodes.splits import get_episode
-from roboirg.language import instruct, instruct_with, interpret
-from roboirg.language.command_chance import blind_goals, right_share
+from roboirg.language import instruct, instruct_with
 from roboirg.language.generator import find_refusal
-from roboirg.language.interpreter.comparisons import (
-    PlaceComparison,
-    compared_colors,
-    read_comparison,
-)
-from roboirg.language.patterns.open_numbers import quantities, relations
-from roboirg.language.shortcuts import SURFACE_RULES, goal_share, guess_goal
-from roboirg.language.templates import open_reasoning
+from roboirg.language.open_reasoning import open_templates
+from roboirg.language.open_reasoning.open_numbers import quantities, relations
+from roboirg.reader import interpret
+from roboirg.reader.comparisons import PlaceComparison, compared_colors, read_comparison
+from roboirg.shortcuts import SURFACE_RULES, goal_share, guess_goal
+from roboirg.shortcuts.command_chance import blind_goals, right_share
 from roboirg.tasks import all_tasks
 
 OPEN = InstructionOptions("reasoning", reasoning="open")
@@ -165,7 +162,7 @@ def test_no_rule_is_above_chance():
 
 
 def test_the_pools_are_disjoint_and_have_four_each():
-    for name, pool in pools(open_reasoning):
+    for name, pool in pools(open_templates):
         assert not set(map(str, pool.train)) & set(map(str, pool.test)), name
         assert len(pool.train) >= 4, name
         assert len(pool.test) >= 4, name

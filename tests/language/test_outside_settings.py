@@ -36,8 +36,8 @@ from roboirg.language import (
     settings,
 )
 from roboirg.language.instruction_row import row
-from roboirg.language.setting import Setting
 from roboirg.language.settings import all_settings, direct
+from roboirg.language.settings.setting import Setting
 from roboirg.language.variants import all_variants, instructions
 from roboirg.tasks import all_tasks
 

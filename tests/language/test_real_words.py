@@ -8,10 +8,11 @@ from hypothesis import strategies as st
 from language_variants import random_episodes
 
 from roboirg.core.episode import ALL_COLORS, Goal, Point, Scene, SceneObject
-from roboirg.language import expressible, instruct, interpret
-from roboirg.language.interpreter.places import DirectionalPlace, NamedPlace, read_places
-from roboirg.language.interpreter.tokens import split_sentences
+from roboirg.language import expressible, instruct
 from roboirg.language.landmarks import MARGIN, landmarks
+from roboirg.reader import interpret
+from roboirg.reader.places import DirectionalPlace, NamedPlace, read_places
+from roboirg.reader.tokens import split_sentences
 
 GREEN = SceneObject("box_green", "box", Point(0.05, 0.15, 0.03), color="green")
 PURPLE = SceneObject("box_purple", "box", Point(0.05, -0.15, 0.03), color="purple")

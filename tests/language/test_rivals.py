@@ -16,14 +16,15 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import POOLS, Pools
 from roboirg.episodes.splits import get_episode
-from roboirg.language import instruct, instruct_with, interpret
-from roboirg.language.command_chance import blind_goals, right_share
+from roboirg.language import instruct, instruct_with
 from roboirg.language.generator import find_refusal
-from roboirg.language.interpreter.selections import read_selection
-from roboirg.language.interpreter.tokens import split_sentences
+from roboirg.language.rivals import rival_templates
 from roboirg.language.settings import settings_of
-from roboirg.language.shortcuts import SURFACE_RULES, goal_share, guess_goal
-from roboirg.language.templates import rivals
+from roboirg.reader import interpret
+from roboirg.reader.selections import read_selection
+from roboirg.reader.tokens import split_sentences
+from roboirg.shortcuts import SURFACE_RULES, goal_share, guess_goal
+from roboirg.shortcuts.command_chance import blind_goals, right_share
 from roboirg.tasks import all_tasks, get_task
 
 SETTINGS = ("direct", "contextual", "spatial")
@@ -149,7 +150,7 @@ def test_each_value_is_meant_equally_often():
     found = Counter(said.metadata["rival_position"] for _, said in all_told("direct"))
     assert abs(found["first"] / found.total() - 0.5) < 0.01
     kinds = Counter(said.metadata["rival_reference"] for _, said in all_told("direct"))
-    assert set(kinds) == {"alone", "set aside", *rivals.CHOICES}
+    assert set(kinds) == {"alone", "set aside", *rival_templates.CHOICES}
     assert min(kinds.values()) > 0.08 * kinds.total()
 
 
@@ -223,7 +224,7 @@ def pools(module):
 
 
 def test_the_pools_are_disjoint_and_have_four_each():
-    for name, pool in pools(rivals):
+    for name, pool in pools(rival_templates):
         assert not set(pool.train) & set(pool.test), name
         least = 2 if name == "MENTIONED" else 4
         assert len(pool.train) >= least, name
@@ -232,7 +233,7 @@ def test_the_pools_are_disjoint_and_have_four_each():
 
 def test_both_orders_have_the_same_key_words():
     """In each kind and pool *not* and *no* are as frequent with the meant value first as last."""
-    for kind, (first, last) in rivals.CHOICES.items():
+    for kind, (first, last) in rival_templates.CHOICES.items():
         for pool in POOLS:
             words = [
                 Counter(
@@ -245,7 +246,7 @@ def test_both_orders_have_the_same_key_words():
             ]
             assert words[0] == words[1], (kind, pool)
     for pool in POOLS:
-        meant, aside = rivals.SINGLED.of(pool), rivals.SET_ASIDE.of(pool)
+        meant, aside = rival_templates.SINGLED.of(pool), rival_templates.SET_ASIDE.of(pool)
         assert sum(bool(re.search(r"\b(not|cannot)\b", one, re.I)) for one in meant) == sum(
             bool(re.search(r"\bnot\b", one, re.I)) for one in aside
         )

@@ -18,10 +18,12 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.episodes.splits import get_episode
 from roboirg.language import instruct, instruct_with
 from roboirg.language.settings import all_settings, get_setting
-from roboirg.language.shortcuts import SURFACE_RULES, draw_goal, goal_share, guess_goal
-from roboirg.language.shortcuts.goal_vocabulary import goal_vocabulary, values_in
-from roboirg.language.shortcuts.learned_floor import LearnedFloor
-from roboirg.language.shortcuts.shortcut_scores import (
+from roboirg.language.variants import expressible_options, instructions
+from roboirg.main import app
+from roboirg.shortcuts import SURFACE_RULES, draw_goal, goal_share, guess_goal
+from roboirg.shortcuts.goal_vocabulary import goal_vocabulary, values_in
+from roboirg.shortcuts.learned_floor import LearnedFloor
+from roboirg.shortcuts.shortcut_scores import (
     CHANCE,
     group_told,
     hidden_slots,
@@ -30,9 +32,7 @@ from roboirg.language.shortcuts.shortcut_scores import (
     score_chance,
     score_rule,
 )
-from roboirg.language.shortcuts.shortcut_tables import LEARNED_SETTING, shortcut_rows
-from roboirg.language.variants import expressible_options, instructions
-from roboirg.main import app
+from roboirg.shortcuts.shortcut_tables import LEARNED_SETTING, shortcut_rows
 from roboirg.tasks import all_tasks, get_task
 
 COLORS = ("blue", "green", "red")

@@ -10,8 +10,9 @@ from language_variants import SPATIAL_TASKS, TASKS, random_episodes
 
 from roboirg.apps.language_lab.validation import Batch, ValidationResults, validate_batch
 from roboirg.episodes.splits import SIZES, get_episode
-from roboirg.language import expressible, instruct, interpret
+from roboirg.language import expressible, instruct
 from roboirg.language.settings import settings_of
+from roboirg.reader import interpret
 from roboirg.tasks import get_task
 
 RANDOM_SCENES = 24

@@ -17,7 +17,7 @@ from roboirg.apps.language_lab.validation.pairing import unpaired
 from roboirg.core.episode import Goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.language import FORMS, generator, instruct, instruct_with, interpret
+from roboirg.language import FORMS, generator, instruct, instruct_with
 from roboirg.language.generator import find_refusal
 from roboirg.language.instruction_row import row
 from roboirg.language.phrases import plain
@@ -27,6 +27,7 @@ from roboirg.language.variants import instructions
 from roboirg.language.worded_command import StatedPhrase, TaskWordings, WordedCommand
 from roboirg.language.wordings.wording_file import parse_wordings, read_wordings
 from roboirg.language.wordings.wording_store import find_wordings, open_wordings, register_wordings
+from roboirg.reader import interpret
 from roboirg.tasks import get_task
 
 HAND = """\

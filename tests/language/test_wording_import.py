@@ -28,11 +28,12 @@ from roboirg.apps.language_lab.validation.episode_checks import check_episode
 from roboirg.core.episode import COLORS, Goal
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.language import FORMS, Instruction, expressible, instruct_with, interpret
+from roboirg.language import FORMS, Instruction, expressible, instruct_with
 from roboirg.language.worded_command import TaskWordings, Wordings, goal_fields
 from roboirg.language.wordings import wording_store
 from roboirg.language.wordings.wording_file import parse_wordings
 from roboirg.language.wordings.wording_store import register_wordings
+from roboirg.reader import interpret
 from roboirg.tasks import all_tasks, get_task
 
 

@@ -32,9 +32,9 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.grounding_set.grounding_item import read_items
 from roboirg.evaluation.grounding_set.item_builder import EpisodeMedia
-from roboirg.language.command_chance import is_right
 from roboirg.language.settings import setting_names
 from roboirg.records.store import StoreError
+from roboirg.shortcuts.command_chance import is_right
 from roboirg.tasks import every_task, get_task
 
 TASKS = "PickXtimes,StopCube,VideoUnmask,ButtonUnmask"
@@ -360,7 +360,7 @@ def test_random_answers_are_right_as_often_as_chance(tmp_path, monkeypatch):
 
 
 def _slots(task, goal):
-    from roboirg.policies.planning.goal_schema import goal_schema
+    from roboirg.policies.vlm.goal_schema import goal_schema
 
     return goal_schema(task).answers[goal]
 

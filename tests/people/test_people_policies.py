@@ -10,7 +10,12 @@ from roboirg.apps.people.people_run import answered_plan
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.rollout import EpisodeRunner
-from roboirg.policies.loading import is_privileged, load_policy_class, make_policy, policy_version
+from roboirg.policies.by_name.loading import (
+    is_privileged,
+    load_policy_class,
+    make_policy,
+    policy_version,
+)
 from roboirg.records.record import Job
 from roboirg.records.store import RecordStore, StoreError, read_records
 from roboirg.tasks import get_task

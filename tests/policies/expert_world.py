@@ -13,7 +13,7 @@ import numpy as np
 
 from roboirg.apps.policy_check.expert_episode import ExpertEpisode, ExpertMoment
 from roboirg.core.actions import JOINT_HIGH, JOINT_LOW
-from roboirg.policies.requirements import wanted_history
+from roboirg.policies.contract.requirements import wanted_history
 
 MOMENTS, ROWS, SIDE, LATENT = 20, 16, 8, 4
 REST = np.array([0.0, 0.2, 0.0, -2.1, 0.0, 2.4, 0.8])

@@ -17,8 +17,8 @@ import av
 import numpy as np
 
 from roboirg.language import instruct
-from roboirg.policies.planning.models import ModelOptions
-from roboirg.policies.planning.vlm_listener import ListenerOptions, VLMListener
+from roboirg.policies.vlm.models import ModelOptions
+from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener
 
 TOKENS = 100, 7
 """Input and output tokens of every reply."""

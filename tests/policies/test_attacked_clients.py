@@ -19,10 +19,10 @@ from wire_servers import WireServer
 
 from roboirg.core.errors import PolicyServerError
 from roboirg.core.printable import printable
-from roboirg.policies.planning.model_content import ChatTurn
-from roboirg.policies.planning.models import ModelOptions, ModelQuery, make_model
 from roboirg.policies.remote.message_codec import CodecError, unpack
 from roboirg.policies.remote.message_size import MAX_DEPTH, MAX_ELEMENTS
+from roboirg.policies.vlm.model_content import ChatTurn
+from roboirg.policies.vlm.models import ModelOptions, ModelQuery, make_model
 
 MIB = 1 << 20
 EMPTY_MAPS = b"\x81\xa1a\xdd" + struct.pack(">I", 50 * MIB) + b"\x80" * (50 * MIB)

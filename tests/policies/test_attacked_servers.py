@@ -23,12 +23,11 @@ from wire_servers import unpack
 
 from roboirg.core.errors import PolicyConnectionError
 from roboirg.main import app
-from roboirg.policies import make_policy
-from roboirg.policies.protocols import protocols_by_scheme
+from roboirg.policies import make_policy, policy_server
+from roboirg.policies.policy_server import PolicyServer, open_server
 from roboirg.policies.remote.message_codec import pack
-from roboirg.policies.serving import policy_server
-from roboirg.policies.serving.policy_server import PolicyServer, open_server
-from roboirg.policies.serving.server_options import ServerOptions
+from roboirg.policies.remote.protocols import protocols_by_scheme
+from roboirg.policies.remote.server_options import ServerOptions
 from roboirg.util.connection_table import ConnectionLimits, ConnectionTable
 
 GIB = 1 << 30

@@ -9,8 +9,8 @@ from roboirg.apps.learned_listener.listener_study import VARIANTS
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.episodes.splits import get_episode
 from roboirg.main import app
-from roboirg.policies.loading import is_privileged, make_policy
-from roboirg.policies.planning.goal_schema import goal_schema
+from roboirg.policies.by_name.loading import is_privileged, make_policy
+from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.tasks import get_task
 
 

@@ -9,8 +9,8 @@ from wire_episode import INSTRUCTION, moment, video
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.policies import Policy, load_policy_class, make_policy
+from roboirg.policies.by_name.loading import policy_version
 from roboirg.policies.lerobot_policy import load
-from roboirg.policies.loading import policy_version
 
 
 def test_a_url_is_checked_without_loading():

@@ -36,12 +36,13 @@ from roboirg.core.errors import (
     PolicyTimeoutError,
 )
 from roboirg.episodes.splits import SIZES, get_episode
-from roboirg.language import instruct, interpret
+from roboirg.language import instruct
 from roboirg.language.settings import settings_of
 from roboirg.policies import play
-from roboirg.policies.planning.goal_schema import goal_schema
-from roboirg.policies.planning.models import ModelOptions
-from roboirg.policies.planning.vlm_listener import NotUnderstoodError
+from roboirg.policies.vlm.goal_schema import goal_schema
+from roboirg.policies.vlm.models import ModelOptions
+from roboirg.policies.vlm.vlm_listener import NotUnderstoodError
+from roboirg.reader import interpret
 from roboirg.tasks import every_task
 from roboirg.util.json_reply import UnparsableReplyError
 

@@ -13,16 +13,15 @@ from planning_fakes import decoded
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import DemonstrationFrames
 from roboirg.episodes.splits import get_episode
-from roboirg.policies.planning.keyframes import MAX_GAP, merge_keyframes
-from roboirg.policies.planning.model_content import summary_clip
-from roboirg.policies.planning.observation_merging import (
+from roboirg.policies.planners.keyframes import MAX_GAP, merge_keyframes
+from roboirg.policies.planners.observation_merging import (
     DemonstrationSubset,
     merge_cameras,
     merge_demonstration_frames,
     merge_observe_every,
     select_history,
 )
-from roboirg.policies.planning.points import (
+from roboirg.policies.planners.points import (
     MAX_SUBGOAL_LENGTH,
     parse_boxes,
     parse_points,
@@ -30,7 +29,8 @@ from roboirg.policies.planning.points import (
     strip_points,
     to_pixel,
 )
-from roboirg.policies.planning.prompts import load_prompts
+from roboirg.policies.vlm.model_content import summary_clip
+from roboirg.policies.vlm.prompts import load_prompts
 from roboirg.tasks import every_task
 from roboirg.util.json_reply import UnparsableReplyError, json_object, text_of
 from roboirg.util.media import Clip, Picture, encode_mp4, encode_png, sample_evenly

@@ -13,11 +13,11 @@ import roboirg
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies import Policy, PrivilegedPolicy, play
 from roboirg.policies.builtin.oracle_policy import OraclePolicy
-from roboirg.policies.planning.hierarchical_policy import HierarchicalPolicy, with_planner
-from roboirg.policies.planning.planners.gemini import GeminiOptions, GeminiPlanner
-from roboirg.policies.planning.planners.memer import MemerOptions, MemerPlanner
-from roboirg.policies.planning.planners.oracle_planner import OracleOptions, OraclePlanner
-from roboirg.policies.planning.planners.qwen import QwenOptions, QwenPlanner
+from roboirg.policies.planners.gemini import GeminiOptions, GeminiPlanner
+from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy, with_planner
+from roboirg.policies.planners.memer import MemerOptions, MemerPlanner
+from roboirg.policies.planners.oracle_planner import OracleOptions, OraclePlanner
+from roboirg.policies.planners.qwen import QwenOptions, QwenPlanner
 
 CHUNK = 16
 GO = "pick up the red cube at <|box_start|>(500,250)<|box_end|>"

@@ -14,17 +14,17 @@ import roboirg
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.episodes.splits import get_episode
 from roboirg.policies import Policy, PrivilegedPolicy, load_policy_class, make_policy, play
-from roboirg.policies.loading import is_privileged, policy_version
-from roboirg.policies.planning import policy_specs
-from roboirg.policies.planning.hierarchical_policy import HierarchicalPolicy
-from roboirg.policies.planning.systems import all_systems, find_system, load_system
-from roboirg.policies.planning.vlm_listener import VLMListener
-from roboirg.policies.requirements import (
+from roboirg.policies.by_name import policy_specs
+from roboirg.policies.by_name.loading import is_privileged, policy_version
+from roboirg.policies.by_name.systems import all_systems, find_system, load_system
+from roboirg.policies.contract.requirements import (
     wanted_cameras,
     wanted_demonstration_frames,
     wanted_history,
     wanted_history_cameras,
 )
+from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
+from roboirg.policies.vlm.vlm_listener import VLMListener
 
 PAPER = ("FrameS-Modul", "GroundSG-Gemini", "GroundSG-QwenVL", "GroundSG-oracle", "MemER",
          "TTT-Expert", "pi0.5")  # fmt: skip
@@ -194,13 +194,13 @@ def test_nothing_is_asked_of_libraries_before_the_first_question():
         "            raise ImportError(name)\n"
         "sys.meta_path.insert(0, Refuse())\n"
         "from roboirg.policies import load_policy_class\n"
-        "from roboirg.policies.planning.systems import all_systems\n"
+        "from roboirg.policies.by_name.systems import all_systems\n"
         f"specs = [{LISTENER!r}, 'vlm-listener:google?model=x']\n"
         "specs += [f'system:{name}' for name in all_systems()]\n"
         "made = [load_policy_class(spec)(seed=1) for spec in specs]\n"
         "from types import SimpleNamespace\n"
         "from roboirg.core.errors import MissingDependencyError\n"
-        "from roboirg.policies.planning.models import make_model, ModelOptions\n"
+        "from roboirg.policies.vlm.models import make_model, ModelOptions\n"
         "for provider in ('openai', 'google'):\n"
         "    try:\n"
         "        make_model(ModelOptions(provider=provider, model='m', base_url='http://x'))\n"

@@ -9,9 +9,9 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.language.settings import settings_of
 from roboirg.policies import Policy, PrivilegedPolicy, load_policy_class, make_policy
 from roboirg.policies.builtin.listeners import ForgetfulPolicy, ListenerPolicy
-from roboirg.policies.loading import is_privileged, policy_version
-from roboirg.policies.policy_classes import BUILTIN
-from roboirg.policies.requirements import (
+from roboirg.policies.by_name.loading import is_privileged, policy_version
+from roboirg.policies.by_name.policy_classes import BUILTIN
+from roboirg.policies.contract.requirements import (
     wanted_actions,
     wanted_calibration,
     wanted_cameras,

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.language.token_counts import count_tokens
+from roboirg.policies.by_name.systems import all_systems
 from roboirg.policies.lerobot_policy import LeRobotPolicy
-from roboirg.policies.planning.systems import all_systems
 from roboirg.policies.prompt_length.declared_limit import prompt_limit, prompt_needs_of
 from roboirg.policies.prompt_length.prompt_audit import (
     PromptLimit,

@@ -18,12 +18,13 @@ import roboirg
 from roboirg.apps.policy_check.policy_check import check_policy
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.policy_environment import env_requirements, make_env
-from roboirg.policies import make_policy, play, protocols
-from roboirg.policies.policy_classes import url_schemes
-from roboirg.policies.protocols import all_protocols, protocols_by_scheme
+from roboirg.policies import make_policy, play
+from roboirg.policies.by_name.policy_classes import url_schemes
+from roboirg.policies.policy_server import open_server
+from roboirg.policies.remote import protocols
 from roboirg.policies.remote.endpoints import RemoteOptions
-from roboirg.policies.serving.policy_server import open_server
-from roboirg.policies.transport import Transport
+from roboirg.policies.remote.protocols import all_protocols, protocols_by_scheme
+from roboirg.policies.remote.transport import Transport
 from roboirg.records.record import Job
 
 PAGE = (Path(__file__).parents[2] / "docs" / "policies.md").read_text()
@@ -159,7 +160,7 @@ for name in ("websockets", "msgpack", "httpx"):
     sys.modules[name] = None  # an import raises ImportError
 from roboirg.core.errors import MissingDependencyError
 from roboirg.policies import load_policy_class
-from roboirg.policies.protocols import protocols_by_scheme
+from roboirg.policies.remote.protocols import protocols_by_scheme
 schemes = list(protocols_by_scheme())
 for scheme in schemes:
     try:

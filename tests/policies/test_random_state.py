@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboirg.policies.random_state import RandomState
+from roboirg.policies.contract.random_state import RandomState
 
 NOBODY = None
 

@@ -12,7 +12,7 @@ from wire_servers import ChallengeHttpServer, ChallengeServer, MmeVlaServer, Wir
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies import Policy, make_policy
-from roboirg.policies.base import SubgoalFollower
+from roboirg.policies.contract.base import SubgoalFollower
 
 CAPTURES = Path(__file__).with_name("captures")
 NOW, LATER, LATEST = moment(3, history=()), moment(4), moment(5, history=(moment(4), moment(5)))

@@ -14,8 +14,8 @@ from roboirg.core import waiting
 from roboirg.core.errors import PolicyConnectionError, PolicyTimeoutError
 from roboirg.core.waiting import queued_seconds
 from roboirg.policies import make_policy
+from roboirg.policies.remote.client.server_lock import lock_server
 from roboirg.policies.remote.endpoints import Endpoint
-from roboirg.policies.remote.server_lock import lock_server
 
 SPAWN = multiprocessing.get_context("spawn")
 ONE, TWO = Endpoint("h", 8001), Endpoint("h", 8002)

@@ -18,9 +18,9 @@ from wire_servers import pack, unpack
 
 from roboirg.core.errors import InvalidValueError, PolicyReplyError, UnknownNameError
 from roboirg.policies import make_policy
-from roboirg.policies.protocols import protocols_by_scheme
-from roboirg.policies.serving.policy_server import open_server
-from roboirg.policies.serving.server_options import ServerOptions
+from roboirg.policies.policy_server import open_server
+from roboirg.policies.remote.protocols import protocols_by_scheme
+from roboirg.policies.remote.server_options import ServerOptions
 
 HERE = f"{__name__}:Recorder"
 SERVED = [scheme for scheme, protocol in protocols_by_scheme().items() if protocol.service]

@@ -12,7 +12,7 @@ import roboirg
 from roboirg.apps.policy_check.policy_check import check_policy
 from roboirg.core.errors import InvalidValueError, PolicyReplyError, PolicyTimeoutError
 from roboirg.policies import make_policy, play
-from roboirg.policies.loading import server_version
+from roboirg.policies.by_name.loading import server_version
 from roboirg.policies.remote.message_codec import TEXT_KEYS, CodecError, pack, unpack
 
 

@@ -15,7 +15,7 @@ from roboirg.evaluation.policy_descriptions import know_policy
 from roboirg.evaluation.progress import ConsoleReporter, SilentReporter
 from roboirg.evaluation.record_hook import CommandHook, HookedReporter, RecordFunction
 from roboirg.evaluation.runner import RunSummary, episode_runner, run_plan
-from roboirg.policies.local_policies import is_local, policy_name, spec_of
+from roboirg.policies.by_name.local_policies import is_local, policy_name, spec_of
 from roboirg.util.console_width import progress_console
 
 AnyPolicy = str | type[Any] | object

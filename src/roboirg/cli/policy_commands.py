@@ -33,8 +33,8 @@ class ProtocolHelpCommand(TyperCommand):
 
     def get_help(self, ctx: Any) -> str:  # noqa: ANN401 - typer does not export its base class
         """Return the help text."""
-        from roboirg.policies.policy_classes import url_schemes
-        from roboirg.policies.protocols import protocols_by_scheme
+        from roboirg.policies.by_name.policy_classes import url_schemes
+        from roboirg.policies.remote.protocols import protocols_by_scheme
 
         urls = ", ".join(f"{scheme}://…" for scheme in url_schemes())
         schemes = protocols_by_scheme().items()
@@ -76,8 +76,8 @@ def serve(
     ] = _LIMITS.idle_s,
 ) -> None:
     """Serve a policy to this benchmark and other clients of a protocol."""
-    from roboirg.policies.serving.policy_server import open_server
-    from roboirg.policies.serving.server_options import ServerOptions
+    from roboirg.policies.policy_server import open_server
+    from roboirg.policies.remote.server_options import ServerOptions
     from roboirg.util.freed_memory import keep_freed_memory
 
     keep_freed_memory()

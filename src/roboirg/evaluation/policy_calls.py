@@ -13,7 +13,7 @@ from pydantic import JsonValue
 from roboirg.core.actions import ActionSpace, check_chunk
 from roboirg.core.errors import InvalidActionError, InvalidValueError
 from roboirg.core.observations import Observation
-from roboirg.policies.base import Policy
+from roboirg.policies.contract.base import Policy
 from roboirg.util.plain_text import is_encodable
 
 MAX_ROWS = 10_000

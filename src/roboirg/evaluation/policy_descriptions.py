@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.evaluation.hosting.host_process import MISSING
 from roboirg.evaluation.hosting.policy_child import ChildLostError, PolicyChild
-from roboirg.policies.loading import (
+from roboirg.policies.by_name.loading import (
     is_foreign,
     is_privileged,
     load_policy_class,

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from roboirg.core.actions import ActionSpace
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import DemonstrationFrames
-from roboirg.policies.base import Policy
-from roboirg.policies.requirements import (
+from roboirg.policies.contract.base import Policy
+from roboirg.policies.contract.requirements import (
     wanted_actions,
     wanted_calibration,
     wanted_cameras,

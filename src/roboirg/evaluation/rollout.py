@@ -40,10 +40,10 @@ from roboirg.evaluation.prompt_shares import audit_job, too_long_text
 from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.video_writer import FrameSink, VideoWriter
 from roboirg.language.wordings.wording_store import open_wordings
-from roboirg.policies.base import Policy, PrivilegedPolicy, close_policy, tell_policy
-from roboirg.policies.loading import needs_host
+from roboirg.policies.by_name.loading import needs_host
+from roboirg.policies.contract.base import Policy, PrivilegedPolicy, close_policy, tell_policy
+from roboirg.policies.contract.random_state import episode_policy_seed
 from roboirg.policies.prompt_length.declared_limit import prompt_limit
-from roboirg.policies.random_state import episode_policy_seed
 from roboirg.records.action_log import write_actions
 from roboirg.records.film import VideoMode, VideoOptions
 from roboirg.records.record import Job, Record

@@ -28,7 +28,7 @@ from roboirg.evaluation.policy_descriptions import PolicyDescription, describe_p
 from roboirg.evaluation.prompt_shares import audit_job, audit_prompt
 from roboirg.judging import Event, attribute_failure
 from roboirg.language.settings import EXPLICIT
-from roboirg.policies.loading import server_version
+from roboirg.policies.by_name.loading import server_version
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit
 from roboirg.records.action_log import ActionLog
 from roboirg.records.record import (

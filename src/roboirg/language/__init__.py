@@ -1,10 +1,9 @@
-"""Instructions: generate them from episodes, and interpret them independently."""
+"""Instructions: what an episode sounds like in each setting."""
 
 from __future__ import annotations
 
 from roboirg.language.generator import expressible, find_refusals, instruct, instruct_with
 from roboirg.language.instruction import FORMS, Instruction, Mention, Utterance
-from roboirg.language.interpreter import Interpretation, interpret
 from roboirg.language.mirrored_landmarks import mirrored_objects
 from roboirg.language.request import STAGE_SETS
 from roboirg.language.settings import setting_names, settings_of
@@ -16,14 +15,12 @@ __all__ = [
     "LANGUAGE_VERSION",
     "STAGE_SETS",
     "Instruction",
-    "Interpretation",
     "Mention",
     "Utterance",
     "expressible",
     "find_refusals",
     "instruct",
     "instruct_with",
-    "interpret",
     "mirrored_objects",
     "open_wordings",
     "setting_names",

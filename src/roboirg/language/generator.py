@@ -31,8 +31,8 @@ from roboirg.language.request import (
     InstructionSpec,
     NoCommandError,
 )
-from roboirg.language.setting import Setting
 from roboirg.language.settings import all_settings, get_setting, settings_of
+from roboirg.language.settings.setting import Setting
 from roboirg.language.template_sampler import TemplateSampler
 from roboirg.language.templates import LANGUAGE_VERSION
 from roboirg.language.worded_command import TaskWordings, describe_goal

@@ -22,7 +22,7 @@ from pydantic import Field
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.observations import CAMERAS, Demonstration, Observation
-from roboirg.policies.policy_urls import UrlOptions, read_options, split_url
+from roboirg.policies.contract.policy_urls import UrlOptions, read_options, split_url
 
 PICTURE = "observation.images.{}"
 STATE = "observation.state"

@@ -17,9 +17,9 @@ from fractions import Fraction
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.episodes.splits import get_episode
 from roboirg.evaluation.job_instruction import instruct_job
-from roboirg.language.command_chance import blind_goals, right_share
-from roboirg.language.shortcuts import SURFACE_RULES, goal_share, guess_goal
 from roboirg.records.record import Job
+from roboirg.shortcuts import SURFACE_RULES, goal_share, guess_goal
+from roboirg.shortcuts.command_chance import blind_goals, right_share
 
 CHANCE = "chance"
 FLOORS = (CHANCE, *SURFACE_RULES)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from roboirg.core.observations import CAMERAS, Demonstration, Observation
 from roboirg.envs.factory import make
 from roboirg.policies import Policy, make_policy, play
-from roboirg.policies.requirements import wanted_cameras
+from roboirg.policies.contract.requirements import wanted_cameras
 
 CHUNK = 16
 CHUNKS = 12

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from roboirg.core.actions import find_action_space
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.observations import Demonstration, Observation
-from roboirg.policies.planning.policy_specs import Build, PolicyKind
+from roboirg.policies.by_name.policy_specs import Build, PolicyKind
 from roboirg.records.action_log import read_actions
 from roboirg.records.record import Record
 from roboirg.records.store import read_records

@@ -31,8 +31,8 @@ from roboirg.core.errors import InvalidValueError, MotionPlanningError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import CAMERAS
 from roboirg.envs.factory import make
-from roboirg.policies.base import Policy, PrivilegedPolicy, tell_policy
-from roboirg.policies.requirements import wanted_actions
+from roboirg.policies.contract.base import Policy, PrivilegedPolicy, tell_policy
+from roboirg.policies.contract.requirements import wanted_actions
 from roboirg.util.atomic_write import replacing
 
 if TYPE_CHECKING:

@@ -16,13 +16,13 @@ from roboirg.episodes.splits import get_episode, split_episodes
 from roboirg.evaluation.grounding_set.answer_file import Answer
 from roboirg.evaluation.grounding_set.grounding_item import LETTERS, GroundingItem
 from roboirg.evaluation.grounding_set.verdicts import right_reply
-from roboirg.language.command_chance import fitting_goals
 from roboirg.language.settings import EXPLICIT
-from roboirg.language.shortcuts import SURFACE_RULES, draw_goal, guess_goal
-from roboirg.language.shortcuts.learned_floor import LearnedFloor, places_of
-from roboirg.language.shortcuts.shortcut_tables import TRAINING_SPLIT
 from roboirg.language.variants import instructions
-from roboirg.policies.planning.goal_schema import goal_schema
+from roboirg.policies.vlm.goal_schema import goal_schema
+from roboirg.shortcuts import SURFACE_RULES, draw_goal, guess_goal
+from roboirg.shortcuts.command_chance import fitting_goals
+from roboirg.shortcuts.learned_floor import LearnedFloor, places_of
+from roboirg.shortcuts.shortcut_tables import TRAINING_SPLIT
 from roboirg.tasks import get_task
 
 ORACLE, CHANCE, COMMAND = "oracle", "chance", "command"

@@ -189,13 +189,9 @@ def score_shortcuts(
     """Score rules that see the words only, beside chance: how much needs no understanding."""
     from roboirg.evaluation.plan_parsing import parse_splits
     from roboirg.language import FORMS
-    from roboirg.language.shortcuts.learned_floor import check_learning_support
-    from roboirg.language.shortcuts.shortcut_scores import GROUPINGS
-    from roboirg.language.shortcuts.shortcut_tables import (
-        TRAINING_SPLIT,
-        shortcut_rows,
-        shortcut_table,
-    )
+    from roboirg.shortcuts.learned_floor import check_learning_support
+    from roboirg.shortcuts.shortcut_scores import GROUPINGS
+    from roboirg.shortcuts.shortcut_tables import TRAINING_SPLIT, shortcut_rows, shortcut_table
 
     splits = () if split.strip().lower() == "none" else parse_splits(split)
     grouping = None if by is None else known_name("row", by, GROUPINGS)

@@ -9,8 +9,8 @@ from rich.table import Table
 from roboirg.apps.language_lab import corpus_statistics
 from roboirg.language.expression_counts import ClassCounts, expression_counts, expression_order
 from roboirg.language.instruction import Instruction
+from roboirg.language.open_reasoning import open_templates
 from roboirg.language.settings import setting_names
-from roboirg.language.templates import open_reasoning
 from roboirg.language.templates.derivations import COUNTED_STEPS, RELATIONS, STEPS
 from roboirg.language.token_counts import SHORT_LIMIT, USUAL_LIMIT
 from roboirg.tasks import every_task
@@ -38,9 +38,9 @@ _RELATIONS = [
     *(
         f"{one.name}, {step}"
         for step in ("total", "difference")
-        for one in open_reasoning.TWO_STEP_RELATIONS
+        for one in open_templates.TWO_STEP_RELATIONS
     ),
-    *(one.words for one in open_reasoning.COMPARATIVES.everything),
+    *(one.words for one in open_templates.COMPARATIVES.everything),
     "favorite",
     "not the favorite",
 ]

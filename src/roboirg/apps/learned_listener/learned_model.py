@@ -21,7 +21,7 @@ from roboirg.apps.learned_listener.object_relations import (
 )
 from roboirg.core.episode import Goal
 from roboirg.core.errors import InvalidValueError
-from roboirg.policies.planning.goal_schema import goal_schema
+from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.util.short_hash import short_hash
 
 FORMAT = "roboirg-listener-2"

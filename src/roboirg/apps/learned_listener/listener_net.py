@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 
 from roboirg.apps.learned_listener.object_relations import VIEWS, ObjectsInView, relation_count
-from roboirg.policies.planning.goal_schema import goal_schema
+from roboirg.policies.vlm.goal_schema import goal_schema
 
 WIDTH, HEADS, LAYERS = 96, 4, 3
 MAX_WORDS = 96

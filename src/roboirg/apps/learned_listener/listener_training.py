@@ -37,7 +37,7 @@ from roboirg.language import FORMS, LANGUAGE_VERSION
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.variants import instructions, settings_with_rivals
-from roboirg.policies.planning.goal_schema import goal_schema
+from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.tasks import get_task, with_goal
 from roboirg.util.parallel_map import parallel_map
 

@@ -32,9 +32,9 @@ from roboirg.evaluation.grounding_set.grounding_item import (
     read_items,
 )
 from roboirg.evaluation.grounding_set.question_set import EpisodeName, read_media
-from roboirg.language.command_chance import is_right
 from roboirg.language.wordings.wording_store import open_wordings
-from roboirg.policies.planning.goal_schema import goal_schema
+from roboirg.policies.vlm.goal_schema import goal_schema
+from roboirg.shortcuts.command_chance import is_right
 from roboirg.util.short_hash import short_hash
 
 QUESTIONS = "questions"

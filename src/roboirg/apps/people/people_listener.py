@@ -15,9 +15,9 @@ from roboirg.apps.people.listener_answers import (
 from roboirg.core.episode import Goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies.builtin.scripted import ScriptedPolicy
-from roboirg.policies.planning.goal_schema import goal_schema
-from roboirg.policies.planning.policy_specs import Build, PolicyKind
-from roboirg.policies.random_state import episode_policy_seed
+from roboirg.policies.by_name.policy_specs import Build, PolicyKind
+from roboirg.policies.contract.random_state import episode_policy_seed
+from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.util.short_hash import short_hash
 
 if TYPE_CHECKING:

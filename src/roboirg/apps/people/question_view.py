@@ -14,7 +14,7 @@ from roboirg.core.episode import Episode
 from roboirg.evaluation.grounding_set.grounding_item import GroundingItem, Mask, PointTarget
 from roboirg.evaluation.grounding_set.item_builder import EpisodeMedia
 from roboirg.evaluation.grounding_set.referents import noun
-from roboirg.policies.planning.goal_schema import AMOUNT, Field, goal_schema
+from roboirg.policies.vlm.goal_schema import AMOUNT, Field, goal_schema
 from roboirg.records.record import Job
 
 MARGIN = 2

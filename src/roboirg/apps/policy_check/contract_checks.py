@@ -29,9 +29,9 @@ from roboirg.apps.policy_check.synthetic_episodes import SyntheticEpisodes
 from roboirg.apps.policy_check.turn_check import largest_difference, play_in_turns
 from roboirg.core.actions import check_chunk
 from roboirg.core.errors import MissingDependencyError, RoboIRGError
-from roboirg.policies.base import tell_policy
-from roboirg.policies.loading import needs_host
-from roboirg.policies.requirements import (
+from roboirg.policies.by_name.loading import needs_host
+from roboirg.policies.contract.base import tell_policy
+from roboirg.policies.contract.requirements import (
     wanted_actions,
     wanted_calibration,
     wanted_cameras,

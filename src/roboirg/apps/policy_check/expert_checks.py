@@ -22,7 +22,7 @@ from roboirg.apps.policy_check.expert_episode import ExpertEpisode, ExpertMoment
 from roboirg.apps.policy_check.picture_formats import change_observation
 from roboirg.apps.policy_check.policy_player import PolicyPlayer
 from roboirg.core.actions import ARM_JOINTS, JOINT_ANGLE, WAYPOINT
-from roboirg.policies.requirements import wanted_cameras
+from roboirg.policies.contract.requirements import wanted_cameras
 
 FITS = 0.5
 """Of the error of holding still: a policy below it knows where the expert goes."""

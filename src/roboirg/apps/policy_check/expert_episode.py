@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from roboirg.core.actions import JOINT_ANGLE
 from roboirg.core.observations import Observation
-from roboirg.policies.base import Policy
 from roboirg.policies.builtin.oracle_policy import OraclePolicy
-from roboirg.policies.requirements import REQUIREMENTS, wanted_actions
+from roboirg.policies.contract.base import Policy
+from roboirg.policies.contract.requirements import REQUIREMENTS, wanted_actions
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv

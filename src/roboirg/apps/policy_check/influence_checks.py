@@ -13,7 +13,7 @@ import numpy as np
 from roboirg.apps.policy_check.check_result import NOTE, PASS, WARN, CheckResult
 from roboirg.apps.policy_check.policy_player import SECOND, VIDEO_STEPS, PolicyPlayer, are_equal
 from roboirg.apps.policy_check.synthetic_episodes import SyntheticEpisode
-from roboirg.policies.requirements import (
+from roboirg.policies.contract.requirements import (
     wanted_cameras,
     wanted_demonstration_frames,
     wanted_depth,

@@ -36,7 +36,7 @@ from roboirg.apps.policy_check.influence_checks import (
     check_video,
 )
 from roboirg.apps.policy_check.policy_player import PolicyPlayer
-from roboirg.policies.base import Policy
+from roboirg.policies.contract.base import Policy
 from roboirg.util.plain_text import counted
 
 if TYPE_CHECKING:

@@ -15,9 +15,9 @@ from roboirg.apps.policy_check.check_result import FAIL, CheckAbortedError, desc
 from roboirg.apps.policy_check.synthetic_episodes import SyntheticEpisode, SyntheticEpisodes
 from roboirg.core.actions import JOINT_ANGLE, ActionSpace, check_chunk
 from roboirg.core.observations import Demonstration, Observation
-from roboirg.policies.base import Policy, close_policy
-from roboirg.policies.loading import make_policy
-from roboirg.policies.policy_urls import is_url
+from roboirg.policies.by_name.loading import make_policy
+from roboirg.policies.contract.base import Policy, close_policy
+from roboirg.policies.contract.policy_urls import is_url
 
 CALLS = 3
 """Calls of `act` in a synthetic episode."""

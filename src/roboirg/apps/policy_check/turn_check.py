@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from roboirg.apps.policy_check.synthetic_episodes import SyntheticEpisode
 from roboirg.core.actions import check_chunk
-from roboirg.policies.base import close_policy
-from roboirg.policies.loading import make_policy
-from roboirg.policies.random_state import RandomState
-from roboirg.policies.requirements import wanted_actions
+from roboirg.policies.by_name.loading import make_policy
+from roboirg.policies.contract.base import close_policy
+from roboirg.policies.contract.random_state import RandomState
+from roboirg.policies.contract.requirements import wanted_actions
 
 CALLS = 3
 Chunks = list[NDArray[np.float64]]

@@ -10,8 +10,8 @@ import numpy as np
 
 from roboirg.core.episode import Episode, Goal
 from roboirg.language import instruct
-from roboirg.language.command_chance import blind_goals, is_right
 from roboirg.language.instruction import Instruction
+from roboirg.shortcuts.command_chance import blind_goals, is_right
 from roboirg.tasks import get_task, with_goal
 
 MOST = 4

@@ -13,15 +13,15 @@ from roboirg.evaluation.grounding_set.goal_choices import draw_choices, explicit
 from roboirg.evaluation.grounding_set.grounding_item import LETTERS, GroundingItem, PointTarget
 from roboirg.evaluation.grounding_set.referents import is_ordered, noun, pointed_kinds
 from roboirg.language import instruct_with
-from roboirg.language.command_chance import blind_goals, is_right, right_share
 from roboirg.language.generator import find_refusal
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import all_settings, settings_of
-from roboirg.language.shortcuts.shortcut_scores import hidden_slots
 from roboirg.language.templates import LANGUAGE_VERSION
-from roboirg.policies.planning.goal_schema import goal_schema
-from roboirg.policies.planning.listener_query import PROMPTS, question_texts
-from roboirg.policies.planning.prompts import Prompts, load_prompts
+from roboirg.policies.vlm.goal_schema import goal_schema
+from roboirg.policies.vlm.listener_query import PROMPTS, question_texts
+from roboirg.policies.vlm.prompts import Prompts, load_prompts
+from roboirg.shortcuts.command_chance import blind_goals, is_right, right_share
+from roboirg.shortcuts.shortcut_scores import hidden_slots
 from roboirg.tasks import get_task
 
 QUESTIONS = "grounding_questions"

@@ -16,7 +16,7 @@ from roboirg.evaluation.grounding_set.grounding_item import (
     PointTarget,
     QuestionKind,
 )
-from roboirg.policies.planning.goal_schema import goal_schema
+from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.util.json_reply import UnparsableReplyError, json_object
 
 _FIRST_LETTER = re.compile(r"^\W*([A-D])(?![A-Za-z'])", re.IGNORECASE)

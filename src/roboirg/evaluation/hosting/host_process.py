@@ -21,9 +21,9 @@ from roboirg.core.errors import MissingDependencyError
 from roboirg.evaluation.episode_errors import describe_error, one_line
 from roboirg.evaluation.hosting.hosted_episode import HostedEpisode
 from roboirg.evaluation.hosting.payload import Message, decode, encode
-from roboirg.policies.loading import is_privileged, load_policy_class, policy_version
+from roboirg.policies.by_name.loading import is_privileged, load_policy_class, policy_version
+from roboirg.policies.contract.random_state import RandomState
 from roboirg.policies.prompt_length.declared_limit import prompt_needs_of
-from roboirg.policies.random_state import RandomState
 
 MISSING = "missing"
 """Instead of a kind of error: a package is not installed."""

@@ -16,10 +16,10 @@ from roboirg.evaluation.hosting.payload import (
     unpack_payload,
 )
 from roboirg.evaluation.policy_calls import check_rows, policy_metadata, policy_usage
-from roboirg.policies.base import close_policy, tell_policy
-from roboirg.policies.loading import is_privileged, make_policy, policy_version
-from roboirg.policies.random_state import RandomState
-from roboirg.policies.requirements import REQUIREMENTS, wanted_actions
+from roboirg.policies.by_name.loading import is_privileged, make_policy, policy_version
+from roboirg.policies.contract.base import close_policy, tell_policy
+from roboirg.policies.contract.random_state import RandomState
+from roboirg.policies.contract.requirements import REQUIREMENTS, wanted_actions
 
 Ask = Callable[[Message], Message]
 """Sends a question to the world of an episode in a call, and returns its answer."""

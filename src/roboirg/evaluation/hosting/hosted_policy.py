@@ -39,8 +39,8 @@ from roboirg.evaluation.hosting.payload import (
     encode,
     pack_payload,
 )
-from roboirg.policies.policy_urls import is_url
-from roboirg.policies.requirements import REQUIREMENTS
+from roboirg.policies.contract.policy_urls import is_url
+from roboirg.policies.contract.requirements import REQUIREMENTS
 from roboirg.records.record import ERROR_KINDS
 from roboirg.util.plain_text import clip_text
 

@@ -4,19 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from roboirg.language.patterns import (
-    before_after,
-    deduction,
-    exclusion,
-    open_colors,
-    open_moments,
-    open_numbers,
-    sequence,
-)
+from roboirg.language.patterns import before_after, deduction, exclusion, sequence
 from roboirg.language.patterns.pattern import Derived, Pattern
 from roboirg.language.request import InstructionRequest
 
-__all__ = ["OPEN_PATTERNS", "PATTERNS", "Derived", "Pattern", "find_pattern"]
+__all__ = ["PATTERNS", "Derived", "Pattern", "find_pattern"]
 
 PATTERNS: Mapping[str, tuple[Pattern, ...]] = {
     "color exclusion": (exclusion.ONE_COLOR,),
@@ -24,14 +16,6 @@ PATTERNS: Mapping[str, tuple[Pattern, ...]] = {
     "sequential relation": (sequence.ORDINAL, before_after.NEIGHBOR),
     "contextual logic": (exclusion.TWO_AMOUNTS, before_after.OTHER),
 }
-
-
-OPEN_PATTERNS: Mapping[str, tuple[Pattern, ...]] = {
-    "color exclusion": (open_colors.ONE_OF_TWO, open_colors.ONE_OF_THREE),
-    "number deduction": (open_numbers.TWO_STEPS,),
-    "contextual logic": (open_moments.FAVORITE,),
-}
-"""Rules whose words alone, or any single one of them, do not give the goal away."""
 
 
 def find_pattern(

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.language.setting import Setting
+from roboirg.language.settings.setting import Setting
 from roboirg.tasks import Task
 from roboirg.util.discovery import discover
 

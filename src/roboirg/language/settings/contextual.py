@@ -7,15 +7,6 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from roboirg.core.instruction_options import RIVALS, InstructionOptions
-from roboirg.language.pairs import (
-    draw_pair,
-    pair_command,
-    pair_introduction,
-    pair_notes,
-    pair_refusal,
-    pair_reinforcement,
-    wants_pair,
-)
 from roboirg.language.phrases import Phrase, fill, plain
 from roboirg.language.request import (
     DISTRACTORS,
@@ -24,8 +15,17 @@ from roboirg.language.request import (
     InstructionSpec,
     UtteranceSpec,
 )
-from roboirg.language.setting import Instruct, Setting
+from roboirg.language.rivals import (
+    draw_pair,
+    pair_command,
+    pair_introduction,
+    pair_notes,
+    pair_refusal,
+    pair_reinforcement,
+    wants_pair,
+)
 from roboirg.language.settings import direct
+from roboirg.language.settings.setting import Instruct, Setting
 from roboirg.language.slot_types import slot_types_in
 from roboirg.language.templates import remarks
 

@@ -8,7 +8,9 @@ from roboirg.core.episode import Goal
 from roboirg.core.instruction_options import RIVALS, InstructionOptions
 from roboirg.core.word_pools import POOLS
 from roboirg.language.instruction import Instruction
-from roboirg.language.pairs import (
+from roboirg.language.phrases import sentences
+from roboirg.language.request import InstructionRequest, InstructionSpec, UtteranceSpec
+from roboirg.language.rivals import (
     draw_pair,
     hidden_by_pair,
     pair_command,
@@ -17,9 +19,7 @@ from roboirg.language.pairs import (
     pair_refusal,
     wants_pair,
 )
-from roboirg.language.phrases import sentences
-from roboirg.language.request import InstructionRequest, InstructionSpec, UtteranceSpec
-from roboirg.language.setting import Instruct, Setting
+from roboirg.language.settings.setting import Instruct, Setting
 from roboirg.language.slot_types import Fields, slot_types_in, stated
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from roboirg.language.request import InstructionRequest, InstructionSpec, UtteranceSpec
-from roboirg.language.setting import Setting
+from roboirg.language.settings.setting import Setting
 from roboirg.language.slot_types import stated
 
 

@@ -10,9 +10,10 @@ from roboirg.core.episode import Goal
 from roboirg.core.goal_slots import COLOR_SLOTS
 from roboirg.core.instruction_options import DEFAULT_REASONING, REASONINGS
 from roboirg.language.instruction import Instruction
-from roboirg.language.patterns import OPEN_PATTERNS, Pattern, find_pattern
+from roboirg.language.open_reasoning import OPEN_PATTERNS
+from roboirg.language.patterns import Pattern, find_pattern
 from roboirg.language.request import InstructionRequest, InstructionSpec, UtteranceSpec
-from roboirg.language.setting import Setting
+from roboirg.language.settings.setting import Setting
 from roboirg.language.slot_types import stated
 
 _COLOR_SLOTS = frozenset(COLOR_SLOTS)

@@ -12,11 +12,11 @@ from roboirg.core.goal_slots import COLOR_SLOTS
 from roboirg.core.instruction_options import RIVALS
 from roboirg.language.instruction import Expression, Instruction
 from roboirg.language.landmarks import FRAMES, SIMPLE, Landmark, landmarks
-from roboirg.language.pairs import draw_pair, hidden_by_pair, pair_notes, pair_refusal, wants_pair
-from roboirg.language.pairs.pair_words import choosing_remark, chosen, the_other
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain, sentences
 from roboirg.language.request import GoalValue, InstructionRequest, InstructionSpec, UtteranceSpec
-from roboirg.language.setting import Setting
+from roboirg.language.rivals import draw_pair, hidden_by_pair, pair_notes, pair_refusal, wants_pair
+from roboirg.language.rivals.pair_words import choosing_remark, chosen, the_other
+from roboirg.language.settings.setting import Setting
 from roboirg.language.slot_types import described, stated
 from roboirg.language.templates import introductions
 

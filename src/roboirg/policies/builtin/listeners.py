@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from roboirg.core.episode import Episode, Goal
-from roboirg.language.command_chance import fitting_goals
 from roboirg.policies.builtin.scripted import ScriptedPolicy
+from roboirg.shortcuts.command_chance import fitting_goals
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv

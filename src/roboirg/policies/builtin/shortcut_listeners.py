@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 from roboirg.core.episode import Goal
-from roboirg.language.shortcuts import draw_goal, guess_goal
 from roboirg.policies.builtin.listeners import choice_generator
 from roboirg.policies.builtin.scripted import ScriptedPolicy
+from roboirg.shortcuts import draw_goal, guess_goal
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -20,7 +20,7 @@ class ShortcutPolicy(ScriptedPolicy):
     """
 
     rule: ClassVar[str]
-    """Name of a rule in `roboirg.language.shortcuts.SURFACE_RULES`."""
+    """Name of a rule in `roboirg.shortcuts.SURFACE_RULES`."""
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
         """Return the goal of the rule; what the rule leaves open is drawn at random."""

@@ -5,16 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
-from roboirg.policies.loading import load_policy_class
-from roboirg.policies.policy_urls import is_url
-from roboirg.policies.prompt_length.prompt_audit import PromptLimit
-from roboirg.policies.prompt_length.tokenizer_file import read_tokenizer
-from roboirg.policies.requirements import (
+from roboirg.policies.by_name.loading import load_policy_class
+from roboirg.policies.contract.policy_urls import is_url
+from roboirg.policies.contract.requirements import (
     wanted_lower_case,
     wanted_prompt_added,
     wanted_prompt_tokens,
     wanted_tokenizer,
 )
+from roboirg.policies.prompt_length.prompt_audit import PromptLimit
+from roboirg.policies.prompt_length.tokenizer_file import read_tokenizer
 
 
 class PromptNeeds(NamedTuple):

@@ -1,1 +1,1 @@
-"""What remote policies share: endpoints, server locks, connections and the message codec."""
+"""Policies behind a network connection: their protocols, clients and servers."""

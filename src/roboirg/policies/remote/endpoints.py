@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field
 
 from roboirg.core.actions import find_action_space
 from roboirg.core.errors import InvalidValueError
-from roboirg.policies.policy_urls import PolicyUrl, UrlOptions
+from roboirg.policies.contract.policy_urls import PolicyUrl, UrlOptions
 
 MIB = 2**20
 _LOOPBACK = {"localhost", "127.0.0.1", "::1"}

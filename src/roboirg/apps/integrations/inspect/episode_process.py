@@ -8,9 +8,9 @@ from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from roboirg.core.errors import PolicyConnectionError
-from roboirg.policies.planning.models import ModelOptions, ModelQuery, ModelReply
-from roboirg.policies.planning.models.openai_compatible import chat_messages
-from roboirg.policies.planning.vlm_listener import ListenerOptions, VLMListener
+from roboirg.policies.vlm.models import ModelOptions, ModelQuery, ModelReply
+from roboirg.policies.vlm.models.openai_compatible import chat_messages
+from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener
 from roboirg.records.record import Job
 
 if TYPE_CHECKING:

@@ -38,10 +38,10 @@ from roboirg.evaluation.grounding_set.grounding_item import (
 )
 from roboirg.evaluation.grounding_set.verdicts import judge_reply, right_reply
 from roboirg.evaluation.plan_parsing import means_all, parse_names
-from roboirg.policies.planning.goal_schema import goal_schema
-from roboirg.policies.planning.listener_query import PROMPTS, QuestionTexts
-from roboirg.policies.planning.prompts import load_prompts
-from roboirg.policies.planning.vlm_query import SILENCE
+from roboirg.policies.vlm.goal_schema import goal_schema
+from roboirg.policies.vlm.listener_query import PROMPTS, QuestionTexts
+from roboirg.policies.vlm.prompts import load_prompts
+from roboirg.policies.vlm.vlm_query import SILENCE
 from roboirg.util.json_reply import UnparsableReplyError
 
 EPISODE = "episode"

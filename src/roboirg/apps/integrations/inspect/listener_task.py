@@ -32,8 +32,8 @@ from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.instruction_options import DEFAULT_DELIVERY, DEFAULT_REASONING, DEFAULT_RIVAL
 from roboirg.episodes.splits import split_size
-from roboirg.policies.planning.models import ModelOptions
-from roboirg.policies.planning.vlm_listener import ListenerOptions
+from roboirg.policies.vlm.models import ModelOptions
+from roboirg.policies.vlm.vlm_listener import ListenerOptions
 from roboirg.records.record import DEFAULT_MAX_STEPS, Job
 from roboirg.tasks import find_tasks
 from roboirg.util.child_process import ChildExit, ChildProcess

@@ -27,7 +27,6 @@ from roboirg.apps.language_lab.validation.episode_checks import check_episode
 from roboirg.core.episode import DIFFICULTIES, Episode, Goal, Split
 from roboirg.episodes.published_episodes import published_episode
 from roboirg.episodes.splits import SIZES
-from roboirg.language.interpreter import interpret
 from roboirg.language.settings import EXPLICIT, settings_of
 from roboirg.language.worded_command import (
     ROBOMME_NAME,
@@ -39,6 +38,7 @@ from roboirg.language.worded_command import (
 )
 from roboirg.language.wordings.wording_file import check_name, parse_wordings
 from roboirg.language.wordings.wording_store import forget_wordings, register_wordings
+from roboirg.reader import interpret
 from roboirg.tasks import Task, all_tasks
 from roboirg.util.plain_text import counted
 

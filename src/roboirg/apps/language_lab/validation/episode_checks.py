@@ -20,10 +20,10 @@ from roboirg.core.episode import Episode
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.generator import expressible, find_refusal, instruct_with
 from roboirg.language.instruction import Instruction
-from roboirg.language.interpreter import Interpretation, interpret
-from roboirg.language.setting import Setting
 from roboirg.language.settings import ACCEPTANCE_SETTINGS, all_settings, settings_of
+from roboirg.language.settings.setting import Setting
 from roboirg.language.variants import expressible_options
+from roboirg.reader import Interpretation, interpret
 from roboirg.tasks import get_task
 
 Read = Callable[[str], Interpretation]

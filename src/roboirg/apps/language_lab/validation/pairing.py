@@ -9,8 +9,8 @@ from roboirg.core.episode import Episode
 from roboirg.core.instruction_options import REASONINGS, RIVALS, InstructionOptions
 from roboirg.language.generator import find_refusal, instruct_with
 from roboirg.language.instruction import Instruction, Mention
-from roboirg.language.setting import Instruct
 from roboirg.language.settings import all_settings
+from roboirg.language.settings.setting import Instruct
 
 
 def unpaired(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from roboirg.apps.real.control.robot import HORIZON
 from roboirg.core.observations import Demonstration, Observation
-from roboirg.policies.base import Policy, PrivilegedPolicy
+from roboirg.policies.contract.base import Policy, PrivilegedPolicy
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv

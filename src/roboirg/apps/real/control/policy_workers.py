@@ -25,8 +25,8 @@ from roboirg.evaluation.episode_errors import (
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.hosting.policy_child import ChildLostError
-from roboirg.policies.base import Policy, PrivilegedPolicy
-from roboirg.policies.loading import make_policy
+from roboirg.policies.by_name.loading import make_policy
+from roboirg.policies.contract.base import Policy, PrivilegedPolicy
 from roboirg.records.record import ErrorKind
 
 if TYPE_CHECKING:

@@ -28,8 +28,8 @@ from roboirg.evaluation.plan_parsing import name_and_spec
 from roboirg.evaluation.policy_descriptions import describe_policy
 from roboirg.evaluation.rollout_result import make_record, utc_now
 from roboirg.language import LANGUAGE_VERSION
-from roboirg.policies.loading import is_privileged, load_policy_class
-from roboirg.policies.requirements import wanted_actions, wanted_cameras, wanted_history
+from roboirg.policies.by_name.loading import is_privileged, load_policy_class
+from roboirg.policies.contract.requirements import wanted_actions, wanted_cameras, wanted_history
 from roboirg.records.record import Job, Record
 
 ROBOT_LOCK = ".robot.lock"

@@ -1,0 +1,130 @@
+"""Open color exclusion: one color is excluded, and the scene tells which of two others is meant."""
+
+from __future__ import annotations
+
+from roboirg.core.motions import Swap
+from roboirg.language.instruction import REFERENCE
+from roboirg.language.landmarks import MARGIN
+from roboirg.language.open_reasoning import open_templates as templates
+from roboirg.language.patterns.pattern import Derived, Pattern
+from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain
+from roboirg.language.request import InstructionRequest
+from roboirg.language.slot_types import described
+
+TWO, THREE = 2, 3
+
+
+def _present(request: InstructionRequest) -> tuple[str, ...]:
+    """Return the colors of the things that the task may choose among, each once."""
+    thing = request.task.commands.colored
+    kinds = (thing, f"hidden_{thing}")
+    found = (item.color for item in request.episode.scene.objects if item.kind in kinds)
+    return tuple(dict.fromkeys(str(color) for color in found if color is not None))
+
+
+# One color of two: what is left is one of the two other colors, and only the scene tells which.
+
+
+def _allows_amount(request: InstructionRequest) -> bool:
+    if not request.values_of("amount") or len(request.color_values) != 1:
+        return False
+    (color,), colors = request.color_values, _present(request)
+    wanted = request.count_of(color)
+    enough = all(len(request.pointed(color._replace(value=one))) >= wanted for one in colors)
+    return len(colors) == TWO and enough
+
+
+def _exclude_amount(request: InstructionRequest) -> Derived:
+    (color,) = request.color_values
+    (excluded,) = (one for one in _present(request) if one != color.value)
+    words = _cube(request, excluded, plural=request.count_of(color) > 1)
+    notes = {"patterns": ["color exclusion"]}
+    return Derived(_context(request, excluded), described(request, [words]), notes)
+
+
+# One color of three: of the two things left, the words compare where they stand.
+
+
+def _excluded(request: InstructionRequest) -> tuple[str, str] | None:
+    """Return the excluded color, and the one that is left beside the goal's; None if not three."""
+    colors, goal = _present(request), [one.color for one in request.color_values]
+    if not request.values_of("color") or len(colors) != THREE:
+        return None
+    others = [one for one in colors if one not in goal]
+    if len(goal) == TWO:
+        return others[0], goal[1]
+    excluded = request.sampler.pick("excluded color", sorted(others))
+    return excluded, next(one for one in others if one != excluded)
+
+
+def _comparatives(request: InstructionRequest, left: str) -> list[templates.Comparative]:
+    """Return the words that tell the goal's thing from the one of another color."""
+    meant = request.color_values[0]
+    places = [
+        request.pointed(meant._replace(value=color))[0].position for color in (meant.value, left)
+    ]
+    return [
+        one
+        for one in templates.COMPARATIVES.of(request.pool)
+        if (places[0][one.axis] - places[1][one.axis]) * one.sign >= MARGIN
+    ]
+
+
+def _allows_place(request: InstructionRequest) -> bool:
+    found = _excluded(request)
+    return found is not None and bool(_comparatives(request, found[1]))
+
+
+def _exclude_by_place(request: InstructionRequest) -> Derived:
+    found = _excluded(request)
+    assert found is not None  # noqa: S101 - `_allows_place`
+    excluded, left = found
+    possible = _comparatives(request, left)
+    chosen = request.sampler.pick("comparative", possible)
+    opposite = next(
+        one
+        for one in templates.COMPARATIVES.of(request.pool)
+        if (one.axis, one.sign) == (chosen.axis, -chosen.sign)
+    )
+    things = [
+        request.by_color(
+            color, (*_cube(request, excluded), *plain(f" {_standing(request, words)}"))
+        )
+        for color, words in zip(request.color_values, (chosen, opposite), strict=False)
+    ]
+    first = request.color_values[0]
+    notes = {
+        "patterns": ["color exclusion"],
+        "relation": chosen.words,
+        "candidates": {first.slot: sorted((first.color, left))},
+    }
+    return Derived(_context(request, excluded), described(request, things), notes)
+
+
+def _standing(request: InstructionRequest, words: templates.Comparative) -> str:
+    """Return the comparison, with its time where things change places."""
+    if any(isinstance(motion, Swap) for motion in request.episode.scene.motions):
+        return f"that was {words.words} at first"
+    return f"that is {words.words}"
+
+
+def _context(request: InstructionRequest, excluded: str) -> Phrase:
+    template = request.pick("excluded introduction", templates.EXCLUDED_COLORS)
+    return fill(template, {"color": antecedent(excluded, REFERENCE, excluded)})
+
+
+def _cube(request: InstructionRequest, excluded: str, *, plural: bool = False) -> Phrase:
+    """Return ``the cube of another color``, or ``cubes of another color``."""
+    counted = bool(request.values_of("amount"))
+    noun = f"{request.task.commands.colored}{'s' if plural else ''}"
+    words = request.pick("another color", templates.ANOTHER_COLOR)
+    another = (
+        antecedent(f"a color other than {excluded}", REFERENCE, excluded)
+        if request.resolved
+        else anaphor(words, "other", REFERENCE, excluded)
+    )
+    return (*plain(f"{noun} of " if counted else f"the {noun} of "), *another)
+
+
+ONE_OF_TWO = Pattern(_allows_amount, _exclude_amount)
+ONE_OF_THREE = Pattern(_allows_place, _exclude_by_place)

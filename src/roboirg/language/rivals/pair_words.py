@@ -1,0 +1,195 @@
+"""The words for a pair: its introduction, the remark that chooses, and the command."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from roboirg.core.word_pools import Pools
+from roboirg.language.instruction import REFERENCE, Expression
+from roboirg.language.number_words import cardinal, ordinal, plural
+from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, sentences
+from roboirg.language.request import GoalValue, InstructionRequest, UtteranceSpec
+from roboirg.language.rivals import rival_templates as templates
+from roboirg.language.rivals.value_pair import PairDraw
+from roboirg.language.slot_types import Fields, amount, described, relation, stated
+from roboirg.language.slot_types.ordinal import series_noun, wrapped
+from roboirg.language.templates.derivations import MOMENTS
+
+Name = Callable[[GoalValue], str]
+"""Returns the full words for a value: ``the red cube``."""
+
+INTRODUCTIONS: Mapping[str, Pools[str]] = {
+    "color": templates.THING_PAIRS,
+    "amount": templates.THING_PAIRS,
+    "number": templates.NUMBER_PAIRS,
+    "visit": templates.ELEMENT_PAIRS,
+    "placement": templates.ELEMENT_PAIRS,
+    "relation": templates.MOMENT_PAIRS,
+}
+_POINTER_CLASSES: tuple[Expression, ...] = (
+    "former", "latter", "first", "last", "earlier", "later",
+)  # fmt: skip
+
+
+def pair_introduction(request: InstructionRequest, draw: PairDraw) -> UtteranceSpec:
+    """Return a sentence that names both values on equal terms."""
+    names = [_introduced(request, draw, value) for value in draw.introduced]
+    first, second = (
+        antecedent(name, value.slot, value.value)
+        for name, value in zip(names, draw.introduced, strict=True)
+    )
+    pools = INTRODUCTIONS[_word_kind(draw)]
+    template = request.pick("pair introduction of rivals", pools)
+    words = fill(template, {"pair": (*first, *plain(" and "), *second)})
+    return UtteranceSpec("introduction", words)
+
+
+def pair_reinforcement(request: InstructionRequest, draw: PairDraw) -> UtteranceSpec:
+    """Return one more remark on both values."""
+    values = " and ".join(str(value.value) for value in draw.introduced)
+    nouns = noun(request, draw) if _many(draw) else plural(noun(request, draw))
+    ref = anaphor(f"those {nouns}", "them", REFERENCE, values)
+    template = request.pick("pair reinforcement", templates.PAIR_REINFORCEMENTS)
+    return UtteranceSpec("reinforcement", fill(template, {"ref": ref}))
+
+
+def pair_command(request: InstructionRequest, draw: PairDraw) -> UtteranceSpec:
+    """Return the remark that chooses, and a command that states the other slots."""
+    remark = choosing_remark(request, draw, lambda value: _full_name(request, draw, value))
+    fields = stated(request)
+    if draw.pair.slot == "counts":
+        fields |= _counted(request, draw)
+    elif not request.resolved:
+        fields |= _chosen_fields(request, draw)
+    return UtteranceSpec("command", sentences([remark, request.command(fields)]))
+
+
+def choosing_remark(
+    request: InstructionRequest, draw: PairDraw, name: Name, thing: str | None = None
+) -> Phrase:
+    """Return the remark that chooses one value; resolved, both have their names.
+
+    Args:
+        request: what to say.
+        draw: the pair.
+        name: names a value.
+        thing: the noun for a value; None for that of its kind.
+    """
+    thing = thing or noun(request, draw)
+    meant, rival = draw.pair
+    at_meant = draw.fill == "both" or draw.points_at_meant
+    at_rival = draw.fill == "both" or not draw.points_at_meant
+    words = {
+        "yes": _pointer(draw, meant, thing, points=at_meant),
+        "no": _pointer(draw, rival, thing, points=at_rival),
+    }
+    if request.resolved:
+        words = {
+            field: antecedent(name(value), value.slot, value.value)
+            for field, value in (("yes", meant), ("no", rival))
+        }
+    return fill(draw.text, words)
+
+
+def chosen(request: InstructionRequest, draw: PairDraw, words: str) -> Phrase:
+    """Return ``the cube I mean`` for a noun phrase such as ``the cube``."""
+    clause = request.pick("rival clause", templates.CLAUSES)
+    return anaphor(f"{words} {clause}", "choice", draw.pair.meant.slot, draw.pair.meant.value)
+
+
+def the_other(value: GoalValue, words: str) -> Phrase:
+    """Return words for the value that is not meant."""
+    return anaphor(words, "other", value.slot, value.value)
+
+
+def pair_notes(draw: PairDraw) -> dict[str, object]:
+    """Return the entries of the metadata."""
+    values = [value.value for value in draw.introduced]
+    return {
+        "rival": draw.pair.rival.value,
+        "rival_slot": draw.pair.slot,
+        "rival_position": "second" if draw.meant_first else "first",
+        "rival_reference": draw.kind,
+        "candidates": {draw.pair.slot: values},
+    }
+
+
+def noun(request: InstructionRequest, draw: PairDraw) -> str:
+    """Return the noun for what the values are: ``cube``, ``number``, ``visit``."""
+    kind = _word_kind(draw)
+    if kind == "amount":
+        return "cubes"
+    if kind == "color":
+        return request.task.commands.colored
+    return {"relation": "moment"}.get(kind, kind)
+
+
+def _word_kind(draw: PairDraw) -> str:
+    meant = draw.pair.meant
+    return "number" if meant.slot == "counts" else meant.slot_type
+
+
+def _many(draw: PairDraw) -> bool:
+    """Return whether each of the two values is several things."""
+    return _word_kind(draw) == "amount"
+
+
+def _pointer(draw: PairDraw, value: GoalValue, thing: str, *, points: bool) -> Phrase:
+    if not points:
+        return the_other(value, f"the other {thing}")
+    first, second, first_many, second_many = draw.pointers
+    if thing == "cubes":
+        first, second = first_many, second_many
+    words = first if value is draw.introduced[0] else second
+    found = next(one for one in _POINTER_CLASSES if one in words.split())
+    return anaphor(words, found, value.slot, value.value)
+
+
+def _introduced(request: InstructionRequest, draw: PairDraw, value: GoalValue) -> str:
+    """Return the words of the introduction, where the second moment has the words of both."""
+    if _word_kind(draw) != "relation":
+        return _full_name(request, draw, value)
+    return MOMENTS[str(value.value)] if value is draw.introduced[1] else f"right {value.value}"
+
+
+def _full_name(request: InstructionRequest, draw: PairDraw, value: GoalValue) -> str:
+    kind = _word_kind(draw)
+    if kind in ("color", "amount"):
+        return f"the {value.value} {noun(request, draw)}"
+    if kind == "number":
+        return cardinal(value.number)
+    if kind == "relation":
+        return f"the moment {MOMENTS[str(value.value)]}"
+    return f"the {ordinal(value.number)} {kind}"
+
+
+def _chosen_fields(request: InstructionRequest, draw: PairDraw) -> Fields:
+    """Return the fields of the command that point at the choice."""
+    kind, (meant, rival) = _word_kind(draw), draw.pair
+    if kind == "color":
+        words = chosen(request, draw, f"the {noun(request, draw)}")
+        fields = {meant.field: request.by_color(meant, words)}
+        if draw.pair.ordered:
+            fields[rival.field] = request.by_color(rival, the_other(rival, "the other one"))
+        return fields
+    if kind == "amount":
+        words = chosen(request, draw, f"of the {noun(request, draw)}")
+        return described(request, [words])
+    if kind == "number":
+        return {meant.field: chosen(request, draw, "the number of times")}
+    if kind == "relation":
+        return relation.placed(request, meant, chosen(request, draw, "at the moment"))
+    return wrapped(request, meant, chosen(request, draw, f"the {series_noun(request, meant)}"))
+
+
+def _counted(request: InstructionRequest, draw: PairDraw) -> Fields:
+    """Return ``my number of the red cubes``; resolved, ``two of the red cubes``."""
+    meant, (color,) = draw.pair.meant, request.color_values
+    words = request.pick("rival number", templates.NUMBERS_OF)
+    number = (
+        antecedent(cardinal(meant.number), meant.slot, meant.value)
+        if request.resolved
+        else anaphor(words, "choice", meant.slot, meant.value)
+    )
+    # The plural fits any number.
+    return amount.amounts([(*number, *plain(" of the "), *amount.cubes(color, 2))])

@@ -1,0 +1,217 @@
+"""The pair of an episode: the value that is meant, its rival, and how one of them is chosen."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator, Mapping
+from typing import Literal, NamedTuple
+
+from roboirg.core.episode import Difficulty, Goal, SlotValue, Split
+from roboirg.core.goal_slots import COLOR_SLOTS
+from roboirg.core.instruction_options import DEFAULT_DISTRACTOR, DEFAULT_RIVAL
+from roboirg.episodes.splits import split_episodes
+from roboirg.language.balanced_draw import draw_balanced
+from roboirg.language.instruction import REFERENCE, Instruction
+from roboirg.language.landmarks import Landmark
+from roboirg.language.request import GoalValue, InstructionRequest
+from roboirg.language.rivals import rival_templates as templates
+from roboirg.tasks import get_task
+
+SPLIT: Split = "train"
+"""Its goals show which numbers are usual for a difficulty."""
+NUMBER_SLOTS = ("repeats", "counts", "visit", "placement")
+
+Fill = Literal["other", "both"]
+Locate = Callable[[InstructionRequest, GoalValue], Mapping[int, list[Landmark]]]
+"""Returns the landmarks of a thing of a color, by class."""
+
+
+class ValuePair(NamedTuple):
+    """Two values, one of which is meant.
+
+    Attributes:
+        meant: a value of the goal; of two colors in order, the one that comes first.
+        rival: the other value; its slot is ``reference`` unless the goal has it too.
+        slot: the goal slot of the meant value.
+    """
+
+    meant: GoalValue
+    rival: GoalValue
+
+    @property
+    def slot(self) -> str:
+        """The goal slot of the meant value."""
+        return self.meant.slot
+
+    @property
+    def ordered(self) -> bool:
+        """Whether the goal has both values, and only their order is open."""
+        return self.rival.slot == self.meant.slot
+
+
+class PairDraw(NamedTuple):
+    """A pair, and how the words choose one of its values.
+
+    Attributes:
+        pair: the values.
+        meant_first: whether the meant one is introduced first.
+        kind: kind of the remark that chooses.
+        text: its template.
+        fill: of a template with two fields: whether both values are pointed at, or the one is
+            *the other*.
+        points_at_meant: if not both: whether the pointer is for the meant value.
+        pointers: the words that point.
+    """
+
+    pair: ValuePair
+    meant_first: bool
+    kind: templates.ReferenceKind
+    text: str
+    fill: Fill
+    points_at_meant: bool
+    pointers: templates.Pointers
+
+    @property
+    def introduced(self) -> tuple[GoalValue, GoalValue]:
+        """The values in the order of the introduction."""
+        meant, rival = self.pair
+        return (meant, rival) if self.meant_first else (rival, meant)
+
+
+def wants_pair(request: InstructionRequest) -> bool:
+    """Return whether the options ask for a rival."""
+    return request.options.rival != DEFAULT_RIVAL
+
+
+def hidden_by_pair(instruction: Instruction) -> frozenset[str] | None:
+    """Return the slot that an instruction with a rival leaves open; None without a rival."""
+    slot = instruction.metadata.get("rival_slot")
+    return None if slot is None else frozenset((str(slot),))
+
+
+def pair_refusal(request: InstructionRequest, locate: Locate | None = None) -> str | None:
+    """Return why an episode can have no rival; None if it can, or if none is asked for."""
+    if not wants_pair(request):
+        return None
+    if request.wordings is not None:
+        return "commands from a wording file have no rivals"
+    if request.options.distractor != DEFAULT_DISTRACTOR:
+        return "next to a rival, a competing distractor would name one value too many"
+    return None if _pairs(request, locate) else _lack(request, locate)
+
+
+def _lack(request: InstructionRequest, locate: Locate | None) -> str:
+    """Return what a scene lacks for a rival."""
+    if len(request.values_of("amount")) > 2:  # noqa: PLR2004 - a color and its count
+        return "a goal that counts cubes of several colors leaves no rival"
+    if locate is None or not any(pair.slot in COLOR_SLOTS for pair in _possible(request)):
+        return "the scene has no second value that the goal could ask for"
+    return "no landmark singles out a second thing that the goal could ask for"
+
+
+def draw_pair(request: InstructionRequest, locate: Locate | None = None) -> PairDraw:
+    """Draw a slot, its rival, and the words that choose.
+
+    Args:
+        request: with a rival, and not refused.
+        locate: returns landmarks, where both values must have one; None for all slots.
+    """
+    pairs = _pairs(request, locate)
+    slot = request.sampler.pick("rival slot", list(dict.fromkeys(one.slot for one in pairs)))
+    pair = request.sampler.pick("rival", [one for one in pairs if one.slot == slot])
+    bits = draw_balanced(request, "rival order")
+    kind, text, fill = _remark(request, points_at_meant=bits.second)
+    pointers: tuple[templates.Pointers, ...] = (templates.RANKS,)
+    if slot in COLOR_SLOTS and fill == "other":  # two of the longer ones would be too long
+        pointers = (templates.RANKS, templates.RANKS, *templates.MENTIONED.of(request.pool))
+    return PairDraw(
+        pair,
+        bits.first,
+        kind,
+        text,
+        fill,
+        bits.second,
+        request.sampler.pick("rival pointers", pointers),
+    )
+
+
+def _remark(
+    request: InstructionRequest, *, points_at_meant: bool
+) -> tuple[templates.ReferenceKind, str, Fill]:
+    """Draw a remark; alone it has one pointer, and the others have two fields."""
+    kind = request.sampler.pick("rival reference", ("alone", *templates.CHOICES))
+    if kind == "alone":
+        name: templates.ReferenceKind = "alone" if points_at_meant else "set aside"
+        options = templates.SINGLED if points_at_meant else templates.SET_ASIDE
+        return name, request.pick(f"{name} remark", options), "other"
+    meant_first, meant_last = templates.CHOICES[kind]
+    fill: Fill = request.sampler.pick("rival fill", ("other", "both"))
+    if fill == "both":
+        # The first of two pointers is then right as often as a single one is.
+        chosen = meant_first if points_at_meant else meant_last
+    else:
+        chosen = request.sampler.pick("rival remark order", (meant_first, meant_last))
+    return kind, request.pick(f"{kind} remark", chosen), fill
+
+
+def _pairs(request: InstructionRequest, locate: Locate | None) -> list[ValuePair]:
+    found = [pair for pair in _possible(request) if locate is None or pair.slot in COLOR_SLOTS]
+    if locate is None:
+        return found
+    return [pair for pair in found if all(locate(request, value) for value in pair)]
+
+
+def _possible(request: InstructionRequest) -> Iterator[ValuePair]:
+    """Yield a pair for every other value that a goal of the scene has in one slot."""
+    goal = request.episode.goal
+    if len(request.values_of("amount")) > 2:  # noqa: PLR2004 - a color and its count
+        return
+    for slot, _ in goal.slots:
+        values = [one for one in request.goal_values if one.slot == slot]
+        meant = values[0]
+        others = _alternatives(request, slot)
+        if len(values) > 1:
+            swapped = tuple(one.value for one in reversed(values))
+            if swapped in others:
+                yield ValuePair(meant, values[1])
+            continue
+        usual = _usual_numbers(request.task.name, request.episode.difficulty, slot)
+        for (value,) in others:
+            if slot not in NUMBER_SLOTS or value in usual:
+                rival = meant._replace(field="rival", slot=REFERENCE, value=value)
+                yield ValuePair(meant, rival)
+
+
+def _alternatives(request: InstructionRequest, slot: str) -> list[tuple[str | int, ...]]:
+    """Return the other contents of a slot in goals of the scene that agree in all other slots."""
+    goal = request.episode.goal
+    own = _contents(goal, slot)
+    found = [
+        _contents(one, slot)
+        for one in request.task.goals(request.episode.scene)
+        if _without(one, slot) == _without(goal, slot)
+    ]
+    return [one for one in found if one != own and len(one) == len(own)]
+
+
+def _without(goal: Goal, slot: str) -> dict[str, SlotValue]:
+    return {name: value for name, value in goal.slots if name != slot}
+
+
+def _contents(goal: Goal, slot: str) -> tuple[str | int, ...]:
+    content = goal[slot]
+    return content if isinstance(content, tuple) else (content,)
+
+
+@functools.cache
+def _usual_numbers(task: str, difficulty: Difficulty, slot: str) -> frozenset[str | int]:
+    """Return the numbers in goals of a difficulty.
+
+    A rival from all others would be told from them: only hard episodes ask for four or five times.
+    """
+    return frozenset(
+        value
+        for episode in split_episodes([get_task(task).name], [SPLIT])
+        if episode.difficulty == difficulty
+        for value in _contents(episode.goal, slot)
+    )

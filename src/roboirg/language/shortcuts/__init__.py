@@ -1,8 +1,0 @@
-"""Shortcuts: how far rules and models come that see the words only, and understand none of them."""
-
-from __future__ import annotations
-
-from roboirg.language.shortcuts.surface_rules import SURFACE_RULES
-from roboirg.language.shortcuts.text_guess import TextGuess, draw_goal, goal_share, guess_goal
-
-__all__ = ["SURFACE_RULES", "TextGuess", "draw_goal", "goal_share", "guess_goal"]

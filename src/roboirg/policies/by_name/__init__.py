@@ -1,0 +1,1 @@
+"""From the name of a policy on the command line to the policy."""

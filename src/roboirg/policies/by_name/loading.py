@@ -1,0 +1,130 @@
+"""Make policies from their names on the command line."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, cast
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.policies.by_name import policy_specs
+from roboirg.policies.by_name.policy_classes import (
+    BUILTIN,
+    CHECKPOINTS,
+    find_class,
+    make_from_class,
+)
+from roboirg.policies.by_name.systems import find_system
+from roboirg.policies.contract.base import Policy
+from roboirg.policies.contract.policy_urls import is_url, parse_query
+from roboirg.util.plain_text import clip_text
+from roboirg.util.short_hash import short_hash
+
+_MAX_VERSION_LENGTH = 200
+
+
+def load_policy_class(spec: str) -> type[Any]:
+    """Return the class of a built-in name, ``package.module:Class``, or a URL.
+
+    For ``system:NAME`` and ``vlm-listener:PROVIDER`` (`roboirg.policies.by_name.policy_specs`)
+    it is a factory with the attributes of such a class.
+
+    Raises:
+        UnknownNameError: the spec is none of them, or the URL has an unknown option.
+        InvalidValueError: the module or class cannot be imported or is not a policy, or the URL
+            is malformed.
+        MissingDependencyError: a library that the URL's scheme needs is not installed.
+    """
+    factory = policy_specs.find_policy_factory(spec) if ":" in spec else None
+    # A factory has every attribute of a class that is read here.
+    return find_class(spec) if factory is None else cast("type[Any]", factory)
+
+
+def make_policy(spec: str, seed: int) -> Policy:
+    """Make a policy from its spec.
+
+    Args:
+        spec: a name in `policy_classes.BUILTIN`, such as ``oracle``; ``package.module:Class``,
+            called with ``seed=`` if it takes it, else without arguments; or a URL.
+        seed: of the policy's own random choices.
+
+    Raises:
+        UnknownNameError: there is no such built-in policy, scheme or option.
+        InvalidValueError: the module or class cannot be imported or is not a policy, or the URL
+            is malformed.
+        MissingDependencyError: a library that the URL's scheme needs is not installed.
+    """
+    return make_from_class(spec, load_policy_class(spec), seed)
+
+
+def is_foreign(spec: str) -> bool:
+    """Return whether a spec names code that does not come with this package or a protocol.
+
+    Raises:
+        InvalidValueError: it is a system that cannot be read.
+    """
+    kind, colon, rest = spec.partition(":")
+    if spec in BUILTIN or is_url(spec) or not colon:
+        return False
+    if kind == policy_specs.SYSTEM:
+        name, _, query = rest.partition("?")
+        return is_foreign(find_system(name, parse_query(spec, query)).policy)
+    return not policy_specs.comes_with_us(kind)
+
+
+def needs_host(spec: str) -> bool:
+    """Return whether a policy gets a process of its own, unless it is privileged.
+
+    Built-in policies and the clients of remote ones are our own code and run beside the world.
+
+    Raises:
+        InvalidValueError: it is a system that cannot be read.
+    """
+    return is_foreign(spec) or (is_url(spec) and spec.partition("://")[0] in CHECKPOINTS)
+
+
+def is_privileged(spec: str) -> bool:
+    """Return whether a spec names a policy that reads the simulator's state."""
+    try:
+        policy_class = load_policy_class(spec)
+        return hasattr(policy_class(spec) if is_url(spec) else policy_class, "attach")
+    except InvalidValueError:
+        return False
+
+
+def policy_version(spec: str) -> str:
+    """Return what distinguishes a policy from an earlier one of the same name.
+
+    This is the class attribute ``version`` (say, the name of a checkpoint), else a fingerprint of
+    the file that defines the class; ``built-in``; or ``unknown`` if neither is found. For a URL it
+    is the option ``version``: no server is asked.
+    """
+    if spec in BUILTIN:
+        return "built-in"
+    try:
+        policy_class = load_policy_class(spec)
+        if is_url(spec):
+            version = getattr(policy_class(spec), "version", "unknown")
+        else:
+            version = getattr(policy_class, "version", None)
+        if version is not None:
+            return clip_text(str(version), _MAX_VERSION_LENGTH)
+        source = Path(inspect.getfile(policy_class)).read_bytes()
+    except (InvalidValueError, OSError, TypeError):
+        return "unknown"
+    return short_hash(source)
+
+
+def server_version(metadata: Mapping[str, Any]) -> str | None:
+    """Return the version that a policy's server told; None if there is none, or it told none.
+
+    Args:
+        metadata: of the policy, or of a planner and a policy, after `reset`. Those of clients hold
+            the address of the ``server`` and what it told, such as its ``version``.
+    """
+    for told in (metadata, metadata.get("policy")):
+        if isinstance(told, Mapping) and "server" in told:
+            version = told.get("version")
+            return None if version in (None, "", "unknown") else str(version)
+    return None

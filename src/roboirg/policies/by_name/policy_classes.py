@@ -1,0 +1,198 @@
+"""Find the class of a policy: built in, by import path, or by URL scheme."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import importlib.util
+import inspect
+import pkgutil
+from collections.abc import Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
+from roboirg.policies.contract.base import Policy
+from roboirg.policies.contract.batch_policy import make_batched, takes_batches
+from roboirg.policies.contract.policy_urls import is_url
+from roboirg.policies.contract.requirements import REQUIREMENTS
+from roboirg.policies.remote.protocols import protocols_by_scheme
+from roboirg.util.discovery import entry_names
+
+_MAX_SHOWN = 3
+
+BUILTIN: Mapping[str, str] = {
+    "oracle": "roboirg.policies.builtin.oracle_policy:OraclePolicy",
+    "listener": "roboirg.policies.builtin.listeners:ListenerPolicy",
+    "forgetful": "roboirg.policies.builtin.listeners:ForgetfulPolicy",
+    "first-mention": "roboirg.policies.builtin.shortcut_listeners:FirstMentionPolicy",
+    "last-mention": "roboirg.policies.builtin.shortcut_listeners:LastMentionPolicy",
+    "elimination": "roboirg.policies.builtin.shortcut_listeners:EliminationPolicy",
+    "surface": "roboirg.policies.builtin.shortcut_listeners:SurfacePolicy",
+    "random": "roboirg.policies.builtin.random_policy:RandomPolicy",
+}
+
+CHECKPOINTS: Mapping[str, str] = {"lerobot": "roboirg.policies.lerobot_policy:LeRobotPolicy"}
+"""Policies of this process that a URL names, by its scheme; called with ``(url, seed=)``."""
+
+KINDS_GROUP = "roboirg.policy_kinds"
+"""Entry points of packages that add kinds of policies; our applications add theirs so, too."""
+
+
+def url_schemes() -> tuple[str, ...]:
+    """Return the schemes of all URLs that name policies."""
+    return (*protocols_by_scheme(), *CHECKPOINTS)
+
+
+def find_class(spec: str) -> type[Any]:
+    """Return the class of a built-in name, ``package.module:Class``, or a URL.
+
+    Raises:
+        UnknownNameError: the spec is none of them, or the URL has an unknown option.
+        InvalidValueError: the module or class cannot be imported or is not a policy, or the URL
+            is malformed.
+        MissingDependencyError: a library that the URL's scheme needs is not installed.
+    """
+    if is_url(spec):
+        policy_class = _url_class(spec)
+        _check_requirements(spec, policy_class(spec))
+        return policy_class
+    if spec not in BUILTIN and ":" not in spec:
+        if (hint := _describe_module(spec)) is not None:
+            raise InvalidValueError(f"Policy {spec!r} {hint}")
+        raise UnknownNameError("policy", spec, [*BUILTIN, "package.module:Class", *_examples()])
+    module_name, _, name = BUILTIN.get(spec, spec).partition(":")
+    module = _module(spec, module_name)
+    if not hasattr(module, name):
+        raise InvalidValueError(f"Policy {spec!r}: module {module_name} has no class {name!r}.")
+    found = getattr(module, name)
+    if not inspect.isclass(found):
+        raise InvalidValueError(
+            f"Policy {spec!r}: {name!r} in module {module_name} is of type "
+            f"{type(found).__name__}, not a class."
+        )
+    _check_class(spec, found)
+    return found
+
+
+def make_from_class(spec: str, policy_class: type[Any], seed: int) -> Policy:
+    """Make a policy of the class that `find_class` returned.
+
+    Args:
+        spec: passed to the constructor if it is a URL.
+        policy_class: called with ``seed=`` if it takes it, else without arguments.
+        seed: of the policy's own random choices. A policy that takes batches is made once, with
+            seed 0, and gets the seed of each episode in ``begin``.
+    """
+    if takes_batches(policy_class):
+        return make_batched(
+            (spec, policy_class), lambda: _construct(spec, policy_class, seed=0), seed
+        )
+    policy: Policy = _construct(spec, policy_class, seed)
+    return policy
+
+
+def _construct(spec: str, policy_class: type[Any], seed: int) -> Any:  # noqa: ANN401
+    if is_url(spec):
+        return policy_class(spec, seed=seed)
+    return policy_class(seed=seed) if "seed" in _parameters(policy_class) else policy_class()
+
+
+def _check_class(spec: str, policy_class: type[Any]) -> None:
+    """Raise for a class with which every episode would end in an error."""
+    name = policy_class.__name__
+    if takes_batches(policy_class) and hasattr(policy_class, "attach"):
+        raise InvalidValueError(
+            f"Policy {spec!r}: class {name} has attach() and act_batch(); a privileged policy is "
+            "asked about one episode at a time."
+        )
+    for method in () if takes_batches(policy_class) else ("reset", "act"):
+        if not hasattr(policy_class, method):
+            raise InvalidValueError(f"Policy {spec!r}: class {name} has no method {method}().")
+        if not callable(getattr(policy_class, method)):
+            raise InvalidValueError(f"Policy {spec!r}: {method} of class {name} is not a method.")
+    if inspect.isabstract(policy_class):
+        missing = sorted(policy_class.__abstractmethods__)
+        raise InvalidValueError(
+            f"Policy {spec!r}: class {name} is abstract; it lacks {', '.join(missing)}."
+        )
+    for parameter in _parameters(policy_class).values():
+        optional = parameter.default is not parameter.empty or parameter.kind in (
+            parameter.VAR_POSITIONAL,
+            parameter.VAR_KEYWORD,
+        )
+        if not optional and parameter.name != "seed":
+            raise InvalidValueError(
+                f"Policy {spec!r}: {name}() is called with seed= at most, but needs "
+                f"{parameter.name!r}; give it a default."
+            )
+    _check_requirements(spec, policy_class)
+
+
+def _check_requirements(spec: str, policy: object) -> None:
+    """Raise if the requirements of a class, or of a policy, are invalid."""
+    for attribute, read in REQUIREMENTS.items():
+        # The value of a property is known only for an object.
+        if not inspect.isclass(policy) or not hasattr(
+            inspect.getattr_static(policy, attribute, ()), "__get__"
+        ):
+            try:
+                read(policy)
+            except InvalidValueError as error:
+                raise InvalidValueError(f"Policy {spec!r}: {error}") from error
+
+
+def _url_class(spec: str) -> type[Any]:
+    """Return the class of a URL's scheme."""
+    scheme = spec.partition("://")[0]
+    if scheme in CHECKPOINTS:
+        found: type[Any] = pkgutil.resolve_name(CHECKPOINTS[scheme])
+        return found
+    protocols = protocols_by_scheme()
+    if scheme not in protocols:
+        raise UnknownNameError("policy scheme", scheme, url_schemes())
+    return protocols[scheme].clients[scheme]
+
+
+def _describe_module(spec: str) -> str | None:
+    """Return what a spec is if it names a module and no class, and how to name one; else None."""
+    try:
+        found = importlib.util.find_spec(spec.removesuffix(".py").replace("/", "."))
+        source = Path(found.origin).read_bytes() if found and found.origin else None
+        tree = None if source is None else ast.parse(source)
+    except (ImportError, ValueError, AttributeError, OSError, SyntaxError):
+        return None
+    if found is None:
+        return None
+    classes = [] if tree is None else [one for one in tree.body if isinstance(one, ast.ClassDef)]
+    shown = [f"{found.name}:{one.name}" for one in classes if not one.name.startswith("_")]
+    return (
+        "is a module; name its class, "
+        f"{' or '.join(shown[:_MAX_SHOWN]) or f'such as {found.name}:MyPolicy'}."
+    )
+
+
+def _examples() -> list[str]:
+    urls = (f"{scheme}://…" for scheme in url_schemes())
+    kinds = (f"{kind}:…" for kind in entry_names(KINDS_GROUP))
+    return [*urls, "system:NAME", "vlm-listener:PROVIDER", *kinds]
+
+
+def _parameters(policy_class: type[Any]) -> Mapping[str, inspect.Parameter]:
+    try:
+        return inspect.signature(policy_class).parameters
+    except (TypeError, ValueError):  # a class written in C may have no signature
+        return {}
+
+
+def _module(spec: str, name: str) -> ModuleType:
+    try:
+        return importlib.import_module(name)
+    except MissingDependencyError:
+        raise
+    except (Exception, SystemExit) as error:
+        words = " ".join(f"{type(error).__name__}: {error}".split())
+        raise InvalidValueError(
+            f"Policy {spec!r}: module {name!r} cannot be imported ({words})."
+        ) from error

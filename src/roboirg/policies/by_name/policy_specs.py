@@ -1,0 +1,164 @@
+"""Make policies from specs with a kind, such as ``system:…``, on the command line.
+
+| spec | meaning |
+| --- | --- |
+| ``system:NAME?server=host:port&vlm=URL`` | a system of the paper, or of a file |
+| ``vlm-listener:PROVIDER?model=NAME&base_url=URL`` | a model names the goal |
+
+Installed packages add kinds through entry points of the group ``roboirg.policy_kinds``: an entry
+point has the name of the kind, and names a `PolicyKind` or a module with one as ``KIND``.
+
+Values that contain ``&`` or ``#`` are percent-encoded.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.policies.by_name.policy_classes import KINDS_GROUP
+from roboirg.policies.contract.base import Policy
+from roboirg.policies.contract.option_checking import check_options
+from roboirg.policies.contract.policy_urls import parse_query
+from roboirg.policies.contract.requirements import (
+    wanted_actions,
+    wanted_calibration,
+    wanted_cameras,
+    wanted_demonstration_frames,
+    wanted_depth,
+    wanted_history,
+    wanted_history_cameras,
+    wanted_lower_case,
+    wanted_prompt_added,
+    wanted_prompt_tokens,
+    wanted_tokenizer,
+)
+from roboirg.policies.vlm.models import ModelOptions
+from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener
+from roboirg.util.discovery import entry_names, find_entry
+
+if TYPE_CHECKING:
+    from roboirg.envs.environment import RoboIRGEnv
+
+SYSTEM = "system"
+LISTENER = "vlm-listener"
+Build = Callable[[int], Policy]
+"""Makes a policy from a seed, without network or the libraries of providers."""
+
+
+class PolicyKind(NamedTuple):
+    """One kind of spec.
+
+    Attributes:
+        name: what stands before the colon.
+        build: returns what makes the policies of a spec. It is called with the whole spec, with
+            what stands between the colon and the question mark, and with the options behind that.
+    """
+
+    name: str
+    build: Callable[[str, str, Mapping[str, str]], Build]
+
+
+class PolicyFactory:
+    """Makes policies, and has the attributes of a class of such policies.
+
+    Args:
+        spec: names the policies.
+        build: makes a policy from a seed, without network or the libraries of providers.
+        sample: a policy that `build` made.
+    """
+
+    def __init__(self, spec: str, build: Build, sample: Policy) -> None:
+        self.spec, self._build = spec, build
+        self.__name__ = spec
+        self.cameras = wanted_cameras(sample)
+        self.actions = wanted_actions(sample).name
+        self.demonstration_frames = wanted_demonstration_frames(sample)
+        self.observe_every = wanted_history(sample)
+        self.history_cameras = wanted_history_cameras(sample)
+        self.depth = wanted_depth(sample)
+        self.calibration = wanted_calibration(sample)
+        self.prompt_tokens = wanted_prompt_tokens(sample)
+        self.prompt_added = wanted_prompt_added(sample)
+        self.tokenizer = wanted_tokenizer(sample)
+        self.lowers_prompt = wanted_lower_case(sample)
+        self.grounded = bool(getattr(sample, "grounded", False))
+        self.version = str(getattr(sample, "version", "unknown"))
+
+    def __call__(self, seed: int = 0) -> Policy:
+        """Make a fresh policy."""
+        return self._build(seed)
+
+
+class PrivilegedPolicyFactory(PolicyFactory):
+    """Makes privileged policies; having ``attach`` declares it."""
+
+    def attach(self, env: RoboIRGEnv) -> None:
+        """Raise TypeError: only the policies themselves can be attached."""
+        raise TypeError(f"{self.spec} makes policies; call attach({env}) on one of those.")
+
+
+def find_policy_factory(spec: str) -> PolicyFactory | None:
+    """Return the factory of a spec; None if the spec is of another kind.
+
+    Needs neither a network nor a provider's client library.
+
+    Raises:
+        UnknownNameError: there is no such system, provider or option.
+        InvalidValueError: an option is missing or has an invalid value.
+    """
+    kind, colon, rest = spec.partition(":")
+    found = find_kind(kind) if colon else None
+    if found is None:
+        return None
+    name, _, query = rest.partition("?")
+    build = found.build(spec, name, parse_query(spec, query))
+    sample = build(0)
+    made = PrivilegedPolicyFactory if hasattr(sample, "attach") else PolicyFactory
+    return made(spec, build, sample)
+
+
+def _system(spec: str, name: str, options: Mapping[str, str]) -> Build:
+    from roboirg.policies.by_name.systems import build_system, find_system
+
+    if not name:
+        raise InvalidValueError(f"Policy {spec!r} names no system.")
+    system = find_system(name, options)
+    return lambda seed: build_system(system, seed)
+
+
+def _listener(_spec: str, name: str, options: Mapping[str, str]) -> Build:
+    """Return the builder of a VLM listener; its options and its model's stand side by side."""
+    own = [option for option in ListenerOptions.model_fields if option != "model"]
+    of_model = [option for option in ModelOptions.model_fields if option != "provider"]
+    for option in options:
+        if option not in (*own, *of_model):
+            raise UnknownNameError(f"option of {LISTENER}:", option, [*own, *of_model])
+    values: dict[str, Any] = {key: value for key, value in options.items() if key in own}
+    model: dict[str, Any] = {key: value for key, value in options.items() if key not in own}
+    origin = f"policy {LISTENER}:{name}"
+    values["model"] = check_options(ModelOptions, {"provider": name, **model}, origin)
+    checked = check_options(ListenerOptions, values, origin)
+    return lambda seed: VLMListener(checked, seed)
+
+
+OURS = (PolicyKind(SYSTEM, _system), PolicyKind(LISTENER, _listener))
+
+
+@functools.cache
+def find_kind(name: str) -> PolicyKind | None:
+    """Return the kind of a name; None if there is none. Other kinds are not imported.
+
+    Raises:
+        InvalidValueError: the installed package that adds it cannot be loaded.
+    """
+    ours = {kind.name: kind for kind in OURS}
+    return ours.get(name) or find_entry(name, "KIND", PolicyKind, KINDS_GROUP)
+
+
+@functools.cache
+def comes_with_us(name: str) -> bool:
+    """Return whether a kind is our own code, and not that of another package."""
+    return name in entry_names(KINDS_GROUP, package="roboirg") or name in {one.name for one in OURS}

@@ -1,0 +1,172 @@
+"""Systems: configurations of a policy and an optional planner, such as the paper's seven."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlencode
+
+from pydantic import BaseModel, ConfigDict
+
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.policies.by_name.policy_classes import find_class, make_from_class
+from roboirg.policies.contract.base import Policy
+from roboirg.policies.contract.option_checking import check_options
+from roboirg.policies.contract.policy_urls import is_url, split_url
+from roboirg.policies.planners import make_planner
+from roboirg.policies.planners.hierarchical_policy import with_planner
+
+PACKAGE, FOLDER = "roboirg.policies.by_name", "system_files"
+SUFFIX = ".toml"
+
+SERVER, VLM, MODEL = "server", "vlm", "model"
+POLICY, PLANNER = "policy.", "planner."
+SHORTCUTS: Mapping[str, str] = {VLM: "planner.model.base_url", MODEL: "planner.model.model"}
+"""Short names of options, and the entries that they set."""
+OPTIONS = (SERVER, *SHORTCUTS, "policy.OPTION", "planner.OPTION", "planner.model.OPTION")
+
+
+class Published(BaseModel):
+    """Origin of a system, and the commands that start its servers.
+
+    Attributes:
+        checkpoint: of the policy, in its public release.
+        server: command that serves the policy, in the release's repository.
+        vlm: command that serves the planner's model, if it is served locally.
+        flags: of RoboMME's own client, specific to this system.
+        differs: differences of this configuration from the release.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    checkpoint: str
+    server: str
+    vlm: str | None = None
+    flags: str
+    differs: str = ""
+
+
+class System(BaseModel):
+    """A system to evaluate.
+
+    Attributes:
+        name: as on the command line.
+        about: one sentence.
+        policy: spec of the low-level policy.
+        planner: ``kind`` and options of its planner, or None.
+        published: its origin; None for systems of your own.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str
+    about: str
+    policy: str
+    planner: dict[str, Any] | None = None
+    published: Published | None = None
+
+
+def load_system(
+    name_or_file: str, overrides: Mapping[str, str] | None = None, seed: int = 0
+) -> Policy:
+    """Load a system as a policy; nothing is connected.
+
+    Args:
+        name_or_file: a name such as ``GroundSG-QwenVL``, or a TOML file with the same entries.
+        overrides: ``server`` (host:port of the policy), ``vlm`` (URL of the planner's model),
+            ``model`` (its name), ``policy.OPTION``, ``planner.OPTION``, ``planner.model.OPTION``.
+        seed: of the policy's own random choices.
+
+    Raises:
+        UnknownNameError: there is no such system or option.
+        InvalidValueError: the file cannot be read, or an option has an invalid value.
+    """
+    return build_system(find_system(name_or_file, overrides or {}), seed)
+
+
+def all_systems() -> tuple[str, ...]:
+    """Return the names of the systems in this package."""
+    files = resources.files(PACKAGE).joinpath(FOLDER).iterdir()
+    return tuple(sorted(_stem(one.name) for one in files if one.name.endswith(SUFFIX)))
+
+
+def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
+    """Load a system with some entries overridden; see `load_system`."""
+    if name_or_file in all_systems():
+        file = resources.files(PACKAGE).joinpath(FOLDER, f"{name_or_file}{SUFFIX}")
+        content = file.read_bytes()
+    elif name_or_file.endswith(SUFFIX):
+        try:
+            content = Path(name_or_file).read_bytes()
+        except OSError as error:
+            raise InvalidValueError(f"System {name_or_file!r} cannot be read ({error}).") from error
+    else:
+        raise UnknownNameError("system", name_or_file, [*all_systems(), f"FILE{SUFFIX}"])
+    try:
+        entries = tomllib.loads(content.decode())
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InvalidValueError(f"System {name_or_file!r} is not TOML ({error}).") from error
+    origin = f"system {name_or_file}"
+    return _overridden(check_options(System, entries, origin), overrides, origin)
+
+
+def build_system(system: System, seed: int) -> Policy:
+    """Make the policy of a system; nothing is connected.
+
+    Raises:
+        UnknownNameError: there is no such planner, policy or option.
+        InvalidValueError: an option has an invalid value.
+    """
+    policy = make_from_class(system.policy, find_class(system.policy), seed)
+    if system.planner is None:
+        return policy
+    options = dict(system.planner)
+    kind = str(options.pop("kind", ""))
+    planner = make_planner(kind, options, f"the planner of system {system.name}")
+    return with_planner(planner, policy, system.name)
+
+
+def _overridden(system: System, overrides: Mapping[str, str], origin: str) -> System:
+    policy, planner = system.policy, system.planner
+    for option, value in overrides.items():
+        entry = SHORTCUTS.get(option, option)
+        if option == SERVER or option.startswith(POLICY):
+            policy = _policy_with(policy, option, value, origin)
+        elif not entry.startswith(PLANNER):
+            raise UnknownNameError(f"option of {origin}", option, OPTIONS)
+        elif planner is None:
+            raise InvalidValueError(f"Option {option!r}: {origin} has no planner.")
+        else:
+            planner = _nested(planner, entry.removeprefix(PLANNER).split("."), value)
+    return system.model_copy(update={"policy": policy, "planner": planner})
+
+
+def _policy_with(spec: str, option: str, value: str, origin: str) -> str:
+    """Return a policy's URL with another server or another option."""
+    if not is_url(spec):
+        raise InvalidValueError(
+            f"Option {option!r}: the policy of {origin} is {spec!r}, which is not a URL."
+        )
+    url = split_url(spec)
+    place, options = url.place, dict(url.options)
+    if option == SERVER:
+        place = value
+    else:
+        options[option.removeprefix(POLICY)] = value
+    query = urlencode(options)
+    return f"{url.scheme}://{place}" + (f"?{query}" if query else "")
+
+
+def _nested(entries: Mapping[str, Any], path: list[str], value: str) -> dict[str, Any]:
+    first, *rest = path
+    if not rest:
+        return {**entries, first: value}
+    table = entries.get(first, {})
+    return {**entries, first: _nested(table if isinstance(table, dict) else {}, rest, value)}
+
+
+def _stem(name: str) -> str:
+    return name.removesuffix(SUFFIX)

@@ -1,0 +1,91 @@
+"""Serve a policy, given by name, in any protocol."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.policies.by_name.loading import (
+    is_privileged,
+    load_policy_class,
+    make_policy,
+    policy_version,
+)
+from roboirg.policies.contract.base import Policy
+from roboirg.policies.remote.endpoints import Endpoint
+from roboirg.policies.remote.protocols import protocols_by_scheme
+from roboirg.policies.remote.server_options import ServerOptions
+from roboirg.policies.remote.serving.arithmetic import describe_arithmetic
+from roboirg.policies.remote.transport import ListeningServer
+
+_MAX_PORT = 65535
+
+
+class PolicyServer(NamedTuple):
+    """A server that listens.
+
+    Attributes:
+        listening: the server.
+        url: names the policy for clients.
+    """
+
+    listening: ListeningServer
+    url: str
+
+
+def open_server(
+    spec: str,
+    protocol: str = "mme-vla",
+    options: ServerOptions | None = None,
+    *,
+    seed: int = 0,
+) -> PolicyServer:
+    """Serve a policy; every episode gets a fresh object with the same seed.
+
+    Args:
+        spec: of the policy, as for `roboirg.policies.make_policy`.
+        protocol: a scheme of `roboirg.policies.remote.protocols.protocols_by_scheme`.
+        options: where to listen, and whom to answer; by default any free port of loopback, and
+            every client.
+        seed: of the policy.
+
+    Raises:
+        UnknownNameError: there is no such policy or protocol.
+        InvalidValueError: the policy is privileged, or the address cannot be used.
+        MissingDependencyError: the protocol's network library is not installed.
+    """
+    options = options or ServerOptions()
+    protocols = protocols_by_scheme()
+    if protocol not in protocols:
+        raise UnknownNameError("protocol", protocol, protocols)
+    service = protocols[protocol].service
+    if service is None:
+        raise InvalidValueError(f"{protocol}:// is for clients only: no policy is served with it.")
+    if not 0 <= options.port <= _MAX_PORT:
+        raise InvalidValueError(f"The port is {options.port}; it must be 0 to {_MAX_PORT}.")
+    load_policy_class(spec)
+    if is_privileged(spec):
+        raise InvalidValueError(
+            f"Policy {spec!r} is privileged: it reads the simulator in its own process, so it "
+            "cannot be served."
+        )
+
+    def make() -> Policy:
+        return make_policy(spec, seed)
+
+    found = protocols[protocol]
+    metadata = {
+        "policy": spec,
+        "version": policy_version(spec),
+        "protocol": protocol,
+        **describe_arithmetic(),
+    }
+    listen = found.clients[protocol].transport.load_server()
+    try:
+        listening = listen(service(make), metadata, options)
+    except OSError as error:
+        raise InvalidValueError(
+            f"Cannot listen at {options.host}:{options.port} ({error})."
+        ) from error
+    endpoint = Endpoint(options.host, listening.socket.getsockname()[1])
+    return PolicyServer(listening, f"{protocol}://{endpoint}")

@@ -1,0 +1,126 @@
+"""Requests over HTTP, as in the second interface of the RoboMME challenge."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from roboirg.core.errors import (
+    PolicyConnectionError,
+    PolicyReplyError,
+    PolicyTimeoutError,
+)
+from roboirg.core.extras import extra_needed
+from roboirg.policies.remote.client.bounded_transport import (
+    BoundedTransport,
+    RequestTimeoutError,
+    ResponseTooLargeError,
+)
+from roboirg.policies.remote.connections import (
+    ConnectionSpec,
+    RetryableError,
+    connect_with_retries,
+    error_reply,
+    read_reply,
+)
+from roboirg.policies.remote.message_codec import MSGPACK, pack
+
+with extra_needed("Policies over HTTP need httpx", "remote"):
+    import httpx
+
+_OK, _SERVER_ERROR = 200, 500
+_STARTING = frozenset({502, 503, 504})
+"""Statuses that a proxy returns while the server starts."""
+
+
+class HttpConnection:
+    """Posts to ``/infer`` or, if a message has the key ``reset``, to ``/reset``.
+
+    Args:
+        spec: the server, and the limits of waits and replies.
+
+    Raises:
+        PolicyConnectionError: the server cannot be reached in time, or refuses.
+        PolicyTimeoutError: the server does not answer.
+        PolicyReplyError: its metadata are malformed.
+    """
+
+    def __init__(self, spec: ConnectionSpec) -> None:
+        self._spec, self._closed = spec, False
+        options = spec.options
+        headers = {**options.headers, "Accept": MSGPACK}
+        self._transport = BoundedTransport(
+            options.max_reply, min(options.timeout, options.connect), tls=options.tls
+        )
+        self._client: httpx.Client = httpx.Client(
+            base_url=f"{'https' if options.tls else 'http'}://{spec.endpoint}",
+            headers=headers,
+            transport=self._transport,
+            trust_env=False,
+        )
+        try:
+            self.metadata: Mapping[str, Any] = connect_with_retries(spec, self._read_metadata)
+        except BaseException:
+            self.close()
+            raise
+
+    def request(self, message: Mapping[str, Any]) -> dict[str, Any]:
+        """Post a message and return the reply; any error closes the connection.
+
+        Raises:
+            PolicyConnectionError: the server cannot be reached or went away.
+            PolicyTimeoutError: the server took too long.
+            PolicyReplyError: the server replied with an error, or with no message.
+        """
+        if self._closed:
+            raise PolicyConnectionError(f"The connection to {self._spec} is closed; call reset().")
+        path = "/reset" if "reset" in message else "/infer"
+        try:
+            return self._exchange("POST", path, pack(message), self._spec.options.timeout)
+        except (httpx.TransportError, RetryableError) as error:
+            self.close()
+            raise PolicyConnectionError(f"{self._spec} ended the connection ({error}).") from error
+        except (PolicyConnectionError, PolicyTimeoutError, PolicyReplyError):
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Close the connection; repeated calls do nothing."""
+        self._closed = True
+        self._client.close()
+
+    def _read_metadata(self, left: float) -> dict[str, Any]:
+        try:
+            return self._exchange("GET", "/metadata", None, max(left, 0.001))
+        except httpx.TransportError as error:
+            raise RetryableError(str(error) or type(error).__name__) from error
+
+    def _exchange(
+        self, method: str, path: str, body: bytes | None, seconds: float
+    ) -> dict[str, Any]:
+        """Send one request; the caller handles the errors of the transport."""
+        spec, headers = self._spec, {"Content-Type": MSGPACK} if body is not None else {}
+        limits = httpx.Timeout(seconds)
+        try:
+            with self._transport.within(seconds):
+                response = self._client.request(
+                    method, path, content=body, headers=headers, timeout=limits
+                )
+        except httpx.ConnectTimeout as error:
+            raise RetryableError(f"no answer within {seconds:g} s") from error
+        except (httpx.TimeoutException, RequestTimeoutError) as error:
+            raise PolicyTimeoutError(f"{spec} did not answer within {seconds:g} s.") from error
+        except ResponseTooLargeError as error:
+            raise PolicyReplyError(
+                f"{spec} sent a compressed reply, or one of more than "
+                f"{spec.options.max_reply_mib:g} MiB; option max_reply_mib raises that limit."
+            ) from error
+        if response.status_code in _STARTING and body is None:
+            raise RetryableError(f"HTTP status {response.status_code}")
+        if response.status_code == _SERVER_ERROR:
+            raise error_reply(spec, response.content.decode("utf-8", "replace"))
+        if response.status_code != _OK:
+            raise PolicyConnectionError(
+                f"{spec} answered {path} with HTTP status {response.status_code}."
+            )
+        return read_reply(spec, response.content)

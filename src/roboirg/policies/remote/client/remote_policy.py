@@ -1,0 +1,185 @@
+"""Base class of the clients of all protocols: the session of an episode, checked replies."""
+
+from __future__ import annotations
+
+import contextlib
+import weakref
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.actions import JOINT_ANGLE, check_chunk, find_action_space
+from roboirg.core.errors import InvalidActionError, PolicyReplyError
+from roboirg.core.observations import CAMERAS, Demonstration, Observation
+from roboirg.core.printable import printable
+from roboirg.policies.contract.policy_urls import read_options, split_url
+from roboirg.policies.remote.client.server_session import ServerSession
+from roboirg.policies.remote.endpoints import RemoteOptions, read_endpoints
+from roboirg.policies.remote.transport import WEBSOCKET, Transport
+
+UNKNOWN_VERSION = "unknown"
+_MAX_LISTED = 64
+"""Numbers of an array that are written out in the metadata."""
+_MAX_TEXT_LENGTH = 1000
+
+
+class RemotePolicy(ABC):
+    """A policy on a server, connected from `reset` to `close`.
+
+    Subclasses define `begin_episode` and `request_actions`, and set ``options_type`` and
+    ``transport`` if they differ. The constructor checks the URL and connects to nothing.
+
+    Args:
+        url: one or several servers, and options.
+        seed: not sent; servers have seeds of their own.
+
+    Attributes:
+        options: of the URL; one named ``actions`` selects the action space.
+        metadata: of the server, as JSON values, from `reset` on.
+        instruction: what was said last in the current episode; without `delivery` in turns, the
+            whole instruction. Clients send it with every request if the protocol allows it.
+
+    Raises:
+        UnknownNameError: the URL has an unknown option.
+        InvalidValueError: the URL names no server, or an option has a wrong value.
+        MissingDependencyError: the library of the transport is not installed.
+    """
+
+    options_type: ClassVar[type[RemoteOptions]] = RemoteOptions
+    transport: ClassVar[Transport] = WEBSOCKET
+    cameras: tuple[str, ...] = CAMERAS
+    actions: str = JOINT_ANGLE.name
+
+    def __init__(self, url: str, seed: int = 0) -> None:
+        del seed
+        parts = split_url(url)
+        self.options = read_options(parts, self.options_type)
+        self.prompt_tokens = self.options.prompt_tokens
+        self.prompt_added = self.options.prompt_added
+        self.tokenizer = self.options.tokenizer
+        self.metadata: dict[str, Any] = {}
+        self._space = find_action_space(getattr(self.options, "actions", self.actions))
+        self.actions = self._space.name
+        self.instruction = ""
+        self._session = ServerSession(
+            parts.scheme, read_endpoints(parts), self.options, self.transport.load_client()
+        )
+        # Without a close() the server is unlocked when the policy is deleted.
+        weakref.finalize(self, self._session.end)
+
+    @property
+    def version(self) -> str:
+        """Version of the checkpoint: the URL's, else the server's, else ``unknown``."""
+        version = self.metadata.get("version")
+        return self.options.version or (UNKNOWN_VERSION if version is None else str(version))
+
+    def reset(self, instruction: str, demonstration: Demonstration) -> None:
+        """Lock a server, connect, and begin an episode.
+
+        Raises:
+            PolicyConnectionError: no server can be reached.
+            PolicyTimeoutError: no server was free, or it did not answer in time.
+            PolicyReplyError: the server replied with an error or with something else.
+        """
+        self.instruction = instruction
+        server = self._session.begin()
+        self.metadata = {"server": str(self._session.spec.endpoint), **as_json(server)}
+        with self._closed_on_error():
+            self.begin_episode(demonstration)
+
+    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
+        """Return the server's next actions; an error ends the episode.
+
+        Raises:
+            PolicyConnectionError: the server went away.
+            PolicyTimeoutError: the server took too long.
+            PolicyReplyError: the server replied with an error or with something else.
+        """
+        self.instruction = observation["instruction"]
+        with self._closed_on_error():
+            return self.request_actions(observation)
+
+    @abstractmethod
+    def begin_episode(self, demonstration: Demonstration) -> None:
+        """Reset the server; the demonstration may be kept for `request_actions`."""
+
+    @abstractmethod
+    def request_actions(self, observation: Observation) -> NDArray[np.floating[Any]]:
+        """Return the server's next actions, (n, size); see `request` and `read_actions`."""
+
+    def close(self) -> None:
+        """End the episode: disconnect and unlock the server; repeated calls do nothing."""
+        self._session.end()
+
+    def request(self, message: Mapping[str, Any]) -> dict[str, Any]:
+        """Send a message to the server and return the reply.
+
+        Raises:
+            PolicyConnectionError: the connection broke, or there is none.
+            PolicyTimeoutError: the server took too long.
+            PolicyReplyError: the server replied with an error, or with no message.
+        """
+        return self._session.request(message)
+
+    def request_confirmed(self, message: Mapping[str, Any], key: str) -> None:
+        """Send a message whose reply must have True under a key.
+
+        Raises:
+            PolicyReplyError: it does not.
+        """
+        reply = self.request(message)
+        if reply.get(key) is not True:
+            raise PolicyReplyError(
+                f"{self._session.spec} did not confirm {next(iter(message))!r}: {key!r} in its "
+                f"reply is {str(reply.get(key))[:80]}."
+            )
+
+    def reconnect(self) -> None:
+        """Connect to the server of the episode again."""
+        self._session.reconnect()
+
+    def read_actions(self, reply: Mapping[str, Any]) -> NDArray[np.float64]:
+        """Return the ``actions`` of a reply, (n, size).
+
+        Raises:
+            PolicyReplyError: there are none, or they have a wrong shape or are not finite.
+        """
+        if "actions" not in reply:
+            keys = ", ".join(map(repr, list(reply)[:8])) or "nothing"
+            raise PolicyReplyError(
+                f"{self._session.spec} sent a reply without 'actions'; it holds {keys}."
+            )
+        try:
+            return check_chunk(reply["actions"], self._space)
+        except InvalidActionError as error:
+            raise PolicyReplyError(
+                f"{self._session.spec} sent actions that cannot be executed: {error}"
+            ) from error
+
+    @contextlib.contextmanager
+    def _closed_on_error(self) -> Iterator[None]:
+        """Unlock the server as soon as an episode cannot go on."""
+        try:
+            yield
+        except Exception:
+            self.close()
+            raise
+
+
+def as_json(value: object) -> Any:  # noqa: ANN401 - JSON has no narrower type
+    """Return a message's content as JSON values; large arrays are described, long texts cut."""
+    if isinstance(value, Mapping):
+        return {printable(str(key)): as_json(held) for key, held in value.items()}
+    if isinstance(value, np.ndarray) and value.size > _MAX_LISTED:
+        return f"array of shape {value.shape}, {value.dtype}"
+    if isinstance(value, np.ndarray | np.generic):
+        return as_json(value.tolist())
+    if isinstance(value, list | tuple):
+        return [as_json(held) for held in value]
+    plain = value is None or isinstance(value, bool | int)
+    if plain or (isinstance(value, float) and np.isfinite(value)):
+        return value
+    return printable(str(value)[:_MAX_TEXT_LENGTH])

@@ -1,0 +1,131 @@
+"""openpi://host:port: servers of the openpi repository and compatible ones.
+
+Such a server remembers nothing: there is no reset, and every request holds all that a reply
+needs. Several episodes may use it at once, and a request whose connection breaks is sent once
+more. Our service has one policy per connection; an episode begins with the connection and when
+the prompt changes. So a policy behind our service cannot be told an instruction in turns: every
+utterance begins an episode that knows nothing of the one before.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from roboirg.core.errors import PolicyConnectionError
+from roboirg.core.observations import Demonstration, Observation, proprioception
+from roboirg.policies.contract.base import Policy, close_policy
+from roboirg.policies.remote.client.remote_policy import RemotePolicy
+from roboirg.policies.remote.endpoints import MIB, ActionSpaceName, RemoteOptions
+from roboirg.policies.remote.protocol import Protocol
+from roboirg.policies.remote.service import Handler, MakePolicy, Message, Service, act, read_request
+
+
+class OpenpiOptions(RemoteOptions):
+    """Options of openpi://.
+
+    Attributes:
+        execute: rows of a chunk that are executed; None for all.
+        actions: action space of the checkpoint.
+        front: key of the front picture; empty to leave it out.
+        wrist: key of the wrist picture; empty to leave it out.
+        state: key of the eight numbers of proprioception.
+        prompt: key of the instruction.
+    """
+
+    timeout: float = Field(120.0, gt=0)
+    shared: bool = True
+    execute: int | None = Field(None, ge=1)
+    actions: ActionSpaceName = "joint_angle"
+    front: str = "observation/image"
+    wrist: str = "observation/wrist_image"
+    state: str = Field("observation/state", min_length=1)
+    prompt: str = Field("prompt", min_length=1)
+
+
+class OpenpiPolicy(RemotePolicy):
+    """Client of an openpi server."""
+
+    options_type: ClassVar[type[RemoteOptions]] = OpenpiOptions
+    options: OpenpiOptions
+    demonstration_frames: ClassVar[str] = "none"
+    deterministic: ClassVar[bool] = False
+
+    def __init__(self, url: str, seed: int = 0) -> None:
+        super().__init__(url, seed)
+        keys = {"front": self.options.front, "wrist": self.options.wrist}
+        self._pictures = {key: f"{camera}_rgb" for camera, key in keys.items() if key}
+        self.cameras = tuple(camera for camera, key in keys.items() if key)
+
+    def begin_episode(self, demonstration: Demonstration) -> None:
+        """Do nothing: the protocol has neither a reset nor a memory."""
+
+    def request_actions(self, observation: Observation) -> NDArray[np.floating[Any]]:
+        """Send the observation; return the rows of the reply to execute."""
+        message = {
+            **{key: observation[field] for key, field in self._pictures.items()},  # type: ignore[literal-required]
+            self.options.state: proprioception(
+                observation["joint_positions"], observation["gripper"]
+            ),
+            self.options.prompt: self.instruction,
+        }
+        try:
+            reply = self.request(message)
+        except PolicyConnectionError:
+            # The request is complete in itself, so a new connection can answer it.
+            self.reconnect()
+            reply = self.request(message)
+        return self.read_actions(reply)[: self.options.execute]
+
+
+class OpenpiService(Service):
+    """Answers requests for actions, with one policy per connection."""
+
+    max_request_bytes: ClassVar[int] = 64 * MIB
+
+    def new_handler(self) -> Handler:
+        """Return a handler with a policy of its own."""
+        return _OpenpiConversation(self.make_policy).handle
+
+
+class _OpenpiConversation:
+    """One connection: a policy that is reset whenever the prompt changes."""
+
+    def __init__(self, make_policy: MakePolicy) -> None:
+        self._make_policy = make_policy
+        self._policy: Policy | None = None
+        self._prompt: str | None = None
+
+    def handle(self, message: Message) -> dict[str, Any]:
+        """Return the reply to a request for actions."""
+        observation = read_request(message)
+        if self._policy is None:
+            self._policy = self._make_policy()
+        if observation["instruction"] != self._prompt:
+            if self._prompt is not None:
+                close_policy(self._policy)
+            self._prompt = observation["instruction"]
+            self._policy.reset(self._prompt, _empty_video(observation["front_rgb"].shape))
+        actions, milliseconds = act(self._policy, observation)
+        return {"actions": actions, "server_timing": {"infer_ms": milliseconds}}
+
+
+def _empty_video(shape: tuple[int, ...]) -> dict[str, Any]:
+    return {
+        "front_rgb": np.zeros((0, *shape), np.uint8),
+        "wrist_rgb": np.zeros((0, *shape), np.uint8),
+        "joint_positions": np.zeros((0, 7), np.float32),
+        "gripper": np.zeros((0, 2), np.float32),
+    }
+
+
+PROTOCOL = Protocol(
+    name="openpi",
+    summary="openpi servers and compatible ones",
+    memory="none",
+    clients={"openpi": OpenpiPolicy},
+    service=OpenpiService,
+)

@@ -1,0 +1,85 @@
+"""What a vision-language model is asked about an episode: words, video, first picture, fields.
+
+The listener and the grounding dataset ask the same question in the same words.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple, TypeVar
+
+from roboirg.policies.vlm.goal_schema import Field, GoalSchema
+from roboirg.policies.vlm.prompts import Prompts
+
+PROMPTS = "listener"
+"""Name of the prompts."""
+
+Medium = TypeVar("Medium")
+
+
+class QuestionTexts(NamedTuple):
+    """The texts of a question, in the order in which they are read.
+
+    Attributes:
+        system: the system prompt.
+        instruction: what was said to the robot.
+        video: what comes before the video, or that there is none.
+        now: what comes before the first picture.
+        question: what is asked, after the picture.
+    """
+
+    system: str
+    instruction: str
+    video: str
+    now: str
+    question: str
+
+    def parts(self, video: tuple[Medium, ...], picture: Medium) -> tuple[str | Medium, ...]:
+        """Return the user's turn: texts, the parts of the video, and the first picture."""
+        return (self.instruction, self.video, *video, self.now, picture, self.question)
+
+
+def question_texts(
+    prompts: Prompts,
+    schema: GoalSchema,
+    instruction: str,
+    steps: int,
+    reasoning: str | None = None,
+) -> QuestionTexts:
+    """Return the texts that ask for the goal of an instruction.
+
+    Args:
+        prompts: with the entries of ``listener.toml``.
+        schema: of the task.
+        instruction: everything that was said.
+        steps: control steps of the video; 0 without one.
+        reasoning: meaning of the field in which the model may think; None without it.
+
+    Raises:
+        InvalidValueError: the prompts lack a text or have an unknown field.
+    """
+    fields = "\n".join(_describe_fields(prompts, schema, reasoning))
+    return QuestionTexts(
+        system=prompts.fill("system"),
+        instruction=prompts.fill("instruction", instruction=instruction),
+        video=prompts.fill("video", steps=str(steps)) if steps else prompts.fill("no_video"),
+        now=prompts.fill("now"),
+        question=prompts.fill("question", fields=fields),
+    )
+
+
+def _describe_fields(prompts: Prompts, schema: GoalSchema, reasoning: str | None) -> Iterator[str]:
+    if reasoning is not None:
+        yield f"- reasoning: {reasoning}"
+    for field in schema.fields:
+        meaning = prompts.fill(f"meanings.{field.kind}", color=field.name, thing=schema.thing)
+        values = _describe_values(prompts, field)
+        yield prompts.fill("field", name=field.name, meaning=meaning, values=values)
+
+
+def _describe_values(prompts: Prompts, field: Field) -> str:
+    listed = ", ".join(map(str, field.values))
+    if field.lengths is None:
+        return prompts.fill("values.one", values=listed)
+    least, most = map(str, field.lengths)
+    return prompts.fill("values.list", values=listed, least=least, most=most)

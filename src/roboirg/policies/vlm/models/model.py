@@ -1,0 +1,139 @@
+"""The contract of models: options, queries, and replies with their cost."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any, Literal, NamedTuple, Protocol
+from urllib.parse import urlsplit
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from roboirg.core.errors import MissingDependencyError
+from roboirg.policies.vlm.model_content import ChatTurn
+
+Provider = Literal["openai", "google"]
+
+KEY_VARIABLES: Mapping[Provider, str] = {"openai": "OPENAI_API_KEY", "google": "GOOGLE_API_KEY"}
+"""Environment variables with the keys of the providers' own services, by default."""
+NO_KEY = "none"
+"""Sent as the key to a server that needs none."""
+
+
+class ModelOptions(BaseModel):
+    """A model and the options of its queries.
+
+    Attributes:
+        provider: ``openai`` for every endpoint with its API, or ``google``.
+        model: its name at the provider.
+        base_url: of the endpoint; None for the provider's own.
+        api_key_env: environment variable with the key. By default it is the provider's usual one
+            for the provider's own service, and none for any other address, so that a key is sent
+            only where it belongs.
+        timeout_s: seconds for one reply, retries of the connection included.
+        retries: retries of the client library when the service is busy or unreachable.
+        temperature: None leaves it to the provider.
+        max_output_tokens: None leaves it to the provider.
+        input_price, output_price: US dollars per million tokens; without them no cost is reported.
+        video: send clips as ``mp4`` files, or as pictures (``frames``). Google takes files.
+        clip_frames: maximum of pictures per clip, where it is not a file.
+        structured: whether to send the JSON schema of the answer.
+        sampling_fps: frames per second at which Google samples a clip; None for its default, 1.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    provider: Provider = "openai"
+    model: str = Field(min_length=1)
+    base_url: str | None = None
+    api_key_env: str | None = None
+    timeout_s: float = Field(default=120.0, gt=0)
+    retries: int = Field(default=2, ge=0, le=10)
+    temperature: float | None = Field(default=0.0, ge=0)
+    max_output_tokens: int | None = Field(default=None, ge=1)
+    input_price: float | None = Field(default=None, ge=0)
+    output_price: float | None = Field(default=None, ge=0)
+    video: Literal["frames", "mp4"] = "frames"
+    clip_frames: int = Field(default=16, ge=1)
+    structured: bool = True
+    sampling_fps: float | None = Field(default=None, gt=0)
+
+    @field_validator("base_url")
+    @classmethod
+    def _has_no_secret(cls, url: str | None) -> str | None:
+        parts = urlsplit(url or "http://provider")
+        if parts.scheme not in ("http", "https") or not parts.hostname:
+            raise ValueError("an address must begin with http:// or https:// and name a host")
+        if "@" in parts.netloc or parts.query:
+            raise ValueError(
+                "addresses are recorded, so they must not hold a user, password or query; put a "
+                "key into an environment variable and name that in api_key_env"
+            )
+        return url
+
+    def key(self) -> str:
+        """Return the key, or `NO_KEY` if none is needed.
+
+        Raises:
+            MissingDependencyError: the environment variable is not set; a run stops, as it could
+                play no episode.
+        """
+        variable = self.api_key_env
+        if variable is None:
+            if self.base_url is not None:
+                return NO_KEY
+            variable = KEY_VARIABLES[self.provider]
+        key = os.environ.get(variable, "")
+        if not key:
+            raise MissingDependencyError(
+                f"Model {self.model!r} needs a key in the environment variable {variable}, "
+                "which is not set."
+            )
+        return key
+
+    def address(self) -> str:
+        """Return the URL of the endpoint; the provider's name for its own service."""
+        return self.base_url or self.provider
+
+    def about(self) -> dict[str, str | float | int | bool | None]:
+        """Return, for records, the address and all that may change a reply; never a key."""
+        omitted = {"base_url", "api_key_env", "timeout_s", "retries", "input_price", "output_price"}
+        return {**self.model_dump(mode="json", exclude=omitted), "address": self.address()}
+
+
+class ModelQuery(NamedTuple):
+    """A query to a model.
+
+    Attributes:
+        system: the system prompt.
+        turns: the conversation so far; the last turn is the user's.
+        schema: JSON schema of the reply, or None for free text.
+    """
+
+    system: str
+    turns: tuple[ChatTurn, ...]
+    schema: Mapping[str, Any] | None = None
+
+
+class ModelReply(NamedTuple):
+    """A model's reply, possibly empty, and its tokens."""
+
+    text: str
+    input_tokens: int = 0
+    output_tokens: int = 0
+
+
+class Model(Protocol):
+    """A connection to a model."""
+
+    def answer(self, query: ModelQuery) -> ModelReply:
+        """Send a query and return the reply.
+
+        Raises:
+            PolicyConnectionError: the service cannot be reached or is overloaded.
+            PolicyTimeoutError: there was no reply in time.
+            PolicyReplyError: the service replied with an error or with something else.
+        """
+
+    def close(self) -> None:
+        """Close the connection."""

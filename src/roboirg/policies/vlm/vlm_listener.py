@@ -1,0 +1,177 @@
+"""A vision-language model names the goal; the scripted expert executes it.
+
+The model receives what a policy may know: the instruction, the video, the first picture, and for
+each slot of the task its possible values in any scene. The scene itself is read only to execute
+the goal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from pydantic import BaseModel, ConfigDict
+from pydantic import Field as Option
+
+from roboirg.core.episode import Goal
+from roboirg.core.observations import Demonstration
+from roboirg.policies.builtin.scripted import ScriptedPolicy
+from roboirg.policies.vlm.config_fingerprint import config_version
+from roboirg.policies.vlm.goal_schema import GoalSchema, goal_schema
+from roboirg.policies.vlm.listener_query import PROMPTS, question_texts
+from roboirg.policies.vlm.model_content import ChatTurn, summary_clip
+from roboirg.policies.vlm.models import Model, ModelOptions, ModelQuery, make_model
+from roboirg.policies.vlm.prompts import load_prompts
+from roboirg.policies.vlm.vlm_query import VLMQuery
+from roboirg.tasks import get_task
+from roboirg.util.media import Clip, Picture
+
+if TYPE_CHECKING:
+    from roboirg.envs.environment import RoboIRGEnv
+
+CAMERA = "front"
+
+
+class ListenerOptions(BaseModel):
+    """Options of a VLM listener.
+
+    Attributes:
+        model: the model and its options.
+        frames: maximum of video frames, evenly spaced.
+        frames_every: control steps between the video frames that are rendered.
+        pictures: whether the model gets pictures and video; no for one that reads text only.
+        reasoning: whether the answer begins with a field in which the model may think.
+        prompts: a file with other prompts, or None for our own.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    model: ModelOptions
+    frames: int = Option(default=16, ge=1)
+    frames_every: int = Option(default=8, ge=1)
+    pictures: bool = True
+    reasoning: bool = False
+    prompts: str | None = None
+
+
+class NotUnderstoodError(Exception):
+    """The model named no goal of this scene; caught by `VLMListener.reset`."""
+
+
+class VLMListener(ScriptedPolicy):
+    """Executes the goal that a vision-language model names.
+
+    If the model gives no valid answer even to a second query, or names objects that the scene does
+    not have, the robot holds still until time is up: a failure that cannot succeed by luck.
+    `usage` counts both cases (``unparsed``, ``impossible``).
+
+    Args:
+        options: of the listener and its model.
+        seed: unused.
+        connect: connects the model.
+
+    Raises:
+        InvalidValueError: the prompts cannot be read.
+    """
+
+    cameras: tuple[str, ...] = (CAMERA,)
+
+    def __init__(
+        self,
+        options: ListenerOptions,
+        seed: int = 0,
+        connect: Callable[[ModelOptions], Model] = make_model,
+    ) -> None:
+        super().__init__(seed)
+        self.options = options
+        self.demonstration_frames: int | str = options.frames_every
+        if not options.pictures:
+            self.cameras, self.demonstration_frames = (), "none"
+        self.prompts = load_prompts(PROMPTS, options.prompts)
+        self.understood: Goal | None = None
+        self._vlm = VLMQuery(options.model, self.prompts["again"], connect)
+        self._demonstration: Demonstration = {}
+        self._impossible = 0
+
+    @property
+    def version(self) -> str:
+        """The model, and a fingerprint of the options and prompts that may change its answers."""
+        return config_version(self.options.model, self.metadata_of_options())
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """Options and prompts, and the goal that the model named (None if none was valid)."""
+        goal = self.understood
+        understood = None if goal is None else dict(goal.as_mapping())
+        return {**self.metadata_of_options(), "understood": understood}
+
+    def metadata_of_options(self) -> dict[str, Any]:
+        """Return the options and prompts; there is no key among them."""
+        own = self.options.model_dump(mode="json", exclude={"model", "prompts"})
+        return {
+            "model": self.options.model.about(),
+            "prompts": self.prompts.fingerprint,
+            **own,
+        }
+
+    def reset(self, instruction: str, demonstration: Demonstration) -> None:
+        """Query the goal and begin to execute it, or first hear the rest of the instruction.
+
+        Raises:
+            PolicyConnectionError: the model cannot be reached.
+            PolicyTimeoutError: it did not answer in time.
+            PolicyReplyError: it replied with an error.
+        """
+        self._vlm.start()
+        self._demonstration, self.understood, self._impossible = demonstration, None, 0
+        super().reset(instruction, demonstration)
+
+    def begin(self, env: RoboIRGEnv) -> None:
+        """Query the goal and begin to execute it; errors are those of `reset`."""
+        self._chunks = iter(())
+        try:
+            super().begin(env)
+        except NotUnderstoodError:
+            return
+        finally:
+            self._demonstration = {}
+
+    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
+        """Return the goal that the model names.
+
+        Raises:
+            NotUnderstoodError: there was no valid answer, or the scene has no such goal.
+        """
+        schema = goal_schema(env.episode.task)
+        goal = self._vlm.ask(self._build_query(env, schema, instruction), schema.read)
+        self.understood = goal
+        if goal is None:
+            raise NotUnderstoodError
+        if goal not in get_task(env.episode.task).goals(env.episode.scene):
+            self._impossible += 1
+            raise NotUnderstoodError
+        return goal
+
+    def usage(self) -> dict[str, float]:
+        """Return the cost of the episode."""
+        return {**self._vlm.usage(), "impossible": self._impossible}
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._vlm.close()
+
+    def _build_query(self, env: RoboIRGEnv, schema: GoalSchema, instruction: str) -> ModelQuery:
+        reasoning = self.prompts.fill("reasoning_field") if self.options.reasoning else None
+        steps = len(self._demonstration.get("joint_positions", ()))
+        texts = question_texts(self.prompts, schema, instruction, steps, reasoning)
+        parts: tuple[str | Picture | Clip, ...] = texts.instruction, texts.question
+        if self.options.pictures:
+            parts = texts.parts(*self._media(env, steps))
+        return ModelQuery(texts.system, (ChatTurn("user", parts),), schema.schema(reasoning))
+
+    def _media(self, env: RoboIRGEnv, steps: int) -> tuple[tuple[Clip, ...], Picture]:
+        picture = Picture(env.picture(CAMERA))
+        if not steps:
+            return (), picture
+        frames = self._demonstration[f"{CAMERA}_rgb"]
+        return (summary_clip(frames, self.options.frames, steps),), picture

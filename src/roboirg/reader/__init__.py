@@ -1,0 +1,146 @@
+"""The interpreter: find all goals that fit a text about a scene.
+
+It is independent of the generator: it uses none of its templates, constants or metadata. It knows
+as much English as the benchmark needs, the objects on the table, what moves, what the video
+shows, and which goals a task can have. `docs/interpreter.md` explains its parts.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from roboirg.core.episode import Goal, Scene
+from roboirg.reader.command import is_command, read_command
+from roboirg.reader.comprehension import ComprehensionGap, find_gaps, is_unknown_command
+from roboirg.reader.constraints import goal_constraints
+from roboirg.reader.discourse_context import names_camera, read_discourse, read_remark
+from roboirg.reader.negations import is_negated_command, unread_negations
+from roboirg.reader.preferences import with_preference
+from roboirg.reader.reference_resolution import ReferenceResolver
+from roboirg.reader.selections import read_selection, with_selection
+from roboirg.reader.temporal_relations import mentioned_times
+from roboirg.reader.tokens import Sentence, split_sentences
+from roboirg.reader.vocabulary import VERBS
+from roboirg.tasks import get_task
+
+__all__ = ["Interpretation", "interpret"]
+
+
+class Interpretation(NamedTuple):
+    """The result of reading a text.
+
+    Attributes:
+        goals: every goal that fits the text. One if the text says everything; none if it
+            contradicts itself or the scene, gives no command, or gives one that the interpreter
+            does not understand to the end.
+        not_understood: complaints in plain sentences.
+        unknown_words: the words of the command that the interpreter does not know or cannot use,
+            in lower case and American spelling, each once.
+    """
+
+    goals: tuple[Goal, ...]
+    not_understood: tuple[str, ...]
+    unknown_words: tuple[str, ...] = ()
+
+
+def interpret(text: str, scene: Scene, task: str) -> Interpretation:
+    """Return all goals of a task that fit a text: a whole prompt, its command, or any other text.
+
+    Args:
+        text: the prompt.
+        scene: what the robot may know: objects, colors, positions, what moves; and from the
+            video what was done, and which cube is under which container.
+        task: name of the task.
+
+    Raises:
+        UnknownNameError: there is no such task.
+    """
+    candidates = _possible_goals(scene, task)
+    sentences = split_sentences(text)
+    first, last = _command_span(sentences)
+    gaps = _command_gaps(sentences, first, last)
+    if gaps:
+        return Interpretation(
+            (),
+            _distinct(gap.complaint for gap in gaps),
+            _distinct(word for gap in gaps for word in gap.words),
+        )
+    before = sentences[:first]
+    context = with_selection(with_preference(read_discourse(before), before), before)
+    words = _joined(sentences[first:last])
+    command = read_command(words)
+    times = context.times | mentioned_times(command.text)
+    resolver = ReferenceResolver(scene, context, times, mirrored=names_camera(words))
+    constraints = goal_constraints(candidates, command, resolver)
+    goals = tuple(goal for goal in candidates if all(limit.fits(goal) for limit in constraints))
+    complaints = list(resolver.complaints)
+    if candidates and not goals:
+        unmet = [limit for limit in constraints if not any(map(limit.fits, candidates))]
+        complaints += [limit.complaint for limit in unmet]
+        complaints = complaints or ["no goal of the task fits everything that the text says"]
+    return Interpretation(goals, _distinct(complaints))
+
+
+@functools.lru_cache(maxsize=64)
+def _possible_goals(scene: Scene, task: str) -> tuple[Goal, ...]:
+    # Cached, because a scene is read about in many settings.
+    return get_task(task).goals(scene)
+
+
+def _commands(words: Sentence) -> bool:
+    """Return whether a sentence gives a command, understood or not."""
+    if is_command(words) or is_negated_command(words):
+        return True
+    # "Leave out the former" chooses; it is no command with an unknown verb.
+    return is_unknown_command(words) and read_selection(words) is None
+
+
+def _command_span(sentences: tuple[Sentence, ...]) -> tuple[int, int]:
+    """Return where the last run of commanding sentences begins and ends."""
+    last = len(sentences)
+    while last and not _commands(sentences[last - 1]):
+        last -= 1
+    first = last
+    while first and _commands(sentences[first - 1]):
+        first -= 1
+    return (first, last) if last else (len(sentences), len(sentences))
+
+
+def _command_gaps(sentences: tuple[Sentence, ...], first: int, last: int) -> list[ComprehensionGap]:
+    """Return what the interpreter does not understand of the command.
+
+    Args:
+        sentences: all of them.
+        first: index of the first commanding sentence.
+        last: index after the last one; the same as `first` if there is no command.
+    """
+    negated = [words for words in sentences[:first] if is_negated_command(words)]
+    following = [words for words in sentences[last:] if _matters(words)]
+    gaps = [] if first < last else [ComprehensionGap("finds no command")]
+    gaps += [
+        ComprehensionGap(f'does not read what follows the command: "{" ".join(words)}"')
+        for words in following
+    ]
+    for words in (*negated, *(sentences[first:last] or sentences[-1:]), *following):
+        gaps += find_gaps(words)
+    return gaps
+
+
+def _matters(words: Sentence) -> bool:
+    """Return whether a sentence after the command may change what it asks for."""
+    remark = read_remark(words)
+    if remark.dismissed:
+        return False
+    named = remark.colors or remark.numbers or remark.positions or remark.moments or remark.places
+    return bool(named or unread_negations(words)) or not VERBS.isdisjoint(words)
+
+
+def _joined(sentences: Iterable[Sentence]) -> Sentence:
+    """Return the words of all sentences, with a comma after each sentence."""
+    return tuple(word for words in sentences for word in (*words, ","))
+
+
+def _distinct(texts: Iterable[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(texts))

@@ -1,0 +1,127 @@
+"""Descriptions: read the words for a thing or a color."""
+
+from __future__ import annotations
+
+import re
+from typing import Literal, NamedTuple
+
+from roboirg.reader.comparisons import PlaceComparison, read_comparison
+from roboirg.reader.places import NamedPlace, read_places
+from roboirg.reader.temporal_relations import Time, mentioned_times
+from roboirg.reader.tokens import COLOR, Sentence, color_of, colors_in, ordinal_of, word_set
+
+_PRONOUNS = word_set("it them")
+_POINTED = word_set("cube box tape one color")
+_PLACE_NOUNS = word_set("place spot position location")
+_SERIES_NOUNS = word_set("visit placement time pass placing stay occasion")
+_FORMER = {"former": 0, "latter": -1}
+_CHOSEN = re.compile(
+    r"\b(?:the|my) (?P<noun>cubes?|box|container|tapes?|ones?|color|place|spot) i "
+    r"(?:mean|meant|want|wanted|asked for|favor|chose|choose|prefer|preferred|decided on"
+    r"|settled on|picked|selected|opted for)\b"
+)
+_OTHERS = re.compile(
+    r"\bthe (?:other (?P<noun>cubes?|ones?|box|container|tape|place|spot)|others)\b"
+    r"(?! (?:of|in|from|than)\b)"
+)
+
+DescriptionKind = Literal[
+    "any", "color", "not", "other", "place", "introduced", "introduced place", "compared"
+]
+
+
+class Description(NamedTuple):
+    """A description of one thing to handle.
+
+    Attributes:
+        kind: ``any`` describes nothing; ``color`` names a color; ``not`` excludes colors; ``other``
+            is the remaining one of some colors; ``place`` names a place; ``introduced`` and
+            ``introduced place`` point at an earlier color or place; ``compared`` is the foremost
+            one of those that ``not`` leaves.
+        colors: named colors; empty if the words point at those of the context.
+        excluded: for ``other``, the excluded color; None if the words only point at it.
+        place: the named place.
+        times: whether the place is the one before or after things move.
+        position: index of the introduced value; None for any of them.
+        comparison: for ``compared``, the order.
+    """
+
+    kind: DescriptionKind
+    colors: tuple[str, ...] = ()
+    excluded: str | None = None
+    place: NamedPlace | None = None
+    times: frozenset[Time] = frozenset()
+    position: int | None = None
+    comparison: PlaceComparison | None = None
+
+
+_THAN = re.compile(
+    r"\b(other than|different from|different to|differs from|unlike|"
+    r"not (in|of|among|one of|part of)|neither|except|apart from|outside|"
+    r"(another|(a|an|some|any) (different|other|new|distinct|alternative|separate)) color)\b"
+)
+_OTHER_OF = re.compile(
+    r"\bthe other (?:one |color )?(?:of|in|from)\b(?! (?:the |those |these )?(?:two )?moments)"
+)
+_ONE_NOT = re.compile(r"\bthe (?:one|color) (?:of|in|from)\b.*\b(?:not|other than|except)\b")
+_EITHER_NOT = re.compile(rf"\b{COLOR} or {COLOR} , not {COLOR}\b")
+_NOT = re.compile(rf"\b(?:not|other than|except) (?:in |for |the )?({COLOR})\b")
+
+
+def describe(words: Sentence) -> Description:
+    """Return the description that the words for one thing give."""
+    text = " ".join(words)
+    colors = colors_in(words)
+    comparison = read_comparison(text)
+    if comparison is not None and _THAN.search(text):
+        return Description("compared", colors, comparison=comparison)
+    places = read_places(words)
+    if places:
+        return Description("place", place=places[0], times=mentioned_times(text))
+    if _OTHER_OF.search(text) or _ONE_NOT.search(text) or _EITHER_NOT.search(text):
+        return _complement(text, colors)
+    if _THAN.search(text):
+        return Description("not", colors)
+    if colors:
+        return Description("color", colors[:1])
+    return _choice(text) or _pointer(words) or Description("any")
+
+
+def _complement(text: str, colors: tuple[str, ...]) -> Description:
+    found = _NOT.search(text)
+    excluded = color_of(found[1]) if found else None
+    among = tuple(dict.fromkeys(colors))
+    return Description("other", () if among == (excluded,) else among, excluded)
+
+
+def _choice(text: str) -> Description | None:
+    """Read ``the cube I want`` and ``the other one``: the chosen value comes first."""
+    for pattern, position in ((_CHOSEN, 0), (_OTHERS, 1)):
+        found = pattern.search(text)
+        if found:
+            placed = found["noun"] in _PLACE_NOUNS
+            kind: DescriptionKind = "introduced place" if placed else "introduced"
+            return Description(kind, times=mentioned_times(text), position=position)
+    return None
+
+
+def _pointer(words: Sentence) -> Description | None:
+    times = mentioned_times(" ".join(words))
+    if "there" in words:
+        return Description("introduced place", times=times)
+    for before, word, after in zip(("", *words), words, (*words[1:], ""), strict=False):
+        position = _position(before, word)
+        if position is not None and after not in _SERIES_NOUNS:
+            kind: DescriptionKind = "introduced place" if after in _PLACE_NOUNS else "introduced"
+            return Description(kind, times=times, position=position)
+        if word in _PRONOUNS or (before == "that" and word in _POINTED):
+            return Description("introduced")
+    return None
+
+
+def _position(before: str, word: str) -> int | None:
+    """Return the index of ``the former`` or ``the second``; a bare ``first`` is an adverb."""
+    if word in _FORMER:
+        return _FORMER[word]
+    rank = ordinal_of(word)
+    return None if rank is None or before != "the" else rank - 1

@@ -1,0 +1,125 @@
+"""Discourse context: what the sentences before the command introduce."""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from roboirg.reader.ordinals import named_positions
+from roboirg.reader.places import NamedPlace, read_places
+from roboirg.reader.quantities import plain_numbers, quantities
+from roboirg.reader.temporal_relations import PressRelation, Time, mentioned_times, named_moments
+from roboirg.reader.tokens import COLOR, Sentence, colors_in
+
+_DISMISSAL = re.compile(
+    r"\b(never mind|nothing to do with|not matter|not that it matters|no matter|ignore"
+    r"|forget (about )?(it|that|this|them)|irrelevant|not important|unimportant|regardless"
+    r"|not for you)\b"
+)
+
+
+class Remark(NamedTuple):
+    """The values that one sentence names."""
+
+    colors: tuple[str, ...]
+    numbers: tuple[int, ...]
+    amounts: tuple[tuple[str, int], ...]
+    positions: tuple[int, ...]
+    moments: tuple[PressRelation, ...]
+    places: tuple[NamedPlace, ...]
+    times: frozenset[Time]
+    camera: bool
+    dismissed: bool
+
+
+class DiscourseContext(NamedTuple):
+    """The values that sentences introduce, in order.
+
+    Attributes:
+        colors: introduced colors.
+        preferred_color: an introduced color that a later sentence names again, alone.
+        numbers: introduced numbers.
+        amounts: introduced numbers of cubes, with their color.
+        positions: introduced elements of a series, 1 for the first.
+        moments: introduced moments of the video.
+        preferred_moment: an introduced moment that a later sentence names again, alone.
+        places: introduced places.
+        times: whether the places are those before or after things move.
+        mirrored: whether left and right are those of the front camera's picture.
+    """
+
+    colors: tuple[str, ...] = ()
+    preferred_color: str | None = None
+    numbers: tuple[int, ...] = ()
+    amounts: tuple[tuple[str, int], ...] = ()
+    positions: tuple[int, ...] = ()
+    moments: tuple[PressRelation, ...] = ()
+    preferred_moment: PressRelation | None = None
+    places: tuple[NamedPlace, ...] = ()
+    times: frozenset[Time] = frozenset()
+    mirrored: bool = False
+
+
+def names_camera(words: Sentence) -> bool:
+    """Return whether left and right may be those of the front camera's picture."""
+    return "camera" in words or "camera's" in words
+
+
+@functools.lru_cache(maxsize=8192)
+def read_remark(words: Sentence) -> Remark:
+    """Read one sentence on its own."""
+    text = " ".join(words)
+    places = read_places(words)
+    return Remark(
+        # A cube in the words for a place is no referent.
+        colors=() if places else colors_in(words),
+        numbers=() if places else plain_numbers(words),
+        amounts=() if places else _amounts(text),
+        positions=named_positions(text),
+        moments=named_moments(text),
+        places=places,
+        times=mentioned_times(text),
+        camera=names_camera(words),
+        dismissed=_DISMISSAL.search(text) is not None,
+    )
+
+
+def _amounts(text: str) -> tuple[tuple[str, int], ...]:
+    """Return the colors and numbers of ``two of the red cubes and a blue one``."""
+    found: list[tuple[str, int]] = []
+    for one in quantities(text):
+        after = re.match(rf"\s*(?:cubes? )?(?:of )?(?:the )?({COLOR})s?\b", text[one.end :])
+        if one.plain and after and one.expression.quantity is not None:
+            found.append((after[1], one.expression.quantity))
+    return tuple(found)
+
+
+def read_discourse(sentences: Iterable[Sentence]) -> DiscourseContext:
+    """Return what these sentences introduce, without those that the speaker dismisses."""
+    context = DiscourseContext()
+    for sentence in sentences:
+        remark = read_remark(sentence)
+        if not remark.dismissed:
+            context = _with_remark(context, remark)
+    return context
+
+
+def _with_remark(context: DiscourseContext, remark: Remark) -> DiscourseContext:
+    fresh = [color for color in remark.colors if color not in context.colors]
+    again = not fresh and len(remark.colors) == 1
+    moments = (*context.moments, *remark.moments)
+    introduced = tuple(dict.fromkeys(moments))
+    return DiscourseContext(
+        colors=tuple(dict.fromkeys((*context.colors, *fresh))),
+        preferred_color=remark.colors[0] if again else context.preferred_color,
+        numbers=tuple(dict.fromkeys((*context.numbers, *remark.numbers))),
+        amounts=tuple(dict.fromkeys((*context.amounts, *remark.amounts))),
+        positions=tuple(dict.fromkeys((*context.positions, *remark.positions))),
+        moments=introduced,
+        preferred_moment=moments[-1] if len(moments) > len(introduced) > 1 else None,
+        places=(*context.places, *remark.places),
+        times=context.times | remark.times,
+        mirrored=context.mirrored or (remark.camera and bool(remark.places)),
+    )

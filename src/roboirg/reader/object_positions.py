@@ -1,0 +1,45 @@
+"""Object positions: find what stands at a place before and after things move."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Collection
+from dataclasses import replace
+
+from roboirg.core.episode import Scene, SceneObject
+from roboirg.core.motions import Swap
+from roboirg.reader.places import Place, find_objects
+from roboirg.reader.temporal_relations import Time
+
+
+def objects_at(
+    place: Place, scene: Scene, kind: str, times: Collection[Time], *, mirrored: bool
+) -> tuple[SceneObject, ...]:
+    """Return what stands at a place at one of these times, or at any time for no times.
+
+    Args:
+        place: the place.
+        scene: everything on the table, and what moves.
+        kind: kind of the things to compare.
+        times: before or after things move.
+        mirrored: whether left and right are those of the front camera's picture.
+    """
+    found: list[str] = []
+    if "at first" in times or not times:
+        found += [item.name for item in find_objects(place, scene, kind, mirrored=mirrored)]
+    if "at last" in times or not times:
+        final = _final_scene(scene)
+        found += [item.name for item in find_objects(place, final, kind, mirrored=mirrored)]
+    return tuple(scene[name] for name in dict.fromkeys(found))
+
+
+@functools.lru_cache(maxsize=256)
+def _final_scene(scene: Scene) -> Scene:
+    """Return the scene with everything where it stands after the last swap."""
+    places = {item.name: item.position for item in scene.objects}
+    for motion in scene.motions:
+        if isinstance(motion, Swap):
+            first, second = motion.first, motion.second
+            places[first], places[second] = places[second], places[first]
+    moved = (replace(item, position=places[item.name]) for item in scene.objects)
+    return replace(scene, objects=tuple(moved))

@@ -1,0 +1,152 @@
+"""Ordinals: an element of a series, named, pointed at, or derived from another element."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+from typing import Literal, NamedTuple
+
+from roboirg.reader.quantities import CountExpression, read_value
+from roboirg.reader.tokens import NUMBER, ORDINAL, number_of, ordinal_of
+
+Base = int | Literal["that", "last"]
+
+_NOUN = r"(?:visit|placement|pass|passage|stay|time|occasion|placing)"
+_ELEMENT = re.compile(
+    rf"\b(?P<ordinal>{ORDINAL}|last|final) (?:\w+ )?{_NOUN}\b"
+    rf"|\b{_NOUN} (?:number |no )?(?P<number>{NUMBER})\b(?! (?:after|before|visits|placements))"
+)
+_ACTS = (
+    "reache[sd]|arrive[sd]|passe[sd]|stop(?:s|ped)|move[sd]|goes|went|enter(?:s|ed)|return(?:s|ed)"
+)
+_BASE = re.compile(
+    rf"\s*(?P<that>that|it|this)\b(?! (?:is|was|has|{_ACTS})\b)"
+    rf"|\s*(?:the |its )?(?P<ordinal>{ORDINAL}|last|final)\b"
+    rf"|\s*(?:(?:the )?{_NOUN} )?(?:number )?(?P<number>{NUMBER})\b"
+)
+_STEP = re.compile(
+    rf"\b(?:(?P<step>right|just|directly|immediately|{NUMBER})(?: {_NOUN}s?)? )?"
+    r"(?P<way>after|before|following|preceding|later than|earlier than|behind|ahead of)\b"
+    r"(?! (?:the )?(?:button|press|pressing|placing|taking))"
+)
+_NEXT = re.compile(rf"\bthe (?:very )?(?P<way>next|following|previous|preceding) (?:one|{_NOUN})\b")
+_NEIGHBOR = re.compile(
+    r"\b(?:neighbor\w* (?:of|to)|adjacent to|next to|(?:just |right )?before or after)\b"
+)
+_PENULTIMATE = re.compile(
+    rf"\b(?P<rank>{ORDINAL}|next) (?:to|from) (?:the )?last\b|\bpenultimate\b"
+)
+_BARE = re.compile(rf"\b(?:its|the|placed) (?P<ordinal>{ORDINAL}|last)\b")
+_POINTER = re.compile(
+    rf"\b(?:that|this|the same) (?:very )?(?:one|number|{_NOUN})\b|\bthe {_NOUN} i\b"
+)
+_LATER = ("after", "following", "later than", "behind", "next")
+
+
+class OrdinalExpression(NamedTuple):
+    """A description of an element of a series.
+
+    Attributes:
+        base: the number of an element; ``that`` for an introduced one, ``last`` for the last.
+        offsets: the possible distances from the base to the element.
+        value: an expression for the number of the element, instead of base and offsets.
+    """
+
+    base: Base = "that"
+    offsets: tuple[int, ...] = (0,)
+    value: CountExpression | None = None
+
+    def results(
+        self, positions: Collection[int], numbers: Collection[int], length: int
+    ) -> set[int] | None:
+        """Return the numbers of the possible elements; None for any element.
+
+        Args:
+            positions: introduced elements.
+            numbers: introduced numbers.
+            length: number of elements of the series.
+        """
+        elements = set(range(1, length + 1))
+        if self.value is not None:
+            values = self.value.results(numbers or positions)
+            return None if values is None else values & elements
+        bases = self._bases(positions or numbers, length)
+        if not bases and self.base == "that":
+            if self.offsets == (0,):
+                return None
+            bases = elements
+        # An element outside the series has no neighbors.
+        return {base + offset for base in bases & elements for offset in self.offsets} & elements
+
+    def _bases(self, introduced: Collection[int], length: int) -> set[int]:
+        if self.base == "that":
+            return set(introduced)
+        return {length if self.base == "last" else self.base}
+
+    @property
+    def points(self) -> bool:
+        """Whether the context must introduce an element or a number."""
+        return self.value.quantity is None if self.value is not None else self.base == "that"
+
+
+def named_positions(text: str) -> tuple[int, ...]:
+    """Return the elements of a series that a sentence names by number, in order."""
+    numbers = (_number(found) for found in _ELEMENT.finditer(text))
+    return tuple(one for one in numbers if isinstance(one, int))
+
+
+def read_position(text: str) -> OrdinalExpression | None:
+    """Return the description of an element of a series; None if there is none."""
+    value = read_value(text)
+    if value is not None:
+        return OrdinalExpression(value=value)
+    return _read_last(text) or _read_relative(text) or _read_named(text)
+
+
+def _read_relative(text: str) -> OrdinalExpression | None:
+    # First of all: the "one" of "the preceding one" is no number.
+    following = _NEXT.search(text)
+    if following:
+        return OrdinalExpression("that", (1 if following["way"] in _LATER else -1,))
+    for found in _NEIGHBOR.finditer(text):
+        base = _base(text, found.end())
+        if base is not None:
+            return OrdinalExpression(base, (-1, 1))
+    for found in _STEP.finditer(text):
+        base = _base(text, found.end())
+        if base is not None:
+            step = number_of(found["step"] or "") or 1
+            return OrdinalExpression(base, (step if found["way"] in _LATER else -step,))
+    return None
+
+
+def _read_last(text: str) -> OrdinalExpression | None:
+    found = _PENULTIMATE.search(text)
+    if found is None:
+        return None
+    return OrdinalExpression("last", (1 - (ordinal_of(found["rank"] or "") or 2),))
+
+
+def _read_named(text: str) -> OrdinalExpression | None:
+    found = _ELEMENT.search(text)
+    if found is None and not _POINTER.search(text):
+        found = _BARE.search(text)
+        return OrdinalExpression(_ordinal(found["ordinal"])) if found else None
+    return OrdinalExpression("that" if found is None else _number(found))
+
+
+def _base(text: str, at: int) -> Base | None:
+    found = _BASE.match(text, at)
+    if found is None:
+        return None
+    return "that" if found["that"] else _number(found)
+
+
+def _number(found: re.Match[str]) -> Base:
+    if found["ordinal"]:
+        return _ordinal(found["ordinal"])
+    return number_of(found["number"]) or 0
+
+
+def _ordinal(word: str) -> Base:
+    return ordinal_of(word) or "last"

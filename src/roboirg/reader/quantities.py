@@ -1,0 +1,178 @@
+"""Quantities: plain numbers, numbers derived from another one, and words that point at one."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+from typing import Literal, NamedTuple
+
+from roboirg.reader.tokens import COLOR, NUMBER, THING, THINGS, Sentence, number_of
+
+_CONCEIVABLE = range(1, 11)
+"""The values that a quantity may have if no text introduces it."""
+
+
+Combination = Literal["total", "difference"]
+
+
+class CountExpression(NamedTuple):
+    """The number ``factor * quantity + offset``; the context gives a missing quantity.
+
+    With a combination, the missing quantity is the total or difference of two introduced numbers.
+    """
+
+    factor: float = 1.0
+    offset: int = 0
+    quantity: int | None = None
+    combination: Combination | None = None
+
+    @property
+    def derived(self) -> bool:
+        """Whether the number differs from the quantity."""
+        return (self.factor, self.offset) != (1.0, 0)
+
+    def results(self, introduced: Iterable[int]) -> set[int] | None:
+        """Return the possible values if the context names these numbers; None for any value."""
+        quantities = [self.quantity] if self.quantity is not None else list(introduced)
+        if not quantities and not self.derived:
+            return None
+        if self.combination is not None and quantities:
+            first, *others = quantities
+            total, difference = sum(quantities), abs(first - sum(others))
+            quantities = [total if self.combination == "total" else difference]
+        results = [self.factor * one + self.offset for one in quantities or _CONCEIVABLE]
+        return {int(result) for result in results if result.is_integer()}
+
+
+class Quantity(NamedTuple):
+    """A quantity in a text, and from which character to which it goes."""
+
+    expression: CountExpression
+    start: int
+    end: int
+    plain: bool = False
+
+
+_NOUNS = rf"(?: (?:times?|{THING}|{THINGS}|ones?|visits?|{COLOR}|such|of|the|them))"
+_TO = (
+    r"(?:(?:the|their|that|this) (?:combined )?(?P<combined>total|sum|difference|gap)\b"
+    rf"(?: between them| (?:of|between) (?P<left>{NUMBER}) and (?P<right>{NUMBER}))?"
+    rf"|(?P<quantity>that|it|this|the|{NUMBER})\b)"
+)
+_MORE = "more|larger|greater|higher|bigger|above|over"
+_LESS = "fewer|less|smaller|lower|below|under"
+_STEP = re.compile(
+    rf"\b(?P<step>{NUMBER}){_NOUNS}{{0,3}} (?P<way>{_MORE}|{_LESS}){_NOUNS}{{0,5}}(?: than)? {_TO}"
+)
+_PLUS = re.compile(rf"\b(?P<quantity>that|it|this|{NUMBER}) (?P<way>plus|minus) (?P<step>{NUMBER})")
+_SCALED = re.compile(
+    rf"\b(?P<factor>twice|double|thrice|triple|half|{NUMBER} times)"
+    rf"(?: as (?:many|often|much){_NOUNS}{{0,5}} as| of| the| as)? {_TO}"
+)
+_SAME = re.compile(
+    r"\b(?:that|as|this|so|equally) (?:many|often)\b"
+    r"|\b(?:that|this|the same) (?:number|amount) of\b"
+    r"|\bmy (?:\w+ )?number of\b|\bthe number of times(?= i\b)"
+)
+_SOME = re.compile(r"\ba (?:couple|pair) of\b")
+_ADVERB = re.compile(r"\b(?:once(?! (?:you|it|that|the|all|this))|twice|thrice)\b")
+_NOT_AFTER = (
+    "the", "that", "this", "those", "these", "which", "other", "another", "every", "each", "any",
+    "some", "no", "than", "as", "from", "red", "green", "blue", "yellow", "gray", "purple",
+    "number", "visit", "placement",
+)  # fmt: skip
+_POINTED = "".join(rf"(?<!\b{word} )" for word in _NOT_AFTER)
+"""After one of these words a number word only points: ``those two``, ``the red one``."""
+_PLAIN = re.compile(
+    rf"{_POINTED}\b(?P<number>{NUMBER})\b(?! times as)"
+    rf"|(?<=\b(?:this|that) )(?P<times>{NUMBER})(?= times\b(?! as))"
+)
+_SINGLE = re.compile(
+    r"(?<!\bas )(?<!\bthan )(?<!\bto )(?<!\bfrom )(?<!\bof )(?<!\bhides )(?<!\bover )"
+    rf"\b(?:an?|the)(?: single)? (?={COLOR} (?:{THING}|one)\b)"
+)
+_TOTALS = ("total", "sum")
+_FACTORS = {"twice": 2.0, "double": 2.0, "thrice": 3.0, "triple": 3.0, "half": 0.5}
+ADVERBS = {"once": 1, "twice": 2, "thrice": 3}
+"""Numbers of repetitions in one word."""
+_TIMES = re.compile(r" (?:times?|rounds?|turns?|occasions?|cycles?)\b")
+
+Reading = tuple[re.Pattern[str], Callable[[re.Match[str]], CountExpression], bool]
+
+
+def _stepped(found: re.Match[str]) -> CountExpression:
+    sign = 1 if re.fullmatch(f"{_MORE}|plus", found["way"]) else -1
+    return _expression(found, offset=sign * (number_of(found["step"]) or 0))
+
+
+def _scaled(found: re.Match[str]) -> CountExpression:
+    factor = _FACTORS.get(found["factor"]) or float(number_of(found["factor"].split()[0]) or 1)
+    return _expression(found, factor=factor)
+
+
+def _expression(found: re.Match[str], *, factor: float = 1.0, offset: int = 0) -> CountExpression:
+    """Return the expression for a quantity that a text names, points at, or combines."""
+    words = found.groupdict()
+    combined = words.get("combined")
+    if combined is None:
+        return CountExpression(factor, offset, number_of(words["quantity"]))
+    way: Combination = "total" if combined in _TOTALS else "difference"
+    left, right = number_of(words["left"] or ""), number_of(words["right"] or "")
+    if left is None or right is None:
+        return CountExpression(factor, offset, combination=way)
+    return CountExpression(factor, offset, left + right if way == "total" else abs(left - right))
+
+
+_DERIVED: tuple[Reading, ...] = ((_STEP, _stepped, False), (_PLUS, _stepped, False),
+                                 (_SCALED, _scaled, False))  # fmt: skip
+_READINGS: tuple[Reading, ...] = (
+    *_DERIVED,
+    (_SAME, lambda _found: CountExpression(), False),
+    (_SOME, lambda _found: CountExpression(quantity=2), True),
+    (_ADVERB, lambda found: CountExpression(quantity=ADVERBS[found[0]]), True),
+    (
+        _PLAIN,
+        lambda found: CountExpression(quantity=number_of(found["number"] or found["times"])),
+        True,
+    ),
+    (_SINGLE, lambda _found: CountExpression(quantity=1), True),
+)
+"""Pattern, reader, and whether it is a plain number; of two that overlap, the first one counts."""
+
+
+def quantities(text: str) -> tuple[Quantity, ...]:
+    """Return all quantities of a sentence, in order."""
+    found: list[Quantity] = []
+    for pattern, read, plain in _READINGS:
+        for match in pattern.finditer(text):
+            start, end = match.span()
+            if all(end <= one.start or one.end <= start for one in found):
+                found.append(Quantity(read(match), start, end, plain))
+    return tuple(sorted(found, key=lambda one: one.start))
+
+
+def plain_numbers(words: Sentence) -> tuple[int, ...]:
+    """Return the plain numbers of a sentence: *three times*, *twice*."""
+    text = " ".join(words)
+    found = [
+        (match.start(), number_of(match["number"] or match["times"]))
+        for match in _PLAIN.finditer(text)
+    ]
+    found += [(match.start(), ADVERBS[match[0]]) for match in _ADVERB.finditer(text)]
+    return tuple(number for _, number in sorted(found) if number is not None)
+
+
+def read_value(text: str) -> CountExpression | None:
+    """Return the first derived number: ``one less than that``."""
+    return next((one.expression for one in quantities(text) if one.expression.derived), None)
+
+
+def read_times(text: str) -> CountExpression | None:
+    """Return the number of repetitions; None if the text gives none."""
+    found = quantities(text)
+    plain = [one for one in found if one.plain]
+    times = [one for one in found if not one.plain]
+    times += [
+        one for one in plain if text[one.start : one.end] in ADVERBS or _TIMES.match(text, one.end)
+    ]
+    return times[0].expression if times else None

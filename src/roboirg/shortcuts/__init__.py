@@ -1,0 +1,8 @@
+"""Shortcuts: how far rules and models come that see the words only, and understand none of them."""
+
+from __future__ import annotations
+
+from roboirg.shortcuts.surface_rules import SURFACE_RULES
+from roboirg.shortcuts.text_guess import TextGuess, draw_goal, goal_share, guess_goal
+
+__all__ = ["SURFACE_RULES", "TextGuess", "draw_goal", "goal_share", "guess_goal"]
