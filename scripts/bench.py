@@ -28,10 +28,10 @@ from roboirg.apps.demonstrations.trajectory import PictureCoding, TrajectoryFile
 from roboirg.apps.demonstrations.trajectory_recorder import PictureTracks, RecordingSpec
 from roboirg.apps.leaderboard.run_verification import verify_run
 from roboirg.core.observations import CAMERAS
-from roboirg.evaluation.executors.executor import InProcess
-from roboirg.evaluation.plan_maker import make_plan
-from roboirg.evaluation.rollout import EpisodeRunner
-from roboirg.evaluation.runner import run_plan
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.play.rollout import EpisodeRunner
+from roboirg.evaluation.run.executor import InProcess
+from roboirg.evaluation.run.runner import run_plan
 from roboirg.util.console_width import widen
 from roboirg.util.freed_memory import keep_freed_memory
 

@@ -17,9 +17,9 @@ import time
 from pathlib import Path
 from typing import Any
 
-from roboirg.analysis.page.report import render
-from roboirg.records.record import Record
-from roboirg.records.store import read_records
+from roboirg.evaluation.analysis.page.report import render
+from roboirg.evaluation.records.record import Record
+from roboirg.evaluation.records.store import read_records
 
 BROWSERS = ("chromium", "google-chrome", "chromium-browser")
 REPEATS = 5

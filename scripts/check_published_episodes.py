@@ -30,13 +30,13 @@ from roboirg.core.motions import Shuttle, Swap
 from roboirg.core.observations import Demonstration
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.envs.factory import make
-from roboirg.episodes.published_episodes import is_published
-from roboirg.episodes.splits import get_episode, split_episodes
-from roboirg.evaluation.plan_parsing import parse_names, parse_splits
+from roboirg.evaluation.plan.plan_parsing import parse_names, parse_splits
 from roboirg.policies import play
 from roboirg.policies.builtin.oracle_policy import OraclePolicy
 from roboirg.simulation.motion_player import shuttle_position
 from roboirg.tasks import find_tasks
+from roboirg.tasks.splits.published_episodes import is_published
+from roboirg.tasks.splits.splits import get_episode, split_episodes
 from roboirg.util.parallel_map import parallel_map
 
 ROWS = Path(__file__).parents[1] / "tests" / "episodes" / "robomme"

@@ -2,9 +2,10 @@
 """Convert RoboMME's published episodes into the data file that the package ships.
 
 Reads ``{train,val,test}.jsonl.gz`` (one JSON object per episode: the poses of all bodies after the
-scene was made, and what the task drew) and writes ``src/roboirg/episodes/published.jsonl.gz``, one
-scene and goal per line in our own terms. The input comes from a running RoboMME (Apache-2.0, see
-NOTICE); ``tests/episodes/robomme`` holds a copy.
+scene was made, and what the task drew) and writes
+``src/roboirg/tasks/splits/published.jsonl.gz``, one scene and goal per line in our own terms. The
+input comes from a running RoboMME (Apache-2.0, see NOTICE); ``tests/episodes/robomme`` holds a
+copy.
 """
 
 from __future__ import annotations
@@ -25,10 +26,10 @@ from roboirg.core import object_sizes
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import SPLITS, Color, Goal, Scene, SceneObject
 from roboirg.core.motions import Motion, Point, Shuttle
-from roboirg.episodes.recordings import FOLDER, INCOMPLETE
-from roboirg.episodes.scene_codec import encode
 from roboirg.tasks import bin_fill, stop_cube, swing_x_times, video_repick
 from roboirg.tasks.shared import unmask, unmask_swap, video_place
+from roboirg.tasks.splits.recordings import FOLDER, INCOMPLETE
+from roboirg.tasks.splits.scene_codec import encode
 
 Row = Mapping[str, Any]
 Body = Sequence[float]

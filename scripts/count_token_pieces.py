@@ -15,11 +15,11 @@ from pathlib import Path
 from sentencepiece import SentencePieceProcessor
 
 from roboirg.core.word_pools import POOLS
-from roboirg.episodes.splits import get_episode
 from roboirg.language.generator import instruct_with
 from roboirg.language.token_counts import split_words
 from roboirg.language.variants import expressible_options
 from roboirg.tasks import every_task
+from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.atomic_write import write_atomically
 
 TABLE = Path(__file__).parent.parent / "src/roboirg/language/token_pieces.json"

@@ -11,7 +11,7 @@ PAGES = {
     "README.md": "index.md",
     "CONTRIBUTING.md": "contributing.md",
     "CHANGELOG.md": "changes.md",
-    "src/roboirg/analysis/published_results/README.md": "published-results.md",
+    "src/roboirg/evaluation/analysis/published_results/README.md": "published-results.md",
 }
 """The site's name of each page outside docs/."""
 LINK = re.compile(r"(\]\()([^)\s#]+)")

@@ -14,10 +14,10 @@ import typer.main
 from roboirg import main as cli
 from roboirg.cli import demo_commands
 from roboirg.cli.progress_bar import progress_bars
-from roboirg.evaluation.plan import read_plan
-from roboirg.evaluation.rollout_result import RolloutResult, make_record
-from roboirg.records.record import Job
-from roboirg.records.store import RecordStore
+from roboirg.evaluation.plan.plan import read_plan
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.records.record import Job
+from roboirg.evaluation.records.store import RecordStore
 from roboirg.util.console_width import progress_console
 
 RUN = ("run", "--policy", "random", "--tasks", "PickXtimes")
@@ -59,7 +59,7 @@ class CannedPlayer:
 
 @pytest.fixture
 def canned(monkeypatch: pytest.MonkeyPatch) -> type[CannedPlayer]:
-    monkeypatch.setattr("roboirg.evaluation.runner.EpisodeRunner", CannedPlayer)
+    monkeypatch.setattr("roboirg.evaluation.run.runner.EpisodeRunner", CannedPlayer)
     monkeypatch.setattr(CannedPlayer, "result", RolloutResult("success", cause=None, steps=7))
     return CannedPlayer
 
@@ -219,7 +219,7 @@ def test_missing_graphics_are_one_sentence(
     def fail(_self: CannedPlayer, _job: Job) -> None:
         raise RenderDeviceError("No Vulkan device can render; install Mesa.")
 
-    monkeypatch.setattr("roboirg.evaluation.runner.EpisodeRunner", CannedPlayer)
+    monkeypatch.setattr("roboirg.evaluation.run.runner.EpisodeRunner", CannedPlayer)
     monkeypatch.setattr(CannedPlayer, "__call__", fail)
     said = roboirg(*RUN, "--workers", "0", "--out", tmp_path)
     assert (said.code, said.err) == (2, "roboirg: No Vulkan device can render; install Mesa.\n")
@@ -263,7 +263,7 @@ def test_splits_are_built_anew_for_what_is_named(
     roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from roboirg.apps.split_search import seed_selection
-    from roboirg.episodes.splits import shipped_splits, splits_text
+    from roboirg.tasks.splits.splits import shipped_splits, splits_text
 
     def find(slots, workers):
         assert workers == 0
@@ -440,7 +440,7 @@ def test_a_relative_folder_stays_where_it_is(
     home.mkdir()
     away.mkdir()
     monkeypatch.chdir(home)
-    monkeypatch.setattr("roboirg.evaluation.runner.EpisodeRunner", Wanderer)
+    monkeypatch.setattr("roboirg.evaluation.run.runner.EpisodeRunner", Wanderer)
     monkeypatch.setattr(Wanderer, "away", away)
     said = roboirg(*RUN, "--episodes", "2", "--workers", "0", "--out", "mine")
     assert said.code == 0, said.err

@@ -12,7 +12,7 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import Scene
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.motions import Away, Glow, Point, Shuttle, Swap, Vanish
-from roboirg.episodes.splits import get_episode
+from roboirg.tasks.splits.splits import get_episode
 
 
 def picture(value):

@@ -17,12 +17,12 @@ from roboirg.core.delivery import (
 )
 from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.episodes.splits import get_episode
+from roboirg.evaluation.records.store import read_records
 from roboirg.language.settings import all_settings, settings_of
 from roboirg.main import app
 from roboirg.policies import make_policy, play
-from roboirg.records.store import read_records
 from roboirg.tasks import all_tasks, get_task
+from roboirg.tasks.splits.splits import get_episode
 
 
 def test_a_prompt_is_heard_at_once():

@@ -19,12 +19,12 @@ from typing import NamedTuple
 import pytest
 import typer.main
 
-from roboirg.evaluation.plan import write_plan
-from roboirg.evaluation.plan_file import read_plan_file
-from roboirg.evaluation.plan_maker import make_plan
-from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.plan.plan import write_plan
+from roboirg.evaluation.plan.plan_file import read_plan_file
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.records.store import RecordStore
 from roboirg.main import app, main
-from roboirg.records.store import RecordStore
 
 ROOT = Path(__file__).parent.parent
 ELSEWHERE = {"integrations.md": "tests/integrations, by `make integrations`"}

@@ -21,15 +21,15 @@ from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.env_settings import EnvSettings
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.envs.registration import environment_id
-from roboirg.envs.vector_environment import RoboIRGVectorEnv
-from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.policy_environment import EnvRequirements, make_env
+from roboirg.envs.vector.vector_environment import RoboIRGVectorEnv
+from roboirg.evaluation.play.policy_environment import EnvRequirements, make_env
+from roboirg.evaluation.records.record import Job
 from roboirg.policies import make_policy, play
 from roboirg.policies.builtin.scripted import ScriptedPolicy
-from roboirg.records.record import Job
 from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.physics_settings import HOME_ACTION
 from roboirg.tasks import every_task, get_task
+from roboirg.tasks.splits.splits import get_episode
 
 pytestmark = pytest.mark.sim
 
@@ -474,7 +474,7 @@ def test_without_vulkan_episodes_play_undrawn_and_drawing_says_what_to_install()
 def test_without_the_simulator_the_extra_is_named():
     code = (
         "import sys; sys.modules['gymnasium'] = None\n"
-        "import roboirg, roboirg.language, roboirg.judging, roboirg.episodes.splits\n"
+        "import roboirg, roboirg.language, roboirg.judging, roboirg.tasks.splits.splits\n"
         "roboirg.make('PickXtimes')"
     )
     result = run_python(code)

@@ -10,13 +10,13 @@ from contextlib import contextmanager
 
 import pytest
 
-from roboirg.analysis.page.page_server import PageServer
 from roboirg.apps.real.pages.score_server import ScoreServer
 from roboirg.apps.real.study.study_plan import make_study, write_study
 from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.analysis.page.page_server import PageServer
 from roboirg.policies.policy_server import open_server
-from roboirg.util.connection_table import ConnectionLimits
-from roboirg.util.http_server import LoopbackRequestHandler, LoopbackServer
+from roboirg.util.web.connection_table import ConnectionLimits
+from roboirg.util.web.http_server import LoopbackRequestHandler, LoopbackServer
 
 VIDEO_BYTES = 64 << 20
 """Larger than what the sockets buffer, so that the server is still sending at the hang-up."""

@@ -94,6 +94,6 @@ def test_the_reference_has_the_public_names(pages):
     wanted |= {
         "roboirg.envs.environment.RoboIRGEnv.step",
         "roboirg.policies.Policy.act",
-        "roboirg.records.record.Record",
+        "roboirg.evaluation.records.record.Record",
     }
     assert wanted <= names

@@ -8,11 +8,12 @@ import pytest
 
 from roboirg.core.episode import SPLITS, Episode
 from roboirg.core.errors import InvalidValueError, SceneRejectedError, UnknownNameError
-from roboirg.episodes import splits
-from roboirg.episodes.fingerprint import fingerprint, plain
-from roboirg.episodes.published_episodes import is_published, published_episode
-from roboirg.episodes.recordings import is_recorded
-from roboirg.episodes.splits import (
+from roboirg.tasks import all_tasks, every_task, get_task
+from roboirg.tasks.splits import splits
+from roboirg.tasks.splits.fingerprint import fingerprint, plain
+from roboirg.tasks.splits.published_episodes import is_published, published_episode
+from roboirg.tasks.splits.recordings import is_recorded
+from roboirg.tasks.splits.splits import (
     MAX_REJECTED,
     SEED_STRIDE,
     TaskSplits,
@@ -23,7 +24,6 @@ from roboirg.episodes.splits import (
     split_episodes,
     splits_text,
 )
-from roboirg.tasks import all_tasks, every_task, get_task
 
 TASKS = tuple(every_task())
 GAPS = {
@@ -55,7 +55,7 @@ def test_no_task_s_episodes_have_drifted(task):
         fingerprint_of(task, shipped_splits()[task].passed_over) == shipped_splits()[task].sha256
     ), (
         f"The episodes of {task} are not those for which the splits were built; if that is wanted, "
-        f"run: roboirg build-splits --tasks {task} --out src/roboirg/episodes/splits.json"
+        f"run: roboirg build-splits --tasks {task} --out src/roboirg/tasks/splits/splits.json"
     )
     assert fingerprint(episodes(task)) == shipped_splits()[task].sha256
 

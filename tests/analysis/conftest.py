@@ -9,9 +9,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from roboirg.analysis.published import TRIALS, published_rows
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.records.record import Result
+from roboirg.evaluation.analysis.published import TRIALS, published_rows
+from roboirg.evaluation.records.record import Result
 
 MakeResult = Callable[..., Result]
 

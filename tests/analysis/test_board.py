@@ -8,18 +8,18 @@ from typing import Any
 
 import pytest
 
-from roboirg.analysis.published import published_rows
 from roboirg.apps.leaderboard.board_page import read_packs, render_board, write_board
 from roboirg.apps.leaderboard.board_rows import BoardRow, PackedRun, board_rows
 from roboirg.apps.leaderboard.pack_checks import CHECKS_FILE, PackCheck, check_pack
 from roboirg.apps.leaderboard.packing import pack_run
 from roboirg.core.errors import InvalidValueError
-from roboirg.episodes.private_splits import SALT_VARIABLE, use_salt
-from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.analysis.published import published_rows
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.records.record import Job, Record
+from roboirg.evaluation.records.store import RecordStore
 from roboirg.language.settings import EXPLICIT
-from roboirg.records.record import Job, Record
-from roboirg.records.store import RecordStore
 from roboirg.tasks import ALL, find_tasks
+from roboirg.tasks.splits.private_splits import SALT_VARIABLE, use_salt
 
 HOLDS = PackCheck("0" * 64, "now", 10, 10)
 

@@ -15,9 +15,12 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from roboirg.analysis.page.report import render
-from roboirg.analysis.stats.breakdown_rows import break_down
-from roboirg.analysis.stats.breakdowns import (
+from roboirg.cli.report_commands import compare as compare_command
+from roboirg.cli.report_commands import tables
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.evaluation.analysis.page.report import render
+from roboirg.evaluation.analysis.stats.breakdown_rows import break_down
+from roboirg.evaluation.analysis.stats.breakdowns import (
     BREAKDOWNS,
     COMPETING,
     NO_RIVAL,
@@ -28,19 +31,21 @@ from roboirg.analysis.stats.breakdowns import (
     find_breakdowns,
     label_instructions,
 )
-from roboirg.analysis.stats.cells import CellResults, gather
-from roboirg.analysis.stats.comparison import compare
-from roboirg.analysis.stats.comparison_text import sentences
-from roboirg.analysis.stats.intervals import SEED
-from roboirg.analysis.stats.paired_tests import Pairs, measure_gap
-from roboirg.analysis.tables.breakdown_table import make_breakdown_table
-from roboirg.cli.report_commands import compare as compare_command
-from roboirg.cli.report_commands import tables
-from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.plan import Plan, write_plan
-from roboirg.evaluation.rollout_result import RolloutResult, make_record
-from roboirg.records.record import Job, Record
-from roboirg.records.store import RECORDS_FILE, RecordStore, read_instructions, read_results
+from roboirg.evaluation.analysis.stats.cells import CellResults, gather
+from roboirg.evaluation.analysis.stats.comparison import compare
+from roboirg.evaluation.analysis.stats.comparison_text import sentences
+from roboirg.evaluation.analysis.stats.intervals import SEED
+from roboirg.evaluation.analysis.stats.paired_tests import Pairs, measure_gap
+from roboirg.evaluation.analysis.tables.breakdown_table import make_breakdown_table
+from roboirg.evaluation.plan.plan import Plan, write_plan
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.records.record import Job, Record
+from roboirg.evaluation.records.store import (
+    RECORDS_FILE,
+    RecordStore,
+    read_instructions,
+    read_results,
+)
 
 app = typer.Typer()
 app.command("tables")(tables)

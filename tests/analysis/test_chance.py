@@ -10,16 +10,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from roboirg.analysis.stats.chance import FLOORS, chance_level, floor_level
-from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.job_instruction import instruct_job
+from roboirg.evaluation.analysis.stats.chance import FLOORS, chance_level, floor_level
+from roboirg.evaluation.play.job_instruction import instruct_job
+from roboirg.evaluation.records.record import Job
 from roboirg.language.settings import settings_of
 from roboirg.language.variants import all_variants
 from roboirg.policies import make_policy
 from roboirg.policies.builtin.listeners import ForgetfulPolicy
-from roboirg.records.record import Job
 from roboirg.shortcuts import SURFACE_RULES
 from roboirg.tasks import all_tasks, get_task
+from roboirg.tasks.splits.splits import get_episode
 
 DOCS = Path(__file__).parents[2] / "docs" / "statistics.md"
 

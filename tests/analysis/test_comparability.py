@@ -8,14 +8,14 @@ import io
 import pytest
 from rich.console import Console
 
-from roboirg.analysis.comparability import IMPLICIT, REAL, differences_of, merged
-from roboirg.analysis.published import MAX_STEPS
-from roboirg.analysis.stats.cells import gather
-from roboirg.analysis.tables.paper_tables import make_table
-from roboirg.analysis.tables.rendering import FORMATS
-from roboirg.analysis.tables.run_tables import make_run_tables, print_run_tables
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.evaluation.analysis.comparability import IMPLICIT, REAL, differences_of, merged
+from roboirg.evaluation.analysis.published import MAX_STEPS
+from roboirg.evaluation.analysis.stats.cells import gather
+from roboirg.evaluation.analysis.tables.paper_tables import make_table
+from roboirg.evaluation.analysis.tables.rendering import FORMATS
+from roboirg.evaluation.analysis.tables.run_tables import make_run_tables, print_run_tables
 
 WORDS = "robomme@1a2b3c4d"
 TASKS = ("PickXtimes", "StopCube")

@@ -7,10 +7,10 @@ import re
 import numpy as np
 import pytest
 
-from roboirg.analysis.stats.cells import gather
-from roboirg.analysis.stats.comparison import compare
-from roboirg.analysis.stats.comparison_text import sentences
 from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.analysis.stats.cells import gather
+from roboirg.evaluation.analysis.stats.comparison import compare
+from roboirg.evaluation.analysis.stats.comparison_text import sentences
 
 GOOD, POOR = "listener", "forgetful"
 

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 import roboirg
-from roboirg.analysis import python_run
-from roboirg.analysis.results import Results
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
-from roboirg.evaluation.plan import Plan, read_plan
-from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.api import python_run
+from roboirg.evaluation.api.results import Results
+from roboirg.evaluation.plan.plan import Plan, read_plan
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.records.record import Job, Record
+from roboirg.evaluation.records.store import read_records
 from roboirg.policies.by_name.local_policies import is_local, spec_of
-from roboirg.records.record import Job, Record
-from roboirg.records.store import read_records
 
 
 class Still:

@@ -10,22 +10,22 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from roboirg.analysis.figures import FIGURES, FigureData, write_figures
-from roboirg.analysis.figures.averages import draw_averages
-from roboirg.analysis.figures.context import draw_context
-from roboirg.analysis.figures.failures import COLORS, UNKNOWN, draw_failures
-from roboirg.analysis.figures.figure_style import STYLE
-from roboirg.analysis.figures.forms import PARTS, draw_forms
-from roboirg.analysis.published import published_rows
-from roboirg.analysis.stats.run_summary import ALL
 from roboirg.cli.report_commands import figures
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.plan import Plan
-from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.analysis.figures import FIGURES, FigureData, write_figures
+from roboirg.evaluation.analysis.figures.averages import draw_averages
+from roboirg.evaluation.analysis.figures.context import draw_context
+from roboirg.evaluation.analysis.figures.failures import COLORS, UNKNOWN, draw_failures
+from roboirg.evaluation.analysis.figures.figure_style import STYLE
+from roboirg.evaluation.analysis.figures.forms import PARTS, draw_forms
+from roboirg.evaluation.analysis.published import published_rows
+from roboirg.evaluation.analysis.stats.run_summary import ALL
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.records.record import Attribution, Result
+from roboirg.evaluation.records.store import RecordStore
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
-from roboirg.records.record import Attribution, Result
-from roboirg.records.store import RecordStore
 
 pytest.importorskip("matplotlib")
 

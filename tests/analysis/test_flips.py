@@ -7,10 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from roboirg.analysis.stats.cells import gather
-from roboirg.analysis.stats.comparison import compare
-from roboirg.analysis.stats.comparison_text import sentences
-from roboirg.analysis.stats.flips import FLIPS_FILE, read_flips
 from roboirg.apps.leaderboard.repeats import (
     count_flips,
     flips_by_cell,
@@ -19,11 +15,15 @@ from roboirg.apps.leaderboard.repeats import (
     write_flips,
 )
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.rollout_result import RolloutResult, make_record
-from roboirg.records.action_log import ActionLog, write_actions
-from roboirg.records.record import Job
-from roboirg.records.record_codec import StoreError
-from roboirg.records.store import RecordStore, read_results
+from roboirg.evaluation.analysis.stats.cells import gather
+from roboirg.evaluation.analysis.stats.comparison import compare
+from roboirg.evaluation.analysis.stats.comparison_text import sentences
+from roboirg.evaluation.analysis.stats.flips import FLIPS_FILE, read_flips
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.records.action_log import ActionLog, write_actions
+from roboirg.evaluation.records.record import Job
+from roboirg.evaluation.records.record_codec import StoreError
+from roboirg.evaluation.records.store import RecordStore, read_results
 
 
 def write_run(folder: Path, outcomes: str, rows: dict[int, np.ndarray] | None = None) -> Path:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from roboirg.analysis.stats.chance import floor_level
 from roboirg.apps.grounding.answer_floors import FLOORS, floor_answers
 from roboirg.apps.grounding.answer_scores import (
     above_chance,
@@ -20,9 +19,9 @@ from roboirg.apps.grounding.score_report import confusion_tables, report_text
 from roboirg.apps.grounding.score_tables import breakdown_tables, range_label
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.grounding_set.answer_file import Answer, read_answers, write_answers
-from roboirg.evaluation.grounding_set.grounding_item import (
+from roboirg.evaluation.analysis.stats.chance import floor_level
+from roboirg.evaluation.grounding_items.answer_file import Answer, read_answers, write_answers
+from roboirg.evaluation.grounding_items.grounding_item import (
     ITEMS_FILE,
     LETTERS,
     QUESTION_KINDS,
@@ -30,15 +29,12 @@ from roboirg.evaluation.grounding_set.grounding_item import (
     encode_items,
     encode_mask,
 )
-from roboirg.evaluation.grounding_set.item_builder import (
-    EpisodeMedia,
-    make_items,
-    wanted_options,
-)
-from roboirg.evaluation.grounding_set.verdicts import guess_chance, judge_reply, right_reply
+from roboirg.evaluation.grounding_items.item_builder import EpisodeMedia, make_items, wanted_options
+from roboirg.evaluation.grounding_items.verdicts import guess_chance, judge_reply, right_reply
+from roboirg.evaluation.records.record import Job
 from roboirg.language import setting_names
 from roboirg.main import app
-from roboirg.records.record import Job
+from roboirg.tasks.splits.splits import get_episode
 
 TASKS = ("PickXtimes", "BinFill", "VideoUnmask", "VideoPlaceButton", "StopCube")
 

@@ -14,17 +14,17 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from roboirg import main
-from roboirg.analysis.page.details import Strings, details_of
-from roboirg.analysis.page.entries import Run, make_entries
-from roboirg.analysis.page.run_warnings import run_warnings
-from roboirg.analysis.stats.heard_rates import add_up, count_heard, cut_text, heard_notes
-from roboirg.analysis.tables.heard_table import make_heard_table
-from roboirg.analysis.tables.rendering import get_format
-from roboirg.analysis.tables.run_tables import make_run_tables, print_run_tables
-from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.analysis.page.details import Strings, details_of
+from roboirg.evaluation.analysis.page.entries import Run, make_entries
+from roboirg.evaluation.analysis.page.run_warnings import run_warnings
+from roboirg.evaluation.analysis.stats.heard_rates import add_up, count_heard, cut_text, heard_notes
+from roboirg.evaluation.analysis.tables.heard_table import make_heard_table
+from roboirg.evaluation.analysis.tables.rendering import get_format
+from roboirg.evaluation.analysis.tables.run_tables import make_run_tables, print_run_tables
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.records.record import Job, Record, Result
+from roboirg.evaluation.records.store import RecordStore
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit, most_tokens
-from roboirg.records.record import Job, Record, Result
-from roboirg.records.store import RecordStore
 
 VERDICTS = st.sampled_from(["heard", "cut", "unknown"])
 OUTCOMES = st.sampled_from(["success", "failure", "error"])

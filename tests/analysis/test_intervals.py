@@ -9,20 +9,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboirg.analysis.stats.cells import (
+from roboirg.evaluation.analysis.stats.cells import (
     CellResults,
     Trial,
     cell_interval,
     clustered_interval,
 )
-from roboirg.analysis.stats.intervals import (
+from roboirg.evaluation.analysis.stats.intervals import (
     percentile_interval,
     resampled_rates,
     unseen_share,
     wilson_interval,
     without_spread,
 )
-from roboirg.analysis.stats.paired_tests import Pairs, measure_gap, sign_flip_test
+from roboirg.evaluation.analysis.stats.paired_tests import Pairs, measure_gap, sign_flip_test
 
 LONG = "ROBOIRG_LONG_TESTS" in os.environ
 """Ten times as many simulated runs."""

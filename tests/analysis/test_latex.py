@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from roboirg.analysis.stats.cells import gather
-from roboirg.analysis.tables.paper_tables import WHICH, make_table
-from roboirg.analysis.tables.rendering.latex import MOST_LINES, latex
-from roboirg.analysis.tables.table import Column, Entry, Row, Table
+from roboirg.evaluation.analysis.stats.cells import gather
+from roboirg.evaluation.analysis.tables.paper_tables import WHICH, make_table
+from roboirg.evaluation.analysis.tables.rendering.latex import MOST_LINES, latex
+from roboirg.evaluation.analysis.tables.table import Column, Entry, Row, Table
 
 DOCUMENT = r"""
 \documentclass%s{article}

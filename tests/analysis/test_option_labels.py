@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from roboirg.analysis.stats.cells import gather
-from roboirg.analysis.stats.option_labels import (
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.evaluation.analysis.stats.cells import gather
+from roboirg.evaluation.analysis.stats.option_labels import (
     default_settings,
     options_label,
     options_sort_key,
     staged_options,
 )
-from roboirg.analysis.tables.paper_tables import make_table
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.evaluation.analysis.tables.paper_tables import make_table
 from roboirg.language import STAGE_SETS
 from roboirg.language.settings import setting_names
 

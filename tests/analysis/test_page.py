@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from roboirg.analysis.page.entries import Run
-from roboirg.analysis.page.page_server import PageServer
-from roboirg.analysis.page.report import make_view, render, render_runs, write_report
-from roboirg.evaluation.plan import Plan
-from roboirg.evaluation.rollout_result import RolloutResult, make_record
-from roboirg.evaluation.video_writer import VideoWriter
-from roboirg.records.episode_log import EpisodeLog, log_path
-from roboirg.records.record import Attribution, EventRecord, Record
-from roboirg.records.store import RecordStore
+from roboirg.evaluation.analysis.page.entries import Run
+from roboirg.evaluation.analysis.page.page_server import PageServer
+from roboirg.evaluation.analysis.page.report import make_view, render, render_runs, write_report
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.play.video_writer import VideoWriter
+from roboirg.evaluation.records.episode_log import EpisodeLog, log_path
+from roboirg.evaluation.records.record import Attribution, EventRecord, Record
+from roboirg.evaluation.records.store import RecordStore
 
 pytest.importorskip("jinja2")
 pytestmark = pytest.mark.browser

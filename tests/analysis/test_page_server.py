@@ -17,13 +17,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboirg.analysis.page.page_server import PageServer
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.plan_maker import make_plan
-from roboirg.evaluation.rollout_result import RolloutResult, make_record
-from roboirg.records.record import Record
-from roboirg.records.store import RecordStore
-from roboirg.util.http_server import ByteRange, parse_range
+from roboirg.evaluation.analysis.page.page_server import PageServer
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.records.record import Record
+from roboirg.evaluation.records.store import RecordStore
+from roboirg.util.web.http_server import ByteRange, parse_range
 
 pytestmark = pytest.mark.usefixtures("patient_sockets")
 

@@ -8,18 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from roboirg.analysis.figures import FigureData, write_figures
-from roboirg.analysis.page.report import write_report
-from roboirg.analysis.stats.chance import chance_level
-from roboirg.analysis.stats.comparison import compare
-from roboirg.analysis.stats.run_summary import ALL
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.executors.executor import choose_executor
-from roboirg.evaluation.plan_maker import make_plan
-from roboirg.evaluation.rollout import EpisodeRunner
-from roboirg.evaluation.runner import run_plan
-from roboirg.records.record import Record
-from roboirg.records.store import read_records
+from roboirg.evaluation.analysis.figures import FigureData, write_figures
+from roboirg.evaluation.analysis.page.report import write_report
+from roboirg.evaluation.analysis.stats.chance import chance_level
+from roboirg.evaluation.analysis.stats.comparison import compare
+from roboirg.evaluation.analysis.stats.run_summary import ALL
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.play.rollout import EpisodeRunner
+from roboirg.evaluation.records.record import Record
+from roboirg.evaluation.records.store import read_records
+from roboirg.evaluation.run.executor import choose_executor
+from roboirg.evaluation.run.runner import run_plan
 
 pytestmark = pytest.mark.sim
 

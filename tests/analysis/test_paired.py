@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboirg.analysis.stats.cells import CellResults, Trial
-from roboirg.analysis.stats.multiple_testing import holm
-from roboirg.analysis.stats.paired_tests import (
+from roboirg.evaluation.analysis.stats.cells import CellResults, Trial
+from roboirg.evaluation.analysis.stats.multiple_testing import holm
+from roboirg.evaluation.analysis.stats.paired_tests import (
     Overlap,
     Pairs,
     measure_gap,

@@ -14,16 +14,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from roboirg.analysis.stats.cells import gather
-from roboirg.analysis.stats.rates import change, mean_percent, percent
-from roboirg.analysis.tables.paper_tables import is_informative, make_table
-from roboirg.analysis.tables.rendering import FORMATS, get_format
-from roboirg.analysis.tables.rendering.terminal import renderable
-from roboirg.analysis.tables.table import Entry
 from roboirg.core.errors import UnknownNameError
-from roboirg.evaluation.rollout_result import RolloutResult, make_record
-from roboirg.records.record import Job, Record
-from roboirg.records.record_codec import read_summary
+from roboirg.evaluation.analysis.stats.cells import gather
+from roboirg.evaluation.analysis.stats.rates import change, mean_percent, percent
+from roboirg.evaluation.analysis.tables.paper_tables import is_informative, make_table
+from roboirg.evaluation.analysis.tables.rendering import FORMATS, get_format
+from roboirg.evaluation.analysis.tables.rendering.terminal import renderable
+from roboirg.evaluation.analysis.tables.table import Entry
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.records.record import Job, Record
+from roboirg.evaluation.records.record_codec import read_summary
 from roboirg.tasks import all_tasks
 
 

@@ -7,9 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roboirg.analysis.stats.paired_tests import sign_flip_test
-from roboirg.analysis.stats.power import MAX_EPISODES, episodes_needed, mcnemar_power, smallest_gap
 from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.analysis.stats.paired_tests import sign_flip_test
+from roboirg.evaluation.analysis.stats.power import (
+    MAX_EPISODES,
+    episodes_needed,
+    mcnemar_power,
+    smallest_gap,
+)
 
 
 def test_power_by_hand() -> None:

@@ -9,20 +9,20 @@ from importlib import resources
 
 import pytest
 
-from roboirg.analysis.published import (
+from roboirg.core.errors import UnknownNameError
+from roboirg.evaluation.analysis.published import (
     RATE_TABLES,
     TRIALS,
     published_coverage,
     published_rows,
     published_tasks,
 )
-from roboirg.analysis.stats.cells import gather
-from roboirg.analysis.stats.rates import mean_percent, percent
-from roboirg.analysis.tables.paper_tables import WHICH, make_table
-from roboirg.analysis.tables.rendering import FORMATS
-from roboirg.analysis.tables.table import Row, Table
-from roboirg.analysis.tables.table_notes import TWIN_MARK
-from roboirg.core.errors import UnknownNameError
+from roboirg.evaluation.analysis.stats.cells import gather
+from roboirg.evaluation.analysis.stats.rates import mean_percent, percent
+from roboirg.evaluation.analysis.tables.paper_tables import WHICH, make_table
+from roboirg.evaluation.analysis.tables.rendering import FORMATS
+from roboirg.evaluation.analysis.tables.table import Row, Table
+from roboirg.evaluation.analysis.tables.table_notes import TWIN_MARK
 from roboirg.language import STAGE_SETS
 from roboirg.language.settings import settings_of
 from roboirg.tasks import all_tasks
@@ -32,7 +32,9 @@ FILES = {"main": "main", "planner": "planner", "context": "context", "real": "re
 
 def printed(table: str) -> list[dict[str, str]]:
     """The file as it is, without the loader."""
-    path = resources.files("roboirg.analysis") / "published_results" / f"{FILES[table]}.csv"
+    path = (
+        resources.files("roboirg.evaluation.analysis") / "published_results" / f"{FILES[table]}.csv"
+    )
     return list(csv.DictReader(path.read_text().splitlines()))
 
 

@@ -13,18 +13,24 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from roboirg.analysis.page import episode_videos
-from roboirg.analysis.page.columns import UNATTRIBUTED
-from roboirg.analysis.page.entries import Run
-from roboirg.analysis.page.report import make_view, render, render_runs, write_report
 from roboirg.cli.report_commands import report
 from roboirg.core.episode import ENVIRONMENT_VERSION
-from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.plan import Plan, write_plan
-from roboirg.evaluation.rollout_result import RolloutResult, make_record
-from roboirg.records.episode_log import EpisodeLog, log_path
-from roboirg.records.record import Attribution, EventRecord, MentionSpan, Record, UtteranceRecord
-from roboirg.records.store import RecordStore, StoreError
+from roboirg.evaluation.analysis.page import episode_videos
+from roboirg.evaluation.analysis.page.columns import UNATTRIBUTED
+from roboirg.evaluation.analysis.page.entries import Run
+from roboirg.evaluation.analysis.page.report import make_view, render, render_runs, write_report
+from roboirg.evaluation.plan.plan import Plan, write_plan
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.records.episode_log import EpisodeLog, log_path
+from roboirg.evaluation.records.record import (
+    Attribution,
+    EventRecord,
+    MentionSpan,
+    Record,
+    UtteranceRecord,
+)
+from roboirg.evaluation.records.store import RecordStore, StoreError
+from roboirg.tasks.splits.splits import get_episode
 
 pytest.importorskip("jinja2")
 

@@ -7,20 +7,20 @@ import io
 import pytest
 from rich.console import Console
 
-from roboirg.analysis.stats.option_labels import REFERENCE, options_label
-from roboirg.analysis.stats.paired_tests import Overlap
-from roboirg.analysis.stats.rates import points
-from roboirg.analysis.stats.run_summary import ALL, Scope
-from roboirg.analysis.tables.run_tables import (
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.evaluation.analysis.stats.option_labels import REFERENCE, options_label
+from roboirg.evaluation.analysis.stats.paired_tests import Overlap
+from roboirg.evaluation.analysis.stats.rates import points
+from roboirg.evaluation.analysis.stats.run_summary import ALL, Scope
+from roboirg.evaluation.analysis.tables.run_tables import (
     NO_GAP,
     gap_text,
     make_run_tables,
     print_failures,
     print_run_tables,
 )
-from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.rollout_result import RolloutResult, make_record
-from roboirg.records.record import Job, Record
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.records.record import Job, Record
 
 DIRECT = InstructionOptions("direct")
 TASK = Scope(task="PickXtimes")

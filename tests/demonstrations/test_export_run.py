@@ -19,7 +19,7 @@ from roboirg.apps.demonstrations import export_run
 from roboirg.apps.demonstrations.dataset_reading import read_dataset
 from roboirg.apps.demonstrations.size_estimate import estimate_size
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.episodes.splits import get_episode
+from roboirg.tasks.splits.splits import get_episode
 
 HERE = Path(__file__).parent
 KILLS = int(os.environ.get("ROBOIRG_TEST_KILLS", "4"))

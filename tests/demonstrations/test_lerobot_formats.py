@@ -12,8 +12,8 @@ from PIL import Image
 from pyarrow import parquet
 
 from roboirg.apps.demonstrations.dataset_reading import read_dataset
-from roboirg.episodes.splits import get_episode
 from roboirg.language import instruct
+from roboirg.tasks.splits.splits import get_episode
 
 CAMERAS = ("front", "wrist")
 

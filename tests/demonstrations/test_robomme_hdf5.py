@@ -7,8 +7,8 @@ import pytest
 import synthetic_trajectories as synthetic
 
 from roboirg.apps.demonstrations.dataset_reading import read_dataset
-from roboirg.episodes.splits import get_episode
 from roboirg.language import instruct
+from roboirg.tasks.splits.splits import get_episode
 
 h5py = pytest.importorskip("h5py")
 

@@ -18,7 +18,7 @@ from roboirg.apps.demonstrations.trajectory import (
 )
 from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec, _with_pixels
 from roboirg.core.errors import InvalidValueError
-from roboirg.episodes.splits import get_episode
+from roboirg.tasks.splits.splits import get_episode
 
 
 def frames_of(content):

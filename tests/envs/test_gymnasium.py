@@ -13,8 +13,8 @@ from gymnasium import wrappers
 import roboirg
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.envs.registration import environment_id
-from roboirg.episodes.splits import get_episode
 from roboirg.simulation.physics_settings import HOME_ACTION
+from roboirg.tasks.splits.splits import get_episode
 
 pytestmark = pytest.mark.sim
 

@@ -15,8 +15,8 @@ from gymnasium.vector import AutoresetMode
 import roboirg
 from roboirg.core.errors import InvalidActionError, InvalidValueError, UnknownNameError
 from roboirg.envs.registration import environment_id
-from roboirg.envs.vector_infos import stack_infos
-from roboirg.envs.vector_workers import SubEnvironmentError
+from roboirg.envs.vector.vector_infos import stack_infos
+from roboirg.envs.vector.vector_workers import SubEnvironmentError
 from roboirg.simulation.physics_settings import HOME_ACTION
 
 pytestmark = pytest.mark.sim

@@ -18,14 +18,14 @@ from hypothesis import strategies as st
 from roboirg.core.episode import DIFFICULTIES, SPLITS, Scene, SceneObject
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.motions import Point, Swap
-from roboirg.episodes import published_episodes
-from roboirg.episodes.episode_export import episode_row, write_episodes
-from roboirg.episodes.published_episodes import published_episode, published_text
-from roboirg.episodes.recordings import INCOMPLETE, is_recorded, recorded_actions
-from roboirg.episodes.scene_codec import decode, encode
-from roboirg.episodes.splits import SIZES, get_episode
 from roboirg.main import app
 from roboirg.tasks import all_tasks, every_task, get_task
+from roboirg.tasks.splits import published_episodes
+from roboirg.tasks.splits.episode_export import episode_row, write_episodes
+from roboirg.tasks.splits.published_episodes import published_episode, published_text
+from roboirg.tasks.splits.recordings import INCOMPLETE, is_recorded, recorded_actions
+from roboirg.tasks.splits.scene_codec import decode, encode
+from roboirg.tasks.splits.splits import SIZES, get_episode
 
 ROWS = Path(__file__).parent / "robomme"
 SCRIPT = Path(__file__).parents[2] / "scripts" / "convert_robomme_episodes.py"

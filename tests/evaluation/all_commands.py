@@ -2,12 +2,12 @@
 
 import typer.main
 
-from roboirg.evaluation.plan import write_plan
-from roboirg.evaluation.plan_maker import make_plan
-from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.plan.plan import write_plan
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.records.record import Job
+from roboirg.evaluation.records.store import RecordStore
 from roboirg.main import app
-from roboirg.records.record import Job
-from roboirg.records.store import RecordStore
 
 
 def all_commands():

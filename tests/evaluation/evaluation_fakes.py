@@ -12,12 +12,12 @@ from pathlib import Path
 
 from roboirg.core.errors import RenderDeviceError
 from roboirg.core.waiting import waiting
-from roboirg.evaluation.executors.executor import LocalProcesses
-from roboirg.evaluation.executors.watchdog import watched
-from roboirg.evaluation.plan import Plan
-from roboirg.evaluation.rollout_result import RolloutResult, make_record
-from roboirg.evaluation.runner import run_plan
-from roboirg.records.record import NON_DETERMINISTIC_FIELDS, EventRecord, Job, Record
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.play.watchdog import watched
+from roboirg.evaluation.records.record import NON_DETERMINISTIC_FIELDS, EventRecord, Job, Record
+from roboirg.evaluation.run.executor import LocalProcesses
+from roboirg.evaluation.run.runner import run_plan
 
 
 @dataclass(frozen=True)

@@ -9,15 +9,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from roboirg.records.action_log import (
+from roboirg.evaluation.records.action_log import (
     ACTION_FOLDER,
     ActionLog,
     action_path,
     read_actions,
     write_actions,
 )
-from roboirg.records.plan_files import PLAN_FILE
-from roboirg.records.store import RECORDS_FILE
+from roboirg.evaluation.records.plan_files import PLAN_FILE
+from roboirg.evaluation.records.store import RECORDS_FILE
 
 Lines = list[dict[str, Any]]
 Forgery = Callable[[Lines, Path, random.Random], Lines | None]

@@ -58,7 +58,7 @@ class Patcher(Hostile):
     """Makes every episode a success."""
 
     def act(self, observation: Any) -> Any:
-        from roboirg.evaluation import rollout_result
+        from roboirg.evaluation.play import rollout_result
         from roboirg.judging import Judge
 
         patched: Any = rollout_result.RolloutResult

@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from roboirg.evaluation import rollout
-from roboirg.evaluation.executors.executor import LocalProcesses
 from roboirg.evaluation.hosting.host_pool import HostSettings
-from roboirg.evaluation.job_instruction import instruct_job
-from roboirg.evaluation.plan import Plan
-from roboirg.evaluation.rollout import EpisodeRunner
-from roboirg.evaluation.runner import run_plan
-from roboirg.records.record import Job, Record
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.play import rollout
+from roboirg.evaluation.play.job_instruction import instruct_job
+from roboirg.evaluation.play.rollout import EpisodeRunner
+from roboirg.evaluation.records.record import Job, Record
+from roboirg.evaluation.run.executor import LocalProcesses
+from roboirg.evaluation.run.runner import run_plan
 
 LENGTH = 24
 """Control steps of an episode."""

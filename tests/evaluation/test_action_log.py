@@ -11,8 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from roboirg.records.action_log import ActionLog, action_path, read_actions, write_actions
-from roboirg.records.record_codec import StoreError
+from roboirg.evaluation.records.action_log import (
+    ActionLog,
+    action_path,
+    read_actions,
+    write_actions,
+)
+from roboirg.evaluation.records.record_codec import StoreError
 
 finite = st.floats(-1e6, 1e6)
 

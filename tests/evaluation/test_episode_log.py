@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from roboirg.records.episode_log import EpisodeLog, log_path, logged_output, logged_slugs
+from roboirg.evaluation.records.episode_log import EpisodeLog, log_path, logged_output, logged_slugs
 
 LONG_WAIT_S = 300.0
 PRINTS = """
 import ctypes, logging, os, subprocess, sys, warnings
 from pathlib import Path
-from roboirg.records.episode_log import logged_output
+from roboirg.evaluation.records.episode_log import logged_output
 print("before")
 with logged_output(Path(sys.argv[1])):
     print("by print")
@@ -35,7 +35,7 @@ print("after")
 FLOODS = """
 import sys
 from pathlib import Path
-from roboirg.records.episode_log import logged_output
+from roboirg.evaluation.records.episode_log import logged_output
 with logged_output(Path(sys.argv[1]), 10_000):
     print("first words")
     for number in range(200_000):
@@ -45,7 +45,7 @@ with logged_output(Path(sys.argv[1]), 10_000):
 DIES = """
 import os, signal, sys
 from pathlib import Path
-from roboirg.records.episode_log import logged_output
+from roboirg.evaluation.records.episode_log import logged_output
 with logged_output(Path(sys.argv[1])):
     print("my last words")
     os.kill(os.getpid(), signal.SIGKILL)
@@ -53,7 +53,7 @@ with logged_output(Path(sys.argv[1])):
 CLOSES = """
 import os, sys
 from pathlib import Path
-from roboirg.records.episode_log import logged_output
+from roboirg.evaluation.records.episode_log import logged_output
 with logged_output(Path(sys.argv[1])):
     print("hello")
     os.close(1)

@@ -6,21 +6,11 @@ import pytest
 from evaluation_fakes import FakePlay, small_plan
 
 from roboirg.evaluation.episode_errors import EpisodeError
-from roboirg.evaluation.plan_maker import make_plan
-from roboirg.evaluation.time_estimate import world_speed
-from roboirg.evaluation.time_estimate.estimate import (
-    ORACLE_STEPS,
-    cell_sizes,
-    estimate,
-    estimate_text,
-)
-from roboirg.evaluation.time_estimate.world_speed import (
-    ASSUMED,
-    WorldSpeed,
-    has_video,
-    measure_world,
-)
-from roboirg.records.store import RecordStore, read_index
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.records.store import RecordStore, read_index
+from roboirg.evaluation.run import world_speed
+from roboirg.evaluation.run.estimate import ORACLE_STEPS, cell_sizes, estimate, estimate_text
+from roboirg.evaluation.run.world_speed import ASSUMED, WorldSpeed, has_video, measure_world
 
 
 def test_cells_are_counted_by_policy_task_setting_and_form() -> None:

@@ -20,12 +20,12 @@ from forgeries import FORGERIES, forge
 
 from roboirg.apps.leaderboard.record_check import LineToCheck, ReplayVerdict, check_line
 from roboirg.apps.leaderboard.run_verification import verify_run
-from roboirg.evaluation.executors.executor import Executor, InProcess, LocalProcesses
-from roboirg.evaluation.executors.ray_cluster import RayCluster
-from roboirg.evaluation.plan_maker import make_plan
-from roboirg.evaluation.rollout import EpisodeRunner
-from roboirg.evaluation.runner import run_plan
-from roboirg.records.store import RECORDS_FILE, read_records
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.play.rollout import EpisodeRunner
+from roboirg.evaluation.records.store import RECORDS_FILE, read_records
+from roboirg.evaluation.run.executor import Executor, InProcess, LocalProcesses
+from roboirg.evaluation.run.ray_cluster import RayCluster
+from roboirg.evaluation.run.runner import run_plan
 from roboirg.tasks import ALL, find_tasks
 
 pytestmark = pytest.mark.sim

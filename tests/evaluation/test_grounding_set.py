@@ -19,25 +19,24 @@ from roboirg.apps.grounding.dataset_export import export_grounding
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.envs.environment import RoboIRGEnv
-from roboirg.episodes.splits import SIZES, get_episode
-from roboirg.evaluation.grounding_set import question_set
-from roboirg.evaluation.grounding_set.grounding_item import (
+from roboirg.evaluation.grounding_items import question_set
+from roboirg.evaluation.grounding_items.grounding_item import (
     LETTERS,
     PointTarget,
     decode_mask,
     encode_mask,
     read_items,
 )
-from roboirg.evaluation.grounding_set.item_builder import (
+from roboirg.evaluation.grounding_items.item_builder import (
     EpisodeMedia,
     item_id,
     make_items,
     wanted_options,
     words_back,
 )
-from roboirg.evaluation.grounding_set.question_set import EpisodeName, ExportRequest
-from roboirg.evaluation.grounding_set.referents import find_referents, pointed_kinds
-from roboirg.evaluation.grounding_set.seen_scene import nearest_to_center
+from roboirg.evaluation.grounding_items.question_set import EpisodeName, ExportRequest
+from roboirg.evaluation.grounding_items.referents import find_referents, pointed_kinds
+from roboirg.evaluation.grounding_items.seen_scene import nearest_to_center
 from roboirg.language import FORMS, instruct, setting_names
 from roboirg.language.settings import all_settings
 from roboirg.main import app
@@ -45,6 +44,7 @@ from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.policies.vlm.prompts import load_prompts
 from roboirg.reader import interpret
 from roboirg.tasks import all_tasks, get_task
+from roboirg.tasks.splits.splits import SIZES, get_episode
 
 BENCHMARK = [name for name, task in all_tasks().items() if task.suite != "real"]
 SEEN = [

@@ -6,13 +6,13 @@ import pytest
 from evaluation_fakes import FakePlay, small_plan
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.executors.executor import InProcess
-from roboirg.evaluation.runner import run_plan
-from roboirg.records.episode_log import EpisodeLog, log_path
-from roboirg.records.merging import merge_runs
-from roboirg.records.record import Record
-from roboirg.records.record_codec import identity_key
-from roboirg.records.store import RecordStore, StoreError, read_records
+from roboirg.evaluation.records.episode_log import EpisodeLog, log_path
+from roboirg.evaluation.records.merging import merge_runs
+from roboirg.evaluation.records.record import Record
+from roboirg.evaluation.records.record_codec import identity_key
+from roboirg.evaluation.records.store import RecordStore, StoreError, read_records
+from roboirg.evaluation.run.executor import InProcess
+from roboirg.evaluation.run.runner import run_plan
 
 
 def fill(folder: Path, *records: Record) -> Path:

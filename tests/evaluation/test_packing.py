@@ -12,11 +12,11 @@ from evaluation_fakes import fake_result
 
 from roboirg.apps.leaderboard.packing import MANIFEST, opened_run, pack_run, read_manifest
 from roboirg.core.errors import RoboIRGError
-from roboirg.evaluation.rollout_result import make_record
-from roboirg.records.action_log import ActionLog, write_actions
-from roboirg.records.record import Job
-from roboirg.records.record_codec import StoreError
-from roboirg.records.store import RecordStore, read_records
+from roboirg.evaluation.play.rollout_result import make_record
+from roboirg.evaluation.records.action_log import ActionLog, write_actions
+from roboirg.evaluation.records.record import Job
+from roboirg.evaluation.records.record_codec import StoreError
+from roboirg.evaluation.records.store import RecordStore, read_records
 
 
 @pytest.fixture

@@ -8,8 +8,8 @@ import pytest
 from evaluation_fakes import FakePlay, small_plan
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.records.parquet import write_parquet
-from roboirg.records.record import Attribution, Record
+from roboirg.evaluation.records.parquet import write_parquet
+from roboirg.evaluation.records.record import Attribution, Record
 
 
 def test_a_table_holds_every_field_of_every_record(tmp_path: Path) -> None:

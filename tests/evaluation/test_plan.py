@@ -5,19 +5,19 @@ from pathlib import Path
 import pytest
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.plan import Plan, read_plan, write_plan
-from roboirg.evaluation.plan_maker import make_plan
-from roboirg.evaluation.plan_parsing import (
+from roboirg.evaluation.plan.plan import Plan, read_plan, write_plan
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.plan_parsing import (
     parse_episodes,
     parse_numbers,
     parse_policies,
     parse_stages,
 )
+from roboirg.evaluation.records.record import Job
+from roboirg.evaluation.records.record_codec import identity_key
 from roboirg.language import expressible
-from roboirg.records.record import Job
-from roboirg.records.record_codec import identity_key
 from roboirg.tasks import all_tasks
+from roboirg.tasks.splits.splits import get_episode
 
 
 def test_a_number_is_the_first_episodes_and_a_list_is_a_list() -> None:

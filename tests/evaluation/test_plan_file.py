@@ -7,9 +7,9 @@ import pytest
 import yaml
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.plan import write_plan
-from roboirg.evaluation.plan_file import named_plans, read_plan_file
-from roboirg.evaluation.plan_maker import make_plan
+from roboirg.evaluation.plan.plan import write_plan
+from roboirg.evaluation.plan.plan_file import named_plans, read_plan_file
+from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.language import STAGE_SETS
 from roboirg.tasks import all_tasks
 

@@ -11,14 +11,14 @@ from pathlib import Path
 import pytest
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.job_instruction import instruct_job
-from roboirg.evaluation.plan import Plan, read_plan, write_plan
-from roboirg.evaluation.plan_file import read_plan_file
-from roboirg.evaluation.plan_maker import make_plan
+from roboirg.evaluation.plan.plan import Plan, read_plan, write_plan
+from roboirg.evaluation.plan.plan_file import read_plan_file
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.play.job_instruction import instruct_job
+from roboirg.evaluation.records.record import Job
+from roboirg.evaluation.records.record_codec import identity_key
+from roboirg.evaluation.records.store import read_records
 from roboirg.language.wordings import wording_store
-from roboirg.records.record import Job
-from roboirg.records.record_codec import identity_key
-from roboirg.records.store import read_records
 
 FILE = """\
 name = "test"

@@ -21,17 +21,17 @@ from hosting_fakes import PaperRunner, paper_plan, paper_runner
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError
-from roboirg.evaluation.executors.executor import Executor, InProcess, LocalProcesses
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.hosting.payload import BLOCK_SIZE, pack_payload, unpack_payload
-from roboirg.evaluation.plan import Plan
-from roboirg.evaluation.policy_descriptions import describe_policy
-from roboirg.evaluation.runner import run_plan
+from roboirg.evaluation.hosting.policy_descriptions import describe_policy
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.records.record import Job, Record
+from roboirg.evaluation.records.store import RECORDS_FILE, read_contents, read_records
+from roboirg.evaluation.run.executor import Executor, InProcess, LocalProcesses
+from roboirg.evaluation.run.runner import run_plan
 from roboirg.policies.by_name.loading import is_foreign, needs_host
 from roboirg.policies.contract.requirements import wanted_cameras, wanted_history
-from roboirg.records.record import Job, Record
-from roboirg.records.store import RECORDS_FILE, read_contents, read_records
 
 KILLS = int(os.environ.get("ROBOIRG_TEST_KILLS", "24"))
 
@@ -472,7 +472,7 @@ class It:
         return np.ones((1, 8))
 """,
     )
-    monkeypatch.setattr("roboirg.evaluation.rollout.MAX_LOSSES", 2)
+    monkeypatch.setattr("roboirg.evaluation.play.rollout.MAX_LOSSES", 2)
     plan = paper_plan(spec, 1)
     runner: PaperRunner = paper_runner(plan, tmp_path, seconds=0.2)
     (record,) = InProcess().run(plan.jobs(), runner)

@@ -17,15 +17,15 @@ from pydantic import ValidationError
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
-from roboirg.evaluation.executors.executor import InProcess, LocalProcesses
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
-from roboirg.evaluation.plan import Plan
-from roboirg.evaluation.plan_maker import make_plan
-from roboirg.evaluation.runner import run_plan
-from roboirg.records.episode_log import MAX_LOG_BYTES, log_path, logged_slugs
-from roboirg.records.record import Job, Record
-from roboirg.records.store import read_records
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.records.episode_log import MAX_LOG_BYTES, log_path, logged_slugs
+from roboirg.evaluation.records.record import Job, Record
+from roboirg.evaluation.records.store import read_records
+from roboirg.evaluation.run.executor import InProcess, LocalProcesses
+from roboirg.evaluation.run.runner import run_plan
 
 HONEST = "hosting_fakes:Dice"
 

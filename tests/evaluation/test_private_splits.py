@@ -14,11 +14,20 @@ import pytest
 from evaluation_fakes import FakePlay
 from typer.testing import CliRunner
 
-from roboirg.analysis.page.report import write_report
 from roboirg.apps.leaderboard.packing import pack_run
 from roboirg.apps.leaderboard.run_verification import verify_run
 from roboirg.core.errors import InvalidValueError, SceneRejectedError
-from roboirg.episodes.private_splits import (
+from roboirg.evaluation.analysis.page.report import write_report
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.play.rollout import EpisodeRunner
+from roboirg.evaluation.records.merging import merge_runs
+from roboirg.evaluation.records.store import read_records
+from roboirg.evaluation.run.executor import InProcess, LocalProcesses
+from roboirg.evaluation.run.ray_cluster import RayCluster
+from roboirg.evaluation.run.runner import run_plan
+from roboirg.main import app
+from roboirg.tasks import ALL, find_tasks
+from roboirg.tasks.splits.private_splits import (
     SALT_VARIABLE,
     MissingSaltError,
     is_private,
@@ -27,16 +36,7 @@ from roboirg.episodes.private_splits import (
     use_salt,
     with_salt,
 )
-from roboirg.episodes.splits import CYCLE, get_episode, make_episode, split_size
-from roboirg.evaluation.executors.executor import InProcess, LocalProcesses
-from roboirg.evaluation.executors.ray_cluster import RayCluster
-from roboirg.evaluation.plan_maker import make_plan
-from roboirg.evaluation.rollout import EpisodeRunner
-from roboirg.evaluation.runner import run_plan
-from roboirg.main import app
-from roboirg.records.merging import merge_runs
-from roboirg.records.store import read_records
-from roboirg.tasks import ALL, find_tasks
+from roboirg.tasks.splits.splits import CYCLE, get_episode, make_episode, split_size
 
 SALT = "a salt that nobody guesses"
 OTHER = "another salt that nobody guesses"

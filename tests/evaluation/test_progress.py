@@ -6,7 +6,7 @@ import pytest
 from evaluation_fakes import FakePlay, small_plan
 from rich.console import Console
 
-from roboirg.evaluation.progress import ConsoleReporter, ProgressCounter
+from roboirg.evaluation.run.progress import ConsoleReporter, ProgressCounter
 
 RECORDS = [FakePlay()(job) for job in small_plan(2).jobs()]
 

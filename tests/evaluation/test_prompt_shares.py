@@ -13,13 +13,13 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from roboirg import main
-from roboirg.analysis.stats.heard_rates import count_heard
-from roboirg.analysis.tables.run_tables import make_run_tables, print_run_tables
 from roboirg.core.errors import UnknownNameError
-from roboirg.evaluation.job_instruction import instruct_job
-from roboirg.evaluation.plan_file import read_plan_file
-from roboirg.evaluation.plan_maker import make_plan
-from roboirg.evaluation.prompt_shares import (
+from roboirg.evaluation.analysis.stats.heard_rates import count_heard
+from roboirg.evaluation.analysis.tables.run_tables import make_run_tables, print_run_tables
+from roboirg.evaluation.plan.plan_file import read_plan_file
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.play.job_instruction import instruct_job
+from roboirg.evaluation.play.prompt_shares import (
     audit_job,
     prompt_shares,
     sent_messages,
@@ -27,12 +27,12 @@ from roboirg.evaluation.prompt_shares import (
     too_long_text,
     warning_lines,
 )
-from roboirg.evaluation.rollout import EpisodeRunner
-from roboirg.evaluation.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.play.rollout import EpisodeRunner
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.records.record import IDENTITY, Job, Record
+from roboirg.evaluation.records.store import read_records
 from roboirg.policies.by_name.systems import all_systems
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit, most_tokens
-from roboirg.records.record import IDENTITY, Job, Record
-from roboirg.records.store import read_records
 
 SYSTEMS = [f"system:{name}" for name in all_systems()]
 EXACT = PromptLimit(64, 0, most_tokens, "some.model")

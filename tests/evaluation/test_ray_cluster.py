@@ -15,10 +15,10 @@ from evaluation_fakes import FakePlayer, comparable, is_alive, small_plan, worke
 from hosting_fakes import PatientRunner, paper_plan, paper_runner
 
 from roboirg.core.errors import InvalidValueError, RenderDeviceError, RoboIRGError
-from roboirg.evaluation.executors.executor import InProcess, LocalProcesses
-from roboirg.evaluation.executors.ray_cluster import RayCluster
-from roboirg.evaluation.runner import run_plan
-from roboirg.records.store import RECORDS_FILE, read_records
+from roboirg.evaluation.records.store import RECORDS_FILE, read_records
+from roboirg.evaluation.run.executor import InProcess, LocalProcesses
+from roboirg.evaluation.run.ray_cluster import RayCluster
+from roboirg.evaluation.run.runner import run_plan
 
 ray = pytest.importorskip("ray")
 

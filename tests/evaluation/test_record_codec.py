@@ -11,11 +11,9 @@ import msgspec
 import pytest
 from evaluation_fakes import FakePlay, small_plan
 
-from roboirg.evaluation.executors.executor import InProcess
-from roboirg.evaluation.runner import run_plan
-from roboirg.records.record import Job, Result
-from roboirg.records.record_codec import identity_key
-from roboirg.records.store import (
+from roboirg.evaluation.records.record import Job, Result
+from roboirg.evaluation.records.record_codec import identity_key
+from roboirg.evaluation.records.store import (
     RECORDS_FILE,
     RecordStore,
     StoreError,
@@ -24,6 +22,8 @@ from roboirg.records.store import (
     read_records,
     read_results,
 )
+from roboirg.evaluation.run.executor import InProcess
+from roboirg.evaluation.run.runner import run_plan
 
 
 def write(folder: Path, *lines: bytes) -> Path:
@@ -109,7 +109,7 @@ def test_very_many_records_need_little_memory(tmp_path: Path) -> None:
             file.write(line.replace(seed, b'"policy_seed":%d' % number) + b"\n")
     code = (
         "import pathlib, sys\n"
-        "from roboirg.records.store import RecordStore\n"
+        "from roboirg.evaluation.records.store import RecordStore\n"
         "with RecordStore(pathlib.Path(sys.argv[1])) as store:\n"
         "    count = len(store.stored)\n"
         # Not what `resource` tells, which may be the parent's from before the fork.

@@ -10,13 +10,13 @@ import pytest
 from evaluation_fakes import FakePlay, small_plan
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation import record_hook
-from roboirg.evaluation.executors.executor import InProcess
-from roboirg.evaluation.progress import SilentReporter
-from roboirg.evaluation.record_hook import CommandHook, HookedReporter, RecordFunction
-from roboirg.evaluation.runner import RunSummary, run_plan
-from roboirg.records.record import Record
-from roboirg.records.store import read_records
+from roboirg.evaluation.records.record import Record
+from roboirg.evaluation.records.store import read_records
+from roboirg.evaluation.run import record_hook
+from roboirg.evaluation.run.executor import InProcess
+from roboirg.evaluation.run.progress import SilentReporter
+from roboirg.evaluation.run.record_hook import CommandHook, HookedReporter, RecordFunction
+from roboirg.evaluation.run.runner import RunSummary, run_plan
 
 
 class Listening(SilentReporter):

@@ -17,14 +17,14 @@ from roboirg.core.errors import (
     MotionPlanningError,
     RenderDeviceError,
 )
-from roboirg.evaluation import rollout
 from roboirg.evaluation.episode_errors import one_line
-from roboirg.evaluation.job_instruction import instruct_job
-from roboirg.evaluation.rollout import EpisodeRunner, load_policy, play_episode
-from roboirg.evaluation.rollout_result import RolloutResult
-from roboirg.evaluation.video_writer import VideoWriter
-from roboirg.records.film import VideoOptions
-from roboirg.records.record import EventRecord, Job, Record
+from roboirg.evaluation.play import rollout
+from roboirg.evaluation.play.job_instruction import instruct_job
+from roboirg.evaluation.play.rollout import EpisodeRunner, load_policy, play_episode
+from roboirg.evaluation.play.rollout_result import RolloutResult
+from roboirg.evaluation.play.video_writer import VideoWriter
+from roboirg.evaluation.records.film import VideoOptions
+from roboirg.evaluation.records.record import EventRecord, Job, Record
 
 JOB = Job(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
 

@@ -14,12 +14,12 @@ import pytest
 from evaluation_fakes import FakePlay, comparable, is_alive, small_plan, starts, worker_pids
 
 from roboirg.core.errors import InvalidValueError, RenderDeviceError
-from roboirg.evaluation.executors.executor import InProcess, LocalProcesses, choose_executor
-from roboirg.evaluation.plan import read_plan
-from roboirg.evaluation.progress import SilentReporter
-from roboirg.evaluation.runner import RunSummary, run_plan
-from roboirg.records.record import Job, Record
-from roboirg.records.store import RECORDS_FILE, RecordStore, StoreError, read_records
+from roboirg.evaluation.plan.plan import read_plan
+from roboirg.evaluation.records.record import Job, Record
+from roboirg.evaluation.records.store import RECORDS_FILE, RecordStore, StoreError, read_records
+from roboirg.evaluation.run.executor import InProcess, LocalProcesses, choose_executor
+from roboirg.evaluation.run.progress import SilentReporter
+from roboirg.evaluation.run.runner import RunSummary, run_plan
 
 WAIT_S = 20.0
 
@@ -155,7 +155,7 @@ def test_words_of_two_versions_are_not_mixed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run_plan(small_plan(1), tmp_path, FakePlay(), InProcess())
-    monkeypatch.setattr("roboirg.evaluation.runner.LANGUAGE_VERSION", "99.0")
+    monkeypatch.setattr("roboirg.evaluation.run.runner.LANGUAGE_VERSION", "99.0")
     with pytest.raises(
         StoreError, match=r"language version .*, but this roboirg has version 99\.0"
     ):

@@ -13,9 +13,9 @@ from pathlib import Path
 import evaluation_fakes
 from evaluation_fakes import FakePlay, comparable, is_alive, small_plan, worker_pids
 
-from roboirg.evaluation.executors.executor import InProcess
-from roboirg.evaluation.runner import run_plan
-from roboirg.records.store import RECORDS_FILE, read_contents, read_records
+from roboirg.evaluation.records.store import RECORDS_FILE, read_contents, read_records
+from roboirg.evaluation.run.executor import InProcess
+from roboirg.evaluation.run.runner import run_plan
 
 KILLS = int(os.environ.get("ROBOIRG_TEST_KILLS", "12"))
 EPISODES, SEEDS = 25, max(1, KILLS // 12)

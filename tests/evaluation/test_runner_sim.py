@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 from evaluation_fakes import comparable
 
-from roboirg.evaluation.plan import read_plan
-from roboirg.records.episode_log import log_path
-from roboirg.records.store import RECORDS_FILE, read_records
+from roboirg.evaluation.plan.plan import read_plan
+from roboirg.evaluation.records.episode_log import log_path
+from roboirg.evaluation.records.store import RECORDS_FILE, read_records
 
 pytestmark = pytest.mark.sim
 

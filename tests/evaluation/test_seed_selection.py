@@ -24,10 +24,10 @@ from roboirg.apps.split_search.seed_selection import (
 from roboirg.apps.split_search.seed_summary import cause_lines, follow_progress, print_summary
 from roboirg.core.episode import SPLITS
 from roboirg.core.errors import InvalidValueError, RoboIRGError, SceneRejectedError
-from roboirg.episodes.splits import SIZES, TaskSplits, get_episode, shipped_splits, slot_seed
 from roboirg.language import expressible, find_refusals
 from roboirg.language.settings import all_settings, settings_of
 from roboirg.tasks import every_task, get_task
+from roboirg.tasks.splits.splits import SIZES, TaskSplits, get_episode, shipped_splits, slot_seed
 
 TASKS = tuple(every_task())
 REJECTED = Rejection(0, "no room", "no place")

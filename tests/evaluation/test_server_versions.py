@@ -8,18 +8,18 @@ import pytest
 from evaluation_fakes import FakePlay
 from wire_servers import ChallengeServer
 
-from roboirg.analysis.stats.cells import Versions, gather, labels
-from roboirg.evaluation.executors.executor import InProcess
-from roboirg.evaluation.plan import Plan
-from roboirg.evaluation.plan_maker import make_plan
-from roboirg.evaluation.rollout_result import RolloutResult, make_record
-from roboirg.evaluation.runner import run_plan
+from roboirg.evaluation.analysis.stats.cells import Versions, gather, labels
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.records.merging import merge_runs
+from roboirg.evaluation.records.record import Job, Record
+from roboirg.evaluation.records.store import RecordStore, StoreError, read_records, read_results
+from roboirg.evaluation.run.executor import InProcess
+from roboirg.evaluation.run.runner import run_plan
 from roboirg.policies import make_policy
 from roboirg.policies.by_name.loading import server_version
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
-from roboirg.records.merging import merge_runs
-from roboirg.records.record import Job, Record
-from roboirg.records.store import RecordStore, StoreError, read_records, read_results
 
 
 def plan_of(episodes: int) -> Plan:

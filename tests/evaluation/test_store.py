@@ -12,10 +12,10 @@ from evaluation_fakes import fake_result, small_plan
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roboirg.evaluation.rollout_result import make_record
-from roboirg.records.record import EventRecord, Record
-from roboirg.records.record_codec import identity_key
-from roboirg.records.store import (
+from roboirg.evaluation.play.rollout_result import make_record
+from roboirg.evaluation.records.record import EventRecord, Record
+from roboirg.evaluation.records.record_codec import identity_key
+from roboirg.evaluation.records.store import (
     RECORDS_FILE,
     TORN_FILE,
     RecordStore,
@@ -123,7 +123,7 @@ def test_a_second_writer_is_told_who_writes(tmp_path: Path) -> None:
 
 def test_a_killed_writer_leaves_no_lock(tmp_path: Path) -> None:
     code = (
-        "import os, pathlib, signal, sys; from roboirg.records.store import RecordStore;"
+        "import os, pathlib, signal, sys; from roboirg.evaluation.records.store import RecordStore;"
         "s = RecordStore(pathlib.Path(sys.argv[1])); os.kill(os.getpid(), signal.SIGKILL)"
     )
     assert subprocess.run([sys.executable, "-c", code, tmp_path], check=False).returncode == -9
@@ -191,9 +191,9 @@ def test_a_full_disk_is_one_sentence_and_costs_no_record(tmp_path: Path) -> None
     code = (
         "import pathlib, resource, sys\n"
         "from evaluation_fakes import FakePlay, small_plan\n"
-        "from roboirg.evaluation.executors.executor import InProcess\n"
-        "from roboirg.evaluation.runner import run_plan\n"
-        "from roboirg.records.store import StoreError\n"
+        "from roboirg.evaluation.run.executor import InProcess\n"
+        "from roboirg.evaluation.run.runner import run_plan\n"
+        "from roboirg.evaluation.records.store import StoreError\n"
         "def play(job):\n"
         "    return FakePlay()(job).model_copy(update={'started_at': 'now'})\n"
         f"resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))\n"

@@ -15,14 +15,14 @@ from typer.testing import CliRunner
 
 from roboirg.apps.leaderboard.record_check import ReplayVerdict
 from roboirg.apps.leaderboard.run_verification import verify_run
-from roboirg.evaluation.executors.executor import InProcess
-from roboirg.evaluation.plan_maker import make_plan
-from roboirg.evaluation.rollout import EpisodeRunner
-from roboirg.evaluation.runner import run_plan
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.play.rollout import EpisodeRunner
+from roboirg.evaluation.records.action_log import read_actions, write_actions
+from roboirg.evaluation.records.merging import merge_runs
+from roboirg.evaluation.records.store import read_records
+from roboirg.evaluation.run.executor import InProcess
+from roboirg.evaluation.run.runner import run_plan
 from roboirg.main import app
-from roboirg.records.action_log import read_actions, write_actions
-from roboirg.records.merging import merge_runs
-from roboirg.records.store import read_records
 
 pytestmark = pytest.mark.sim
 

@@ -5,8 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from roboirg.evaluation.video_writer import DEMONSTRATION_COLOR, GAP, VideoWriter, compose_frame
-from roboirg.records.film import VideoOptions
+from roboirg.evaluation.play.video_writer import (
+    DEMONSTRATION_COLOR,
+    GAP,
+    VideoWriter,
+    compose_frame,
+)
+from roboirg.evaluation.records.film import VideoOptions
 
 av = pytest.importorskip("av")
 

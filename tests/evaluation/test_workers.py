@@ -17,17 +17,17 @@ from evaluation_fakes import FakePlay, WaitingPlay, comparable, small_plan
 
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.waiting import Wait, waiting
-from roboirg.evaluation.call_guard import CallGuard
 from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
-from roboirg.evaluation.executors import watchdog
-from roboirg.evaluation.executors.executor import LocalProcesses
-from roboirg.evaluation.executors.workers import Worker
-from roboirg.evaluation.plan import Plan
-from roboirg.evaluation.rollout import EpisodeRunner, load_policy
-from roboirg.evaluation.rollout_result import RolloutResult
-from roboirg.evaluation.runner import UNREACHABLE_AFTER, RunSummary, run_plan
-from roboirg.records.record import Job, Record
-from roboirg.records.store import read_records
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.play import watchdog
+from roboirg.evaluation.play.call_guard import CallGuard
+from roboirg.evaluation.play.rollout import EpisodeRunner, load_policy
+from roboirg.evaluation.play.rollout_result import RolloutResult
+from roboirg.evaluation.records.record import Job, Record
+from roboirg.evaluation.records.store import read_records
+from roboirg.evaluation.run.executor import LocalProcesses
+from roboirg.evaluation.run.runner import UNREACHABLE_AFTER, RunSummary, run_plan
+from roboirg.evaluation.run.workers import Worker
 
 TIMEOUT_S = 3.0
 

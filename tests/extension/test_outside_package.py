@@ -48,7 +48,7 @@ UNCHANGED = """\
 import sys
 sys.path[:0] = [{language!r}]
 import test_golden
-from roboirg.episodes.splits import fingerprint_of, shipped_splits
+from roboirg.tasks.splits.splits import fingerprint_of, shipped_splits
 for task, splits in shipped_splits().items():
     assert fingerprint_of(task, splits.passed_over) == splits.sha256, task
 for (task, setting), expected in test_golden.GOLDEN.items():

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 import roboirg
-from roboirg.evaluation.rollout import play_episode
+from roboirg.evaluation.play.rollout import play_episode
+from roboirg.evaluation.records.record import Job
 from roboirg.policies import make_policy
-from roboirg.records.record import Job
 
 TASKS = ("VideoUnmask", "ButtonUnmask", "VideoUnmaskSwap", "StopCube", "VideoPlaceOrder")
 SETTING = "contextual"

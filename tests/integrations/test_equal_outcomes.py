@@ -15,7 +15,7 @@ from replay_table import (
 )
 
 from roboirg.apps.integrations.lerobot.vector import make_batch
-from roboirg.records.store import read_records
+from roboirg.evaluation.records.store import read_records
 
 pytestmark = pytest.mark.sim
 

@@ -10,20 +10,16 @@ from planning_fakes import fake_vlm, make_listener, stand_in
 
 from roboirg.apps.grounding.answer_scores import score_answers
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.grounding_set.answer_file import Answer
-from roboirg.evaluation.grounding_set.grounding_item import ITEMS_FILE, PointTarget, encode_items
-from roboirg.evaluation.grounding_set.item_builder import (
-    EpisodeMedia,
-    make_items,
-    wanted_options,
-)
-from roboirg.evaluation.grounding_set.media_store import store_content
+from roboirg.evaluation.grounding_items.answer_file import Answer
+from roboirg.evaluation.grounding_items.grounding_item import ITEMS_FILE, PointTarget, encode_items
+from roboirg.evaluation.grounding_items.item_builder import EpisodeMedia, make_items, wanted_options
+from roboirg.evaluation.grounding_items.media_store import store_content
 from roboirg.language import setting_names
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.policies.vlm.vlm_listener import NotUnderstoodError
 from roboirg.shortcuts.command_chance import is_right
 from roboirg.tasks import all_tasks
+from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.media import Picture, encode_png
 
 NUMBER = 500

@@ -24,10 +24,10 @@ from replay_table import (
     own_outcomes,
 )
 
-from roboirg.episodes.splits import get_episode
+from roboirg.evaluation.records.store import read_records
 from roboirg.language import instruct
 from roboirg.policies.vlm.goal_schema import goal_schema
-from roboirg.records.store import read_records
+from roboirg.tasks.splits.splits import get_episode
 
 pytestmark = pytest.mark.sim
 

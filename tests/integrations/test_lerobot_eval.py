@@ -21,7 +21,7 @@ from replay_table import (
 )
 
 import roboirg
-from roboirg.records.store import read_records
+from roboirg.evaluation.records.store import read_records
 
 pytestmark = pytest.mark.sim
 

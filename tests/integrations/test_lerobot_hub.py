@@ -12,7 +12,7 @@ if not importlib.metadata.version("lerobot").startswith("0.4."):
 from page_commands import ROOT, blocks, check_versions, replaced, run_page
 from replay_table import MANY, MAX_STEPS, MESHES, in_batches_of
 
-from roboirg.records.store import read_records
+from roboirg.evaluation.records.store import read_records
 
 pytestmark = pytest.mark.sim
 

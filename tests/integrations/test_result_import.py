@@ -9,9 +9,9 @@ from typer.testing import CliRunner
 
 from roboirg.apps.integrations.result_import import ImportOptions, import_results
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.evaluation.records.record import Job
+from roboirg.evaluation.records.store import read_records
 from roboirg.main import app
-from roboirg.records.record import Job
-from roboirg.records.store import read_records
 
 OPTIONS = ImportOptions("theirs")
 

@@ -26,7 +26,7 @@ from replay_table import (
 )
 
 from roboirg.apps.integrations.vla_eval.step_benchmark import RoboIRGBenchmark
-from roboirg.records.store import read_records
+from roboirg.evaluation.records.store import read_records
 
 pytestmark = pytest.mark.sim
 

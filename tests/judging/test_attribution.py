@@ -14,10 +14,10 @@ from staged import Staged
 
 from roboirg.core.conditions import ExecutionFailure, Fact, GroundingFailure, Rule, facts_of
 from roboirg.core.episode import Episode
-from roboirg.episodes.fingerprint import NOT_COUNTED, fingerprint, plain
-from roboirg.episodes.splits import get_episode
 from roboirg.judging import EXECUTION, GROUNDING, FailureAttribution, Status, attribute_failure
 from roboirg.tasks import every_task
+from roboirg.tasks.splits.fingerprint import NOT_COUNTED, fingerprint, plain
+from roboirg.tasks.splits.splits import get_episode
 
 DOCUMENT = (Path(__file__).parents[2] / "docs" / "attribution.md").read_text()
 TASKS = tuple(sorted({task for one in CASES for task in one.tasks}))

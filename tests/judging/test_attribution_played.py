@@ -13,13 +13,13 @@ import roboirg
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import SPLITS, Goal, Primitive
 from roboirg.envs.environment import RoboIRGEnv
-from roboirg.episodes.splits import get_episode, split_episodes
 from roboirg.judging import FailureAttribution, attribute_failure
 from roboirg.language import instruct, mirrored_objects
 from roboirg.policies import make_policy, play
 from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.simulation.expert.primitives import MotionPrimitives
 from roboirg.tasks import all_tasks, get_task
+from roboirg.tasks.splits.splits import get_episode, split_episodes
 
 pytestmark = pytest.mark.sim
 

@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 import roboirg
-from roboirg.analysis.page.details import event_text
 from roboirg.apps.show.episode_text import fact_words
 from roboirg.core import fact_traits
 from roboirg.core.conditions import Fact, Rule, facts_of
@@ -17,11 +16,12 @@ from roboirg.core.episode import Primitive, Scene, SceneObject, Stage
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.fact_traits import FACT_TRAITS, FactRole, FactTraits, register_fact_kind
 from roboirg.core.motions import Glow, Point, Shuttle, Vanish
-from roboirg.episodes.splits import get_episode
+from roboirg.evaluation.analysis.page.details import event_text
+from roboirg.evaluation.records.record import EventRecord
 from roboirg.judging import Judge
 from roboirg.judging.grounding_errors import classify_grounding_error
-from roboirg.records.record import EventRecord
 from roboirg.tasks import every_task
+from roboirg.tasks.splits.splits import get_episode
 
 SOURCE = Path(roboirg.__file__).parent
 

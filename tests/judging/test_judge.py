@@ -6,10 +6,10 @@ from hypothesis import strategies as st
 
 from roboirg.core.conditions import Fact, Rule, facts_of
 from roboirg.core.episode import Primitive, Stage
-from roboirg.episodes.splits import get_episode
 from roboirg.judging import Judge, Status, changes, plain_subgoal
 from roboirg.judging.judge import describe_object
 from roboirg.tasks import every_task
+from roboirg.tasks.splits.splits import get_episode
 
 A, B, BAD = Fact("picked", "a"), Fact("placed", "a", "target"), Fact("pressed", "button")
 

@@ -3,8 +3,8 @@
 import pytest
 
 from roboirg.core.conditions import Fact
-from roboirg.episodes.splits import make_episode
 from roboirg.judging import Judge, Status
+from roboirg.tasks.splits.splits import make_episode
 
 STILL = Fact("still", "robot")
 BUTTON, LEFT, RIGHT = (Fact("pressed", name) for name in ("button", "button_left", "button_right"))

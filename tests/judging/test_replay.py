@@ -7,10 +7,10 @@ import pytest
 
 from roboirg.core.conditions import facts_of
 from roboirg.core.episode import Episode
-from roboirg.episodes.splits import get_episode
 from roboirg.judging import Event, Judge
 from roboirg.judging.episode_replay import completed_stages, facts_by_step, rejudge
 from roboirg.tasks import all_tasks
+from roboirg.tasks.splits.splits import get_episode
 
 EPISODES = 12
 

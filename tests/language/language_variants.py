@@ -6,10 +6,10 @@ from dataclasses import replace
 
 from roboirg.core.episode import SPLITS, Episode, Point
 from roboirg.core.errors import SceneRejectedError
-from roboirg.episodes import splits
-from roboirg.episodes.splits import CYCLE, get_episode, make_episode
 from roboirg.language.settings import settings_of
 from roboirg.tasks import every_task
+from roboirg.tasks.splits import splits
+from roboirg.tasks.splits.splits import CYCLE, get_episode, make_episode
 
 TASKS = tuple(every_task())
 PAIRS = [(name, setting) for name, task in every_task().items() for setting in settings_of(task)]

@@ -9,10 +9,10 @@ from language_variants import TASKS
 
 from roboirg.apps.language_lab import instruction_export
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
-from roboirg.episodes.splits import get_episode, split_episodes
 from roboirg.language import FORMS, setting_names
 from roboirg.language.instruction_row import row
 from roboirg.language.variants import instructions
+from roboirg.tasks.splits.splits import get_episode, split_episodes
 
 LISTS = {
     "patterns": str,

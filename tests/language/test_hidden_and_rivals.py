@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from roboirg.core.word_pools import POOLS, PoolName
-from roboirg.episodes.splits import get_episode
 from roboirg.language import instruct, settings_of
 from roboirg.language.templates import remarks
 from roboirg.tasks import every_task
+from roboirg.tasks.splits.splits import get_episode
 
 
 @pytest.mark.parametrize(

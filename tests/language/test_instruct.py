@@ -8,10 +8,10 @@ import pytest
 from language_variants import PAIRS, without_landmark
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.episodes.splits import get_episode
 from roboirg.language import expressible, instruct, setting_names
 from roboirg.language.settings import all_settings
 from roboirg.tasks import every_task
+from roboirg.tasks.splits.splits import get_episode
 
 EPISODE = get_episode("PickXtimes", "test", 2)
 
@@ -83,7 +83,7 @@ def test_an_episode_without_landmark_is_refused_in_the_spatial_setting():
 
 def test_the_same_words_in_another_process():
     program = (
-        "from roboirg.episodes.splits import get_episode; from roboirg.language import instruct;"
+        "from roboirg.tasks.splits import get_episode; from roboirg.language import instruct;"
         "print(instruct(get_episode('PickXtimes', 'test', 2), 'contextual').text, end='')"
     )
     command = [sys.executable, "-c", program]

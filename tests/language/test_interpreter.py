@@ -12,13 +12,13 @@ from language_variants import first_episodes
 from roboirg import reader
 from roboirg.core.episode import COLORS, Goal, Point, Scene, SceneObject
 from roboirg.core.errors import UnknownNameError
-from roboirg.episodes.splits import get_episode
 from roboirg.language import expressible, instruct
 from roboirg.language.settings import settings_of
 from roboirg.reader import interpret
 from roboirg.reader.places import DirectionalPlace, RelativePlace, read_places
 from roboirg.reader.tokens import split_sentences
 from roboirg.tasks import every_task, get_task
+from roboirg.tasks.splits.splits import get_episode
 
 FOLDER = Path(reader.__file__).parent
 EPISODES = {task: tuple(first_episodes(task, "train", 8)) for task in every_task()}

@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 from language_variants import TASKS, first_episodes
 
 from roboirg.core.episode import Goal
-from roboirg.episodes.splits import get_episode
 from roboirg.language import instruct
 from roboirg.language.settings import settings_of
 from roboirg.reader import interpret
 from roboirg.reader.tokens import FILLERS, split_sentences
 from roboirg.reader.vocabulary import is_known
 from roboirg.tasks import get_task
+from roboirg.tasks.splits.splits import get_episode
 
 PICK = get_episode("PickXtimes", "test", 2).scene
 BIN = get_episode("BinFill", "test", 2).scene

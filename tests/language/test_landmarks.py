@@ -12,7 +12,6 @@ from language_variants import SPATIAL_TASKS, random_episodes
 from roboirg.core.episode import COLORS, SPLITS, Point, Scene, SceneObject
 from roboirg.core.motions import Away
 from roboirg.core.word_pools import POOLS
-from roboirg.episodes.published_episodes import published_episode
 from roboirg.language import FORMS, expressible, instruct
 from roboirg.language.landmarks import (
     FRAMES,
@@ -26,6 +25,7 @@ from roboirg.reader import interpret
 from roboirg.reader.places import find_objects, read_places
 from roboirg.reader.tokens import split_sentences
 from roboirg.tasks import get_task
+from roboirg.tasks.splits.published_episodes import published_episode
 
 GRID = st.integers(-17, 17).map(lambda step: step / 100)
 PLACES = st.lists(st.tuples(GRID, GRID), min_size=1, max_size=8, unique=True)

@@ -8,11 +8,11 @@ import pytest
 from language_variants import split_episodes
 
 from roboirg.core.episode import Episode, SceneObject
-from roboirg.episodes.splits import get_episode
 from roboirg.language import instruct, mirrored_objects
 from roboirg.language.landmarks import FRAMES, selectors
 from roboirg.language.mirrored_landmarks import exchange_sides
 from roboirg.tasks import every_task
+from roboirg.tasks.splits.splits import get_episode
 
 SPATIAL = tuple(name for name, task in every_task().items() if task.spatial)
 

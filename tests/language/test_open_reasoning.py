@@ -13,7 +13,6 @@ from test_rivals import pools
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import POOLS
-from roboirg.episodes.splits import get_episode
 from roboirg.language import instruct, instruct_with
 from roboirg.language.generator import find_refusal
 from roboirg.language.open_reasoning import open_templates
@@ -23,6 +22,7 @@ from roboirg.reader.comparisons import PlaceComparison, compared_colors, read_co
 from roboirg.shortcuts import SURFACE_RULES, goal_share, guess_goal
 from roboirg.shortcuts.command_chance import blind_goals, right_share
 from roboirg.tasks import all_tasks
+from roboirg.tasks.splits.splits import get_episode
 
 OPEN = InstructionOptions("reasoning", reasoning="open")
 

@@ -22,13 +22,11 @@ from roboirg.apps.split_search import seed_selection
 from roboirg.apps.split_search.seed_selection import EpisodeSlot, check_words
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.episodes.splits import get_episode, split_episodes
-from roboirg.evaluation.plan_maker import make_plan
+from roboirg.evaluation.analysis.figures import expression_counts, expression_figure
+from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.language import (
     FORMS,
     expressible,
-    expression_counts,
-    expression_figure,
     find_refusals,
     instruct,
     instruct_with,
@@ -40,6 +38,7 @@ from roboirg.language.settings import all_settings, direct
 from roboirg.language.settings.setting import Setting
 from roboirg.language.variants import all_variants, instructions
 from roboirg.tasks import all_tasks
+from roboirg.tasks.splits.splits import get_episode, split_episodes
 
 EPISODE = get_episode("PickXtimes", "test", 0)  # easy
 HARD = get_episode("PickXtimes", "test", 3)

@@ -15,7 +15,6 @@ from language_variants import TASKS, first_episodes
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import POOLS, Pools
-from roboirg.episodes.splits import get_episode
 from roboirg.language import instruct, instruct_with
 from roboirg.language.generator import find_refusal
 from roboirg.language.rivals import rival_templates
@@ -26,6 +25,7 @@ from roboirg.reader.tokens import split_sentences
 from roboirg.shortcuts import SURFACE_RULES, goal_share, guess_goal
 from roboirg.shortcuts.command_chance import blind_goals, right_share
 from roboirg.tasks import all_tasks, get_task
+from roboirg.tasks.splits.splits import get_episode
 
 SETTINGS = ("direct", "contextual", "spatial")
 CELLS = [

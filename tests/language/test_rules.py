@@ -11,7 +11,6 @@ from language_variants import SPATIAL_TASKS, TASKS, split_episodes
 
 from roboirg.core.episode import ALL_COLORS
 from roboirg.core.word_pools import POOLS, pool_of
-from roboirg.episodes.splits import get_episode
 from roboirg.language import FORMS, LANGUAGE_VERSION, STAGE_SETS, instruct, instruct_with
 from roboirg.language.number_words import CARDINALS, ORDINALS
 from roboirg.language.patterns import deduction, sequence
@@ -20,6 +19,7 @@ from roboirg.language.slot_types.number import SAME_NUMBER
 from roboirg.language.templates import derivations, introductions, remarks
 from roboirg.language.variants import expressible_options
 from roboirg.tasks import every_task, get_task
+from roboirg.tasks.splits.splits import get_episode
 
 COLOR_NAMES = frozenset(ALL_COLORS)
 SAID_AS = {

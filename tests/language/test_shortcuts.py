@@ -15,7 +15,6 @@ from typer.testing import CliRunner
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.episodes.splits import get_episode
 from roboirg.language import instruct, instruct_with
 from roboirg.language.settings import all_settings, get_setting
 from roboirg.language.variants import expressible_options, instructions
@@ -34,6 +33,7 @@ from roboirg.shortcuts.shortcut_scores import (
 )
 from roboirg.shortcuts.shortcut_tables import LEARNED_SETTING, shortcut_rows
 from roboirg.tasks import all_tasks, get_task
+from roboirg.tasks.splits.splits import get_episode
 
 COLORS = ("blue", "green", "red")
 EXCLUDED = "My kitchen is painted red and blue. Take the cube of a color other than that pair"

@@ -9,11 +9,12 @@ from rich.console import Console
 
 from roboirg.apps.language_lab import corpus_statistics, statistics_tables
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
-from roboirg.episodes.splits import split_episodes
-from roboirg.language import expression_counts, expression_figure, setting_names
+from roboirg.evaluation.analysis.figures import expression_counts, expression_figure
+from roboirg.language import setting_names
 from roboirg.language.settings import settings_of
 from roboirg.language.variants import instructions
 from roboirg.tasks import every_task
+from roboirg.tasks.splits.splits import split_episodes
 from roboirg.util import figure_files
 
 

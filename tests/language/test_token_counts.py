@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 from sentencepiece import SentencePieceProcessor
 
 from roboirg.core.word_pools import POOLS
-from roboirg.episodes.splits import SPLITS, get_episode, split_episodes
 from roboirg.language import FORMS, instruct_with, setting_names
 from roboirg.language.token_counts import ADDED_TOKENS, SHORT_LIMIT, USUAL_LIMIT, count_tokens
 from roboirg.language.variants import expressible_options, instructions
 from roboirg.tasks import every_task
+from roboirg.tasks.splits.splits import SPLITS, get_episode, split_episodes
 
 FIXED = tuple(split for split in SPLITS if split != "random")
 LONG = {("BinFill/train/27", "resolved"), ("BinFill/train/79", "resolved")}

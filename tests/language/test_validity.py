@@ -9,11 +9,11 @@ import pytest
 from language_variants import SPATIAL_TASKS, TASKS, random_episodes
 
 from roboirg.apps.language_lab.validation import Batch, ValidationResults, validate_batch
-from roboirg.episodes.splits import SIZES, get_episode
 from roboirg.language import expressible, instruct
 from roboirg.language.settings import settings_of
 from roboirg.reader import interpret
 from roboirg.tasks import get_task
+from roboirg.tasks.splits.splits import SIZES, get_episode
 
 RANDOM_SCENES = 24
 """For each task, beyond those of the test split."""

@@ -2,10 +2,10 @@
 
 from collections import Counter
 
-from roboirg.episodes.splits import get_episode
 from roboirg.language import setting_names, variants
 from roboirg.language.settings import settings_of
 from roboirg.tasks import all_tasks, every_task
+from roboirg.tasks.splits.splits import get_episode
 
 
 def test_the_registry_yields_forty_variants():

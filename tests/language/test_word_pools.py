@@ -14,15 +14,15 @@ from roboirg import main as cli
 from roboirg.apps.language_lab.validation import Batch, validate_batch
 from roboirg.core.episode import SPLITS
 from roboirg.core.word_pools import POOLS, Pools, pool_of
-from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.job_instruction import instruct_job
-from roboirg.evaluation.plan_maker import make_plan
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.language import instruct, setting_names
 from roboirg.language.settings import all_settings
 from roboirg.language.slot_types.number import SAME_NUMBER
 from roboirg.language.templates import derivations, introductions, remarks
 from roboirg.language.variants import instructions
 from roboirg.tasks import all_tasks, every_task
+from roboirg.tasks.splits.splits import get_episode
 
 KINDS = {
     name: pools

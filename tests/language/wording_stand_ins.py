@@ -8,10 +8,10 @@ from pathlib import Path
 
 from roboirg.apps.language_lab.robomme import goal_sentences
 from roboirg.core.episode import Episode, Goal
-from roboirg.episodes.published_episodes import published_episode
 from roboirg.language.instruction import Instruction
 from roboirg.language.slot_types.number import SAME_NUMBER
 from roboirg.tasks import all_tasks, get_task
+from roboirg.tasks.splits.published_episodes import published_episode
 
 STYLES = ("sentences_in_words", "sentences_in_digits")
 TASKS = tuple(all_tasks())

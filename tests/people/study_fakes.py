@@ -8,12 +8,12 @@ import numpy as np
 from roboirg.apps.people.listen_server import ListenServer
 from roboirg.apps.people.listening_session import QUESTIONS, ListeningSession
 from roboirg.apps.people.listening_study import PEOPLE, ListeningStudy, write_listening_study
-from roboirg.evaluation.grounding_set import question_set
-from roboirg.evaluation.grounding_set.grounding_item import PointTarget, encode_mask, write_items
-from roboirg.evaluation.grounding_set.item_builder import EpisodeMedia
-from roboirg.evaluation.grounding_set.media_store import PICTURES, VIDEOS, store_content
-from roboirg.evaluation.grounding_set.referents import find_candidates, find_referents
-from roboirg.evaluation.plan_maker import make_plan
+from roboirg.evaluation.grounding_items import question_set
+from roboirg.evaluation.grounding_items.grounding_item import PointTarget, encode_mask, write_items
+from roboirg.evaluation.grounding_items.item_builder import EpisodeMedia
+from roboirg.evaluation.grounding_items.media_store import PICTURES, VIDEOS, store_content
+from roboirg.evaluation.grounding_items.referents import find_candidates, find_referents
+from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.tasks import get_task
 from roboirg.util.media import Clip, Picture, encode_mp4, encode_png
 

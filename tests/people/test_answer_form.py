@@ -14,9 +14,9 @@ from roboirg.apps.people.answer_form import (
     goal_of,
 )
 from roboirg.core.errors import InvalidValueError
-from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.grounding_set.referents import find_candidates
+from roboirg.evaluation.grounding_items.referents import find_candidates
 from roboirg.tasks import every_task, get_task
+from roboirg.tasks.splits.splits import get_episode
 
 
 @pytest.mark.parametrize("task", every_task())

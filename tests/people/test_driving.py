@@ -15,12 +15,12 @@ from roboirg.apps.people.drive_server import DriveServer
 from roboirg.apps.people.driving_policy import CARRY, LOWEST, DrivingPolicy
 from roboirg.apps.people.driving_session import DrivingSession, DrivingStoppedError
 from roboirg.core.observations import CAMERAS
-from roboirg.episodes.splits import get_episode
+from roboirg.evaluation.records.record import Job
+from roboirg.evaluation.records.store import read_records
 from roboirg.language.settings import setting_names
-from roboirg.records.record import Job
-from roboirg.records.store import read_records
 from roboirg.simulation.rendering.viewpoint import FOCAL_LENGTH, SIZE, to_front_camera
 from roboirg.tasks import every_task
+from roboirg.tasks.splits.splits import get_episode
 
 TASK, EPISODE = "PickXtimes", 1
 """An easy one: a green cube, once on the target, then the button."""

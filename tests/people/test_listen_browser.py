@@ -14,9 +14,9 @@ from roboirg.apps.people.answer_form import answer_form, answer_of
 from roboirg.apps.people.listener_answers import AnswerUndone, read_events, standing_answers
 from roboirg.apps.people.listening_session import QUESTIONS
 from roboirg.apps.people.listening_study import words_of
-from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.grounding_set.question_set import EpisodeName, read_media
-from roboirg.records.store import read_records
+from roboirg.evaluation.grounding_items.question_set import EpisodeName, read_media
+from roboirg.evaluation.records.store import read_records
+from roboirg.tasks.splits.splits import get_episode
 
 pytestmark = [pytest.mark.browser, pytest.mark.sim]
 

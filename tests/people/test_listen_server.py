@@ -29,13 +29,13 @@ from roboirg.apps.people.listening_study import words_of
 from roboirg.apps.people.people_run import answered_plan
 from roboirg.apps.people.question_view import view_question
 from roboirg.core.errors import InvalidValueError
-from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.grounding_set.grounding_item import read_items
-from roboirg.evaluation.grounding_set.item_builder import EpisodeMedia
+from roboirg.evaluation.grounding_items.grounding_item import read_items
+from roboirg.evaluation.grounding_items.item_builder import EpisodeMedia
+from roboirg.evaluation.records.store import StoreError
 from roboirg.language.settings import setting_names
-from roboirg.records.store import StoreError
 from roboirg.shortcuts.command_chance import is_right
 from roboirg.tasks import every_task, get_task
+from roboirg.tasks.splits.splits import get_episode
 
 TASKS = "PickXtimes,StopCube,VideoUnmask,ButtonUnmask"
 

@@ -15,7 +15,7 @@ from roboirg.apps.people.listening_study import (
     write_listening_study,
 )
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.plan_maker import make_plan
+from roboirg.evaluation.plan.plan_maker import make_plan
 
 
 @given(some.integers(1, 12))

@@ -8,17 +8,17 @@ from roboirg.apps.people.answer_form import FormAnswer, all_answers, answer_of, 
 from roboirg.apps.people.listening_session import ListeningSession
 from roboirg.apps.people.people_run import answered_plan
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.rollout import EpisodeRunner
+from roboirg.evaluation.play.rollout import EpisodeRunner
+from roboirg.evaluation.records.record import Job
+from roboirg.evaluation.records.store import RecordStore, StoreError, read_records
 from roboirg.policies.by_name.loading import (
     is_privileged,
     load_policy_class,
     make_policy,
     policy_version,
 )
-from roboirg.records.record import Job
-from roboirg.records.store import RecordStore, StoreError, read_records
 from roboirg.tasks import get_task
+from roboirg.tasks.splits.splits import get_episode
 
 
 def test_specs_that_name_nothing_are_refused(tmp_path):

@@ -6,10 +6,10 @@ import pytest
 
 from roboirg.apps.people.answer_form import answer_form
 from roboirg.apps.people.question_view import MARGIN, outlines
-from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.grounding_set.grounding_item import decode_mask
-from roboirg.evaluation.grounding_set.referents import find_candidates
-from roboirg.evaluation.grounding_set.seen_scene import look_at_episode
+from roboirg.evaluation.grounding_items.grounding_item import decode_mask
+from roboirg.evaluation.grounding_items.referents import find_candidates
+from roboirg.evaluation.grounding_items.seen_scene import look_at_episode
+from roboirg.tasks.splits.splits import get_episode
 
 
 def polygon(text):

@@ -28,7 +28,7 @@ from roboirg.policies.policy_server import PolicyServer, open_server
 from roboirg.policies.remote.message_codec import pack
 from roboirg.policies.remote.protocols import protocols_by_scheme
 from roboirg.policies.remote.server_options import ServerOptions
-from roboirg.util.connection_table import ConnectionLimits, ConnectionTable
+from roboirg.util.web.connection_table import ConnectionLimits, ConnectionTable
 
 GIB = 1 << 30
 SCHEMES = [scheme for scheme, protocol in protocols_by_scheme().items() if protocol.service]

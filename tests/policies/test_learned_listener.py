@@ -7,11 +7,11 @@ from typer.testing import CliRunner
 from roboirg.apps.learned_listener.labeled_views import LATER_STEP, class_of, look
 from roboirg.apps.learned_listener.listener_study import VARIANTS
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
-from roboirg.episodes.splits import get_episode
 from roboirg.main import app
 from roboirg.policies.by_name.loading import is_privileged, make_policy
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.tasks import get_task
+from roboirg.tasks.splits.splits import get_episode
 
 
 def test_without_pytorch_one_sentence_says_what_to_do(monkeypatch, tmp_path):

@@ -35,7 +35,6 @@ from roboirg.core.errors import (
     PolicyReplyError,
     PolicyTimeoutError,
 )
-from roboirg.episodes.splits import SIZES, get_episode
 from roboirg.language import instruct
 from roboirg.language.settings import settings_of
 from roboirg.policies import play
@@ -44,6 +43,7 @@ from roboirg.policies.vlm.models import ModelOptions
 from roboirg.policies.vlm.vlm_listener import NotUnderstoodError
 from roboirg.reader import interpret
 from roboirg.tasks import every_task
+from roboirg.tasks.splits.splits import SIZES, get_episode
 from roboirg.util.json_reply import UnparsableReplyError
 
 EPISODES = 3

@@ -12,7 +12,6 @@ from planning_fakes import decoded
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import DemonstrationFrames
-from roboirg.episodes.splits import get_episode
 from roboirg.policies.planners.keyframes import MAX_GAP, merge_keyframes
 from roboirg.policies.planners.observation_merging import (
     DemonstrationSubset,
@@ -32,6 +31,7 @@ from roboirg.policies.planners.points import (
 from roboirg.policies.vlm.model_content import summary_clip
 from roboirg.policies.vlm.prompts import load_prompts
 from roboirg.tasks import every_task
+from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.json_reply import UnparsableReplyError, json_object, text_of
 from roboirg.util.media import Clip, Picture, encode_mp4, encode_png, sample_evenly
 

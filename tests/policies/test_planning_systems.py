@@ -12,7 +12,6 @@ from wire_servers import MmeVlaServer, unpack
 
 import roboirg
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.episodes.splits import get_episode
 from roboirg.policies import Policy, PrivilegedPolicy, load_policy_class, make_policy, play
 from roboirg.policies.by_name import policy_specs
 from roboirg.policies.by_name.loading import is_privileged, policy_version
@@ -25,6 +24,7 @@ from roboirg.policies.contract.requirements import (
 )
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 from roboirg.policies.vlm.vlm_listener import VLMListener
+from roboirg.tasks.splits.splits import get_episode
 
 PAPER = ("FrameS-Modul", "GroundSG-Gemini", "GroundSG-QwenVL", "GroundSG-oracle", "MemER",
          "TTT-Expert", "pi0.5")  # fmt: skip

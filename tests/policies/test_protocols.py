@@ -17,7 +17,8 @@ from wire_servers import ChallengeServer, unpack
 import roboirg
 from roboirg.apps.policy_check.policy_check import check_policy
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.policy_environment import env_requirements, make_env
+from roboirg.evaluation.play.policy_environment import env_requirements, make_env
+from roboirg.evaluation.records.record import Job
 from roboirg.policies import make_policy, play
 from roboirg.policies.by_name.policy_classes import url_schemes
 from roboirg.policies.policy_server import open_server
@@ -25,7 +26,6 @@ from roboirg.policies.remote import protocols
 from roboirg.policies.remote.endpoints import RemoteOptions
 from roboirg.policies.remote.protocols import all_protocols, protocols_by_scheme
 from roboirg.policies.remote.transport import Transport
-from roboirg.records.record import Job
 
 PAGE = (Path(__file__).parents[2] / "docs" / "policies.md").read_text()
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import roboirg
-from roboirg.episodes.splits import get_episode
 from roboirg.policies import make_policy, play
 from roboirg.policies.builtin import shortcut_listeners
 from roboirg.policies.by_name.loading import is_privileged, policy_version
 from roboirg.policies.by_name.policy_classes import BUILTIN
 from roboirg.shortcuts import SURFACE_RULES
+from roboirg.tasks.splits.splits import get_episode
 
 SPATIAL = "Have a look at the cube at the far left. Take it and place it on the target once."
 

@@ -20,7 +20,7 @@ from roboirg.apps.real.study.study_plan import make_study
 from roboirg.apps.real.study.study_run import Study
 from roboirg.apps.real.study.trial_log import TrialLog
 from roboirg.core.errors import InvalidValueError
-from roboirg.records.record import Job
+from roboirg.evaluation.records.record import Job
 
 pytestmark = pytest.mark.sim
 

@@ -15,7 +15,7 @@ from roboirg.apps.real.pages.score_server import ScoreServer
 from roboirg.apps.real.study.failure_choices import failure_choices
 from roboirg.apps.real.study.study_plan import make_study, write_study
 from roboirg.apps.real.study.trial_log import TrialLog, trial_metadata
-from roboirg.records.store import read_records
+from roboirg.evaluation.records.store import read_records
 
 NARROW = {"width": 400, "height": 800}
 

@@ -9,14 +9,14 @@ import time
 import pytest
 from real_start import start
 
-from roboirg.analysis.stats.cells import gather
-from roboirg.analysis.tables.paper_tables import make_table
 from roboirg.apps.real.control.interruption import Interruption
 from roboirg.apps.real.pages.study_figure import bar_series, write_figure
 from roboirg.apps.real.study.failure_choices import failure_choices
 from roboirg.apps.real.study.study_plan import read_study
 from roboirg.apps.real.study.trial_log import TrialLog, trial_metadata
-from roboirg.records.store import read_records, read_results
+from roboirg.evaluation.analysis.stats.cells import gather
+from roboirg.evaluation.analysis.tables.paper_tables import make_table
+from roboirg.evaluation.records.store import read_records, read_results
 
 pytestmark = pytest.mark.sim
 

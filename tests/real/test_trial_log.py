@@ -2,15 +2,15 @@
 
 import pytest
 
-from roboirg.analysis.page.report import render
-from roboirg.analysis.stats.cells import gather
-from roboirg.analysis.tables.paper_tables import make_table
 from roboirg.apps.real.study.failure_choices import failure_choices
 from roboirg.apps.real.study.trial_log import UNSCORED, VOID, WITHDRAWN, TrialLog, trial_metadata
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.rollout_result import RolloutResult, make_record
-from roboirg.records.record import Record
-from roboirg.records.store import RecordStore, read_records, read_results
+from roboirg.evaluation.analysis.page.report import render
+from roboirg.evaluation.analysis.stats.cells import gather
+from roboirg.evaluation.analysis.tables.paper_tables import make_table
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.records.record import Record
+from roboirg.evaluation.records.store import RecordStore, read_records, read_results
 
 
 def read(plan, folder):

@@ -10,8 +10,8 @@ from roboirg.apps.real.control.robot import CAMERA_RATE, JudgingRobot
 from roboirg.apps.real.control.twin import Twin
 from roboirg.apps.real.study.study_plan import make_study
 from roboirg.apps.real.study.study_run import Study
-from roboirg.evaluation.rollout import EpisodeRunner
-from roboirg.records.record import NON_DETERMINISTIC_FIELDS
+from roboirg.evaluation.play.rollout import EpisodeRunner
+from roboirg.evaluation.records.record import NON_DETERMINISTIC_FIELDS
 
 pytestmark = pytest.mark.sim
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from roboirg.core.observations import CAMERAS
-from roboirg.episodes.splits import get_episode
 from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.physics_settings import HOME_ACTION
 from roboirg.simulation.world import World
+from roboirg.tasks.splits.splits import get_episode
 
 pytestmark = pytest.mark.sim
 

@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 import roboirg
-from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.rollout import EpisodeRunner
-from roboirg.records.record import Job
+from roboirg.evaluation.play.rollout import EpisodeRunner
+from roboirg.evaluation.records.record import Job
 from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.episode_session import EpisodeSession
 from roboirg.simulation.expert.primitives import MotionPrimitives
@@ -23,6 +22,7 @@ from roboirg.simulation.recording import RecordedStep, Recording
 from roboirg.simulation.rendering.render_settings import FAITHFUL
 from roboirg.simulation.video import demonstration_cache, frame_sequence
 from roboirg.tasks import all_tasks
+from roboirg.tasks.splits.splits import get_episode
 
 pytestmark = pytest.mark.sim
 

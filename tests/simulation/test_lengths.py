@@ -7,9 +7,9 @@ from statistics import median
 import pytest
 
 from roboirg.core.errors import SceneRejectedError
-from roboirg.episodes.splits import make_episode
 from roboirg.simulation.episode_session import EpisodeSession
 from roboirg.simulation.expert.primitives import MotionPrimitives
+from roboirg.tasks.splits.splits import make_episode
 
 pytestmark = pytest.mark.sim
 

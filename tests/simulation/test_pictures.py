@@ -8,10 +8,10 @@ import pytest
 
 import roboirg
 from roboirg.core.observations import CAMERAS
-from roboirg.episodes.splits import get_episode
 from roboirg.policies import make_policy, play
 from roboirg.simulation.physics_settings import HOME_ACTION
 from roboirg.simulation.world import World
+from roboirg.tasks.splits.splits import get_episode
 
 pytestmark = pytest.mark.sim
 

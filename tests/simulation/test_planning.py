@@ -10,7 +10,6 @@ from roboirg.core.episode import Primitive, Scene, SceneObject
 from roboirg.core.errors import MotionPlanningError
 from roboirg.core.motions import Point
 from roboirg.core.object_sizes import CUBE_HALF
-from roboirg.episodes.splits import get_episode
 from roboirg.simulation.expert import primitives
 from roboirg.simulation.expert.motion_planning import MotionPlanner, ToolPose
 from roboirg.simulation.expert.primitives import MotionPrimitives
@@ -22,6 +21,7 @@ from roboirg.simulation.expert.trajectory_timing import (
 from roboirg.simulation.physics_settings import CONTROL_PERIOD, HOME, HOME_ACTION
 from roboirg.simulation.world import World
 from roboirg.tasks.shared.unmask import APPEAR_STEP
+from roboirg.tasks.splits.splits import get_episode
 
 pytestmark = pytest.mark.sim
 

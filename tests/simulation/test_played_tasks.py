@@ -11,12 +11,12 @@ from roboirg.core.episode import DIFFICULTIES, Goal
 from roboirg.core.errors import SceneRejectedError
 from roboirg.core.motions import Away, Glow, Swap
 from roboirg.core.observations import CAMERAS
-from roboirg.episodes.splits import get_episode, make_episode
 from roboirg.policies import make_policy, play
 from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.simulation import physics_settings
 from roboirg.simulation.world import World
 from roboirg.tasks import every_task, get_task
+from roboirg.tasks.splits.splits import get_episode, make_episode
 
 pytestmark = pytest.mark.sim
 

@@ -10,12 +10,12 @@ from roboirg.core import object_sizes
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Goal, Primitive, Scene, SceneObject
 from roboirg.core.motions import Point
-from roboirg.episodes.splits import get_episode
 from roboirg.policies import play
 from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.simulation import physics_settings
 from roboirg.simulation.expert.primitives import MotionPrimitives
 from roboirg.simulation.world import World
+from roboirg.tasks.splits.splits import get_episode
 
 pytestmark = pytest.mark.sim
 

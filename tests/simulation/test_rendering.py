@@ -12,7 +12,6 @@ import sapien.physx
 
 import roboirg
 from roboirg.core.observations import CAMERAS
-from roboirg.episodes.splits import get_episode
 from roboirg.policies import make_policy, play
 from roboirg.simulation import bodies, physics_settings
 from roboirg.simulation.cameras import Cameras
@@ -22,6 +21,7 @@ from roboirg.simulation.rendering.render_device import render_system
 from roboirg.simulation.rendering.render_settings import FAITHFUL, LIGHT, STOCK, RenderSettings
 from roboirg.simulation.scenery import add_scenery
 from roboirg.tasks import all_tasks
+from roboirg.tasks.splits.splits import get_episode
 
 pytestmark = pytest.mark.sim
 

@@ -7,10 +7,10 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import Scene
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.motions import Away
-from roboirg.episodes.splits import get_episode
 from roboirg.simulation import physics_settings
 from roboirg.simulation.world import World
 from roboirg.tasks import every_task
+from roboirg.tasks.splits.splits import get_episode
 
 pytestmark = pytest.mark.sim
 

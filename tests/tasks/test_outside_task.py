@@ -11,10 +11,10 @@ import roboirg
 from roboirg import tasks
 from roboirg.apps.language_lab.validation import check_episode
 from roboirg.core.conditions import Fact
-from roboirg.episodes.splits import get_episode, make_episode
 from roboirg.judging import Judge, Status
 from roboirg.language.settings import settings_of
 from roboirg.policies import make_policy, play
+from roboirg.tasks.splits.splits import get_episode, make_episode
 
 PAGE = (Path(__file__).parents[2] / "docs" / "tasks.md").read_text()
 NAME = "PlaceAndPress"

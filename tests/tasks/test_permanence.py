@@ -12,10 +12,10 @@ from roboirg.core.episode import DIFFICULTIES
 from roboirg.core.errors import SceneRejectedError
 from roboirg.core.footprints import Rectangle, Region, distance_to
 from roboirg.core.motions import Away, Swap
-from roboirg.episodes.splits import make_episode
 from roboirg.tasks import get_task
 from roboirg.tasks.shared import unmask, unmask_swap
 from roboirg.tasks.shared.layouts import FOUR, LINE, PATTERNS, TRIANGLE, layout_points
+from roboirg.tasks.splits.splits import make_episode
 
 SEEDS = range(300)
 CODES = {"VideoUnmaskSwap": 5, "VideoUnmask": 6, "ButtonUnmaskSwap": 7, "ButtonUnmask": 8}

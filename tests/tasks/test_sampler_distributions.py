@@ -24,9 +24,9 @@ from roboirg.core.episode import DIFFICULTIES, SPLITS, Goal, Scene
 from roboirg.core.errors import SceneRejectedError
 from roboirg.core.footprints import Circle, overlap
 from roboirg.core.motions import Away, Point, Shuttle, Swap
-from roboirg.episodes.published_episodes import published_episode
 from roboirg.tasks import bin_fill, get_task, video_repick
 from roboirg.tasks.shared.fixtures import cube_footprint
+from roboirg.tasks.splits.published_episodes import published_episode
 
 TASKS = (
     "BinFill",

@@ -13,13 +13,13 @@ from roboirg.core.episode import DIFFICULTIES, ROBOT_BASE, SPLITS, Goal
 from roboirg.core.errors import SceneRejectedError
 from roboirg.core.footprints import Circle, overlap
 from roboirg.core.motions import Away, Glow, Shuttle, Swap, Vanish
-from roboirg.episodes.fingerprint import plain
-from roboirg.episodes.splits import SIZES, get_episode, make_episode
 from roboirg.language.settings import settings_of
 from roboirg.tasks import every_task, get_task
 from roboirg.tasks.shared.fixtures import bin_footprint, button_footprint, cube_footprint
 from roboirg.tasks.shared.real_table import box_footprint
 from roboirg.tasks.shared.unmask import container_footprint
+from roboirg.tasks.splits.fingerprint import plain
+from roboirg.tasks.splits.splits import SIZES, get_episode, make_episode
 
 TASKS = tuple(every_task())
 SETTINGS = {"explicit", "direct", "reasoning", "contextual", "spatial"}

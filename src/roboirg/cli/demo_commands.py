@@ -26,9 +26,9 @@ def demo(
     workers: Workers = None,
 ) -> None:
     """Play three built-in policies on every task and setting, record videos, write a report."""
-    from roboirg.analysis.page.report import check_report_support
-    from roboirg.evaluation.executors.executor import choose_executor
-    from roboirg.evaluation.plan_maker import make_plan
+    from roboirg.evaluation.analysis.page.report import check_report_support
+    from roboirg.evaluation.plan.plan_maker import make_plan
+    from roboirg.evaluation.run.executor import choose_executor
 
     folder = run_commands.folder_of(out)
     plan = make_plan(DEMO_POLICIES, episodes=episodes, video=video)
@@ -40,6 +40,6 @@ def demo(
 
 
 def _write_page(folder: Path, *, videos: bool) -> Path:
-    from roboirg.analysis.page.report import write_report
+    from roboirg.evaluation.analysis.page.report import write_report
 
     return write_report(folder, planned=run_commands.planned_jobs(folder), videos=videos)

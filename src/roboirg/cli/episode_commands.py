@@ -17,10 +17,10 @@ def export_episodes(
     tasks: Tasks = "all",
 ) -> None:
     """Export a line per episode: objects, motions, video and goal (keys: see docs/tasks.md)."""
-    from roboirg.episodes.episode_export import write_episodes
-    from roboirg.episodes.splits import split_episodes
-    from roboirg.evaluation.plan_parsing import parse_names, parse_splits
+    from roboirg.evaluation.plan.plan_parsing import parse_names, parse_splits
     from roboirg.tasks import find_tasks
+    from roboirg.tasks.splits.episode_export import write_episodes
+    from roboirg.tasks.splits.splits import split_episodes
 
     check_output_file(out)
     names = find_tasks(parse_names("task", tasks))

@@ -64,13 +64,13 @@ def instruct(
     wordings: Wordings = None,
 ) -> None:
     """Print the instructions of an episode, and how many tokens they need."""
-    from roboirg.episodes.splits import get_episode
-    from roboirg.evaluation.plan_parsing import means_all, parse_stages
+    from roboirg.evaluation.plan.plan_parsing import means_all, parse_stages
     from roboirg.language import instruct as make_instruction
     from roboirg.language import settings_of
     from roboirg.language.token_counts import count_tokens
     from roboirg.language.wordings.wording_store import open_wordings
     from roboirg.tasks import get_task
+    from roboirg.tasks.splits.splits import get_episode
 
     spoken, identity = parse_stages(stages), open_wordings(wordings)
     found = get_episode(task, split, episode)

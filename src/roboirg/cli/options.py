@@ -65,7 +65,7 @@ class WordChoices(NamedTuple):
             InvalidValueError: there is no such stage, or the wording file cannot be read.
         """
         from roboirg.core.instruction_options import InstructionOptions
-        from roboirg.evaluation.plan_parsing import parse_stages
+        from roboirg.evaluation.plan.plan_parsing import parse_stages
         from roboirg.language.wordings.wording_store import open_wordings
 
         chosen = self._asdict() | {

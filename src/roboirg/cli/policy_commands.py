@@ -13,8 +13,8 @@ from typer.core import TyperCommand
 
 from roboirg.cli.import_path import add_working_directory
 from roboirg.core.errors import InvalidValueError, RoboIRGError
-from roboirg.util.connection_table import ConnectionLimits
-from roboirg.util.request_origin import LOOPBACK, LOOPBACK_NAMES
+from roboirg.util.web.connection_table import ConnectionLimits
+from roboirg.util.web.request_origin import LOOPBACK, LOOPBACK_NAMES
 
 _STOPPED = {signal.SIGINT: 130, signal.SIGTERM: 143}
 _LIMITS = ConnectionLimits()

@@ -12,11 +12,11 @@ import typer
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 
 if TYPE_CHECKING:
-    from roboirg.analysis.stats.breakdowns import Breakdown, Labels
-    from roboirg.analysis.stats.cells import Cells
-    from roboirg.analysis.tables.table import Table
-    from roboirg.records.record import Job
-    from roboirg.records.record_codec import AnyResult
+    from roboirg.evaluation.analysis.stats.breakdowns import Breakdown, Labels
+    from roboirg.evaluation.analysis.stats.cells import Cells
+    from roboirg.evaluation.analysis.tables.table import Table
+    from roboirg.evaluation.records.record import Job
+    from roboirg.evaluation.records.record_codec import AnyResult
 
 # Heavy modules are imported inside the commands, so that --help answers at once.
 
@@ -39,9 +39,9 @@ def report(
     videos: Annotated[bool, typer.Option(help="Embed the videos in the page.")] = True,
 ) -> None:
     """Print the table of a run and write RUN/report.html, one self-contained page."""
-    from roboirg.analysis.page.report import check_report_support, write_report
     from roboirg.cli import run_commands
     from roboirg.cli.progress_bar import progress_bar
+    from roboirg.evaluation.analysis.page.report import check_report_support, write_report
 
     path, other = run_commands.folder_of(folder), None if against is None else Path(against)
     check_report_support()
@@ -64,10 +64,10 @@ def view(
     port: Annotated[int, typer.Option(help="Port on loopback; 0 chooses a free one.")] = 0,
 ) -> None:
     """Serve the page of a run with its videos on this machine, until Ctrl-C."""
-    from roboirg.analysis.page.page_server import PageServer
-    from roboirg.analysis.page.report import make_view
     from roboirg.cli import run_commands
     from roboirg.cli.progress_bar import progress_bar
+    from roboirg.evaluation.analysis.page.page_server import PageServer
+    from roboirg.evaluation.analysis.page.report import make_view
 
     path = run_commands.folder_of(folder)
 
@@ -98,7 +98,7 @@ def figures(
     published: Annotated[bool, typer.Option(help="Add the paper's values.")] = False,
 ) -> None:
     """Draw the paper's figures of one or several runs, as PNG, SVG and PDF."""
-    from roboirg.analysis.figures import FIGURES, FigureData, write_figures
+    from roboirg.evaluation.analysis.figures import FIGURES, FigureData, write_figures
     from roboirg.util.figure_files import check_figure_support
 
     check_figure_support()
@@ -135,7 +135,7 @@ def tables(
     ] = None,
 ) -> None:
     """Print the paper's tables, or gaps by kind of words, for one or several runs."""
-    from roboirg.analysis.tables.rendering import get_format
+    from roboirg.evaluation.analysis.tables.rendering import get_format
 
     output = get_format(format)
     if heard:
@@ -169,10 +169,10 @@ def compare(
     from rich.console import Console
     from rich.text import Text
 
-    from roboirg.analysis.stats.comparison import compare as compare_cells
-    from roboirg.analysis.stats.comparison_text import sentences
-    from roboirg.analysis.stats.flips import read_flips
-    from roboirg.analysis.stats.intervals import SEED
+    from roboirg.evaluation.analysis.stats.comparison import compare as compare_cells
+    from roboirg.evaluation.analysis.stats.comparison_text import sentences
+    from roboirg.evaluation.analysis.stats.flips import read_flips
+    from roboirg.evaluation.analysis.stats.intervals import SEED
     from roboirg.util.console_width import widen
 
     ours, theirs = _one_policy(first), _one_policy(second)
@@ -193,8 +193,8 @@ def compare(
 def _tables(
     which: str, cells: Cells, *, published: bool, chance: bool, floors: bool
 ) -> list[Table]:
-    from roboirg.analysis.published import RATE_TABLES
-    from roboirg.analysis.tables.paper_tables import WHICH, is_informative, make_table
+    from roboirg.evaluation.analysis.published import RATE_TABLES
+    from roboirg.evaluation.analysis.tables.paper_tables import WHICH, is_informative, make_table
 
     if which == _ALL:
         wanted: list[str] = [
@@ -219,7 +219,7 @@ def _tables(
 
 
 def _breakdown_tables(runs: list[str], by: str) -> list[Table]:
-    from roboirg.analysis.tables.breakdown_table import make_breakdown_table
+    from roboirg.evaluation.analysis.tables.breakdown_table import make_breakdown_table
 
     if not runs:
         raise InvalidValueError("--by needs a run; give its folder.")
@@ -234,9 +234,9 @@ def _breakdown_tables(runs: list[str], by: str) -> list[Table]:
 
 
 def _heard_table(runs: list[str]) -> Table:
-    from roboirg.analysis.stats.cells import gather, labels, policy_order, sort_cells
-    from roboirg.analysis.stats.heard_rates import count_heard
-    from roboirg.analysis.tables.heard_table import make_heard_table
+    from roboirg.evaluation.analysis.stats.cells import gather, labels, policy_order, sort_cells
+    from roboirg.evaluation.analysis.stats.heard_rates import count_heard
+    from roboirg.evaluation.analysis.tables.heard_table import make_heard_table
 
     results, planned = _runs(runs)
     cells = gather(results, planned)
@@ -250,7 +250,7 @@ def _heard_table(runs: list[str]) -> Table:
 
 
 def _breakdowns(by: str | None) -> tuple[Breakdown, ...]:
-    from roboirg.analysis.stats.breakdowns import BREAKDOWNS, find_breakdowns
+    from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS, find_breakdowns
 
     if by is None:
         return ()
@@ -259,8 +259,8 @@ def _breakdowns(by: str | None) -> tuple[Breakdown, ...]:
 
 def _labels(breakdowns: tuple[Breakdown, ...], runs: list[str]) -> dict[str, Labels]:
     """Return the labels of the instructions of runs, whose records are read one by one."""
-    from roboirg.analysis.stats.breakdowns import label_instructions
-    from roboirg.records.store import read_instructions
+    from roboirg.evaluation.analysis.stats.breakdowns import label_instructions
+    from roboirg.evaluation.records.store import read_instructions
 
     if not breakdowns:
         return {}
@@ -272,7 +272,7 @@ def _labels(breakdowns: tuple[Breakdown, ...], runs: list[str]) -> dict[str, Lab
 def _print(found: list[Table]) -> None:
     from rich.console import Console
 
-    from roboirg.analysis.tables.rendering.terminal import renderable
+    from roboirg.evaluation.analysis.tables.rendering.terminal import renderable
 
     console = Console()
     for table in found:
@@ -280,8 +280,8 @@ def _print(found: list[Table]) -> None:
 
 
 def _write(found: list[Table], folder: Path, suffix: str, name: str) -> None:
-    from roboirg.analysis.tables.rendering import get_format
-    from roboirg.records.store import StoreError
+    from roboirg.evaluation.analysis.tables.rendering import get_format
+    from roboirg.evaluation.records.store import StoreError
     from roboirg.util.atomic_write import write_atomically
 
     try:
@@ -295,7 +295,7 @@ def _write(found: list[Table], folder: Path, suffix: str, name: str) -> None:
 
 
 def _cells(runs: list[str]) -> Cells:
-    from roboirg.analysis.stats.cells import gather
+    from roboirg.evaluation.analysis.stats.cells import gather
 
     return gather(*_runs(runs))
 
@@ -303,7 +303,7 @@ def _cells(runs: list[str]) -> Cells:
 def _runs(runs: list[str]) -> tuple[list[tuple[str, Sequence[AnyResult]]], list[Job]]:
     """Return the results of runs, each with its folder, and the jobs of their plans."""
     from roboirg.cli.run_commands import planned_jobs
-    from roboirg.records.store import read_results
+    from roboirg.evaluation.records.store import read_results
 
     folders = [Path(run) for run in runs]
     planned = [job for folder in folders for job in planned_jobs(folder)]

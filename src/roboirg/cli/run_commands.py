@@ -20,11 +20,11 @@ from roboirg.util.plain_text import counted
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from roboirg.evaluation.executors.executor import Executor
-    from roboirg.evaluation.plan import Plan
-    from roboirg.evaluation.progress import Reporter
-    from roboirg.evaluation.runner import RunSummary
-    from roboirg.records.record import Job
+    from roboirg.evaluation.plan.plan import Plan
+    from roboirg.evaluation.records.record import Job
+    from roboirg.evaluation.run.executor import Executor
+    from roboirg.evaluation.run.progress import Reporter
+    from roboirg.evaluation.run.runner import RunSummary
 
 # Heavy modules are imported inside the commands, so that --help is fast.
 
@@ -74,7 +74,7 @@ def run(
     ] = False,
 ) -> None:
     """Play episodes and store a record of each in OUT/records.jsonl; resumes where it stopped."""
-    from roboirg.evaluation.record_hook import split_command
+    from roboirg.evaluation.run.record_hook import split_command
 
     # Absolute: a policy in this process may change the working directory.
     folder = folder_of(out).absolute()
@@ -98,7 +98,7 @@ def merge(
     out: Annotated[str, typer.Option(help="Folder for all their records and videos.")],
 ) -> None:
     """Merge the records and videos of several runs into one folder."""
-    from roboirg.records.merging import merge_runs
+    from roboirg.evaluation.records.merging import merge_runs
 
     merged = merge_runs([folder_of(run) for run in runs], folder_of(out))
     typer.echo(
@@ -119,9 +119,9 @@ def export_records(
     out: Annotated[Path, typer.Option(help="Parquet file to write.")],
 ) -> None:
     """Export the records of a run as a Parquet table (columns: see docs/running.md)."""
-    from roboirg.records.parquet import write_parquet
-    from roboirg.records.record_codec import read_index_entry
-    from roboirg.records.store import StoredRun
+    from roboirg.evaluation.records.parquet import write_parquet
+    from roboirg.evaluation.records.record_codec import read_index_entry
+    from roboirg.evaluation.records.store import StoredRun
     from roboirg.util.parquet_support import check_parquet_support
 
     check_parquet_support()
@@ -146,9 +146,9 @@ def play(
     plan: Plan, out: Path, executor: Executor, *, retry: bool, on_record: str | None = None
 ) -> RunSummary:
     """Play a plan with a progress bar; exits the process when it is interrupted."""
-    from roboirg.evaluation.progress import ConsoleReporter
-    from roboirg.evaluation.record_hook import CommandHook, HookedReporter
-    from roboirg.evaluation.runner import Terminated, episode_runner, run_plan
+    from roboirg.evaluation.run.progress import ConsoleReporter
+    from roboirg.evaluation.run.record_hook import CommandHook, HookedReporter
+    from roboirg.evaluation.run.runner import Terminated, episode_runner, run_plan
     from roboirg.util.console_width import progress_console
     from roboirg.util.freed_memory import keep_freed_memory
 
@@ -172,7 +172,7 @@ def print_tables_of(folder: Path, planned: Sequence[Job]) -> None:
     """Print the table of a run with its planned jobs, and its unsuccessful episodes."""
     from rich.console import Console
 
-    from roboirg.analysis.tables.run_tables import (
+    from roboirg.evaluation.analysis.tables.run_tables import (
         make_run_tables,
         print_failures,
         print_run_tables,
@@ -185,7 +185,7 @@ def print_tables_of(folder: Path, planned: Sequence[Job]) -> None:
 
 def planned_jobs(folder: Path) -> tuple[Job, ...]:
     """Return the jobs of a run's newest plan; none if the plan or its episodes are not known."""
-    from roboirg.evaluation.plan import read_plan
+    from roboirg.evaluation.plan.plan import read_plan
 
     plan = read_plan(folder)
     return plan.drawable_jobs() if plan else ()
@@ -218,16 +218,16 @@ def report_problems(summary: RunSummary, folder: Path) -> None:
 
 
 def _results(folder: Path) -> Any:  # noqa: ANN401 - imported where it is needed
-    from roboirg.records.store import read_results
+    from roboirg.evaluation.records.store import read_results
 
     return read_results(folder)
 
 
 def _plan(name: str | None, typed: dict[str, Any], salt: str | None) -> Plan:
     """Return the plan of a file, overridden by the options that were typed."""
-    from roboirg.episodes.private_splits import with_salt
-    from roboirg.evaluation.plan_file import read_plan_file
-    from roboirg.evaluation.plan_maker import make_plan
+    from roboirg.evaluation.plan.plan_file import read_plan_file
+    from roboirg.evaluation.plan.plan_maker import make_plan
+    from roboirg.tasks.splits.private_splits import with_salt
 
     chosen = {**({} if name is None else read_plan_file(name)), **typed}
     policies = chosen.pop("policies", None)
@@ -242,8 +242,8 @@ def _plan(name: str | None, typed: dict[str, Any], salt: str | None) -> Plan:
 
 def _check_run(plan: Plan, folder: Path) -> None:
     """Check what a run checks before its first episode; nothing is written."""
-    from roboirg.evaluation.runner import check_run
-    from roboirg.evaluation.video_writer import check_video_support
+    from roboirg.evaluation.play.video_writer import check_video_support
+    from roboirg.evaluation.run.runner import check_run
 
     if plan.video != "off":
         check_video_support()
@@ -251,7 +251,7 @@ def _check_run(plan: Plan, folder: Path) -> None:
 
 
 def _warn_of_cut_prompts(plan: Plan) -> None:
-    from roboirg.evaluation.prompt_shares import prompt_shares, warning_lines
+    from roboirg.evaluation.play.prompt_shares import prompt_shares, warning_lines
 
     for line in warning_lines(prompt_shares(plan.jobs())):
         typer.echo(line, err=True)
@@ -261,12 +261,12 @@ def _executor(plan: Plan, name: str, address: str | None, workers: int | None) -
     if name not in EXECUTORS:
         raise UnknownNameError("executor", name, EXECUTORS)
     if name == "ray":
-        from roboirg.evaluation.executors.ray_cluster import RayCluster
+        from roboirg.evaluation.run.ray_cluster import RayCluster
 
         return RayCluster(workers, address, plan.episode_timeout_s)
     if address is not None:
         raise InvalidValueError(f"--address {address!r} needs --executor ray.")
-    from roboirg.evaluation.executors.executor import choose_executor
+    from roboirg.evaluation.run.executor import choose_executor
 
     return choose_executor(workers, plan.episode_timeout_s)
 
@@ -275,10 +275,10 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from roboirg.evaluation.time_estimate.estimate import cell_sizes, estimate, estimate_text
-    from roboirg.evaluation.time_estimate.world_speed import ASSUMED, measure_world
-    from roboirg.records.record_codec import identity_key
-    from roboirg.records.store import read_index
+    from roboirg.evaluation.records.record_codec import identity_key
+    from roboirg.evaluation.records.store import read_index
+    from roboirg.evaluation.run.estimate import cell_sizes, estimate, estimate_text
+    from roboirg.evaluation.run.world_speed import ASSUMED, measure_world
     from roboirg.util.console_width import widen
     from roboirg.util.processor import core_count
 
@@ -314,7 +314,7 @@ def _print_prompt_shares(
     """Print how many instructions the policies that declare a limit do not read whole."""
     from rich.table import Table
 
-    from roboirg.evaluation.prompt_shares import prompt_shares, share_text
+    from roboirg.evaluation.play.prompt_shares import prompt_shares, share_text
     from roboirg.policies.by_name.policy_classes import BUILTIN
     from roboirg.util.console_width import widen
 

@@ -21,10 +21,10 @@ from roboirg.core.instruction_options import (
     InstructionOptions,
 )
 from roboirg.core.observations import CAMERAS, DemonstrationFrames
-from roboirg.episodes.splits import get_episode, split_size
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.simulation.observation_builder import ObservationSpec
 from roboirg.simulation.rendering.render_settings import find_render_settings
+from roboirg.tasks.splits.splits import get_episode, split_size
 
 MAX_STEPS = 1300
 """Control steps a policy has, as in RoboMME's published experiments."""

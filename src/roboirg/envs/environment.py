@@ -17,19 +17,19 @@ from roboirg.core.errors import InvalidValueError, MotionPlanningError
 from roboirg.core.observations import CAMERAS
 from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.env_settings import RENDER_MODES, EnvSettings, choose_index
+from roboirg.envs.episode_state import EpisodeState
 from roboirg.envs.observation_spaces import make_observation_space
-from roboirg.episodes.recordings import is_recorded, recorded_actions
 from roboirg.judging import Event, Status, plain_subgoal
 from roboirg.language import instruct_with
 from roboirg.simulation.controllers import make_controller
 from roboirg.simulation.episode_session import EpisodeSession
-from roboirg.simulation.episode_state import EpisodeState
 from roboirg.simulation.observation_builder import ObservationBuilder
 from roboirg.simulation.pixel_grounding import PixelGrounding
 from roboirg.simulation.recording import Recording
 from roboirg.simulation.rendering.render_device import describe_device, find_render_device
 from roboirg.simulation.video.demonstration_cache import replay_or_plan
 from roboirg.simulation.video.demonstration_video import make_video
+from roboirg.tasks.splits.recordings import is_recorded, recorded_actions
 
 COMPLETED = "All tasks completed"
 """The subgoal after the last stage."""

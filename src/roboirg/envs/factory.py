@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from roboirg.core.episode import Episode
     from roboirg.envs.environment import RoboIRGEnv
-    from roboirg.envs.vector_environment import RoboIRGVectorEnv
+    from roboirg.envs.vector.vector_environment import RoboIRGVectorEnv
 
 
 def make(task: str | Episode, **options: Unpack[EnvOptions]) -> RoboIRGEnv:
@@ -90,7 +90,7 @@ def make_vec(
         InvalidValueError: a number is out of range, or the combination is not defined.
     """
     with extra_needed("Playing episodes needs the simulator", "sim"):
-        from roboirg.envs.vector_environment import RoboIRGVectorEnv
+        from roboirg.envs.vector.vector_environment import RoboIRGVectorEnv
     return RoboIRGVectorEnv(
         task, num_envs, autoreset_mode=autoreset_mode, workers=workers, lazy=lazy, **options
     )

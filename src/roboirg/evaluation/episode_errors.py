@@ -16,7 +16,7 @@ from roboirg.core.errors import (
     RoboIRGError,
 )
 from roboirg.core.printable import printable
-from roboirg.records.record import ErrorKind
+from roboirg.evaluation.records.record import ErrorKind
 from roboirg.util.plain_text import clip_text
 
 ErrorSource = Literal["policy", "environment"]

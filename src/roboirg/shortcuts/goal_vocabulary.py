@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from roboirg.core.episode import Goal, SlotValue, Split
-from roboirg.episodes.splits import split_episodes
 from roboirg.tasks import get_task
+from roboirg.tasks.splits.splits import split_episodes
 
 Value = str | int
 

@@ -11,7 +11,6 @@ from rich.table import Table
 from roboirg.core.episode import Episode, Split
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.episodes.splits import get_episode, split_episodes
 from roboirg.language.settings import EXPLICIT
 from roboirg.language.variants import instructions
 from roboirg.shortcuts.learned_floor import LearnedFloor
@@ -24,6 +23,7 @@ from roboirg.shortcuts.shortcut_scores import (
     mean_shares,
     rule_scorers,
 )
+from roboirg.tasks.splits.splits import get_episode, split_episodes
 
 TRAINING_SPLIT: Split = "train"
 LEARNED_EXPLICIT = "learned from explicit"

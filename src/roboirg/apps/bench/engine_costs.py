@@ -9,15 +9,15 @@ import tempfile
 import time
 from pathlib import Path
 
-from roboirg.evaluation.executors.executor import LocalProcesses
-from roboirg.evaluation.plan import Plan
-from roboirg.evaluation.plan_maker import make_plan
-from roboirg.evaluation.progress import SilentReporter
-from roboirg.evaluation.rollout import EpisodeRunner
-from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
-from roboirg.evaluation.runner import run_plan
-from roboirg.records.record import EventRecord, Job, Record
-from roboirg.records.store import RECORDS_FILE, RecordStore
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.play.rollout import EpisodeRunner
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, utc_now
+from roboirg.evaluation.records.record import EventRecord, Job, Record
+from roboirg.evaluation.records.store import RECORDS_FILE, RecordStore
+from roboirg.evaluation.run.executor import LocalProcesses
+from roboirg.evaluation.run.progress import SilentReporter
+from roboirg.evaluation.run.runner import run_plan
 
 MANY_RECORDS = 100_000
 _EVENTS = 60

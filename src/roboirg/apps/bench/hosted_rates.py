@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from roboirg.apps.bench.remote_rates import CHUNK, WavingPolicy, steps_per_second
 from roboirg.core.observations import FRONT, Demonstration, Observation
-from roboirg.evaluation.executors.executor import LocalProcesses
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
-from roboirg.evaluation.plan_maker import make_plan
-from roboirg.evaluation.rollout import EpisodeRunner
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.play.rollout import EpisodeRunner
+from roboirg.evaluation.run.executor import LocalProcesses
 
 CALL_S = 0.05
 """How long a call of the slow policy takes, whatever the number of episodes."""

@@ -20,9 +20,9 @@ def observe(path: Path, index: int) -> None:
         make(TASK, episode=index).reset()
         return
     from roboirg.core.observations import CAMERAS
-    from roboirg.episodes.splits import get_episode
     from roboirg.simulation.episode_session import EpisodeSession
     from roboirg.simulation.rendering.render_settings import STOCK
+    from roboirg.tasks.splits.splits import get_episode
 
     session = EpisodeSession(get_episode(TASK, "test", index), visible=True, rendering=STOCK)
     session.play_demonstration()

@@ -11,9 +11,9 @@ from contextlib import contextmanager
 from roboirg.core.episode import Episode
 from roboirg.core.observations import CAMERAS
 from roboirg.envs.factory import make
-from roboirg.episodes.splits import get_episode
 from roboirg.simulation.episode_session import EpisodeSession
 from roboirg.simulation.rendering.render_settings import STOCK
+from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.cache import FOLDER_VARIABLE, OFF
 
 

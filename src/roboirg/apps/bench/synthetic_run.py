@@ -14,12 +14,12 @@ import numpy as np
 
 from roboirg.core.conditions import Fact, FactCount, OccurrenceCount, facts_of
 from roboirg.core.episode import Episode, Stage
-from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.plan import Plan, write_plan
-from roboirg.evaluation.plan_maker import make_plan
-from roboirg.evaluation.rollout_result import RolloutResult, make_record
-from roboirg.records.record import Attribution, EventRecord, Job, Outcome, Record
-from roboirg.records.store import RECORDS_FILE
+from roboirg.evaluation.plan.plan import Plan, write_plan
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.records.record import Attribution, EventRecord, Job, Outcome, Record
+from roboirg.evaluation.records.store import RECORDS_FILE
+from roboirg.tasks.splits.splits import get_episode
 
 POLICIES = tuple(f"policy-{letter}=random" for letter in "abcd")
 EPISODES = 50

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.episode import Episode
-from roboirg.episodes.splits import get_episode
 from roboirg.simulation.episode_session import EpisodeSession
 from roboirg.simulation.expert.primitives import MotionPrimitives
 from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
+from roboirg.tasks.splits.splits import get_episode
 
 STEPS = 48
 """Timed control steps of a stretch."""

@@ -86,7 +86,7 @@ def export_demonstrations(
     from roboirg.apps.demonstrations.size_estimate import size_text
     from roboirg.cli.names import known_settings
     from roboirg.cli.progress_bar import progress_bars
-    from roboirg.evaluation.plan_parsing import means_all, parse_episodes, parse_names
+    from roboirg.evaluation.plan.plan_parsing import means_all, parse_episodes, parse_names
     from roboirg.language import FORMS
     from roboirg.policies import load_policy_class
     from roboirg.tasks import find_tasks

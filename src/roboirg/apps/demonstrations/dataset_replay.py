@@ -16,7 +16,7 @@ from roboirg.apps.demonstrations.dataset_reading import ReplayableTrajectory, re
 from roboirg.core.episode import SPLITS, Episode
 from roboirg.core.errors import InvalidValueError
 from roboirg.envs.factory import make
-from roboirg.episodes.splits import SIZES, get_episode
+from roboirg.tasks.splits.splits import SIZES, get_episode
 from roboirg.util.parallel_map import parallel_map
 
 TOLERANCE = 1e-4

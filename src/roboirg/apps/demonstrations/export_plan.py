@@ -14,12 +14,12 @@ from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.episodes.splits import get_episode
 from roboirg.language import FORMS, LANGUAGE_VERSION
 from roboirg.language.generator import instruct_with
 from roboirg.language.instruction_row import row
 from roboirg.language.settings import all_settings
 from roboirg.language.variants import instructions
+from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.short_hash import short_hash
 
 FormatName = Literal["lerobot-v3", "lerobot-v2.1", "robomme-hdf5"]

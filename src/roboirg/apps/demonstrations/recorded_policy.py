@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from roboirg.core.actions import find_action_space
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.observations import Demonstration, Observation
+from roboirg.evaluation.records.action_log import read_actions
+from roboirg.evaluation.records.record import Record
+from roboirg.evaluation.records.store import read_records
 from roboirg.policies.by_name.policy_specs import Build, PolicyKind
-from roboirg.records.action_log import read_actions
-from roboirg.records.record import Record
-from roboirg.records.store import read_records
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv

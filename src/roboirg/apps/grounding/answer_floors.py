@@ -12,10 +12,9 @@ import numpy as np
 from roboirg.core.episode import Episode, Goal
 from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.episodes.splits import get_episode, split_episodes
-from roboirg.evaluation.grounding_set.answer_file import Answer
-from roboirg.evaluation.grounding_set.grounding_item import LETTERS, GroundingItem
-from roboirg.evaluation.grounding_set.verdicts import right_reply
+from roboirg.evaluation.grounding_items.answer_file import Answer
+from roboirg.evaluation.grounding_items.grounding_item import LETTERS, GroundingItem
+from roboirg.evaluation.grounding_items.verdicts import right_reply
 from roboirg.language.settings import EXPLICIT
 from roboirg.language.variants import instructions
 from roboirg.policies.vlm.goal_schema import goal_schema
@@ -24,6 +23,7 @@ from roboirg.shortcuts.command_chance import fitting_goals
 from roboirg.shortcuts.learned_floor import LearnedFloor, places_of
 from roboirg.shortcuts.shortcut_tables import TRAINING_SPLIT
 from roboirg.tasks import get_task
+from roboirg.tasks.splits.splits import get_episode, split_episodes
 
 ORACLE, CHANCE, COMMAND = "oracle", "chance", "command"
 LEARNED_EXPLICIT, LEARNED_SETTING = "words-explicit", "words-setting"

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from roboirg.analysis.stats.cells import (
+from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.analysis.stats.cells import (
     CellKey,
     CellResults,
     Cells,
@@ -20,16 +21,15 @@ from roboirg.analysis.stats.cells import (
     Versions,
     sort_cells,
 )
-from roboirg.analysis.stats.intervals import SEED
-from roboirg.analysis.stats.run_summary import ALL, SummaryRow, summarize
-from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.grounding_set.answer_file import Answer
-from roboirg.evaluation.grounding_set.grounding_item import (
+from roboirg.evaluation.analysis.stats.intervals import SEED
+from roboirg.evaluation.analysis.stats.run_summary import ALL, SummaryRow, summarize
+from roboirg.evaluation.grounding_items.answer_file import Answer
+from roboirg.evaluation.grounding_items.grounding_item import (
     QUESTION_KINDS,
     GroundingItem,
     QuestionKind,
 )
-from roboirg.evaluation.grounding_set.verdicts import ReplyVerdict, guess_chance, judge_reply
+from roboirg.evaluation.grounding_items.verdicts import ReplyVerdict, guess_chance, judge_reply
 
 ANSWERS_VERSION = "answers"
 OWN_WORDS = "own"

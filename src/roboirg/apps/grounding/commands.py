@@ -63,12 +63,12 @@ def export_grounding(
     from roboirg.apps.grounding.dataset_export import export_grounding
     from roboirg.cli.names import known_name, known_settings, known_tasks
     from roboirg.cli.progress_bar import progress_bar
-    from roboirg.evaluation.grounding_set.question_set import (
+    from roboirg.evaluation.grounding_items.question_set import (
         TABLE_FORMATS,
         EpisodeName,
         ExportRequest,
     )
-    from roboirg.evaluation.plan_parsing import parse_episodes, parse_names, parse_splits
+    from roboirg.evaluation.plan.plan_parsing import parse_episodes, parse_names, parse_splits
     from roboirg.language import FORMS
     from roboirg.language.generator import check_options
     from roboirg.util.parquet_support import check_parquet_support
@@ -130,13 +130,13 @@ def score_grounding(
     """Score answers to the grounding dataset; two files are also compared."""
     from rich.console import Console
 
-    from roboirg.analysis.tables.rendering.terminal import renderable
     from roboirg.apps.grounding.answer_floors import floor_answers
     from roboirg.apps.grounding.answer_scores import score_answers
     from roboirg.apps.grounding.score_report import report_text
     from roboirg.apps.grounding.score_tables import score_table
-    from roboirg.evaluation.grounding_set.answer_file import read_answers, write_answers
-    from roboirg.evaluation.grounding_set.grounding_item import read_items
+    from roboirg.evaluation.analysis.tables.rendering.terminal import renderable
+    from roboirg.evaluation.grounding_items.answer_file import read_answers, write_answers
+    from roboirg.evaluation.grounding_items.grounding_item import read_items
     from roboirg.util.atomic_write import write_atomically
 
     names = _floors(floor)
@@ -167,7 +167,7 @@ def score_grounding(
 def _floors(text: str | None) -> tuple[str, ...]:
     from roboirg.apps.grounding.answer_floors import FLOORS
     from roboirg.cli.names import known_name
-    from roboirg.evaluation.plan_parsing import means_all, parse_names
+    from roboirg.evaluation.plan.plan_parsing import means_all, parse_names
 
     if text is None:
         return ()
@@ -180,9 +180,9 @@ def _comparisons(scores: Sequence[GroundingScore]) -> list[str]:
     """Return the paired comparison of two models in each kind of question that both answered."""
     import numpy as np
 
-    from roboirg.analysis.stats.comparison import compare
-    from roboirg.analysis.stats.comparison_text import sentences
-    from roboirg.analysis.stats.intervals import SEED
+    from roboirg.evaluation.analysis.stats.comparison import compare
+    from roboirg.evaluation.analysis.stats.comparison_text import sentences
+    from roboirg.evaluation.analysis.stats.intervals import SEED
 
     found: list[str] = []
     for place, first in enumerate(scores):

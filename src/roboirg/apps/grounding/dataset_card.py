@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple, Self
 
 from roboirg.core.version import __version__
-from roboirg.evaluation.grounding_set.grounding_item import ITEMS_FILE, GroundingItem
+from roboirg.evaluation.grounding_items.grounding_item import ITEMS_FILE, GroundingItem
 from roboirg.language.settings import setting_names
 from roboirg.util.atomic_write import write_atomically
 

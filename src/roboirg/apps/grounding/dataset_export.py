@@ -8,11 +8,8 @@ from pathlib import Path
 
 from roboirg.apps.grounding.dataset_card import CARD, DatasetFacts, write_card
 from roboirg.apps.grounding.dataset_tables import TSV_FOLDER, write_parquet, write_tsv
-from roboirg.evaluation.grounding_set.grounding_item import (
-    GroundingItem,
-    write_items,
-)
-from roboirg.evaluation.grounding_set.question_set import (
+from roboirg.evaluation.grounding_items.grounding_item import GroundingItem, write_items
+from roboirg.evaluation.grounding_items.question_set import (
     PARTS,
     ExportRequest,
     Progress,

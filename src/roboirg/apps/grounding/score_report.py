@@ -8,11 +8,11 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from roboirg.analysis.tables.rendering.markdown import markdown
-from roboirg.analysis.tables.table import Column, Entry, Row, Table
 from roboirg.apps.grounding.answer_scores import GroundingScore, JudgedItem, hidden_fields
 from roboirg.apps.grounding.score_tables import QUESTIONS, breakdown_tables, score_table
-from roboirg.evaluation.grounding_set.verdicts import right_reply
+from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
+from roboirg.evaluation.analysis.tables.table import Column, Entry, Row, Table
+from roboirg.evaluation.grounding_items.verdicts import right_reply
 from roboirg.util.plain_text import counted
 
 NO_ANSWER = "no answer"

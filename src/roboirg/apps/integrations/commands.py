@@ -37,7 +37,7 @@ def import_results(
 
 
 def _field(text: str) -> tuple[str, str]:
-    from roboirg.records.record import IDENTITY
+    from roboirg.evaluation.records.record import IDENTITY
 
     name, sign, value = text.partition("=")
     if not sign:

@@ -25,11 +25,11 @@ from typing import Any, NamedTuple
 from pydantic import JsonValue, ValidationError
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.episodes.splits import split_size
-from roboirg.evaluation.policy_descriptions import PolicyDescription
-from roboirg.evaluation.rollout_result import RolloutResult, make_record
-from roboirg.records.record import DEFAULT_MAX_STEPS, ErrorKind, Job, Record
-from roboirg.records.store import RecordStore
+from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, ErrorKind, Job, Record
+from roboirg.evaluation.records.store import RecordStore
+from roboirg.tasks.splits.splits import split_size
 
 LEROBOT_SEED = 1000
 """The seed of lerobot-eval's first episode, if none is given."""
@@ -52,7 +52,7 @@ class ImportOptions(NamedTuple):
     Attributes:
         policy: name of the policy in the records.
         seed: of LeRobot's first episode.
-        fields: fields of `roboirg.records.record.Job` that differ from their defaults.
+        fields: fields of `roboirg.evaluation.records.record.Job` that differ from their defaults.
     """
 
     policy: str

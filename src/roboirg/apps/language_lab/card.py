@@ -8,13 +8,13 @@ from typing import Any
 
 from roboirg.core.episode import Episode
 from roboirg.core.instruction_options import REASONINGS, RIVALS, InstructionOptions
-from roboirg.episodes.splits import get_episode
 from roboirg.language.generator import find_refusal, instruct, instruct_with
 from roboirg.language.instruction import Instruction, Mention
 from roboirg.language.settings import all_settings
 from roboirg.language.templates import LANGUAGE_VERSION
 from roboirg.language.variants import Variant, all_variants
 from roboirg.tasks import all_tasks, get_task
+from roboirg.tasks.splits.splits import get_episode
 
 SPLIT = "test"
 

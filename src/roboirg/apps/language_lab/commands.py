@@ -61,11 +61,11 @@ def export_instructions(
         check_export_support,
         write_rows,
     )
-    from roboirg.episodes.splits import split_episodes
-    from roboirg.evaluation.plan_parsing import parse_names, parse_splits
+    from roboirg.evaluation.plan.plan_parsing import parse_names, parse_splits
     from roboirg.language import FORMS
     from roboirg.language.instruction_row import row
     from roboirg.language.variants import instructions
+    from roboirg.tasks.splits.splits import split_episodes
 
     kind = known_name("format", format, EXPORT_FORMATS)
     check_export_support(kind)
@@ -96,10 +96,10 @@ def stats(
     """Count words, referring expressions, patterns, relations and landmarks."""
     from roboirg.apps.language_lab.statistics_tables import overview_tables
     from roboirg.core.instruction_options import InstructionOptions
-    from roboirg.episodes.splits import split_episodes
-    from roboirg.evaluation.plan_parsing import parse_splits
-    from roboirg.language.expression_figure import write_figure
+    from roboirg.evaluation.analysis.figures.expression_figure import write_figure
+    from roboirg.evaluation.plan.plan_parsing import parse_splits
     from roboirg.language.variants import instructions
+    from roboirg.tasks.splits.splits import split_episodes
     from roboirg.util.figure_files import check_figure_support
 
     if out is not None:
@@ -132,7 +132,7 @@ def validate_instructions(
     """Read all instructions back and check their rules; exit code 2 if one is broken."""
     from roboirg.apps.language_lab.validation import ValidationResults, batches, validate
     from roboirg.apps.language_lab.validation.validation_tables import validation_tables
-    from roboirg.evaluation.plan_parsing import parse_splits
+    from roboirg.evaluation.plan.plan_parsing import parse_splits
     from roboirg.language.wordings.wording_store import open_wordings
     from roboirg.util.processor import core_count
 
@@ -187,7 +187,7 @@ def score_shortcuts(
     ] = False,
 ) -> None:
     """Score rules that see the words only, beside chance: how much needs no understanding."""
-    from roboirg.evaluation.plan_parsing import parse_splits
+    from roboirg.evaluation.plan.plan_parsing import parse_splits
     from roboirg.language import FORMS
     from roboirg.shortcuts.learned_floor import check_learning_support
     from roboirg.shortcuts.shortcut_scores import GROUPINGS

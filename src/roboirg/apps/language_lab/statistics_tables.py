@@ -7,7 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from rich.table import Table
 
 from roboirg.apps.language_lab import corpus_statistics
-from roboirg.language.expression_counts import ClassCounts, expression_counts, expression_order
+from roboirg.evaluation.analysis.figures.expression_counts import (
+    ClassCounts,
+    expression_counts,
+    expression_order,
+)
 from roboirg.language.instruction import Instruction
 from roboirg.language.open_reasoning import open_templates
 from roboirg.language.settings import setting_names

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from roboirg.core.actions import find_action_space
 from roboirg.core.observations import Observation
-from roboirg.evaluation.call_guard import CallGuard
 from roboirg.evaluation.episode_errors import EpisodeError
-from roboirg.evaluation.policy_descriptions import PolicyDescription
-from roboirg.evaluation.policy_environment import EnvRequirements
-from roboirg.evaluation.rollout import play_with
-from roboirg.evaluation.rollout_result import RolloutResult, make_record
-from roboirg.records.action_log import ActionLog
-from roboirg.records.record import Job, Record
+from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription
+from roboirg.evaluation.play.call_guard import CallGuard
+from roboirg.evaluation.play.policy_environment import EnvRequirements
+from roboirg.evaluation.play.rollout import play_with
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.records.action_log import ActionLog
+from roboirg.evaluation.records.record import Job, Record
 
 
 class ReplayPolicy:

@@ -6,17 +6,17 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from roboirg.analysis.page.report import check_report_support
-from roboirg.analysis.stats.option_labels import setting_sort_key
 from roboirg.apps.leaderboard.board_rows import BoardRate, BoardRow, PackedRun, board_rows
 from roboirg.apps.leaderboard.pack_checks import check_pack, read_check
 from roboirg.apps.leaderboard.packing import PACK_SUFFIX, opened_run
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.version import __version__
-from roboirg.evaluation.plan import read_plans
-from roboirg.records.store import read_results
+from roboirg.evaluation.analysis.page.report import check_report_support
+from roboirg.evaluation.analysis.stats.option_labels import setting_sort_key
+from roboirg.evaluation.plan.plan import read_plans
+from roboirg.evaluation.records.store import read_results
 from roboirg.util.atomic_write import write_atomically
-from roboirg.util.page_templates import template_environment
+from roboirg.util.web.page_templates import template_environment
 
 BOARD_FILE = "board.html"
 _TEMPLATE = "board.html.j2"

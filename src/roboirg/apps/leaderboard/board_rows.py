@@ -9,24 +9,24 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
-from roboirg.analysis.published import MAX_STEPS, published_rows
-from roboirg.analysis.stats.cells import Cells, PolicyRun, clustered_interval, gather
-from roboirg.analysis.stats.intervals import SEED
-from roboirg.analysis.stats.multiple_testing import holm
-from roboirg.analysis.stats.option_labels import (
+from roboirg.apps.leaderboard.pack_checks import PackCheck
+from roboirg.evaluation.analysis.published import MAX_STEPS, published_rows
+from roboirg.evaluation.analysis.stats.cells import Cells, PolicyRun, clustered_interval, gather
+from roboirg.evaluation.analysis.stats.intervals import SEED
+from roboirg.evaluation.analysis.stats.multiple_testing import holm
+from roboirg.evaluation.analysis.stats.option_labels import (
     has_default_options,
     setting_sort_key,
     words_label,
 )
-from roboirg.analysis.stats.paired_tests import Pairs, measure_gap
-from roboirg.analysis.stats.run_summary import ALL as ALL_SCOPE
-from roboirg.analysis.stats.run_summary import ScopeResults, group_by_scope
-from roboirg.apps.leaderboard.pack_checks import PackCheck
-from roboirg.episodes.private_splits import is_private
+from roboirg.evaluation.analysis.stats.paired_tests import Pairs, measure_gap
+from roboirg.evaluation.analysis.stats.run_summary import ALL as ALL_SCOPE
+from roboirg.evaluation.analysis.stats.run_summary import ScopeResults, group_by_scope
+from roboirg.evaluation.records.record import Job
+from roboirg.evaluation.records.record_codec import AnyResult
 from roboirg.language.settings import settings_of
-from roboirg.records.record import Job
-from roboirg.records.record_codec import AnyResult
 from roboirg.tasks import ALL, find_tasks, get_task
+from roboirg.tasks.splits.private_splits import is_private
 
 Status = Literal["verified", "unchecked", "refuted", "published"]
 STATUSES: tuple[Status, ...] = get_args(Status)

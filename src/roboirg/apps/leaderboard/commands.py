@@ -83,8 +83,8 @@ def board(
     workers: Workers = None,
 ) -> None:
     """Make a leaderboard page of packed runs: verified, privileged, comparable or not."""
-    from roboirg.analysis.page.report import check_report_support
     from roboirg.apps.leaderboard.board_page import BOARD_FILE, read_packs, write_board
+    from roboirg.evaluation.analysis.page.report import check_report_support
     from roboirg.util.processor import core_count
 
     check_report_support()
@@ -103,7 +103,7 @@ def board(
 
 
 def _take_salt(salt: str | None) -> None:
-    from roboirg.episodes.private_splits import use_salt
+    from roboirg.tasks.splits.private_splits import use_salt
 
     if salt is not None:
         use_salt(salt)
@@ -166,8 +166,8 @@ def repeat(
     """Play a run's plan again with its policies, and print which verdicts changed."""
     from roboirg.apps.leaderboard.repeats import flips_by_cell, repeated_episodes, write_flips
     from roboirg.cli.run_commands import play
-    from roboirg.evaluation.executors.executor import choose_executor
-    from roboirg.evaluation.plan import read_plan
+    from roboirg.evaluation.plan.plan import read_plan
+    from roboirg.evaluation.run.executor import choose_executor
 
     folder, target = folder_of(run), folder_of(out)
     if folder.resolve() == target.resolve():
@@ -192,8 +192,8 @@ def _print_flips(episodes: tuple[RepeatedEpisode, ...]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from roboirg.analysis.stats.option_labels import options_label
     from roboirg.apps.leaderboard.repeats import count_flips, flips_by_cell
+    from roboirg.evaluation.analysis.stats.option_labels import options_label
 
     table = Table(title="verdicts, first and second time", title_justify="left")
     for name in ("policy", "setting"):

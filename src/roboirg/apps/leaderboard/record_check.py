@@ -12,11 +12,11 @@ import numpy as np
 from roboirg.apps.leaderboard.action_replay import replay, unplayed
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
+from roboirg.evaluation.records.action_log import ActionLog, read_actions
+from roboirg.evaluation.records.record import Record
+from roboirg.evaluation.records.record_codec import read_line
+from roboirg.evaluation.records.store import RECORDS_FILE
 from roboirg.language import LANGUAGE_VERSION
-from roboirg.records.action_log import ActionLog, read_actions
-from roboirg.records.record import Record
-from roboirg.records.record_codec import read_line
-from roboirg.records.store import RECORDS_FILE
 
 TOLERANCE = 0.02
 """Largest difference of an end state, in m, rad and s, that is granted to a record from another

@@ -11,13 +11,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from roboirg.analysis.stats.flips import FLIPS_FILE, FlipCounts, Flips
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.records.action_log import ActionLog, read_actions
-from roboirg.records.record import Record
-from roboirg.records.record_codec import identity_key, read_index_entry
-from roboirg.records.store import StoredRun
+from roboirg.evaluation.analysis.stats.flips import FLIPS_FILE, FlipCounts, Flips
+from roboirg.evaluation.records.action_log import ActionLog, read_actions
+from roboirg.evaluation.records.record import Record
+from roboirg.evaluation.records.record_codec import identity_key, read_index_entry
+from roboirg.evaluation.records.store import StoredRun
 from roboirg.util.atomic_write import write_atomically
 
 _ARITHMETIC = ("device", "driver", "flags")

@@ -17,12 +17,12 @@ from roboirg.apps.leaderboard.record_check import (
 )
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.episodes.private_splits import check_salt
-from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.plan import read_earlier_plans, read_plans
+from roboirg.evaluation.plan.plan import read_earlier_plans, read_plans
+from roboirg.evaluation.records.record_codec import EpisodeSummary, identity_key
+from roboirg.evaluation.records.store import StoredRun, read_summaries
 from roboirg.language.generator import find_refusal
-from roboirg.records.record_codec import EpisodeSummary, identity_key
-from roboirg.records.store import StoredRun, read_summaries
+from roboirg.tasks.splits.private_splits import check_salt
+from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.parallel_map import parallel_map
 from roboirg.util.plain_text import counted
 

@@ -112,8 +112,8 @@ def learned_answers(
     """Let a trained listener answer the grounding dataset, for roboirg score grounding."""
     from roboirg.apps.learned_listener.learned_answers import learned_answers as answers_of
     from roboirg.apps.learned_listener.learned_listener import check_learn_support
-    from roboirg.evaluation.grounding_set.answer_file import write_answers
-    from roboirg.evaluation.grounding_set.grounding_item import read_items
+    from roboirg.evaluation.grounding_items.answer_file import write_answers
+    from roboirg.evaluation.grounding_items.grounding_item import read_items
 
     check_learn_support()
     from roboirg.apps.learned_listener.learned_model import load_model

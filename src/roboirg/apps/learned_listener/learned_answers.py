@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.grounding_set.answer_file import Answer
-from roboirg.evaluation.grounding_set.grounding_item import GroundingItem
+from roboirg.evaluation.grounding_items.answer_file import Answer
+from roboirg.evaluation.grounding_items.grounding_item import GroundingItem
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.util.media import Pixels
 

@@ -12,10 +12,10 @@ from roboirg.core.instruction_options import RIVALS, InstructionOptions
 from roboirg.core.observations import FRONT
 from roboirg.core.word_pools import POOLS, PoolName
 from roboirg.envs.environment import RoboIRGEnv
-from roboirg.episodes.splits import SIZES, get_episode
 from roboirg.language import FORMS
 from roboirg.language.settings import all_settings
 from roboirg.language.variants import instructions, settings_with_rivals
+from roboirg.tasks.splits.splits import SIZES, get_episode
 from roboirg.util.parallel_map import parallel_map
 
 if TYPE_CHECKING:

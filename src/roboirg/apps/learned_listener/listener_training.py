@@ -32,13 +32,13 @@ from roboirg.core.episode import Episode, Split
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import RIVALS, InstructionOptions
 from roboirg.core.word_pools import PoolName
-from roboirg.episodes.splits import SIZES, get_episode
 from roboirg.language import FORMS, LANGUAGE_VERSION
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.variants import instructions, settings_with_rivals
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.tasks import get_task, with_goal
+from roboirg.tasks.splits.splits import SIZES, get_episode
 from roboirg.util.parallel_map import parallel_map
 
 TRAINING_SPLIT: Split = "train"

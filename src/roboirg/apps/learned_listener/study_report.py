@@ -9,10 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from roboirg.analysis.figures.averages import draw_averages
-from roboirg.analysis.figures.figure_data import FigureData, summaries_by_key
-from roboirg.analysis.figures.figure_style import save
-from roboirg.analysis.stats.cells import (
+from roboirg.apps.learned_listener.listener_study import HELD_OUT, TEST, VARIANTS, StudyAnswer
+from roboirg.core.episode import ENVIRONMENT_VERSION
+from roboirg.core.instruction_options import DEFAULT_RIVAL, RIVALS, InstructionOptions
+from roboirg.evaluation.analysis.figures.averages import draw_averages
+from roboirg.evaluation.analysis.figures.figure_data import FigureData, summaries_by_key
+from roboirg.evaluation.analysis.figures.figure_style import save
+from roboirg.evaluation.analysis.stats.cells import (
     CellKey,
     CellResults,
     Cells,
@@ -21,13 +24,10 @@ from roboirg.analysis.stats.cells import (
     Trial,
     Versions,
 )
-from roboirg.analysis.stats.intervals import SEED
-from roboirg.analysis.stats.run_summary import ALL, SummaryRow, summarize
-from roboirg.analysis.tables.rendering.markdown import markdown
-from roboirg.analysis.tables.table import NOT_APPLICABLE, Column, Entry, Row, Table
-from roboirg.apps.learned_listener.listener_study import HELD_OUT, TEST, VARIANTS, StudyAnswer
-from roboirg.core.episode import ENVIRONMENT_VERSION
-from roboirg.core.instruction_options import DEFAULT_RIVAL, RIVALS, InstructionOptions
+from roboirg.evaluation.analysis.stats.intervals import SEED
+from roboirg.evaluation.analysis.stats.run_summary import ALL, SummaryRow, summarize
+from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
+from roboirg.evaluation.analysis.tables.table import NOT_APPLICABLE, Column, Entry, Row, Table
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.language.settings import all_settings
 

@@ -16,10 +16,10 @@ from typing import NamedTuple
 
 from roboirg.core.episode import Episode, Goal, ObjectKind
 from roboirg.core.errors import InvalidValueError
-from roboirg.episodes.splits import split_episodes
-from roboirg.evaluation.grounding_set.referents import find_referents, is_ordered
+from roboirg.evaluation.grounding_items.referents import find_referents, is_ordered
 from roboirg.policies.vlm.goal_schema import SOURCE, Field, goal_schema
 from roboirg.tasks import get_task
+from roboirg.tasks.splits.splits import split_episodes
 
 Value = str | int
 

@@ -22,7 +22,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.util.plain_text import counted
 
 if TYPE_CHECKING:
-    from roboirg.util.keyed_pages import KeyedPageServer
+    from roboirg.util.web.keyed_pages import KeyedPageServer
 
 # Heavy modules are imported inside the commands, so that --help is fast.
 
@@ -78,9 +78,9 @@ def plan(
         write_listening_study,
     )
     from roboirg.cli.progress_bar import progress_bar
-    from roboirg.evaluation.grounding_set.grounding_item import write_items
-    from roboirg.evaluation.grounding_set.question_set import collect_items
-    from roboirg.evaluation.plan_maker import make_plan
+    from roboirg.evaluation.grounding_items.grounding_item import write_items
+    from roboirg.evaluation.grounding_items.question_set import collect_items
+    from roboirg.evaluation.plan.plan_maker import make_plan
     from roboirg.util.processor import core_count
 
     # The policy can be checked only when its answers are there; the oracle stands in for it.
@@ -139,7 +139,7 @@ def serve_study(
 def play_answers(folder: Study, workers: Workers = None) -> None:
     """Play what people answered with the oracle's hands; records are in FOLDER/run."""
     from roboirg.apps.people.people_run import RUN, answered_plan
-    from roboirg.evaluation.executors.executor import choose_executor
+    from roboirg.evaluation.run.executor import choose_executor
 
     made, out = answered_plan(folder), folder.absolute() / RUN
     summary = run_commands.play(made, out, choose_executor(workers), retry=True)
@@ -157,10 +157,10 @@ def print_listeners(folder: Study) -> None:
 def _print_listeners(folder: Path) -> None:
     from rich.console import Console
 
-    from roboirg.analysis.tables.rendering.terminal import renderable
     from roboirg.apps.people.listener_answers import read_events
     from roboirg.apps.people.listener_tables import person_table, setting_table
     from roboirg.apps.people.listening_study import read_listening_study
+    from roboirg.evaluation.analysis.tables.rendering.terminal import renderable
     from roboirg.util.console_width import widen
 
     read_listening_study(folder)
@@ -215,7 +215,7 @@ def drive(
     from roboirg.apps.people.drive_server import DriveServer
     from roboirg.apps.people.driving_run import DRIVER
     from roboirg.envs.factory import check_simulator
-    from roboirg.evaluation.plan_maker import make_plan
+    from roboirg.evaluation.plan.plan_maker import make_plan
 
     # The plan checks the words as those of a run; a person is no policy that can be loaded.
     made = make_plan(

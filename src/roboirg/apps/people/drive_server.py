@@ -15,10 +15,10 @@ from urllib.parse import parse_qs, urlsplit
 from roboirg.apps.people.driving_run import drive_episode, next_seed
 from roboirg.apps.people.driving_session import DrivingSession
 from roboirg.apps.people.listen_server import PACKAGE
-from roboirg.records.record import Job
-from roboirg.util.keyed_pages import KeyedPageHandler, KeyedPageServer
-from roboirg.util.page_templates import check_page_support, template_environment
-from roboirg.util.request_origin import LOOPBACK
+from roboirg.evaluation.records.record import Job
+from roboirg.util.web.keyed_pages import KeyedPageHandler, KeyedPageServer
+from roboirg.util.web.page_templates import check_page_support, template_environment
+from roboirg.util.web.request_origin import LOOPBACK
 
 if TYPE_CHECKING:
     import jinja2

@@ -8,16 +8,16 @@ from pathlib import Path
 from roboirg.apps.people.driving_policy import DrivingPolicy
 from roboirg.apps.people.driving_session import DrivingSession, DrivingStoppedError
 from roboirg.core.errors import RoboIRGError
-from roboirg.evaluation.call_guard import CallGuard
 from roboirg.evaluation.episode_errors import EpisodeError
-from roboirg.evaluation.policy_descriptions import PolicyDescription
-from roboirg.evaluation.policy_environment import env_requirements
-from roboirg.evaluation.rollout import play_with
-from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
-from roboirg.records.action_log import write_actions
-from roboirg.records.record import Job, Record
-from roboirg.records.record_codec import identity_key
-from roboirg.records.store import RecordStore, read_index
+from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription
+from roboirg.evaluation.play.call_guard import CallGuard
+from roboirg.evaluation.play.policy_environment import env_requirements
+from roboirg.evaluation.play.rollout import play_with
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, utc_now
+from roboirg.evaluation.records.action_log import write_actions
+from roboirg.evaluation.records.record import Job, Record
+from roboirg.evaluation.records.record_codec import identity_key
+from roboirg.evaluation.records.store import RecordStore, read_index
 
 DRIVER = "person"
 """Name of the policy in records."""

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, cast
 
 from roboirg.core.observations import CAMERAS
-from roboirg.evaluation.video_writer import PictureSource
-from roboirg.records.film import VideoOptions
-from roboirg.records.record import Record
+from roboirg.evaluation.play.video_writer import PictureSource
+from roboirg.evaluation.records.film import VideoOptions
+from roboirg.evaluation.records.record import Record
 from roboirg.util.media import encode_jpeg
 
 if TYPE_CHECKING:

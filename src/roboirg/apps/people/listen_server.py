@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from roboirg.apps.people.listening_session import ListeningSession, OutOfDateError
 from roboirg.core.errors import RoboIRGError
-from roboirg.util.keyed_pages import KeyedPageHandler, KeyedPageServer, stored_key
-from roboirg.util.page_templates import check_page_support, template_environment
-from roboirg.util.request_origin import LOOPBACK
+from roboirg.util.web.keyed_pages import KeyedPageHandler, KeyedPageServer, stored_key
+from roboirg.util.web.page_templates import check_page_support, template_environment
+from roboirg.util.web.request_origin import LOOPBACK
 
 if TYPE_CHECKING:
     import jinja2

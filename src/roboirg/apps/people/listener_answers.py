@@ -11,8 +11,8 @@ from typing import Self
 
 import msgspec
 
-from roboirg.records.line_file import AppendFile, LineFile
-from roboirg.records.record_codec import DamagedLineError, StoreError
+from roboirg.evaluation.records.line_file import AppendFile, LineFile
+from roboirg.evaluation.records.record_codec import DamagedLineError, StoreError
 
 ANSWERS_FILE = "answers.jsonl"
 TORN_ANSWERS_FILE = "answers.torn"

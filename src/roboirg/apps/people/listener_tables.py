@@ -11,7 +11,6 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from roboirg.analysis.tables.table import NOT_APPLICABLE, Column, Entry, Row, Table
 from roboirg.apps.people.agreement import krippendorff_alpha, pairwise_agreement
 from roboirg.apps.people.answer_form import FormAnswer, answer_of
 from roboirg.apps.people.listener_answers import (
@@ -22,8 +21,9 @@ from roboirg.apps.people.listener_answers import (
     person_name,
     standing_answers,
 )
-from roboirg.episodes.splits import get_episode
+from roboirg.evaluation.analysis.tables.table import NOT_APPLICABLE, Column, Entry, Row, Table
 from roboirg.language.settings import setting_names
+from roboirg.tasks.splits.splits import get_episode
 
 ALL = "all"
 _SETTING_NOTE = (

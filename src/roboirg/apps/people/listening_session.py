@@ -25,16 +25,12 @@ from roboirg.apps.people.listening_study import PersonQuestion, read_listening_s
 from roboirg.apps.people.question_view import PersonView, view_question
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError
-from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.grounding_set.grounding_item import (
-    ITEMS_FILE,
-    GroundingItem,
-    read_items,
-)
-from roboirg.evaluation.grounding_set.question_set import EpisodeName, read_media
+from roboirg.evaluation.grounding_items.grounding_item import ITEMS_FILE, GroundingItem, read_items
+from roboirg.evaluation.grounding_items.question_set import EpisodeName, read_media
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.shortcuts.command_chance import is_right
+from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.short_hash import short_hash
 
 QUESTIONS = "questions"

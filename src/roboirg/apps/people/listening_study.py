@@ -21,11 +21,11 @@ from roboirg.apps.people.latin_square import balanced_square
 from roboirg.apps.people.people_listener import STUDY_FILE
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import DEFAULT_DELIVERY, InstructionOptions
-from roboirg.episodes.splits import SIZES
-from roboirg.evaluation.grounding_set.question_set import EpisodeName, ExportRequest
-from roboirg.evaluation.plan import Plan
+from roboirg.evaluation.grounding_items.question_set import EpisodeName, ExportRequest
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.records.record import Job
 from roboirg.language.settings import EXPLICIT, setting_names
-from roboirg.records.record import Job
+from roboirg.tasks.splits.splits import SIZES
 from roboirg.util.atomic_write import write_atomically
 
 PEOPLE = "people"

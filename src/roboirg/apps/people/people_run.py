@@ -10,8 +10,8 @@ from pydantic import PrivateAttr
 from roboirg.apps.people.listener_answers import read_events, standing_answers
 from roboirg.apps.people.listening_study import PEOPLE, read_listening_study
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.plan import Plan
-from roboirg.records.record import Job
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.records.record import Job
 
 RUN = "run"
 """Folder of the run in the folder of the study."""

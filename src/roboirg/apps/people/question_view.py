@@ -11,11 +11,11 @@ import numpy as np
 from roboirg.apps.people.answer_form import answer_form
 from roboirg.core.delivery import TURNS
 from roboirg.core.episode import Episode
-from roboirg.evaluation.grounding_set.grounding_item import GroundingItem, Mask, PointTarget
-from roboirg.evaluation.grounding_set.item_builder import EpisodeMedia
-from roboirg.evaluation.grounding_set.referents import noun
+from roboirg.evaluation.grounding_items.grounding_item import GroundingItem, Mask, PointTarget
+from roboirg.evaluation.grounding_items.item_builder import EpisodeMedia
+from roboirg.evaluation.grounding_items.referents import noun
+from roboirg.evaluation.records.record import Job
 from roboirg.policies.vlm.goal_schema import AMOUNT, Field, goal_schema
-from roboirg.records.record import Job
 
 MARGIN = 2
 """Pixels by which an outline keeps off its thing, so that it hides nothing of it."""

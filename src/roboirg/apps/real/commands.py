@@ -49,7 +49,7 @@ def plan(
     """Plan a study: write plan.json, CSV files and a sheet to print."""
     from roboirg.apps.real.pages.trial_sheet import check_sheet_support
     from roboirg.apps.real.study.study_plan import make_study
-    from roboirg.evaluation.plan_parsing import means_all, parse_names
+    from roboirg.evaluation.plan.plan_parsing import means_all, parse_names
     from roboirg.tasks import find_tasks
 
     if sheet:
@@ -176,9 +176,9 @@ def figure(
     published: Annotated[bool, typer.Option(help="Show the paper's results beside these.")] = True,
 ) -> None:
     """Draw success by setting, with 95 % intervals, as PNG and SVG."""
-    from roboirg.analysis.stats.cells import gather
     from roboirg.apps.real.pages.study_figure import write_figure
-    from roboirg.records.store import read_results
+    from roboirg.evaluation.analysis.stats.cells import gather
+    from roboirg.evaluation.records.store import read_results
 
     samples = gather([(name, read_results(Path(name))) for name in runs])
     for path in write_figure(samples, Path(out), published=published):

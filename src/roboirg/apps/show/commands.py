@@ -27,7 +27,7 @@ def show(
     from roboirg.apps.show.episode_text import print_episode
     from roboirg.apps.show.playthrough import draw_sheet
     from roboirg.envs.factory import check_simulator
-    from roboirg.episodes.splits import get_episode
+    from roboirg.tasks.splits.splits import get_episode
 
     found = get_episode(task, split, episode)
     path = Path(f"{task}-{split}-{episode}.png" if out is None else out)

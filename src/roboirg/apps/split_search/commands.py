@@ -28,9 +28,9 @@ def build_splits(
         merge_splits,
     )
     from roboirg.apps.split_search.seed_summary import follow_progress, print_summary
-    from roboirg.episodes import splits
-    from roboirg.evaluation.plan_parsing import parse_names, parse_splits
+    from roboirg.evaluation.plan.plan_parsing import parse_names, parse_splits
     from roboirg.tasks import find_tasks
+    from roboirg.tasks.splits import splits
     from roboirg.util.atomic_write import write_atomically
     from roboirg.util.console_width import progress_console
     from roboirg.util.processor import core_count

@@ -14,8 +14,12 @@ from roboirg.core.errors import (
     SceneRejectedError,
 )
 from roboirg.envs.factory import make
-from roboirg.episodes.published_episodes import is_published
-from roboirg.episodes.splits import (
+from roboirg.language import find_refusals
+from roboirg.language.settings import ACCEPTANCE_SETTINGS
+from roboirg.policies import make_policy, play
+from roboirg.tasks import every_task, get_task
+from roboirg.tasks.splits.published_episodes import is_published
+from roboirg.tasks.splits.splits import (
     MAX_REJECTED,
     SIZES,
     TaskSplits,
@@ -25,10 +29,6 @@ from roboirg.episodes.splits import (
     slot_key,
     slot_seed,
 )
-from roboirg.language import find_refusals
-from roboirg.language.settings import ACCEPTANCE_SETTINGS
-from roboirg.policies import make_policy, play
-from roboirg.tasks import every_task, get_task
 from roboirg.util.parallel_map import parallel_map
 
 Reason = Literal["no room", "not expressible", "oracle failed"]

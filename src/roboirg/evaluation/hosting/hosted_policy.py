@@ -39,9 +39,9 @@ from roboirg.evaluation.hosting.payload import (
     encode,
     pack_payload,
 )
+from roboirg.evaluation.records.record import ERROR_KINDS
 from roboirg.policies.contract.policy_urls import is_url
 from roboirg.policies.contract.requirements import REQUIREMENTS
-from roboirg.records.record import ERROR_KINDS
 from roboirg.util.plain_text import clip_text
 
 _DRAWN = ("_rgb", "_depth")

@@ -11,9 +11,9 @@ import threading
 from collections.abc import Mapping
 from typing import IO, Self
 
-from roboirg.episodes.private_splits import SALT_VARIABLE
 from roboirg.evaluation.hosting.payload import MAX_MESSAGE, Message, decode, encode
-from roboirg.records.record import ErrorKind
+from roboirg.evaluation.records.record import ErrorKind
+from roboirg.tasks.splits.private_splits import SALT_VARIABLE
 from roboirg.util.child_process import ChildExit, ChildProcess
 
 _MODULE = "roboirg.evaluation.hosting.host_process"

@@ -9,13 +9,13 @@ from typing import Literal, NamedTuple
 from roboirg.core.episode import Difficulty, Goal, SlotValue, Split
 from roboirg.core.goal_slots import COLOR_SLOTS
 from roboirg.core.instruction_options import DEFAULT_DISTRACTOR, DEFAULT_RIVAL
-from roboirg.episodes.splits import split_episodes
 from roboirg.language.balanced_draw import draw_balanced
 from roboirg.language.instruction import REFERENCE, Instruction
 from roboirg.language.landmarks import Landmark
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.rivals import rival_templates as templates
 from roboirg.tasks import get_task
+from roboirg.tasks.splits.splits import split_episodes
 
 SPLIT: Split = "train"
 """Its goals show which numbers are usual for a difficulty."""

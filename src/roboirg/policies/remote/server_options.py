@@ -6,8 +6,8 @@ import hmac
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from roboirg.util.connection_table import ConnectionLimits
-from roboirg.util.request_origin import LOOPBACK, is_own_request, names_of_this_machine
+from roboirg.util.web.connection_table import ConnectionLimits
+from roboirg.util.web.request_origin import LOOPBACK, is_own_request, names_of_this_machine
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from typing import Any
 
 from roboirg.core.episode import Goal, SlotValue, Split
 from roboirg.core.goal_slots import COLOR_SLOTS, SLOT_TYPE_NAMES
-from roboirg.episodes.splits import SIZES, get_episode
 from roboirg.tasks import get_task
+from roboirg.tasks.splits.splits import SIZES, get_episode
 from roboirg.util.json_reply import UnparsableReplyError, json_object
 
 Answer = Mapping[str, Any]

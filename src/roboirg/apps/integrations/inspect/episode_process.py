@@ -8,10 +8,10 @@ from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from roboirg.core.errors import PolicyConnectionError
+from roboirg.evaluation.records.record import Job
 from roboirg.policies.vlm.models import ModelOptions, ModelQuery, ModelReply
 from roboirg.policies.vlm.models.openai_compatible import chat_messages
 from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener
-from roboirg.records.record import Job
 
 if TYPE_CHECKING:
     Pipe = Connection[Any, Any]
@@ -71,8 +71,8 @@ def play(pipe: Pipe, job: Job, options: ListenerOptions) -> None:
         job: the episode; its policy's spec is `PipedListener`.
         options: of the listener.
     """
-    from roboirg.evaluation.rollout import play_episode
-    from roboirg.evaluation.rollout_result import make_record, utc_now
+    from roboirg.evaluation.play.rollout import play_episode
+    from roboirg.evaluation.play.rollout_result import make_record, utc_now
 
     PipedListener.pipe, PipedListener.chosen = pipe, options
     started = utc_now()

@@ -29,15 +29,15 @@ from inspect_ai.scorer import Score, Scorer, Target, accuracy, grouped, scorer, 
 from inspect_ai.solver import Generate, Solver, TaskState, solver
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.grounding_set.answer_file import Answer
-from roboirg.evaluation.grounding_set.grounding_item import (
+from roboirg.evaluation.grounding_items.answer_file import Answer
+from roboirg.evaluation.grounding_items.grounding_item import (
     QUESTION_KINDS,
     GroundingItem,
     QuestionKind,
     read_items,
 )
-from roboirg.evaluation.grounding_set.verdicts import judge_reply, right_reply
-from roboirg.evaluation.plan_parsing import means_all, parse_names
+from roboirg.evaluation.grounding_items.verdicts import judge_reply, right_reply
+from roboirg.evaluation.plan.plan_parsing import means_all, parse_names
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.policies.vlm.listener_query import PROMPTS, QuestionTexts
 from roboirg.policies.vlm.prompts import load_prompts

@@ -31,11 +31,11 @@ from roboirg.apps.integrations.inspect.episode_process import SPEC, ModelRequest
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.instruction_options import DEFAULT_DELIVERY, DEFAULT_REASONING, DEFAULT_RIVAL
-from roboirg.episodes.splits import split_size
+from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, Job
 from roboirg.policies.vlm.models import ModelOptions
 from roboirg.policies.vlm.vlm_listener import ListenerOptions
-from roboirg.records.record import DEFAULT_MAX_STEPS, Job
 from roboirg.tasks import find_tasks
+from roboirg.tasks.splits.splits import split_size
 from roboirg.util.child_process import ChildExit, ChildProcess
 
 RECORD = "record"
@@ -93,7 +93,7 @@ def listener(
 
 
 def _sample(job: Job) -> Sample:
-    from roboirg.evaluation.job_instruction import instruct_job
+    from roboirg.evaluation.play.job_instruction import instruct_job
 
     return Sample(
         input=instruct_job(job).text,

@@ -167,7 +167,7 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
 
     def get_metadata(self) -> dict[str, Any]:
         """Return the limits; without them the harness stops after 300 steps."""
-        from roboirg.episodes.splits import split_size
+        from roboirg.tasks.splits.splits import split_size
 
         episodes = split_size(self.split)
         return {"max_steps": self.max_steps, "max_episodes_per_task": episodes}

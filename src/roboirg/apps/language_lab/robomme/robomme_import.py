@@ -25,8 +25,6 @@ from roboirg.apps.language_lab.robomme.template_search import find_templates
 from roboirg.apps.language_lab.robomme.wording_writer import wording_text
 from roboirg.apps.language_lab.validation.episode_checks import check_episode
 from roboirg.core.episode import DIFFICULTIES, Episode, Goal, Split
-from roboirg.episodes.published_episodes import published_episode
-from roboirg.episodes.splits import SIZES
 from roboirg.language.settings import EXPLICIT, settings_of
 from roboirg.language.worded_command import (
     ROBOMME_NAME,
@@ -40,6 +38,8 @@ from roboirg.language.wordings.wording_file import check_name, parse_wordings
 from roboirg.language.wordings.wording_store import forget_wordings, register_wordings
 from roboirg.reader import interpret
 from roboirg.tasks import Task, all_tasks
+from roboirg.tasks.splits.published_episodes import published_episode
+from roboirg.tasks.splits.splits import SIZES
 from roboirg.util.plain_text import counted
 
 SPLIT: Split = "train"

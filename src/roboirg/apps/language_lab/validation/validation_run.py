@@ -9,8 +9,8 @@ from roboirg.apps.language_lab.validation.episode_checks import check_episode
 from roboirg.apps.language_lab.validation.validation_results import ValidationResults
 from roboirg.core.episode import SPLITS, Split
 from roboirg.core.errors import InvalidValueError
-from roboirg.episodes.splits import SIZES, get_episode
 from roboirg.language.wordings.wording_store import open_wordings
+from roboirg.tasks.splits.splits import SIZES, get_episode
 from roboirg.util.parallel_map import parallel_map
 
 BATCH = 50

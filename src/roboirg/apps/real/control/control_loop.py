@@ -32,8 +32,8 @@ from roboirg.apps.real.control.policy_workers import PolicyReply, PolicyThread
 from roboirg.apps.real.control.robot import HORIZON, Command, JudgingRobot, Robot, SensorReading
 from roboirg.core.actions import ARM_JOINTS, check_chunk
 from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
-from roboirg.evaluation.rollout_result import RolloutResult
-from roboirg.records.record import Job
+from roboirg.evaluation.play.rollout_result import RolloutResult
+from roboirg.evaluation.records.record import Job
 from roboirg.util.deadline_watch import DeadlineWatch
 
 REPLY_WAIT_SHARE = 0.5

@@ -30,7 +30,7 @@ from roboirg.apps.real.control.kinematics import end_effector_pose
 from roboirg.apps.real.control.robot import COMMAND_RATE, Command, SensorReading
 from roboirg.core.actions import ARM_JOINTS
 from roboirg.core.errors import InvalidValueError
-from roboirg.records.record import Job
+from roboirg.evaluation.records.record import Job
 
 PREFIX = "lerobot:"
 SIZE = 256

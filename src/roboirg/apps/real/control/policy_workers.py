@@ -25,9 +25,9 @@ from roboirg.evaluation.episode_errors import (
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.hosting.policy_child import ChildLostError
+from roboirg.evaluation.records.record import ErrorKind
 from roboirg.policies.by_name.loading import make_policy
 from roboirg.policies.contract.base import Policy, PrivilegedPolicy
-from roboirg.records.record import ErrorKind
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv

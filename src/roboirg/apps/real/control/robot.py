@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.apps.real.control.clock import Clock
-from roboirg.evaluation.rollout_result import RolloutResult
-from roboirg.records.record import Job
+from roboirg.evaluation.play.rollout_result import RolloutResult
+from roboirg.evaluation.records.record import Job
 
 CAMERA_RATE = 30.0
 """Pictures per second of each camera (paper)."""

@@ -9,7 +9,7 @@ from roboirg.apps.real.control.lerobot_arm import PREFIX, make_arm
 from roboirg.apps.real.control.robot import Robot
 from roboirg.apps.real.control.twin import Twin
 from roboirg.core.errors import UnknownNameError
-from roboirg.records.record import TWIN, Job
+from roboirg.evaluation.records.record import TWIN, Job
 
 
 def make_robot(spec: str, *, real_time: bool, arrange: Callable[[Job], None]) -> Robot:

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from roboirg.apps.real.control.clock import Clock, VirtualClock
 from roboirg.apps.real.control.robot import CAMERA_RATE, COMMAND_RATE, Command, SensorReading
 from roboirg.core.actions import ARM_JOINTS, JOINT_ANGLE
-from roboirg.evaluation.policy_environment import EnvRequirements, make_env
-from roboirg.evaluation.rollout_result import RolloutResult
-from roboirg.records.record import TWIN, Job
+from roboirg.evaluation.play.policy_environment import EnvRequirements, make_env
+from roboirg.evaluation.play.rollout_result import RolloutResult
+from roboirg.evaluation.records.record import TWIN, Job
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv

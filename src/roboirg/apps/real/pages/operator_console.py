@@ -8,7 +8,7 @@ import sys
 from roboirg.apps.real.study.study_plan import PlannedTrial, StudyPlan
 from roboirg.apps.real.study.trial_log import UNSCORED
 from roboirg.apps.real.study.trial_text import describe_positions, spoken_turns
-from roboirg.records.record import Job, Record
+from roboirg.evaluation.records.record import Job, Record
 
 
 class OperatorConsole:

@@ -13,8 +13,8 @@ from roboirg.apps.real.study.failure_choices import failure_choices
 from roboirg.apps.real.study.study_plan import PlannedTrial
 from roboirg.apps.real.study.trial_log import SUCCESS, VOID_CHOICE, TrialLog, trial_metadata
 from roboirg.apps.real.study.trial_text import describe_positions, explicit_command, spoken_turns
-from roboirg.records.record import Record
-from roboirg.util.page_templates import check_page_support, template_environment
+from roboirg.evaluation.records.record import Record
+from roboirg.util.web.page_templates import check_page_support, template_environment
 
 if TYPE_CHECKING:
     import jinja2

@@ -18,10 +18,10 @@ from roboirg.apps.real.pages.score_page import page_address, render_trial
 from roboirg.apps.real.study.study_plan import PlannedTrial, StudyPlan
 from roboirg.apps.real.study.trial_log import TrialLog
 from roboirg.core.errors import InvalidValueError, RoboIRGError
-from roboirg.util.http_server import HTML_TYPE, LoopbackRequestHandler, LoopbackServer
-from roboirg.util.keyed_pages import PRIVATE_HEADERS, page_policy
-from roboirg.util.page_templates import check_page_support
-from roboirg.util.request_origin import LOOPBACK
+from roboirg.util.web.http_server import HTML_TYPE, LoopbackRequestHandler, LoopbackServer
+from roboirg.util.web.keyed_pages import PRIVATE_HEADERS, page_policy
+from roboirg.util.web.page_templates import check_page_support
+from roboirg.util.web.request_origin import LOOPBACK
 
 MAX_FORM_BYTES = 65_536
 

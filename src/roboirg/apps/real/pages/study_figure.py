@@ -6,15 +6,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from roboirg.analysis.published import TRIALS
-from roboirg.analysis.stats.cells import Cells
-from roboirg.analysis.stats.intervals import wilson_interval
-from roboirg.analysis.stats.option_labels import setting_sort_key
-from roboirg.analysis.tables.paper_tables import make_table
-from roboirg.analysis.tables.table import Row, Table
 from roboirg.apps.real.pages.trial_sheet import check_sheet_support
 from roboirg.core.errors import InvalidValueError
-from roboirg.records.store import StoreError
+from roboirg.evaluation.analysis.published import TRIALS
+from roboirg.evaluation.analysis.stats.cells import Cells
+from roboirg.evaluation.analysis.stats.intervals import wilson_interval
+from roboirg.evaluation.analysis.stats.option_labels import setting_sort_key
+from roboirg.evaluation.analysis.tables.paper_tables import make_table
+from roboirg.evaluation.analysis.tables.table import Row, Table
+from roboirg.evaluation.records.store import StoreError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

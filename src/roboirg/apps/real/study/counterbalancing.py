@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 from roboirg.core.episode import Color, Episode, ObjectKind
 from roboirg.core.errors import InvalidValueError
-from roboirg.episodes.splits import SIZES, check_fixed_split, get_episode
 from roboirg.tasks import get_task
 from roboirg.tasks.shared.real_table import left_to_right
+from roboirg.tasks.splits.splits import SIZES, check_fixed_split, get_episode
 
 REAL_SUITE = "real"
 KINDS: dict[str, ObjectKind] = {"box": "box", "tape": "tape"}

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 from roboirg.core.conditions import Rule, facts_of
 from roboirg.core.episode import Episode
+from roboirg.evaluation.records.record import Attribution
 from roboirg.judging.failure_attribution import FailureAttribution, FailureName
-from roboirg.records.record import Attribution
 
 EXECUTION_WORDS: tuple[tuple[FailureName, str], ...] = (
     ("nothing_reached", "never reached the right object"),

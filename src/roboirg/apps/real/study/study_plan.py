@@ -18,11 +18,11 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from roboirg.apps.real.study.counterbalancing import counterbalanced_episodes, target_kind
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
-from roboirg.episodes.splits import get_episode
-from roboirg.evaluation.plan_parsing import name_and_spec
+from roboirg.evaluation.plan.plan_parsing import name_and_spec
+from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, Job
 from roboirg.language.settings import setting_names, settings_of
-from roboirg.records.record import DEFAULT_MAX_STEPS, Job
 from roboirg.tasks import get_task
+from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.atomic_write import write_atomically
 from roboirg.util.short_hash import short_hash
 

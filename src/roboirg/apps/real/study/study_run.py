@@ -23,14 +23,14 @@ from roboirg.core.actions import JOINT_ANGLE
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import DEFAULT_DELIVERY
-from roboirg.evaluation.job_instruction import instruct_job
-from roboirg.evaluation.plan_parsing import name_and_spec
-from roboirg.evaluation.policy_descriptions import describe_policy
-from roboirg.evaluation.rollout_result import make_record, utc_now
+from roboirg.evaluation.hosting.policy_descriptions import describe_policy
+from roboirg.evaluation.plan.plan_parsing import name_and_spec
+from roboirg.evaluation.play.job_instruction import instruct_job
+from roboirg.evaluation.play.rollout_result import make_record, utc_now
+from roboirg.evaluation.records.record import Job, Record
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.policies.by_name.loading import is_privileged, load_policy_class
 from roboirg.policies.contract.requirements import wanted_actions, wanted_cameras, wanted_history
-from roboirg.records.record import Job, Record
 
 ROBOT_LOCK = ".robot.lock"
 

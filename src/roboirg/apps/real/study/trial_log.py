@@ -18,9 +18,9 @@ from roboirg.apps.real.study.failure_choices import failure_choices
 from roboirg.apps.real.study.study_plan import PlannedTrial, StudyPlan
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.episode_errors import format_cause
-from roboirg.evaluation.rollout_result import RolloutResult, make_record, utc_now
-from roboirg.records.record import REAL_TRIAL, Record
-from roboirg.records.store import RECORDS_FILE, RecordStore, StoreError, read_contents
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, utc_now
+from roboirg.evaluation.records.record import REAL_TRIAL, Record
+from roboirg.evaluation.records.store import RECORDS_FILE, RecordStore, StoreError, read_contents
 
 UNSCORED = format_cause("infrastructure", "played; waiting for the operator's verdict")
 WITHDRAWN = format_cause("infrastructure", "the operator undid the score")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from roboirg import language
 from roboirg.apps.real.study.arrangement_shapes import describe_position, scene_shapes
 from roboirg.apps.real.study.study_plan import PlannedDemonstration, PlannedTrial
-from roboirg.evaluation.job_instruction import instruct_job
+from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.language.settings import EXPLICIT
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from roboirg.policies.remote.message_codec import MSGPACK, pack, unpack
 from roboirg.policies.remote.server_options import ServerOptions
 from roboirg.policies.remote.service import Service
-from roboirg.util.http_server import HTTPServerBase, RequestHandler
+from roboirg.util.web.http_server import HTTPServerBase, RequestHandler
 
 
 class _ChallengeHTTPServer(HTTPServerBase):

@@ -22,7 +22,7 @@ from websockets.exceptions import ConnectionClosed, InvalidMessage
 from roboirg.policies.remote.message_codec import pack, unpack
 from roboirg.policies.remote.server_options import ServerOptions
 from roboirg.policies.remote.service import Handler, Service
-from roboirg.util.connection_table import OUT_OF_FILES, ConnectionTable
+from roboirg.util.web.connection_table import OUT_OF_FILES, ConnectionTable
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import Server

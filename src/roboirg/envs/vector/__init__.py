@@ -1,0 +1,1 @@
+"""The vector environment: sub-environments in worker processes."""

@@ -1,1 +1,0 @@
-"""The splits: the episodes of the benchmark, and fingerprints that detect changes."""

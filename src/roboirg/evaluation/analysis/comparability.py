@@ -1,0 +1,129 @@
+"""Whether a rate can be compared with the published one of its cell, and what differs if not.
+
+Only the explicit setting can be repeated: its episodes are RoboMME's test episodes and its words
+RoboMME's, which a wording file brings. The paper's implicit instructions are not published.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+
+from roboirg.core.episode import ENVIRONMENT_VERSION
+from roboirg.evaluation.analysis.published import MAX_STEPS, TRIALS, published_tasks
+from roboirg.evaluation.analysis.stats.cells import CellKey, CellResults, PolicyRun
+from roboirg.evaluation.analysis.stats.option_labels import words_label
+from roboirg.evaluation.records.record import DEFAULT_MESHES
+from roboirg.language.settings import EXPLICIT
+from roboirg.language.worded_command import ROBOMME_NAME
+from roboirg.util.plain_text import counted
+
+Differences = tuple[str, ...]
+"""What differs from the published rate; empty if the two can be compared."""
+AllDifferences = Mapping[CellKey, Differences | None]
+"""The differences of cells; None where there is nothing to compare."""
+
+IMPLICIT: Differences = ("the paper's instructions are not published",)
+REAL: Differences = ("the paper's own robot",)
+
+COMPARABLE_SIGN = "="
+DIFFERENT_SIGN = "≠"
+
+_SPLIT = "test"
+
+
+def differences_of(key: CellKey, cell: CellResults) -> Differences | None:
+    """Return what differs between a cell and the published rate of that cell.
+
+    The number of policy seeds makes no difference, nor does it matter what the policy is.
+
+    Returns:
+        None if nothing is published for the task, or if the cell has no rate.
+    """
+    if not cell.trials:
+        return None
+    if key.task in published_tasks("real"):
+        return REAL
+    if key.task not in published_tasks("main"):
+        return None
+    if key.options.setting != EXPLICIT:
+        return IMPLICIT
+    return tuple(_explicit_differences(key.policy_run, cell))
+
+
+def merged(differences: Iterable[Differences | None]) -> Differences | None:
+    """Return what differs in an average of cells; None if one of them cannot be compared."""
+    found: list[str] = []
+    for one in differences:
+        if one is None:
+            return None
+        found += one
+    return tuple(dict.fromkeys(found))
+
+
+def comparison_sign(differences: Differences | None) -> str:
+    """Return the sign of a rate; none if no rate of its kind could be compared."""
+    if differences is None or differences in (IMPLICIT, REAL):
+        return ""
+    return DIFFERENT_SIGN if differences else COMPARABLE_SIGN
+
+
+def comparison_notes(found: AllDifferences, names: Mapping[PolicyRun, str]) -> list[str]:
+    """Return sentences that explain the signs and say what differs, by policy and task.
+
+    Args:
+        found: the differences of each cell.
+        names: labels of the policy runs.
+    """
+    cells = {key: one for key, one in found.items() if comparison_sign(one)}
+    notes = []
+    if () in cells.values():
+        notes.append(
+            f"{COMPARABLE_SIGN} comparable with the published rate: RoboMME's test episodes, "
+            "words, step limit and world."
+        )
+    policy_runs = list(dict.fromkeys(key.policy_run for key in cells))
+    by_text: dict[str, list[PolicyRun]] = {}
+    for policy_run in policy_runs:
+        own = {key.task: one or () for key, one in cells.items() if key.policy_run == policy_run}
+        by_text.setdefault(_text(own), []).append(policy_run)
+    for text, those in by_text.items():
+        if text:
+            who = "" if those == policy_runs else f" ({'; '.join(names[one] for one in those)})"
+            notes.append(f"{DIFFERENT_SIGN} not comparable with the published rate{who}: {text}.")
+    for never, subject in ((IMPLICIT, "Implicit settings are"), (REAL, "These rates are")):
+        if never in found.values():
+            notes.append(f"{subject} not comparable with the published rates: {never[0]}.")
+    return notes
+
+
+def _text(tasks: Mapping[str, Differences]) -> str:
+    """Return what differs, with the tasks in which it does unless these are all."""
+    parts = []
+    for difference in dict.fromkeys(one for differences in tasks.values() for one in differences):
+        where = [task for task, differences in tasks.items() if difference in differences]
+        parts.append(difference + ("" if len(where) == len(tasks) else f" ({', '.join(where)})"))
+    return "; ".join(parts)
+
+
+def _explicit_differences(policy_run: PolicyRun, cell: CellResults) -> Iterator[str]:
+    conditions, versions = policy_run.conditions, policy_run.versions
+    if conditions.wordings is None or conditions.wordings.partition("@")[0] != ROBOMME_NAME:
+        yield words_label(conditions.wordings)
+    episodes = range(TRIALS["main"][0])
+    played = len(cell.by_episode().keys() & set(episodes))
+    if conditions.split != _SPLIT:
+        yield f"split {conditions.split}"
+    elif played < len(episodes):
+        yield f"{played} of {counted(len(episodes), 'episode')}"
+    if conditions.max_steps != MAX_STEPS:
+        yield f"{conditions.max_steps} steps instead of {MAX_STEPS}"
+    if conditions.meshes != DEFAULT_MESHES:
+        yield f"{conditions.meshes} meshes"
+    if conditions.demonstration_frames not in (None, "all"):
+        yield f"frames of the video: {conditions.demonstration_frames}"
+    if versions is not None and versions.environment != ENVIRONMENT_VERSION:
+        yield f"environment version {versions.environment}"
+    if cell.errors:
+        yield counted(cell.errors, "error")
+    if cell.missing:
+        yield f"{counted(cell.missing, 'trial')} still to be played"

@@ -1,0 +1,90 @@
+"""The paper's figures, drawn from the records of one or several runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.evaluation.analysis.figures.figure_data import FigureData
+from roboirg.evaluation.analysis.figures.figure_style import STYLE, save
+from roboirg.util.figure_files import check_figure_support
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["FIGURES", "FigureData", "draw_figure", "write_figures"]
+
+FIGURES = ("averages", "forms", "expressions", "context", "failures")
+
+
+def write_figures(
+    content: FigureData, folder: Path, which: Sequence[str] = FIGURES, *, published: bool = False
+) -> tuple[Path, ...]:
+    """Draw figures as PNG, SVG and PDF; the expressions as PNG and SVG.
+
+    Args:
+        content: of the runs.
+        folder: created if missing.
+        which: names out of `FIGURES`; figures without data are left out.
+        published: whether to add the paper's values, in gray.
+
+    Returns:
+        The files.
+
+    Raises:
+        UnknownNameError: a figure does not exist.
+        MissingDependencyError: matplotlib is not installed.
+        InvalidValueError: the folder is not writable, or there is nothing to draw.
+    """
+    for name in which:
+        if name not in FIGURES:
+            raise UnknownNameError("figure", name, FIGURES)
+    paths = [
+        path for name in which for path in _written(name, content, folder, published=published)
+    ]
+    if not paths:
+        raise InvalidValueError(
+            f"The runs have nothing to draw for {', '.join(which)}; `roboirg tables` shows what "
+            "they have."
+        )
+    return tuple(paths)
+
+
+def _written(name: str, content: FigureData, folder: Path, *, published: bool) -> tuple[Path, ...]:
+    from roboirg.evaluation.analysis.figures.expressions import write_expressions
+
+    if name == "expressions":
+        return write_expressions(content, folder, name)
+    return save(lambda: _drawn(name, content, published=published), folder, name)
+
+
+def draw_figure(name: str, content: FigureData, *, published: bool = False) -> Figure | None:
+    """Draw averages, forms, context or failures; return None without data.
+
+    Raises:
+        MissingDependencyError: matplotlib is not installed.
+    """
+    check_figure_support()
+    import matplotlib as mpl
+
+    # The keys of its own type are those of one version.
+    with mpl.rc_context(cast("Any", STYLE)):
+        return _drawn(name, content, published=published)
+
+
+def _drawn(name: str, content: FigureData, *, published: bool) -> Figure | None:
+    from roboirg.evaluation.analysis.figures.averages import draw_averages
+    from roboirg.evaluation.analysis.figures.context import draw_context
+    from roboirg.evaluation.analysis.figures.failures import draw_failures
+    from roboirg.evaluation.analysis.figures.forms import draw_forms
+
+    match name:
+        case "averages":
+            return draw_averages(content, published=published)
+        case "context":
+            return draw_context(content, published=published)
+        case "forms":
+            return draw_forms(content)
+    return draw_failures(content)

@@ -1,0 +1,76 @@
+"""The data of the figures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from roboirg.evaluation.analysis.stats.cells import (
+    Cells,
+    PolicyRun,
+    gather,
+    labels,
+    policy_order,
+    sort_cells,
+)
+from roboirg.evaluation.analysis.stats.intervals import SEED
+from roboirg.evaluation.analysis.stats.run_summary import ScopeKey, SummaryRow, summarize
+from roboirg.evaluation.records.record import Job
+from roboirg.evaluation.records.record_codec import AnyResult
+
+
+@dataclass(frozen=True)
+class FigureData:
+    """The results of some runs and their summary.
+
+    Attributes:
+        results: of all runs, each with its policy run.
+        cells: the results gathered into cells, in order.
+        summaries: by policy run, scope and options.
+        names: labels of the policy runs, in order.
+    """
+
+    results: tuple[tuple[PolicyRun, AnyResult], ...]
+    cells: Cells
+    summaries: Mapping[ScopeKey, SummaryRow]
+    names: Mapping[PolicyRun, str]
+
+    @classmethod
+    def of(
+        cls, runs: Sequence[tuple[str, Sequence[AnyResult]]], planned: Sequence[Job] = ()
+    ) -> FigureData:
+        """Gather, sort and summarize runs, each with its name.
+
+        Policies have the order of the plan, or are sorted by name without one.
+        """
+        found = gather(runs, planned)
+        policies = list(dict.fromkeys(job.policy for job in planned))
+        cells = sort_cells(found, policy_order(found, policies))
+        names = labels(cells)
+        results = [
+            (_policy_run(name, one, names), one) for name, results in runs for one in results
+        ]
+        return cls(tuple(results), cells, summaries_by_key(cells), names)
+
+    def is_complete(self, policy_run: PolicyRun) -> bool:
+        """Return whether every planned trial of a policy run has a verdict."""
+        return all(
+            one.is_complete for key, one in self.summaries.items() if key.policy_run == policy_run
+        )
+
+    def name(self, policy_run: PolicyRun) -> str:
+        """Return the label of a policy run, marked if it is incomplete."""
+        return self.names[policy_run] + ("" if self.is_complete(policy_run) else " (incomplete)")
+
+
+def summaries_by_key(cells: Cells) -> Mapping[ScopeKey, SummaryRow]:
+    """Summarize cells for look-up by key."""
+    return {one.key: one for one in summarize(cells, np.random.default_rng(SEED))}
+
+
+def _policy_run(run: str, result: AnyResult, known: Mapping[PolicyRun, str]) -> PolicyRun:
+    """Return the policy run of a result; it names the run if several runs played the policy."""
+    policy_run = PolicyRun.of(result)
+    return policy_run if policy_run in known else policy_run._replace(run=run)

@@ -1,0 +1,63 @@
+"""Videos of the page: embedded in it, or linked to."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import PurePosixPath
+from typing import NamedTuple
+from urllib.parse import quote
+
+from roboirg.evaluation.analysis.page.entries import EpisodeEntry
+
+MAX_EMBEDDED_BYTES = 60_000_000
+"""Larger videos, taken together, are linked to."""
+POSTER_SUFFIX = ".jpg"
+
+
+class EpisodeVideo(NamedTuple):
+    """A video and its last frame, as data URIs or as paths from the page."""
+
+    source: str
+    poster: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class EpisodeVideos:
+    """The videos of a page.
+
+    Attributes:
+        embeds: whether they are part of the page.
+        count: number of videos.
+    """
+
+    embeds: bool
+    count: int
+
+    @classmethod
+    def of(cls, entries: Iterable[EpisodeEntry], *, embed: bool = True) -> EpisodeVideos:
+        """Embed the videos if wanted and not too large."""
+        sizes = [
+            path.stat().st_size
+            for one in entries
+            if one.run.folder is not None and one.record.video is not None
+            if (path := one.run.folder / one.record.video).is_file()
+        ]
+        return cls(embed and sum(sizes) <= MAX_EMBEDDED_BYTES, len(sizes))
+
+    def video(self, entry: EpisodeEntry) -> EpisodeVideo | None:
+        """Return the video of an episode, or None."""
+        name = entry.record.video
+        source = None if name is None else self._link(entry, name, "video/mp4")
+        if name is None or source is None:
+            return None
+        poster = str(PurePosixPath(name).with_suffix(POSTER_SUFFIX))
+        return EpisodeVideo(source, self._link(entry, poster, "image/jpeg"))
+
+    def _link(self, entry: EpisodeEntry, name: str, kind: str) -> str | None:
+        if entry.run.folder is None or not (path := entry.run.folder / name).is_file():
+            return None
+        if not self.embeds:
+            return quote(f"{entry.run.link}{name}")
+        return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"

@@ -1,0 +1,178 @@
+"""The overview of the page: success by policy, task and setting, as heat maps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from roboirg.core.episode import DIFFICULTIES
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.evaluation.analysis.page.columns import setting_label
+from roboirg.evaluation.analysis.page.entries import EpisodeEntries, gather_run
+from roboirg.evaluation.analysis.stats.cells import (
+    CellKey,
+    CellResults,
+    Cells,
+    sort_cells,
+    task_order,
+)
+from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
+from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
+from roboirg.evaluation.analysis.stats.rates import p_text, points, whole_percent
+from roboirg.evaluation.analysis.stats.run_summary import (
+    ALL,
+    ALL_TASKS,
+    Scope,
+    SummaryRow,
+    summarize,
+)
+from roboirg.tasks import all_tasks
+from roboirg.util.plain_text import counted
+
+
+class MatrixRow(NamedTuple):
+    """A row of every heat map."""
+
+    name: str
+    kind: str
+    scope: Scope
+
+
+def make_matrix(entries: EpisodeEntries) -> dict[str, Any]:
+    """Return the heat maps as JSON values: columns, rows, and cells by policy, row and column.
+
+    There is one set of cells for all episodes and, if there are several difficulties, one for
+    each. Missing episodes have no difficulty yet; they count among all episodes only.
+    """
+    columns = sorted({key.options for key in entries.cells}, key=options_sort_key)
+    rows = _rows(entries.cells)
+    levels = {"": entries.cells}
+    found = {entry.record.difficulty for entry in entries.all}
+    if len(found) > 1:
+        levels |= {
+            level: _of_difficulty(entries, level)
+            for level in (*DIFFICULTIES, *found)
+            if level in found
+        }
+    return {
+        "policies": list(entries.names.values()),
+        "columns": [
+            {"setting": setting_label(one), "form": one.form, "name": options_label(one)}
+            for one in columns
+        ],
+        "rows": [{"name": row.name, "kind": row.kind, **row.scope._asdict()} for row in rows],
+        "levels": [
+            {"difficulty": level, "cells": _matrix_cells(cells, entries, rows, columns)}
+            for level, cells in levels.items()
+        ],
+    }
+
+
+def _rows(cells: Cells) -> list[MatrixRow]:
+    tasks = task_order({key.task for key in cells})
+    suites: dict[str, list[str]] = {}
+    for task in tasks:
+        known = all_tasks().get(task)
+        suites.setdefault(known.suite if known else "", []).append(task)
+    rows = [MatrixRow(ALL_TASKS, "all", ALL)] if len(tasks) > 1 else []
+    for suite, members in suites.items():
+        if suite and len(suites) > 1 and len(members) > 1:
+            rows.append(MatrixRow(suite, "suite", Scope(suite=suite)))
+        rows += [MatrixRow(task, "task", Scope(task=task)) for task in members]
+    return rows
+
+
+def _of_difficulty(entries: EpisodeEntries, difficulty: str) -> Cells:
+    """Gather the episodes of one difficulty."""
+    found: dict[CellKey, CellResults] = {}
+    for run in dict.fromkeys(entry.policy_run.run for entry in entries.all):
+        records = [
+            entry.record
+            for entry in entries.all
+            if entry.policy_run.run == run and entry.record.difficulty == difficulty
+        ]
+        found |= gather_run(run, records)
+    return sort_cells(found, list(entries.names))
+
+
+def _matrix_cells(
+    cells: Cells,
+    entries: EpisodeEntries,
+    rows: Sequence[MatrixRow],
+    columns: Sequence[InstructionOptions],
+) -> list[dict[str, Any]]:
+    names = entries.names
+    places = {policy_run: place for place, policy_run in enumerate(names)}
+    lines = {row.scope: line for line, row in enumerate(rows)}
+    return [
+        {
+            "at": [places[one.policy_run], lines[one.scope], columns.index(one.options)],
+            **_cell(one, f"{names[one.policy_run]}, {rows[lines[one.scope]].name}"),
+        }
+        for one in summarize(cells, np.random.default_rng(SEED))
+        if one.scope in lines
+    ]
+
+
+def _cell(one: SummaryRow, subject: str) -> dict[str, Any]:
+    cell: dict[str, Any] = {"note": notes(one, subject)}
+    if one.rate is not None:
+        cell |= {"rate": round(float(one.rate), 4), "text": whole_percent(one.rate)}
+    if one.interval is not None:
+        cell["interval"] = [round(end, 4) for end in one.interval]
+    if one.gap is not None:
+        cell |= {"gap": round(one.gap.value, 4), "gap_text": points(one.gap.value)}
+        if one.gap.retention is None and not one.gap.value:
+            cell["floor"] = True
+    cell |= {name: count for name in ("errors", "missing") if (count := getattr(one, name))}
+    return cell
+
+
+def notes(one: SummaryRow, subject: str) -> list[str]:
+    """Return a cell in words: first its subject, then its results."""
+    lines = [f"{subject}, {options_label(one.options)}"]
+    if one.rate is None:
+        lines.append("no verdict yet")
+    else:
+        mean = f", mean of {len(one.tasks)} tasks" if len(one.tasks) > 1 else ""
+        lines.append(
+            f"{whole_percent(one.rate)} % success{mean}: {one.successes} of "
+            f"{counted(one.trials, 'trial')}, {counted(one.episodes, 'episode')}"
+        )
+        if one.interval is not None:
+            low, high = map(whole_percent, one.interval)
+            lines.append(f"95 % interval {low} to {high} %")
+    lines += _gap_notes(one)
+    if one.errors:
+        lines.append(f"{counted(one.errors, 'error')} in no rate")
+    if one.missing:
+        lines.append(f"{one.missing} still to be played")
+    return lines
+
+
+def _gap_notes(one: SummaryRow) -> list[str]:
+    lines: list[str] = []
+    if one.gap is not None:
+        gap = f"{points(one.gap.value)} points to explicit"
+        if one.gap.retention is not None:
+            tested = "not tested" if one.p_holm is None else f"corrected {p_text(one.p_holm)}"
+            lines.append(
+                f"{gap} on the same {counted(one.gap.episodes, 'episode')}"
+                f"{_ends(one.gap.interval)}, {tested}"
+            )
+        elif one.gap.value:
+            lines.append(f"{gap}, which has no success")
+        else:
+            lines.append(f"{gap}, which has no success either, so the gap says nothing")
+    if one.form_gap is not None:
+        lines.append(
+            f"{points(one.form_gap.value)} points to the resolved form"
+            f"{_ends(one.form_gap.interval)}"
+        )
+    return lines
+
+
+def _ends(interval: Interval | None) -> str:
+    return "" if interval is None else f" ({points(interval.low)} to {points(interval.high)})"

@@ -1,0 +1,133 @@
+"""Results of the paper, to compare a run with. Source: ``published_results/README.md``."""
+
+from __future__ import annotations
+
+import csv
+import functools
+from collections.abc import Collection, Mapping
+from decimal import Decimal
+from importlib import resources
+from typing import Literal, NamedTuple, get_args
+
+from roboirg.core.errors import UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.evaluation.analysis.stats.option_labels import options_label, staged_options
+from roboirg.evaluation.analysis.stats.rates import DIGITS, mean_percent
+
+RateTable = Literal["main", "planner", "context", "real", "other"]
+"""The tables of success rates; ``other`` holds the tasks that the paper does not have."""
+RATE_TABLES: tuple[RateTable, ...] = ("main", "planner", "context", "real")
+"""Those of the paper."""
+
+Covers = Literal["yes", "no", "partial"]
+
+AVERAGE = "Avg"
+TRIALS: Mapping[RateTable, tuple[int, int]] = {
+    "main": (50, 3),
+    "planner": (50, 3),
+    "context": (50, 3),
+    "real": (10, 1),
+}
+"""Episodes and model seeds behind every published rate."""
+MAX_STEPS = 1300
+"""Control steps that the published policies had."""
+
+_FILES = {"main": "main", "planner": "planner", "context": "context", "real": "real_world"}
+_MODEL_COLUMNS = ("model", "planner")
+
+
+class PublishedRow(NamedTuple):
+    """One row of a published table.
+
+    Attributes:
+        model: the policy, or its planner in the table of planners.
+        options: of the instructions.
+        rates: percent by task; None if the setting is not defined for the task.
+        average: as printed.
+    """
+
+    model: str
+    options: InstructionOptions
+    rates: Mapping[str, Decimal | None]
+    average: Decimal
+
+    def average_over(self, tasks: Collection[str]) -> Decimal | None:
+        """Return the mean over some tasks; None without any, or if one of them has no rate."""
+        rates = [rate for task in tasks if (rate := self.rates.get(task)) is not None]
+        if not rates or len(rates) < len(tasks):
+            return None
+        defined = {task for task, rate in self.rates.items() if rate is not None}
+        return self.average if defined == set(tasks) else mean_percent(rates)
+
+
+class CoverageRow(NamedTuple):
+    """The kinds of implicit reference that a benchmark covers.
+
+    Attributes:
+        benchmark: its name.
+        kind: manipulation or memory.
+        covers: by setting.
+    """
+
+    benchmark: str
+    kind: str
+    covers: Mapping[str, Covers]
+
+
+@functools.cache
+def published_rows(table: str) -> tuple[PublishedRow, ...]:
+    """Return the rows of a table, in the order of the paper.
+
+    Raises:
+        UnknownNameError: the table does not exist.
+    """
+    if table not in RATE_TABLES:
+        raise UnknownNameError("published table", table, RATE_TABLES)
+    grouped: dict[tuple[str, InstructionOptions], dict[str, Decimal | None]] = {}
+    for line in _lines(_FILES[table]):
+        model = next(line[column] for column in _MODEL_COLUMNS if column in line)
+        text = line["success_rate_percent"]
+        rate = Decimal(text).quantize(DIGITS) if text else None
+        grouped.setdefault((model, _options(line)), {})[line["task"]] = rate
+    rows = []
+    for (model, options), rates in grouped.items():
+        average = rates.pop(AVERAGE)
+        if average is None:
+            raise ValueError(f"{table}.csv has no average of {model}, {options_label(options)}")
+        rows.append(PublishedRow(model, options, rates, average))
+    return tuple(rows)
+
+
+def published_tasks(table: str) -> tuple[str, ...]:
+    """Return the tasks of a table, in the order of the paper."""
+    return tuple(published_rows(table)[0].rates)
+
+
+@functools.cache
+def published_coverage() -> tuple[CoverageRow, ...]:
+    """Return what each benchmark covers, in the order of the paper."""
+    rows = []
+    for line in _lines("coverage"):
+        benchmark, kind = line.pop("benchmark"), line.pop("kind")
+        rows.append(CoverageRow(benchmark, kind, {name: _covers(line[name]) for name in line}))
+    return tuple(rows)
+
+
+def _options(line: Mapping[str, str]) -> InstructionOptions:
+    if "stages" in line:
+        stages = tuple(map(int, line["stages"].split(",")))
+        return staged_options()[0]._replace(stages=stages)
+    return InstructionOptions(line["setting"])
+
+
+def _covers(word: str) -> Covers:
+    for known in get_args(Covers):
+        if word == known:
+            covers: Covers = known
+            return covers
+    raise ValueError(f"coverage.csv says {word!r}")
+
+
+def _lines(name: str) -> list[dict[str, str]]:
+    path = resources.files("roboirg.evaluation.analysis") / "published_results" / f"{name}.csv"
+    return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))

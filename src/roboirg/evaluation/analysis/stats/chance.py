@@ -1,0 +1,59 @@
+"""Expected success of the policies that do not understand: the chance level, and shortcuts.
+
+The forgetful listener hears only the final command and chooses uniformly among the goals that fit
+it, or among all goals if none fits. Its expected success is the chance level. It follows without
+playing, assuming flawless execution: the share of these goals that have the stages of the right
+one. Where the words leave two values, as with a rival, it is a guess among these. A shortcut
+listener draws its goal by a surface rule; its expected success is the probability that this goal is
+right. Nothing is estimated.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable
+from fractions import Fraction
+
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.evaluation.play.job_instruction import instruct_job
+from roboirg.evaluation.records.record import Job
+from roboirg.shortcuts import SURFACE_RULES, goal_share, guess_goal
+from roboirg.shortcuts.command_chance import blind_goals, right_share
+from roboirg.tasks.splits.splits import get_episode
+
+CHANCE = "chance"
+FLOORS = (CHANCE, *SURFACE_RULES)
+"""The policies: the forgetful listener, and the shortcut listeners by the names of their rules."""
+
+
+def chance_level(jobs: Iterable[Job]) -> Fraction | None:
+    """Return the mean chance over the distinct instructions of some jobs; None without jobs.
+
+    Policies and their seeds do not matter.
+
+    Raises:
+        UnknownNameError: a task does not exist.
+        InvalidValueError: an episode does not exist, or has no such instruction.
+    """
+    return floor_level(CHANCE, jobs)
+
+
+def floor_level(floor: str, jobs: Iterable[Job]) -> Fraction | None:
+    """Return the same as `chance_level` for any of `FLOORS`.
+
+    Raises:
+        UnknownNameError: a task or the floor does not exist.
+        InvalidValueError: an episode does not exist, or has no such instruction.
+    """
+    instructions = dict.fromkeys((job.task, job.split, job.episode, job.options) for job in jobs)
+    levels = [_level(floor, *each) for each in instructions]
+    return sum(levels, Fraction(0)) / len(levels) if levels else None
+
+
+@functools.lru_cache(maxsize=65_536)
+def _level(floor: str, task: str, split: str, number: int, options: InstructionOptions) -> Fraction:
+    job = Job(policy="", task=task, split=split, episode=number, **options._asdict())
+    episode, instruction = get_episode(task, split, number), instruct_job(job)
+    if floor == CHANCE:
+        return right_share(blind_goals(instruction, episode), episode)
+    return goal_share(guess_goal(floor, instruction.text, task), episode)

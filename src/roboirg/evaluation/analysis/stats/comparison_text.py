@@ -1,0 +1,151 @@
+"""A comparison as sentences."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+from roboirg.evaluation.analysis.stats.comparison import Comparison, ComparisonResult
+from roboirg.evaluation.analysis.stats.flips import Flips
+from roboirg.evaluation.analysis.stats.option_labels import options_label
+from roboirg.evaluation.analysis.stats.power import MAX_EPISODES, POWER
+from roboirg.evaluation.analysis.stats.rates import p_text, points
+from roboirg.util.plain_text import counted
+
+
+def sentences(
+    comparison: Comparison, first: str, second: str, flips: tuple[Flips, Flips] | None = None
+) -> Iterator[str]:
+    """Yield the results, a sentence each; empty ones separate paragraphs.
+
+    Args:
+        comparison: of two policies.
+        first: label of the first.
+        second: label of the second.
+        flips: how often the verdicts of each policy change by themselves, as far as that is known;
+            None says nothing about it.
+    """
+    names = (first, second)
+    yield f"{first} against {second}, on the same episodes."
+    yield ""
+    for result in comparison.averages:
+        yield _sentence(result, names) + _own_flips(comparison, result, names, flips)
+    decided = [result for result in comparison.cells if result.verdict != "open"]
+    if any(len(result.tasks) > 1 for result in comparison.averages):
+        yield ""
+        cells = f"{counted(len(comparison.cells), 'single cell')} (one task in one setting)"
+        yield (
+            f"{len(decided)} of {cells} {'shows' if len(decided) == 1 else 'show'} a difference:"
+            if decided
+            else f"None of {cells} shows a difference by itself."
+        )
+        for result in sorted(decided, key=lambda result: -abs(result.gap.value)):
+            yield f"  {_subject(result)}: {_better(result, names)}, {_figures(result)}."
+    for title, results in comparison.parts.items():
+        yield ""
+        yield f"By {title}:" if results else f"By {title}: no instruction has any."
+        for result in results:
+            yield f"  {_sentence(result, names)}"
+    yield ""
+    yield from _caveats(comparison)
+    if flips is not None and not all(flips):
+        yield (
+            "How much a policy differs from itself is not known of "
+            f"{' and '.join(name for name, own in zip(names, flips, strict=True) if not own)}: "
+            "`roboirg repeat RUN --out AGAIN` measures it."
+        )
+
+
+def _sentence(result: ComparisonResult, names: tuple[str, str]) -> str:
+    if result.verdict == "open":
+        return f"{_subject(result)}: no clear difference, {_figures(result)}.{_outlook(result)}"
+    return f"{_subject(result)}: {_better(result, names)}, {_figures(result)}."
+
+
+def _own_flips(
+    comparison: Comparison,
+    result: ComparisonResult,
+    names: tuple[str, str],
+    flips: tuple[Flips, Flips] | None,
+) -> str:
+    """Return which share of the policies' verdicts changed when the same was played again."""
+    runs = (comparison.first, comparison.second)
+    found = [
+        f"{name} {own[run.policy, result.key.options]}"
+        for name, run, own in zip(names, runs, flips or ({}, {}), strict=True)
+        if (run.policy, result.key.options) in own
+    ]
+    return f" Verdicts that change by themselves: {', '.join(found)}." if found else ""
+
+
+def _subject(result: ComparisonResult) -> str:
+    task, options, part = result.key
+    label = ", ".join((options_label(options), *([] if part is None else [part])))
+    return label if task is None else f"{task}, {label}"
+
+
+def _better(result: ComparisonResult, names: tuple[str, str]) -> str:
+    return f"{names[result.verdict == 'second']} is better"
+
+
+def _figures(result: ComparisonResult) -> str:
+    gap = result.gap
+    words = f"{points(gap.value, 1)} points"
+    if gap.interval is not None:
+        low, high = (points(end, 1) for end in gap.interval)
+        words += f" (95 % interval {low} to {high})"
+    tasks = "" if len(result.tasks) == 1 else f" of {len(result.tasks)} tasks"
+    p_value = p_text(result.p_holm)
+    if _is_surprising(result):
+        p_value += f" (uncorrected {p_text(gap.p_value).removeprefix('p ').removeprefix('= ')})"
+    return f"{words}, {p_value}, {counted(gap.episodes, 'episode')}{tasks}"
+
+
+def _is_surprising(result: ComparisonResult) -> bool:
+    """Return whether the interval excludes no difference, and the corrected test does not."""
+    interval = result.gap.interval
+    return (
+        result.verdict == "open" and interval is not None and not interval.low <= 0 <= interval.high
+    )
+
+
+def _outlook(result: ComparisonResult) -> str:
+    """Say which gaps these episodes show, and how many episodes would show this gap."""
+    least = result.detectable
+    detectable = "no gap" if least is None else f"gaps of {100 * least:.1f} points or more"
+    this_many = "This episode shows" if result.gap.episodes == 1 else "This many episodes show"
+    words = f" {this_many} {detectable} in {POWER:.0%} of cases".replace("%", " %")
+    if result.gap.value == 0:
+        return f"{words}; the two did equally well."
+    needed = result.needed
+    number = f"more than {MAX_EPISODES:,}" if needed is None else f"about {needed:,}"
+    return f"{words}; showing a gap of this size needs {number}."
+
+
+def _caveats(comparison: Comparison) -> Iterator[str]:
+    unpaired = sum(result.unpaired for result in comparison.averages)
+    unjudged = sum(result.unjudged for result in comparison.averages)
+    several = any(len(result.tasks) > 1 for result in comparison.averages)
+    yield "p-values are of the exact paired test, after Holm's correction" + (
+        ": over the averages, and over the single cells. An average is the unweighted mean over "
+        "tasks."
+        if several
+        else " over the settings."
+    )
+    shown = (*comparison.averages, *itertools.chain.from_iterable(comparison.parts.values()))
+    if any(map(_is_surprising, shown)):
+        yield (
+            "An interval is of one gap alone, so it may exclude 0 although p is above 0.05: p is "
+            "corrected for all gaps that are tested together, and it decides."
+        )
+    if comparison.parts:
+        yield "A break-down is corrected by itself, over all its rows."
+    if unpaired:
+        verb = "is" if unpaired == 1 else "are"
+        yield f"{counted(unpaired, 'trial')} without a counterpart {verb} left out."
+    if unjudged:
+        verb = "is" if unjudged == 1 else "are"
+        yield (
+            f"Incomplete: {counted(unjudged, 'trial')} without a verdict (an error, or still to be "
+            f"played) {verb} left out."
+        )

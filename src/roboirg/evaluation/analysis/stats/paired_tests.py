@@ -1,0 +1,195 @@
+"""Paired comparison of two cells on the same episodes: gap, test, retention, overlap."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.evaluation.analysis.stats.cells import CellResults
+from roboirg.evaluation.analysis.stats.intervals import (
+    DRAWS,
+    Interval,
+    Rows,
+    percentile_interval,
+    resampled_rates,
+    without_spread,
+)
+
+
+class Overlap(NamedTuple):
+    """Outcomes of two cells in the trials (episode and policy seed) that they share.
+
+    Attributes:
+        both: trials that succeed in both cells.
+        only_first: trials that succeed in the first cell alone.
+        only_second: trials that succeed in the second cell alone.
+        neither: trials that succeed in neither cell.
+    """
+
+    both: int
+    only_first: int
+    only_second: int
+    neither: int
+
+    @property
+    def trials(self) -> int:
+        """Number of shared trials."""
+        return sum(self)
+
+    @property
+    def discordance(self) -> float | None:
+        """Share of the trials that succeed in exactly one cell; None without trials."""
+        return (self.only_first + self.only_second) / self.trials if self.trials else None
+
+
+@dataclass(frozen=True, slots=True)
+class Pairs:
+    """Two cells of one task, paired by episode.
+
+    Attributes:
+        rows: for each episode with verdicts in both cells, successes and trials of the first,
+            then of the second; shape (episodes, 4). Counts the policy seeds that both cells have,
+            or all seeds if they share none.
+        overlap: of the trials that both cells have.
+    """
+
+    rows: Rows
+    overlap: Overlap
+
+    @classmethod
+    def of(cls, first: CellResults, second: CellResults) -> Pairs:
+        """Pair two cells of the same task."""
+        ours, theirs = first.by_episode(), second.by_episode()
+        rows = []
+        for episode in sorted(ours.keys() & theirs.keys()):
+            here, there = ours[episode], theirs[episode]
+            shared = here.keys() & there.keys()
+            ours_shared = [won for seed, won in here.items() if seed in shared or not shared]
+            theirs_shared = [won for seed, won in there.items() if seed in shared or not shared]
+            rows.append(
+                (sum(ours_shared), len(ours_shared), sum(theirs_shared), len(theirs_shared))
+            )
+        trials = [
+            (won, second.verdicts[at])
+            for at, won in first.verdicts.items()
+            if at in second.verdicts
+        ]
+        overlap = Overlap(
+            both=trials.count((True, True)),
+            only_first=trials.count((True, False)),
+            only_second=trials.count((False, True)),
+            neither=trials.count((False, False)),
+        )
+        return cls(np.array(rows, dtype=np.int64).reshape(-1, 4), overlap)
+
+    @property
+    def differences(self) -> NDArray[np.int64]:
+        """First less second in each episode, in whole numbers.
+
+        In trials if both cells have equally many in every episode, else in success rates times
+        both numbers of trials.
+        """
+        first, first_trials, second, second_trials = self.rows.T
+        if np.array_equal(first_trials, second_trials):
+            return np.asarray(first - second)
+        return np.asarray(first * second_trials - second * first_trials)
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """Difference between two cells of a task, or the unweighted mean over several tasks.
+
+    Attributes:
+        value: success rate of the first less that of the second on the same episodes, -1 to 1.
+        interval: of the value, from the paired bootstrap over episodes.
+        p_value: of the null hypothesis of no difference; not corrected.
+        retention: success rate of the first by that of the second; None if the latter is 0.
+        retention_interval: of the retention; ends that the data do not bound are infinite.
+        episodes: number of paired episodes.
+        overlap: of their trials.
+    """
+
+    value: float
+    interval: Interval | None
+    p_value: float
+    retention: float | None
+    retention_interval: Interval | None
+    episodes: int
+    overlap: Overlap
+
+
+def measure_gap(tasks: Sequence[Pairs], rng: np.random.Generator, draws: int = DRAWS) -> Gap | None:
+    """Measure the gap over the tasks that have pairs; None if no task has any."""
+    paired = [pairs for pairs in tasks if len(pairs.rows)]
+    if not paired:
+        return None
+    rows = [pairs.rows for pairs in paired]
+    sizes = [len(each) for each in rows]
+    sums = np.array([each.sum(axis=0) for each in rows], dtype=np.float64)
+    first, second = np.mean(sums[:, 0::2] / sums[:, 1::2], axis=0)
+    drawn = resampled_rates(rows, rng, draws)
+    return Gap(
+        value=float(first - second),
+        interval=_gap_interval(drawn, sizes),
+        p_value=sign_flip_test(np.concatenate([pairs.differences for pairs in paired])),
+        retention=float(first / second) if second else None,
+        retention_interval=_retention_interval(drawn, sizes) if second else None,
+        episodes=sum(sizes),
+        overlap=pooled_overlap(paired),
+    )
+
+
+def pooled_overlap(tasks: Sequence[Pairs]) -> Overlap:
+    """Add the overlaps of several tasks."""
+    counts = zip(*(pairs.overlap for pairs in tasks), strict=True)
+    return Overlap._make(map(sum, counts)) if tasks else Overlap(0, 0, 0, 0)
+
+
+def sign_flip_test(differences: NDArray[np.int64]) -> float:
+    """Return the two-sided p-value of the exact sign-flip test.
+
+    Compares the sum of the differences with the sums of all ways to swap the two cells within
+    episodes. With one policy seed the differences are -1, 0 and 1, and this is McNemar's exact
+    test; with several seeds it stays valid although the seeds of an episode are correlated.
+
+    Args:
+        differences: one for each episode, whole numbers.
+    """
+    sizes = np.abs(differences[differences != 0])
+    if not len(sizes):
+        return 1.0
+    sizes //= np.gcd.reduce(sizes)
+    total = int(sizes.sum())
+    # Probability of each sum of the sizes that get a positive sign.
+    chances = np.zeros(total + 1)
+    chances[0] = 1.0
+    for size in sizes.tolist():
+        chances[size:] = (chances[size:] + chances[:-size]) / 2
+        chances[:size] /= 2
+    positive = int(sizes[differences[differences != 0] > 0].sum())
+    as_far = np.abs(2 * np.arange(total + 1) - total) >= abs(2 * positive - total)
+    return min(1.0, float(chances[as_far].sum()))
+
+
+def _gap_interval(drawn: NDArray[np.float64], sizes: Sequence[int]) -> Interval | None:
+    values = drawn[:, 0] - drawn[:, 1]
+    interval = percentile_interval(values, sizes)
+    if interval is not None and np.ptp(values) == 0:
+        return without_spread(float(values[0]), sum(sizes), least=-1.0)
+    return interval
+
+
+def _retention_interval(drawn: NDArray[np.float64], sizes: Sequence[int]) -> Interval | None:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        values = drawn[:, 0] / drawn[:, 1]
+    interval = percentile_interval(values, sizes)
+    if interval is None:
+        return None
+    if np.ptp(drawn, axis=0).any():
+        return Interval(max(0.0, interval.low), interval.high)
+    first, second = (without_spread(rate, sum(sizes)) for rate in drawn[0].tolist())
+    return Interval(first.low / second.high, first.high / second.low)

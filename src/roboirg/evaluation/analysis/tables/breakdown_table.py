@@ -1,0 +1,113 @@
+"""Table of gaps to explicit, broken down by kind of instruction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from roboirg.evaluation.analysis.stats.breakdown_rows import BreakdownRow, break_down
+from roboirg.evaluation.analysis.stats.breakdowns import UNKNOWN, Breakdown, Labels
+from roboirg.evaluation.analysis.stats.cells import (
+    Cells,
+    PolicyRun,
+    labels,
+    policy_order,
+    sort_cells,
+)
+from roboirg.evaluation.analysis.stats.intervals import SEED
+from roboirg.evaluation.analysis.stats.option_labels import options_label
+from roboirg.evaluation.analysis.stats.rates import p_text, percent, points
+from roboirg.evaluation.analysis.tables.table import (
+    NOT_APPLICABLE,
+    Column,
+    Counts,
+    Entry,
+    Row,
+    Table,
+)
+from roboirg.util.plain_text import counted
+
+COLUMNS = tuple(map(Column, ("episodes", "success", "gap", "95 % interval", "p")))
+
+
+def make_breakdown_table(
+    breakdown: Breakdown,
+    cells: Cells,
+    found: Labels,
+    names: Mapping[PolicyRun, str] | None = None,
+) -> Table:
+    """Make the table of one break-down.
+
+    Args:
+        breakdown: by what.
+        cells: as `gather` makes them.
+        found: labels of the instructions.
+        names: of the policy runs, in order; by default what tells them apart.
+    """
+    ordered = sort_cells(cells, list(names or policy_order(cells, ())))
+    rows = break_down(ordered, found, np.random.default_rng(SEED))
+    names = names or labels(ordered)
+    return Table(
+        key=f"by_{breakdown.name}",
+        title=f"Gap to explicit by {breakdown.title}",
+        heads=("policy and setting", breakdown.title),
+        columns=COLUMNS,
+        rows=tuple(
+            Row(
+                f"{names[row.policy_run]}, {options_label(row.results.options)}",
+                row.label,
+                "ours",
+                _entries(row),
+            )
+            for row in rows
+        ),
+        notes=tuple(_notes(breakdown, cells, rows)),
+    )
+
+
+def interval_text(row: BreakdownRow) -> str:
+    """Return the ends of the gap's interval in points; a dash without one."""
+    if row.gap is None or row.gap.interval is None:
+        return NOT_APPLICABLE
+    low, high = (points(end, 1) for end in row.gap.interval)
+    return f"{low} to {high}"
+
+
+def corrected_p_text(row: BreakdownRow) -> str:
+    """Return the corrected p-value without its letter; a dash without one."""
+    if row.p_holm is None:
+        return NOT_APPLICABLE
+    return p_text(row.p_holm).removeprefix("p ").removeprefix("= ")
+
+
+def _entries(row: BreakdownRow) -> tuple[Entry, ...]:
+    results = row.results
+    counts = Counts(results.successes, results.trials, results.episodes, interval=row.interval)
+    return (
+        Entry(word=str(results.episodes)),
+        Entry(percent=None if results.rate is None else percent(results.rate), counts=counts),
+        Entry(word=NOT_APPLICABLE if row.gap is None else points(row.gap.value, 1)),
+        Entry(word=interval_text(row)),
+        Entry(word=corrected_p_text(row)),
+    )
+
+
+def _notes(breakdown: Breakdown, cells: Cells, rows: tuple[BreakdownRow, ...]) -> Iterator[str]:
+    yield (
+        "Success in percent, the gap to explicit on the same episodes in points, its interval, and "
+        "its p-value corrected over all rows of the policy. Rates are means over the tasks that "
+        "have such instructions, so two rows may differ in their tasks, too. "
+        f"{breakdown.note}"
+    )
+    if any(row.label == UNKNOWN for row in rows):
+        yield "Unknown: the records were written before this was noted."
+    if any(row.gap is None for row in rows):
+        yield f"{NOT_APPLICABLE} without explicit on the same episodes."
+    left_out = sum(cell.errors + cell.missing for cell in cells.values())
+    if left_out:
+        verb = "is" if left_out == 1 else "are"
+        yield (
+            f"Incomplete: {counted(left_out, 'trial')} without a verdict (an error, or still to be "
+            f"played) {verb} left out."
+        )

@@ -1,0 +1,46 @@
+"""Rendering of tables for the terminal, Markdown, LaTeX and other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+from roboirg.core.errors import UnknownNameError
+from roboirg.evaluation.analysis.tables.rendering.csv_lines import csv_text
+from roboirg.evaluation.analysis.tables.rendering.latex import latex
+from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
+from roboirg.evaluation.analysis.tables.rendering.terminal import plain
+from roboirg.evaluation.analysis.tables.table import Table
+
+__all__ = ["FORMATS", "Format", "get_format"]
+
+
+class Format(NamedTuple):
+    """An output format.
+
+    Attributes:
+        suffix: of files in the format.
+        draw: returns a table as text that ends in a newline.
+    """
+
+    suffix: str
+    draw: Callable[[Table], str]
+
+
+FORMATS: Mapping[str, Format] = {
+    "terminal": Format(".txt", plain),
+    "markdown": Format(".md", markdown),
+    "latex": Format(".tex", latex),
+    "csv": Format(".csv", csv_text),
+}
+
+
+def get_format(name: str) -> Format:
+    """Return the format of that name.
+
+    Raises:
+        UnknownNameError: the format does not exist.
+    """
+    if name not in FORMATS:
+        raise UnknownNameError("format", name, FORMATS)
+    return FORMATS[name]

@@ -1,0 +1,82 @@
+"""Tables as comma-separated values, one line for each entry."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+from roboirg.evaluation.analysis.tables.table import (
+    ERROR_MARK,
+    MISSING_MARK,
+    PARTIAL_MARK,
+    Column,
+    Entry,
+    Row,
+    Table,
+)
+
+HEAD = (
+    "table",
+    "source",
+    "group",
+    "name",
+    "column",
+    "is_average",
+    "percent",
+    "word",
+    "applies",
+    "change",
+    "best",
+    "incomplete",
+    "successes",
+    "trials",
+    "episodes",
+    "errors",
+    "missing",
+    "low_percent",
+    "high_percent",
+    "comparable",
+    "differences",
+)
+"""The columns. Unknown values are empty; notes are left out."""
+
+_MARK_NAMES = {ERROR_MARK: "errors", MISSING_MARK: "missing", PARTIAL_MARK: "partial"}
+
+
+def csv_text(table: Table) -> str:
+    """Return every entry of a table with its counts and the interval of its rate."""
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(HEAD)
+    for row in table.rows:
+        for column, entry in zip(table.columns, row.entries, strict=True):
+            writer.writerow(_line(table, row, column, entry))
+    return file.getvalue()
+
+
+def _line(table: Table, row: Row, column: Column, entry: Entry) -> list[object]:
+    counts = entry.counts
+    interval = counts.interval if counts else None
+    ends = ["", ""] if interval is None else [f"{100 * end:.2f}" for end in interval]
+    return [
+        table.key,
+        row.source,
+        row.group,
+        row.name,
+        column.name,
+        _flag(bool(column.averages)),
+        "" if entry.percent is None else entry.percent,
+        entry.word,
+        _flag(entry.applies),
+        entry.change or "",
+        _flag(entry.best),
+        " ".join(_MARK_NAMES[mark] for mark in entry.marks),
+        *(["", "", "", "", ""] if counts is None else counts[:5]),
+        *ends,
+        "" if entry.differences is None else _flag(not entry.differences),
+        "; ".join(entry.differences or ()),
+    ]
+
+
+def _flag(value: bool) -> str:
+    return "yes" if value else "no"

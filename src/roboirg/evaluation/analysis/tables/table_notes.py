@@ -1,0 +1,223 @@
+"""Notes below a table: the meaning of its signs, and limits of the results."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.evaluation.analysis.comparability import AllDifferences, comparison_notes
+from roboirg.evaluation.analysis.published import TRIALS, RateTable
+from roboirg.evaluation.analysis.stats.cells import (
+    FAIRNESS,
+    CellResults,
+    Cells,
+    EvalConditions,
+    PolicyRun,
+    labels,
+)
+from roboirg.evaluation.analysis.stats.option_labels import (
+    has_default_options,
+    options_label,
+    options_sort_key,
+    staged_options,
+)
+from roboirg.evaluation.analysis.tables.table import (
+    ERROR_MARK,
+    MISSING_MARK,
+    NOT_APPLICABLE,
+    PARTIAL_MARK,
+    Entry,
+    Row,
+)
+from roboirg.util.plain_text import counted
+
+RATES_NOTE = (
+    "Success rate in percent, the mean over policy seeds; averages are unweighted means over tasks."
+)
+TWIN_MARK = " (twin)"
+ARROWS = {"up": "↑", "down": "↓", "same": "→"}
+
+
+def notes_of(
+    which: RateTable,
+    rows: Sequence[Row],
+    cells: Cells,
+    tasks: Sequence[str],
+    differences: AllDifferences,
+) -> tuple[str, ...]:
+    """Return the notes of a table of rates."""
+    shown = {
+        key: cell
+        for key, cell in cells.items()
+        if key.task in tasks and is_shown(which, key.options)
+    }
+    entries = [entry for row in rows for entry in row.entries]
+    policy_runs = list(dict.fromkeys(key.policy_run for key in shown))
+    return (
+        RATES_NOTE,
+        *_sign_notes(which, entries),
+        *_condition_notes([one.conditions for one in policy_runs]),
+        *_size_notes(shown.values()),
+        *_incomplete_notes(shown.values(), entries),
+        *_version_notes(policy_runs),
+        *_omission_notes(which, cells, tasks),
+        *_twin_notes(rows),
+        *_published_notes(which, rows),
+        *comparison_notes(
+            {key: one for key, one in differences.items() if key in shown}, labels(cells)
+        ),
+    )
+
+
+def is_shown(which: RateTable, options: InstructionOptions) -> bool:
+    """Return whether a table has rows for these instruction options."""
+    return options in staged_options() if which == "context" else has_default_options(options)
+
+
+def _sign_notes(which: RateTable, entries: Sequence[Entry]) -> list[str]:
+    notes = []
+    if any(entry.change for entry in entries):
+        reference = "the shortest context" if which == "context" else "explicit"
+        notes.append(
+            f"{ARROWS['up']} above, {ARROWS['down']} below, {ARROWS['same']} equal to {reference} "
+            "of the same policy, as printed, on the same tasks; an arrow does not imply a "
+            "significant difference."
+        )
+    if any(entry.best for entry in entries):
+        notes.append("Bold: the best of its group.")
+    if any(not entry.applies for entry in entries):
+        notes.append(f"{NOT_APPLICABLE} the setting is not defined for the task.")
+    return notes
+
+
+def _condition_notes(conditions: Sequence[EvalConditions]) -> list[str]:
+    """Say which episodes were played in whose words, and what is not the same in all rows."""
+    if not conditions:
+        return []
+    notes = [where_played(conditions)]
+    for name, plural in FAIRNESS.items():
+        values = _distinct(conditions, name)
+        if len(values) > 1:
+            notes.append(
+                f"Results of several {plural} ({', '.join(values)}) have separate rows; they are "
+                "not comparable."
+            )
+    return [note for note in notes if note]
+
+
+def where_played(conditions: Sequence[EvalConditions]) -> str:
+    """Return a sentence with the split, the words and the limit, if all have the same."""
+    usual = {
+        "split": "on the {} split",
+        "wordings": "in {}",
+        "max_steps": "with at most {} steps",
+    }
+    same = {name: values[0] for name in usual if len(values := _distinct(conditions, name)) == 1}
+    words = ", ".join(usual[name].format(value) for name, value in same.items())
+    return f"Played {words}." if words else ""
+
+
+def _distinct(conditions: Iterable[EvalConditions], name: str) -> list[str]:
+    return sorted({one.text(name) for one in conditions})
+
+
+def _size_notes(cells: Iterable[CellResults]) -> list[str]:
+    judged = [cell for cell in cells if cell.trials]
+    if not judged:
+        return []
+    episodes = _range([len(cell.by_episode()) for cell in judged], "episode")
+    trials = _range([cell.trials for cell in judged], "trial")
+    if all(len(cell.by_episode()) == cell.trials for cell in judged):
+        return [f"{episodes} per cell, each played once."]
+    return [f"{episodes} and {trials} per cell: several policy seeds."]
+
+
+def _incomplete_notes(cells: Iterable[CellResults], entries: Iterable[Entry]) -> list[str]:
+    found = list(cells)
+    notes = []
+    errors, missing = sum(one.errors for one in found), sum(one.missing for one in found)
+    if errors:
+        verb = "is" if errors == 1 else "are"
+        notes.append(
+            f"{ERROR_MARK} {counted(errors, 'trial')} ended in an error and {verb} in no rate."
+        )
+    if missing:
+        verb = "is" if missing == 1 else "are"
+        notes.append(
+            f"{MISSING_MARK} {counted(missing, 'trial')} of the plan {verb} still to be played."
+        )
+    if any(PARTIAL_MARK in entry.marks for entry in entries):
+        notes.append(f"{PARTIAL_MARK} a partial average: a task is incomplete or was not played.")
+    if errors or missing:
+        notes.append("Incomplete entries have no arrow, and their columns no best.")
+    return notes
+
+
+def _version_notes(policy_runs: Sequence[PolicyRun]) -> list[str]:
+    """Say whether there is a policy to compare with, and which rows are not comparable."""
+    notes = []
+    if len(policy_runs) == 1:
+        notes.append("One policy was played; there is none to compare it with.")
+    for name in ("language", "environment"):
+        versions = _versions(policy_runs, name)
+        if len(versions) > 1:
+            notes.append(
+                f"Results of several {name} versions ({', '.join(versions)}) have separate rows; "
+                "they are not comparable."
+            )
+    policies = sorted({one.policy for one in policy_runs})
+    by_policy = {name: [one for one in policy_runs if one.policy == name] for name in policies}
+    for policy, own in by_policy.items():
+        versions = _versions(own, "policy")
+        if len(versions) > 1:
+            notes.append(
+                f"Several versions of {policy} ({', '.join(versions)}) have separate rows."
+            )
+    others = [name for name in EvalConditions._fields if name not in FAIRNESS]
+    for own in by_policy.values():
+        if any(len(_distinct([one.conditions for one in own], name)) > 1 for name in others):
+            notes.append("Results under different conditions have separate rows.")
+            break
+    return notes
+
+
+def _versions(policy_runs: Iterable[PolicyRun], name: str) -> list[str]:
+    return sorted({str(getattr(one.versions, name)) for one in policy_runs if one.versions})
+
+
+def _omission_notes(which: RateTable, cells: Cells, tasks: Sequence[str]) -> list[str]:
+    if which != "main":
+        return []
+    other_tasks = sorted({key.task for key in cells if key.task not in tasks})
+    other_options = sorted(
+        {key.options for key in cells if key.task in tasks and not is_shown(which, key.options)},
+        key=options_sort_key,
+    )
+    notes = []
+    if other_tasks:
+        notes.append(f"Not in this table: the results of {', '.join(other_tasks)}.")
+    if other_options:
+        notes.append(f"Not in this table: {'; '.join(map(options_label, other_options))}.")
+    return notes
+
+
+def _twin_notes(rows: Iterable[Row]) -> list[str]:
+    if any(row.name.endswith(TWIN_MARK) for row in rows):
+        return [f"{TWIN_MARK.strip()}: the study's twin, in simulation, not on a robot."]
+    return []
+
+
+def _published_notes(which: RateTable, rows: Iterable[Row]) -> list[str]:
+    if not any(row.source == "published" for row in rows):
+        return []
+    episodes, seeds = TRIALS[which]
+    trials = f"{episodes} trials" if seeds == 1 else f"{episodes} episodes × {seeds} seeds"
+    if which == "real":
+        return [f"(published): from the paper, {trials} per cell on its own robot."]
+    suites = " The averages of suites are ours." if which == "main" else ""
+    return [f"(published): from the paper, {trials} per cell, played in its own simulator.{suites}"]
+
+
+def _range(counts: Sequence[int], noun: str) -> str:
+    low, high = min(counts), max(counts)
+    return counted(high, noun) if low == high else f"{low} to {counted(high, noun)}"

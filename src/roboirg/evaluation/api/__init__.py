@@ -1,0 +1,1 @@
+"""`roboirg.evaluate`: a run and its results in Python."""

@@ -1,0 +1,121 @@
+"""Play policies that are given in Python: specs, classes and objects."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.hosting.policy_descriptions import know_policy
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.run.executor import choose_executor
+from roboirg.evaluation.run.progress import ConsoleReporter, SilentReporter
+from roboirg.evaluation.run.record_hook import CommandHook, HookedReporter, RecordFunction
+from roboirg.evaluation.run.runner import RunSummary, episode_runner, run_plan
+from roboirg.policies.by_name.local_policies import is_local, policy_name, spec_of
+from roboirg.util.console_width import progress_console
+
+AnyPolicy = str | type[Any] | object
+"""A spec as on the command line, a class, or an object with ``reset`` and ``act``."""
+
+RUNS = Path("runs")
+
+
+def python_plan(
+    policies: AnyPolicy | Sequence[AnyPolicy] | Mapping[str, AnyPolicy], **options: object
+) -> Plan:
+    """Return a checked plan; options may be Python values or text as on the command line.
+
+    Raises:
+        UnknownNameError: a policy, task, setting, … does not exist.
+        InvalidValueError: a number or combination is out of range.
+    """
+    named = _named(policies)
+    specs = {name: spec_of(policy) for name, policy in named.items()}
+    for spec in specs.values():
+        if is_local(spec):
+            options["policy_process"] = "shared"
+            know_policy(spec)
+    texts = [name if name == spec else f"{name}={spec}" for name, spec in specs.items()]
+    typed = {name: _typed(name, value) for name, value in options.items() if value is not None}
+    return make_plan(texts, **typed)  # type: ignore[arg-type]
+
+
+def play_plan(
+    plan: Plan,
+    out: str | Path | None,
+    *,
+    workers: int | None,
+    progress: bool,
+    on_record: str | RecordFunction | None,
+) -> tuple[Path, RunSummary]:
+    """Play a plan and return the folder of its records.
+
+    Args:
+        plan: what to play.
+        out: folder; the same one again resumes. None makes a new one in ``runs``.
+        workers: processes, None for one per core. A policy that only this process knows is played
+            in it.
+        progress: whether to show it.
+        on_record: function, or command, that gets each stored record.
+    """
+    folder = (_new_folder() if out is None else Path(out)).absolute()
+    if any(is_local(spec) for spec in plan.specs.values()):
+        if workers:
+            raise InvalidValueError(
+                f"workers is {workers}, but the policy exists in this process only; put its class "
+                "into a module that can be imported, or leave workers out."
+            )
+        workers = 0
+    executor = choose_executor(workers, plan.episode_timeout_s)
+    shown = ConsoleReporter(progress_console(stderr=True)) if progress else None
+    hook = CommandHook(on_record) if isinstance(on_record, str) else on_record
+    reporter = HookedReporter(shown or SilentReporter(), hook or (lambda _record: None))
+    try:
+        if shown is not None:
+            shown.__enter__()
+        with reporter:
+            return folder, run_plan(
+                plan, folder, episode_runner(plan, folder), executor, reporter=reporter
+            )
+    finally:
+        if shown is not None:
+            shown.__exit__()
+
+
+def _named(
+    policies: AnyPolicy | Sequence[AnyPolicy] | Mapping[str, AnyPolicy],
+) -> dict[str, AnyPolicy]:
+    if isinstance(policies, Mapping):
+        return dict(policies)
+    found = policies if isinstance(policies, (list, tuple)) else [policies]
+    names = [policy_name(policy) for policy in found]
+    if len(set(names)) < len(names):
+        raise InvalidValueError(
+            f"Two policies have the same name ({', '.join(names)}); give a mapping from names of "
+            "your own to policies."
+        )
+    return dict(zip(names, found, strict=True))
+
+
+def _typed(name: str, value: object) -> object:
+    """Return a value as on the command line: ``(0, 3)`` becomes ``"0,3,"``."""
+    if isinstance(value, str) or not isinstance(value, Iterable):
+        return str(value) if name == "episodes" else value
+    parts = list(value)
+    if name == "stages" and any(not isinstance(one, int) for one in parts):
+        return ";".join(str(_typed(name, one)) for one in parts)
+    text = ",".join(map(str, parts))
+    # A single number without a comma would mean the first n episodes.
+    return f"{text}," if name == "episodes" else text
+
+
+def _new_folder() -> Path:
+    moment = dt.datetime.now().astimezone().strftime("%Y-%m-%d-%H%M%S")
+    number = 1
+    while (folder := RUNS / (moment if number == 1 else f"{moment}-{number}")).exists():
+        number += 1
+    return folder

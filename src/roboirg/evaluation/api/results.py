@@ -1,0 +1,203 @@
+"""The results of a run as a Python object: data frame, tables, figures, comparison, page."""
+
+from __future__ import annotations
+
+import functools
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
+from roboirg.evaluation.analysis.figures import FIGURES, FigureData, draw_figure
+from roboirg.evaluation.analysis.stats.cells import Cells, gather
+from roboirg.evaluation.analysis.stats.comparison import compare
+from roboirg.evaluation.analysis.stats.comparison_text import sentences
+from roboirg.evaluation.analysis.stats.intervals import SEED
+from roboirg.evaluation.analysis.stats.option_labels import options_label
+from roboirg.evaluation.analysis.stats.run_summary import ALL, summarize
+from roboirg.evaluation.analysis.tables.paper_tables import WHICH, is_informative, make_table
+from roboirg.evaluation.analysis.tables.rendering import get_format
+from roboirg.evaluation.plan.plan import read_plan
+from roboirg.evaluation.records.record import Job, Record
+from roboirg.evaluation.records.record_codec import EpisodeSummary
+from roboirg.evaluation.records.store import read_records, read_results
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+COLUMNS = (
+    "policy", "task", "split", "episode", "difficulty", "setting", "form", "policy_seed", "outcome",
+    "cause", "error", "steps", "max_steps", "privileged", "policy_version", "language_version",
+    "environment_version", "duration_s", "video",
+)  # fmt: skip
+"""Columns of the data frame, beside ``success`` and ``failure``."""
+
+
+@dataclass(frozen=True)
+class Results:
+    """What a run yielded. Notebooks show its main table, or that of all tasks it has.
+
+    Attributes:
+        folder: of the run, with ``records.jsonl``; `roboirg` commands take it, too.
+        errors: number of episodes that ended in an error and are in no rate.
+        missing: number of planned episodes that were not played.
+    """
+
+    folder: Path
+    errors: int = field(init=False)
+    missing: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        cells = self.cells.values()
+        object.__setattr__(self, "errors", sum(cell.errors for cell in cells))
+        object.__setattr__(self, "missing", sum(cell.missing for cell in cells))
+
+    @functools.cached_property
+    def summaries(self) -> tuple[EpisodeSummary, ...]:
+        """The verdicts, one for each episode, without instructions and events."""
+        return read_results(self.folder)
+
+    @functools.cached_property
+    def records(self) -> tuple[Record, ...]:
+        """The whole records, with instructions, events, times and metadata."""
+        return read_records(self.folder)
+
+    @functools.cached_property
+    def cells(self) -> Cells:
+        """The verdicts gathered by policy, task and instruction options."""
+        return gather([("", self.summaries)], self._planned)
+
+    @property
+    def frame(self) -> pd.DataFrame:
+        """One row for each episode (`COLUMNS`), ``success`` as a boolean, missing for errors.
+
+        Raises:
+            MissingDependencyError: pandas is not installed.
+        """
+        try:
+            import pandas as pd
+        except ImportError as error:
+            raise MissingDependencyError(
+                f"A data frame needs pandas, which is not installed ({error}); run: "
+                "pip install pandas"
+            ) from error
+        frame = pd.DataFrame(
+            [
+                {
+                    **{name: getattr(one, name) for name in COLUMNS},
+                    "failure": None if one.attribution is None else one.attribution.failure,
+                }
+                for one in self.summaries
+            ],
+            columns=[*COLUMNS, "failure"],
+        )
+        success = frame["outcome"].map({"success": True, "failure": False}).astype("boolean")
+        frame.insert(COLUMNS.index("outcome") + 1, "success", success)
+        return frame
+
+    def rates(self) -> dict[tuple[str, str], float]:
+        """Return the mean success over tasks, 0 to 1, by policy and setting (with options)."""
+        return {
+            (one.key.policy_run.policy, options_label(one.key.options)): float(one.rate)
+            for one in summarize(self.cells, np.random.default_rng(SEED))
+            if one.key.scope == ALL and one.rate is not None
+        }
+
+    def table(self, which: str = "main", format: str = "terminal", **options: bool) -> str:  # noqa: A002
+        """Return a table of the paper as text.
+
+        Args:
+            which: main, planner, context, real, other or coverage.
+            format: terminal, markdown, latex or csv.
+            **options: ``published``, ``chance``, ``floors``: rows to add.
+
+        Raises:
+            UnknownNameError: there is no such table or format.
+        """
+        return get_format(format).draw(make_table(which, self.cells, **options))
+
+    def plot(self, which: str = "averages", *, published: bool = False) -> Plot:
+        """Return one of the figures: averages, forms, context or failures.
+
+        Raises:
+            UnknownNameError: there is no such figure.
+            InvalidValueError: the run has nothing to draw for it.
+            MissingDependencyError: matplotlib is not installed.
+        """
+        names = tuple(name for name in FIGURES if name != "expressions")
+        if which not in names:
+            raise UnknownNameError("figure", which, names)
+        content = FigureData.of([("", self.summaries)], self._planned)
+        figure = draw_figure(which, content, published=published)
+        if figure is None:
+            raise InvalidValueError(f"The run has nothing to draw for {which!r}.")
+        return Plot(figure)
+
+    def compare(self, first: str, second: str) -> str:
+        """Return the comparison of two policies on the same episodes, in sentences.
+
+        Raises:
+            UnknownNameError: the run has no such policy.
+            InvalidValueError: the two cannot be compared.
+        """
+        ours, theirs = self._cells_of(first), self._cells_of(second)
+        found = compare(ours, theirs, np.random.default_rng(SEED))
+        names = found.first.marked_policy, found.second.marked_policy
+        return "\n".join(sentences(found, *names))
+
+    def report(self, *, videos: bool = True) -> Path:
+        """Write the page of the run and return its path.
+
+        Raises:
+            MissingDependencyError: Jinja is not installed.
+        """
+        from roboirg.evaluation.analysis.page.report import write_report
+
+        return write_report(self.folder, planned=self._planned, videos=videos)
+
+    def __repr__(self) -> str:
+        counts = f"{self.errors} errors, {self.missing} missing"
+        lines = [f"Results of {len(self.summaries)} episodes ({counts}) in {self.folder}"]
+        lines += [f"  {policy} {name}: {100 * rate:.1f} %"
+                  for (policy, name), rate in self.rates().items()]  # fmt: skip
+        return "\n".join(lines)
+
+    def _repr_markdown_(self) -> str:
+        shown = [one for one in WHICH if one != "coverage" and is_informative(one, self.cells)]
+        return "\n".join(self.table(one, "markdown") for one in shown[:1]) or repr(self)
+
+    @functools.cached_property
+    def _planned(self) -> Sequence[Job]:
+        plan = read_plan(self.folder)
+        return () if plan is None else plan.drawable_jobs()
+
+    def _cells_of(self, policy: str) -> Cells:
+        names = list(dict.fromkeys(key.policy_run.policy for key in self.cells))
+        if policy not in names:
+            raise UnknownNameError(f"policy in {self.folder}", policy, names)
+        return {key: cell for key, cell in self.cells.items() if key.policy_run.policy == policy}
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure that notebooks show.
+
+    Attributes:
+        figure: matplotlib's.
+    """
+
+    figure: Figure
+
+    def save(self, path: str | Path, **options: Any) -> None:  # noqa: ANN401 - matplotlib's
+        """Write it to a file; options as of ``Figure.savefig``."""
+        self.figure.savefig(path, **options)
+
+    def _repr_png_(self) -> bytes:
+        file = io.BytesIO()
+        self.figure.savefig(file, format="png", dpi=150)
+        return file.getvalue()

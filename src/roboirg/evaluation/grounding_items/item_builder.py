@@ -1,0 +1,234 @@
+"""Make the items of one episode: every wanted instruction, with its questions and answers."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.word_pools import POOLS
+from roboirg.evaluation.grounding_items.goal_choices import draw_choices, explicit_command
+from roboirg.evaluation.grounding_items.grounding_item import LETTERS, GroundingItem, PointTarget
+from roboirg.evaluation.grounding_items.referents import is_ordered, noun, pointed_kinds
+from roboirg.language import instruct_with
+from roboirg.language.generator import find_refusal
+from roboirg.language.instruction import Instruction
+from roboirg.language.settings import all_settings, settings_of
+from roboirg.language.templates import LANGUAGE_VERSION
+from roboirg.policies.vlm.goal_schema import goal_schema
+from roboirg.policies.vlm.listener_query import PROMPTS, question_texts
+from roboirg.policies.vlm.prompts import Prompts, load_prompts
+from roboirg.shortcuts.command_chance import blind_goals, is_right, right_share
+from roboirg.shortcuts.shortcut_scores import hidden_slots
+from roboirg.tasks import get_task
+
+QUESTIONS = "grounding_questions"
+"""Name of the prompts for the questions that the listener does not ask."""
+SIZE = 256
+ID_DIGITS = 16
+
+
+class EpisodeMedia(NamedTuple):
+    """Pictures of an episode, as stored, and where the things that are meant are seen.
+
+    Attributes:
+        picture: path of the first picture.
+        video: path of the video; None without one.
+        frames: paths of frames of the video, evenly spaced.
+        steps: control steps of the video.
+        points: one for each thing that is meant.
+        meters: distance of the first of them from the camera.
+        objects: where every object is seen that could be meant, by its name.
+    """
+
+    picture: str
+    video: str | None
+    frames: tuple[str, ...]
+    steps: int
+    points: tuple[PointTarget, ...]
+    meters: float
+    objects: dict[str, PointTarget] = {}  # noqa: RUF012 - the type of a tuple's field
+
+
+def wanted_options(
+    episode: Episode,
+    settings: Sequence[str],
+    forms: Sequence[str],
+    options: InstructionOptions,
+    *,
+    every_variant: bool,
+) -> Iterator[InstructionOptions]:
+    """Yield the options of an episode's items; equal words once.
+
+    Leaves out settings that the task lacks or that cannot express the episode. An option that a
+    setting does not read keeps its default.
+
+    Args:
+        episode: the episode.
+        settings: names of settings.
+        forms: implicit, resolved or both; explicit has one form.
+        options: all others.
+        every_variant: add every combination of options that changes the words of a setting.
+    """
+    present = settings_of(get_task(episode.task))
+    for name in (name for name in settings if name in present):
+        setting = all_settings()[name]
+        usual = InstructionOptions(name, wordings=options.wordings)
+        chosen: dict[str, Any] = {
+            str(one): getattr(options, one) for one in setting.reads - {"delivery"}
+        }
+        variants: list[Mapping[str, Any]] = [chosen]
+        if every_variant:
+            variants += setting.variants
+        found = [
+            usual._replace(form=form, **changes)
+            for changes in variants
+            for form in (forms if setting.implicit else (usual.form,))
+        ]
+        yield from (one for one in dict.fromkeys(found) if find_refusal(episode, one) is None)
+
+
+def make_items(
+    episode: Episode, media: EpisodeMedia, wanted: Sequence[InstructionOptions]
+) -> list[GroundingItem]:
+    """Return an item for each of the options."""
+    listener, questions = load_prompts(PROMPTS), load_prompts(QUESTIONS)
+    return [_make_item(episode, media, options, listener, questions) for options in wanted]
+
+
+def item_id(episode: Episode, options: InstructionOptions) -> str:
+    """Return the name of an item. It is a hash, which tells nothing about the answer."""
+    content = (episode.key, *options, LANGUAGE_VERSION, ENVIRONMENT_VERSION)
+    return "g" + hashlib.sha256(repr(content).encode()).hexdigest()[:ID_DIGITS]
+
+
+def _make_item(
+    episode: Episode,
+    media: EpisodeMedia,
+    options: InstructionOptions,
+    listener: Prompts,
+    questions: Prompts,
+) -> GroundingItem:
+    task, instruction = get_task(episode.task), instruct_with(episode, options)
+    schema, name = goal_schema(episode.task), item_id(episode, options)
+    texts = question_texts(listener, schema, instruction.text, media.steps)
+    choices = draw_choices(episode, instruction, name)
+    pool = next(one for one in POOLS if one != instruction.metadata["pool"])
+    commands = [explicit_command(episode, goal, pool) for goal in choices.goals]
+    goals, answers = task.goals(episode.scene), schema.answers
+    return GroundingItem(
+        id=name,
+        task=task.name,
+        suite=task.suite,
+        split=episode.split,
+        episode=episode.index,
+        difficulty=episode.difficulty,
+        **_option_fields(options),
+        text=instruction.text,
+        turns=list(instruction.turns),
+        picture=media.picture,
+        video=media.video,
+        video_steps=media.steps,
+        frames=list(media.frames),
+        slots_system=texts.system,
+        system=questions.fill("system"),
+        said=texts.instruction,
+        shown=texts.video,
+        now=texts.now,
+        slots_question=texts.question,
+        choice_question=_choice_question(questions, commands),
+        points_question=_points_question(questions, episode),
+        schema=_json(schema.schema()),
+        choices=commands,
+        answer=answers[episode.goal],
+        answers=[answers[goal] for goal in goals if is_right(goal, episode)],
+        goals=[answers[goal] for goal in goals],
+        choice=LETTERS[choices.right],
+        choice_answers=[answers[goal] for goal in choices.goals],
+        points=list(media.points),
+        points_in_order=is_ordered(episode.goal),
+        command_chance=float(right_share(blind_goals(instruction, episode), episode)),
+        hidden_slots=_hidden(episode, instruction),
+        pattern=_text_or_none(instruction.metadata["pattern"]),
+        expressions=list(_expressions(instruction)),
+        words_back=words_back(instruction),
+        meters=media.meters,
+        language_version=LANGUAGE_VERSION,
+        environment_version=ENVIRONMENT_VERSION,
+    )
+
+
+def words_back(instruction: Instruction) -> int | None:
+    """Return how many words stand between a value and the command's expression that means it.
+
+    It is the largest number over the referring expressions of the command, each counted from the
+    last time that its value was named; None if the command has none or nothing named its value.
+    """
+    last = len(instruction.utterances) - 1
+    places = [
+        (mention, _place(instruction, mention.utterance, mention.start))
+        for mention in instruction.mentions
+    ]
+    found = []
+    for mention, place in places:
+        if mention.role != "anaphor" or mention.utterance != last:
+            continue
+        named = [
+            _place(instruction, one.utterance, one.end)
+            for one, before in places
+            if (one.role, one.slot, one.value) == ("antecedent", mention.slot, mention.value)
+            and before < place
+        ]
+        if named:
+            found.append(place - max(named))
+    return max(found, default=None)
+
+
+def _place(instruction: Instruction, utterance: int, character: int) -> int:
+    """Return the number of words before a place in the prompt."""
+    before = sum(len(text.split()) for text in instruction.turns[:utterance])
+    return before + len(instruction.turns[utterance][:character].split())
+
+
+def _hidden(episode: Episode, instruction: Instruction) -> list[str]:
+    """Return the slots that the command leaves to its context; a resolved command leaves none."""
+    return [] if instruction.form == "resolved" else list(hidden_slots((episode, instruction)))
+
+
+def _expressions(instruction: Instruction) -> Iterator[str]:
+    last = len(instruction.utterances) - 1
+    found = (one.expression for one in instruction.mentions if one.utterance == last)
+    yield from dict.fromkeys(one for one in found if one is not None)
+
+
+def _choice_question(questions: Prompts, commands: Sequence[str]) -> str:
+    lines = (
+        questions.fill("choice_line", letter=letter, goal=command)
+        for letter, command in zip(LETTERS, commands, strict=False)
+    )
+    return questions.fill("choice", choices="\n".join(lines))
+
+
+def _points_question(questions: Prompts, episode: Episode) -> str:
+    nouns = [noun(episode.task, kind) for kind in pointed_kinds(episode.task)]
+    rule = questions.fill("several" if is_ordered(episode.goal) else "amounts")
+    things = ", then ".join(f"the {one}" for one in nouns)
+    return questions.fill("points", things=things, rule=rule, width=str(SIZE), height=str(SIZE))
+
+
+def _option_fields(options: InstructionOptions) -> dict[str, Any]:
+    fields = options._asdict()
+    del fields["delivery"]
+    return {**fields, "stages": list(options.stages), "wordings": options.wordings or "own"}
+
+
+def _text_or_none(value: object) -> str | None:
+    return None if value is None else str(value)
+
+
+def _json(value: object) -> str:
+    import json
+
+    return json.dumps(value, separators=(",", ":"))

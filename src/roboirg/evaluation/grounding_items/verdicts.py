@@ -1,0 +1,187 @@
+"""What a reply to a question means, and whether it is right."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import json
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from roboirg.evaluation.grounding_items.grounding_item import (
+    LETTERS,
+    GroundingItem,
+    PointTarget,
+    QuestionKind,
+)
+from roboirg.policies.vlm.goal_schema import goal_schema
+from roboirg.util.json_reply import UnparsableReplyError, json_object
+
+_FIRST_LETTER = re.compile(r"^\W*([A-D])(?![A-Za-z'])", re.IGNORECASE)
+_CONCLUSION = re.compile(
+    r"(?:answer|choice|option)(?:\s+is|\s*:)?\W*\b([A-D])(?![A-Za-z'])", re.IGNORECASE
+)
+_ARTICLE = re.compile(r"a\s+[a-z]", re.IGNORECASE)
+"""*A cube* names no choice."""
+
+Pixel = tuple[float, float]
+
+
+class ReplyVerdict(NamedTuple):
+    """The verdict on one reply.
+
+    Attributes:
+        right: whether all of it is right.
+        understood: the reply in its usual form: slots as canonical JSON, a letter, or points as
+            JSON; None if it names no answer to the question.
+        parts: for slots, whether each field is right, by name; for points, whether each thing that
+            is meant is hit, by number from 1.
+    """
+
+    right: bool
+    understood: str | None
+    parts: Mapping[str, bool]
+
+
+def judge_reply(item: GroundingItem, kind: QuestionKind, reply: str) -> ReplyVerdict:
+    """Return the verdict on a model's reply to one of an item's questions.
+
+    Slots are read as by the language-model listener: words and code fences around the JSON object
+    do no harm, but a value that the task does not have makes the reply no answer.
+
+    Raises:
+        UnknownNameError: the item's task is not installed.
+    """
+    return _JUDGES[kind](item, reply)
+
+
+def guess_chance(item: GroundingItem, kind: QuestionKind) -> float:
+    """Return how often a random answer is right.
+
+    Slots are a goal of the scene, choices a letter that has one, and points as many random
+    pixels as there are things.
+    """
+    if kind == "slots":
+        return len(item.answers) / len(item.goals)
+    if kind == "choice":
+        return 1 / len(item.choices)
+    shares = [_mask_share(tuple(point.counts)) for point in item.points]
+    orders = 1 if item.points_in_order else math.factorial(len(shares))
+    return math.prod(shares) * orders
+
+
+def right_reply(item: GroundingItem, kind: QuestionKind) -> str:
+    """Return a right reply."""
+    if kind == "slots":
+        return item.answer
+    if kind == "choice":
+        return item.choice
+    return json.dumps({"points": [{"x": point.x, "y": point.y} for point in item.points]})
+
+
+def _judge_slots(item: GroundingItem, reply: str) -> ReplyVerdict:
+    schema = goal_schema(item.task)
+    wanted = json.loads(item.answer)
+    try:
+        answer = schema.answers[schema.read(reply)]
+    except UnparsableReplyError:
+        return ReplyVerdict(False, None, dict.fromkeys(wanted, False))
+    found = json.loads(answer)
+    parts = {name: found[name] == value for name, value in wanted.items()}
+    return ReplyVerdict(answer in item.answers, answer, parts)
+
+
+def _judge_choice(item: GroundingItem, reply: str) -> ReplyVerdict:
+    letter = _read_letter(reply)
+    if letter is None or letter not in LETTERS[: len(item.choices)]:
+        return ReplyVerdict(False, None, {})
+    return ReplyVerdict(letter == item.choice, letter, {})
+
+
+def _read_letter(reply: str) -> str | None:
+    """Return the letter of a reply: at its beginning, or after *the answer is*."""
+    try:
+        named = json_object(reply).get("choice")
+        reply = named if isinstance(named, str) else reply
+    except UnparsableReplyError:
+        pass
+    named_letters = [
+        found[1].upper()
+        for pattern in (_FIRST_LETTER, _CONCLUSION)
+        for found in pattern.finditer(reply.strip())
+        if not _ARTICLE.match(reply.strip(), found.start(1))
+    ]
+    return named_letters[-1] if named_letters else None
+
+
+def _judge_points(item: GroundingItem, reply: str) -> ReplyVerdict:
+    points = _read_points(reply)
+    if points is None:
+        return ReplyVerdict(False, None, _numbered([False] * len(item.points)))
+    if item.points_in_order:
+        pairs = itertools.zip_longest(item.points, points[: len(item.points)])
+        hits = [point is not None and _hits(target, point) for target, point in pairs]
+    else:
+        hits = [any(_hits(target, point) for point in points) for target in item.points]
+    understood = json.dumps([{"x": x, "y": y} for x, y in points])
+    right = all(hits) and len(points) == len(item.points)
+    return ReplyVerdict(right, understood, _numbered(hits))
+
+
+def _numbered(hits: Sequence[bool]) -> dict[str, bool]:
+    return {str(number): hit for number, hit in enumerate(hits, start=1)}
+
+
+def _read_points(reply: str) -> list[Pixel] | None:
+    """Return the points of a reply; None if it has none."""
+    try:
+        found: dict[str, Any] = json_object(reply)
+    except UnparsableReplyError:
+        return None
+    listed = found.get("points", [found])
+    if not isinstance(listed, list) or not listed:
+        return None
+    points = [_read_point(one) for one in listed]
+    return None if None in points else [point for point in points if point is not None]
+
+
+def _read_point(value: object) -> Pixel | None:
+    if not isinstance(value, dict):
+        return None
+    x, y = _number(value.get("x")), _number(value.get("y"))
+    return None if x is None or y is None else (x, y)
+
+
+def _number(value: Any) -> float | None:  # noqa: ANN401 - whatever JSON holds
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        return None
+    return float(value)
+
+
+def _hits(target: PointTarget, point: Pixel) -> bool:
+    """Return whether a point lies in the pixels of a mask; a pixel begins at its number."""
+    column, row = math.floor(point[0]), math.floor(point[1])
+    height, width = target.size
+    if not (0 <= column < width and 0 <= row < height):
+        return False
+    # Without the whole mask: the run of a pixel is inside if its number is odd.
+    place, run = column * height + row, 0
+    for run, length in enumerate(target.counts):  # noqa: B007 - the number is the result
+        place -= length
+        if place < 0:
+            break
+    return run % 2 == 1
+
+
+@functools.lru_cache(maxsize=4096)
+def _mask_share(counts: tuple[int, ...]) -> float:
+    return sum(counts[1::2]) / sum(counts)
+
+
+_JUDGES: Mapping[QuestionKind, Callable[[GroundingItem, str], ReplyVerdict]] = {
+    "slots": _judge_slots,
+    "choice": _judge_choice,
+    "points": _judge_points,
+}

@@ -1,0 +1,1 @@
+"""Plans of runs: which policies play which episodes, from options and files."""

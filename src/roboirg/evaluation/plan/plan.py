@@ -1,0 +1,389 @@
+"""Plans: which episodes to play, checked before anything starts."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from pydantic import BaseModel, ConfigDict, ValidationError, field_validator, model_validator
+
+from roboirg import language, policies, tasks
+from roboirg.core.actions import find_action_space
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import (
+    ALL_STAGES,
+    DEFAULT_DELIVERY,
+    DEFAULT_DISTRACTOR,
+    DEFAULT_DISTRACTORS,
+    DEFAULT_FRAME,
+    DEFAULT_REASONING,
+    DEFAULT_RIVAL,
+    InstructionOptions,
+)
+from roboirg.core.observations import (
+    DemonstrationFrames,
+    check_demonstration_frames,
+    check_observe_every,
+)
+from roboirg.core.word_pools import POOLS
+from roboirg.evaluation.hosting.host_pool import DEFAULT_BATCH, HostSettings
+from roboirg.evaluation.hosting.policy_descriptions import describe_policy
+from roboirg.evaluation.plan.plan_parsing import check_names, name_and_spec
+from roboirg.evaluation.play.job_instruction import instruct_job
+from roboirg.evaluation.records.film import VideoMode
+from roboirg.evaluation.records.plan_files import PLAN_FILE, earlier_plans, store_plan
+from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, ErrorKind, Job
+from roboirg.language.generator import check_options, find_refusal
+from roboirg.language.settings import EXPLICIT, all_settings
+from roboirg.language.wordings.wording_store import open_wordings
+from roboirg.tasks.splits import splits
+from roboirg.tasks.splits.private_splits import MissingSaltError, is_private
+from roboirg.util.plain_text import is_encodable
+from roboirg.util.short_hash import short_hash
+
+REQUIRED = "required"
+"""Instead of a wording file in a plan: one must be given when the plan is run."""
+
+
+PolicyProcessMode = Literal["own", "shared"]
+POLICY_PROCESSES: tuple[PolicyProcessMode, ...] = get_args(PolicyProcessMode)
+
+LongPrompts = Literal["send", "refuse"]
+LONG_PROMPTS: tuple[LongPrompts, ...] = get_args(LongPrompts)
+
+MESHES = ("faithful", "light")
+
+RETRYABLE: tuple[ErrorKind, ...] = ("connection", "environment", "infrastructure")
+"""Kinds of errors that may not occur again when the episode is retried."""
+
+
+class Plan(BaseModel):
+    """Which policies play which episodes, with which instructions.
+
+    Attributes:
+        policies: built-in names, ``package.module:Class``, or addresses; each may be given a name
+            of its own as ``NAME=SPEC``.
+        tasks: names of tasks.
+        settings: names, or ``"all"`` for every setting that can express the episode.
+        forms: implicit, resolved or both.
+        split: train, val, test, random, or the name of a private split.
+        episodes: 0-based positions in the split.
+        policy_seeds: every seed plays every episode.
+        stages: sets of stages for settings that read them; every set is played.
+        distractor: kind of distractor, for settings that read it.
+        distractors: number of distractors, for settings that read it.
+        frame: frame of reference, for settings that read it.
+        delivery: prompt or turns, for settings with several utterances.
+        rival: none or drawn, for settings that read it.
+        reasoning: plain or open, for settings that read it.
+        wordings: path of the wording file whose commands are used; None for our own.
+        wordings_identity: name and fingerprint of that file; read from it if it is not given.
+        max_steps: the policy's limit, control steps.
+        actions: required action space; None for each policy's own.
+        demonstration_frames: which frames of the video policies get; None for each policy's choice.
+        observe_every: control steps between observations; None for each policy's choice.
+        meshes: faithful or light.
+        video: which episodes get a video. This and all that follows is not part of a record's
+            identity.
+        policy_process: ``own``: each policy that is neither built in nor remote has a process of
+            its own; ``shared``: it runs in the world's, for debuggers.
+        batch: most episodes that a policy is asked about together.
+        devices: values of ``CUDA_VISIBLE_DEVICES``; each policy has a process on each of them.
+        long_prompts: whether an episode is played (``send``) or not (``refuse``) if its prompt is
+            longer than what the policy declares that its model reads.
+        policy_timeout_s: seconds that one call of a policy may take.
+        episode_timeout_s: seconds that an episode may take.
+        tries: how often an episode is played if it ends in an error of a kind in `retry_on`.
+        retry_on: kinds of errors.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    policies: tuple[str, ...]
+    tasks: tuple[str, ...]
+    settings: tuple[str, ...] | Literal["all"] = "all"
+    forms: tuple[str, ...] = ("implicit",)
+    split: str = "test"
+    episodes: tuple[int, ...]
+    policy_seeds: tuple[int, ...] = (0,)
+    stages: tuple[tuple[int, ...], ...] = (ALL_STAGES,)
+    distractor: str = DEFAULT_DISTRACTOR
+    distractors: int = DEFAULT_DISTRACTORS
+    frame: str = DEFAULT_FRAME
+    delivery: str = DEFAULT_DELIVERY
+    rival: str = DEFAULT_RIVAL
+    reasoning: str = DEFAULT_REASONING
+    wordings: str | None = None
+    wordings_identity: str | None = None
+    max_steps: int = DEFAULT_MAX_STEPS
+    actions: str | None = None
+    demonstration_frames: DemonstrationFrames | None = None
+    observe_every: int | None = None
+    meshes: str = DEFAULT_MESHES
+    video: VideoMode = "off"
+    policy_process: PolicyProcessMode = "own"
+    batch: int = DEFAULT_BATCH
+    devices: tuple[str, ...] = ()
+    long_prompts: LongPrompts = "send"
+    policy_timeout_s: float = 600.0
+    episode_timeout_s: float = 7200.0
+    tries: int = 2
+    retry_on: tuple[ErrorKind, ...] = RETRYABLE
+
+    @model_validator(mode="before")
+    @classmethod
+    def _identify_wordings(cls, fields: Any) -> Any:  # noqa: ANN401 - whatever is to be validated
+        if not isinstance(fields, dict) or fields.get("wordings") is None:
+            return fields
+        if fields.get("wordings_identity") is not None:
+            return fields
+        if fields["wordings"] in POOLS:
+            return {**fields, "wordings_identity": fields["wordings"]}
+        path = Path(str(fields["wordings"])).resolve()
+        return {**fields, "wordings": str(path), "wordings_identity": open_wordings(path)}
+
+    @field_validator("demonstration_frames", mode="before")
+    @classmethod
+    def _check_frames(cls, value: object) -> object:
+        return None if value is None else check_demonstration_frames(value)
+
+    @property
+    def specs(self) -> dict[str, str]:
+        """The spec of each policy by name.
+
+        Raises:
+            InvalidValueError: two policies have the same name.
+        """
+        specs: dict[str, str] = {}
+        for name, spec in map(name_and_spec, self.policies):
+            if specs.setdefault(name, spec) != spec:
+                raise InvalidValueError(
+                    f"Two policies are named {name!r}: {specs[name]} and {spec}."
+                )
+        return specs
+
+    @property
+    def hosting(self) -> HostSettings | None:
+        """How policies are hosted; None if they run in the world's process.
+
+        Raises:
+            InvalidValueError: the batch is less than 1.
+        """
+        if self.policy_process == "shared":
+            return None
+        return HostSettings(self.batch, self.devices, self.policy_timeout_s)
+
+    @property
+    def fingerprint(self) -> str:
+        """Hash of all fields."""
+        return short_hash(self.model_dump_json())
+
+    def checked(self) -> Plan:
+        """Return this plan if all of it can be played.
+
+        Raises:
+            UnknownNameError: a policy, task, setting, … does not exist; the message suggests the
+                nearest.
+            InvalidValueError: a number is out of range, or a task lacks a setting.
+        """
+        for name, spec in self.specs.items():
+            if not is_encodable(f"{name}={spec}"):
+                raise InvalidValueError(f"Policy {name!r} is not text: it has lone surrogates.")
+            if self.policy_process == "own":
+                describe_policy(spec, again=True)
+            else:
+                policies.load_policy_class(spec)
+        self._check_options()
+        if is_private(self.split) and self.policy_process == "shared":
+            raise InvalidValueError(
+                "policy_process is 'shared', so policies would know the salt of private episodes; "
+                "it must be 'own'."
+            )
+        for task in self.tasks:
+            for index in (min(self.episodes), max(self.episodes)):
+                splits.get_episode(task, self.split, index)
+            self._check_settings(task)
+        jobs = list(self._instruction_jobs())
+        for job in jobs:
+            instruct_job(job)  # raises if the options cannot express the episode
+        if not jobs:
+            raise InvalidValueError(
+                f"There is nothing to play: with rival {self.rival!r} and reasoning "
+                f"{self.reasoning!r} no setting can express any of these episodes."
+            )
+        return self
+
+    def jobs(self) -> tuple[Job, ...]:
+        """Return every job, ordered by policy, task, episode, setting, form, stages and seed."""
+        # The settings of an episode are slow to find, so all policies share them.
+        settings = {
+            (task, episode): self.settings_of(task, episode)
+            for task in self.tasks
+            for episode in self.episodes
+        }
+        return tuple(
+            job
+            for policy in self.specs.items()
+            for where, expressible in settings.items()
+            for job in self._jobs_of(policy, *where, expressible, seeds=self.policy_seeds)
+        )
+
+    def drawable_jobs(self) -> tuple[Job, ...]:
+        """Return every job; none if the episodes are private and their salt is not known."""
+        try:
+            splits.check_split(self.split)
+        except MissingSaltError:
+            return ()
+        return self.jobs()
+
+    def settings_of(self, task: str, episode: int) -> tuple[str, ...]:
+        """Return the settings in which an episode is played."""
+        if self.settings == "all":
+            return language.expressible(splits.get_episode(task, self.split, episode))
+        return self.settings
+
+    def _jobs_of(
+        self,
+        policy: tuple[str, str],
+        task: str,
+        episode: int,
+        settings: Iterable[str],
+        *,
+        seeds: tuple[int, ...],
+    ) -> Iterator[Job]:
+        name, spec = policy
+        for setting in settings:
+            for options in self._options_of(setting):
+                if self._is_left_out(task, episode, options):
+                    continue
+                job = Job(
+                    policy=name,
+                    task=task,
+                    split=self.split,
+                    episode=episode,
+                    **options._replace(wordings=self.wordings_identity)._asdict(),
+                    wordings_file=self.wordings,
+                    policy_seed=seeds[0],
+                    max_steps=self.max_steps,
+                    actions=self.actions,
+                    demonstration_frames=self.demonstration_frames,
+                    observe_every=self.observe_every,
+                    meshes=self.meshes,
+                    spec=None if spec == name else spec,
+                )
+                yield job
+                # Copying is faster, and there may be very many.
+                for seed in seeds[1:]:
+                    yield job.model_copy(update={"policy_seed": seed})
+
+    def _options_of(self, setting: str) -> Iterator[InstructionOptions]:
+        """Yield the instruction options to play in a setting.
+
+        An option that the setting does not read keeps its default, so that equal words are one job.
+        """
+        rule, usual = all_settings()[setting], InstructionOptions(setting)
+        chosen = {option: getattr(self, option) for option in rule.reads - {"stages"}}
+        for form in self.forms if rule.implicit else (usual.form,):
+            for stages in self.stages if "stages" in rule.reads else (usual.stages,):
+                yield usual._replace(form=form, stages=stages, **chosen)
+
+    def _is_left_out(self, task: str, episode: int, options: InstructionOptions) -> bool:
+        """Return whether an episode has no rival, or no open pattern, in a setting that it has.
+
+        Some scenes have no second value; a plan over many tasks leaves them out.
+        """
+        plain = options._replace(rival=DEFAULT_RIVAL, reasoning=DEFAULT_REASONING)
+        if options == plain:
+            return False
+        found = splits.get_episode(task, self.split, episode)
+        refused = [find_refusal(found, one) is not None for one in (options, plain)]
+        return refused == [True, False]
+
+    def _instruction_jobs(self) -> Iterator[Job]:
+        """Yield one job for each instruction that the language may not be able to express."""
+        # All settings with the default frame are only those that can express the episode.
+        usual = (
+            self.settings == "all"
+            and self.frame == DEFAULT_FRAME
+            and self.wordings is None
+            and (self.rival, self.reasoning) == (DEFAULT_RIVAL, DEFAULT_REASONING)
+        )
+        for task in self.tasks:
+            for episode in self.episodes[:1] if usual else self.episodes:
+                settings = self.settings_of(task, episode)
+                yield from self._jobs_of(("", ""), task, episode, settings, seeds=(0,))
+
+    def _check_options(self) -> None:
+        for form, stages in itertools.product(self.forms, self.stages):
+            check_options(
+                InstructionOptions(
+                    EXPLICIT,
+                    form=form,
+                    stages=stages,
+                    distractor=self.distractor,
+                    distractors=self.distractors,
+                    frame=self.frame,
+                    delivery=self.delivery,
+                    rival=self.rival,
+                    reasoning=self.reasoning,
+                )
+            )
+        check_names("kind of meshes", (self.meshes,), MESHES)
+        for name, least in (("max_steps", 1), ("tries", 1), ("batch", 1)):
+            if getattr(self, name) < least:
+                raise InvalidValueError(
+                    f"{name} is {getattr(self, name)}; it must be at least {least}."
+                )
+        for name in ("policy_timeout_s", "episode_timeout_s"):
+            if not getattr(self, name) > 0:
+                raise InvalidValueError(
+                    f"{name} is {getattr(self, name)}; it must be more than 0 seconds."
+                )
+        if self.actions is not None:
+            find_action_space(self.actions)
+        if self.demonstration_frames is not None:
+            check_demonstration_frames(self.demonstration_frames)
+        check_observe_every(self.observe_every)
+
+    def _check_settings(self, task: str) -> None:
+        has = language.settings_of(tasks.get_task(task))
+        for setting in () if self.settings == "all" else self.settings:
+            check_names("setting", (setting,), language.setting_names())
+            if setting not in has:
+                raise InvalidValueError(
+                    f"{task} has no {setting} setting; its settings are {', '.join(has)}."
+                )
+
+
+def write_plan(plan: Plan, folder: Path) -> None:
+    """Write the newest plan of a folder beside its records; earlier ones stay in ``plans/``."""
+    store_plan((plan.model_dump_json(indent=2) + "\n").encode(), folder)
+
+
+def read_plan(folder: Path) -> Plan | None:
+    """Return the newest plan of a folder; None if it is missing or of an unknown version."""
+    return _read_plan_at(folder / PLAN_FILE)
+
+
+def read_plans(folder: Path) -> tuple[Plan, ...]:
+    """Return the plans whose episodes a folder should hold.
+
+    That is the newest, or in a merged run those of its parts.
+    """
+    newest = read_plan(folder)
+    return read_earlier_plans(folder) if newest is None else (newest,)
+
+
+def read_earlier_plans(folder: Path) -> tuple[Plan, ...]:
+    """Return the plans of earlier commands, or of merged runs, that can be read."""
+    found = (_read_plan_at(path) for path in earlier_plans(folder))
+    return tuple(plan for plan in found if plan is not None)
+
+
+def _read_plan_at(path: Path) -> Plan | None:
+    try:
+        return Plan.model_validate_json(path.read_bytes())
+    except (OSError, ValidationError):
+        return None

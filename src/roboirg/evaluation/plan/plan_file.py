@@ -1,0 +1,117 @@
+"""Read plans from YAML files, from the folders of runs (plan.json) and from the package."""
+
+from __future__ import annotations
+
+import importlib.resources
+from collections.abc import Mapping
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.evaluation.plan.plan import Plan
+
+_PACKAGE = "roboirg.evaluation.plan"
+_FOLDER = "plans"
+_SUFFIXES = (".yaml", ".yml", ".json")
+"""JSON is YAML, too: a run's plan.json can be played again."""
+_LISTS = frozenset(
+    {
+        "policies",
+        "tasks",
+        "settings",
+        "forms",
+        "episodes",
+        "policy_seeds",
+        "stages",
+        "retry_on",
+        "devices",
+    }
+)
+"""Keys whose values are lists on the command line."""
+
+
+def named_plans() -> tuple[str, ...]:
+    """Return the names of the plans that come with the package."""
+    names = (Path(file.name) for file in _folder().iterdir())
+    return tuple(sorted(name.stem for name in names if name.suffix in _SUFFIXES))
+
+
+def read_plan_file(name: str) -> dict[str, Any]:
+    """Read a plan file as options of `make_plan`.
+
+    Lists become text as typed on the command line: ``[1, 5]`` becomes ``"1,5"``, and
+    ``[[1, 5], [1, 2, 5]]`` becomes ``"1,5;1,2,5"``.
+
+    Args:
+        name: name of a plan that comes with the package, or path of a YAML file, or of the
+            plan.json that a run wrote.
+
+    Raises:
+        UnknownNameError: there is no such plan, or it has an unknown key.
+        InvalidValueError: the file cannot be read, is not a mapping or has a key twice.
+    """
+    data = _load(name)
+    if not isinstance(data, Mapping):
+        raise InvalidValueError(
+            f"The plan {name!r} is of type {type(data).__name__}; it must be a mapping such as "
+            "'tasks: all'."
+        )
+    for key in data:
+        if key not in Plan.model_fields:
+            raise UnknownNameError(f"plan key (in {name!r})", key, Plan.model_fields)
+    return {key: _as_typed(key, value) for key, value in data.items() if value is not None}
+
+
+class _UniqueKeyLoader(yaml.SafeLoader):
+    """Refuses a mapping with a key twice, of which YAML would take the last."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        keys = [self.construct_object(key, deep=True) for key, _ in node.value]
+        for number, key in enumerate(keys):
+            if key in keys[:number]:
+                line = node.value[number][0].start_mark.line + 1
+                raise yaml.YAMLError(f"line {line} has the key {key!r} again")
+        return super().construct_mapping(node, deep=deep)
+
+
+def _load(name: str) -> object:
+    try:
+        # A safe loader, with one more check.
+        return yaml.load(_find(name).read_text(encoding="utf-8"), _UniqueKeyLoader)  # noqa: S506
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidValueError(f"The plan {name!r} cannot be read: {error}.") from error
+    except yaml.YAMLError as error:
+        words = " ".join(str(error).split())
+        raise InvalidValueError(f"The plan {name!r} is not valid YAML: {words}.") from error
+
+
+def _find(name: str) -> Path | Traversable:
+    path = Path(name)
+    if path.suffix in _SUFFIXES:
+        return path
+    if name not in named_plans():
+        raise UnknownNameError("plan", name, [*named_plans(), "FILE.yaml"])
+    return _folder() / f"{name}.yaml"
+
+
+def _folder() -> Traversable:
+    return importlib.resources.files(_PACKAGE) / _FOLDER
+
+
+def _as_typed(key: str, value: object) -> object:
+    if value is False:
+        return "off"  # YAML 1.1 reads the word as false
+    if key not in _LISTS:
+        return value
+    if not isinstance(value, list):
+        return [str(value)] if key == "policies" else str(value)
+    if key == "policies":
+        return [str(one) for one in value]
+    if key == "stages" and any(isinstance(one, list) for one in value):
+        return ";".join(str(_as_typed(key, one)) for one in value)
+    typed = ",".join(map(str, value)) or ("none" if key == "retry_on" else "")
+    # A single number without a comma would mean the first n episodes.
+    return f"{typed}," if key == "episodes" and len(value) == 1 else typed

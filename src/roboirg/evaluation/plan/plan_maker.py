@@ -1,0 +1,102 @@
+"""Make a plan from options as typed on the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from pydantic import ValidationError
+
+from roboirg import tasks as task_registry
+from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.plan.plan import LONG_PROMPTS, REQUIRED, RETRYABLE, Plan
+from roboirg.evaluation.plan.plan_parsing import (
+    ALL,
+    check_names,
+    means_all,
+    parse_episodes,
+    parse_names,
+    parse_numbers,
+    parse_policies,
+    parse_stage_sets,
+)
+from roboirg.evaluation.records.film import VIDEO_MODES
+from roboirg.evaluation.records.record import ERROR_KINDS, ErrorKind
+
+
+def make_plan(
+    policies: Iterable[str],
+    *,
+    tasks: str = ALL,
+    settings: str = ALL,
+    forms: str = "implicit",
+    episodes: str = "4",
+    policy_seeds: str = "0",
+    stages: str = "1-5",
+    retry_on: str = ",".join(RETRYABLE),
+    devices: str = "",
+    **options: object,
+) -> Plan:
+    """Return a checked plan from options as typed on the command line.
+
+    Args:
+        policies: names or addresses; names may be separated by commas.
+        tasks: names separated by commas; ``all`` anywhere selects all.
+        settings: names separated by commas; ``all`` anywhere selects all.
+        forms: names separated by commas.
+        episodes: ``4`` for the first four, or a list such as ``0,3,5-9``.
+        policy_seeds: a list of numbers.
+        stages: a list of numbers, or several lists separated by semicolons.
+        retry_on: kinds of errors separated by commas, or ``none``.
+        devices: names separated by commas; none for one process on any device.
+        **options: other fields of `Plan`.
+
+    Raises:
+        UnknownNameError: a name does not exist; the message suggests the nearest.
+        InvalidValueError: a number or combination is out of range.
+    """
+    split = str(options.get("split", "test"))
+    if options.get("wordings") == REQUIRED:
+        raise InvalidValueError(
+            "This plan needs words from outside: make a wording file with `roboirg wordings "
+            "import-robomme PATH --out robomme.toml`, where PATH is a clone of RoboMME's "
+            "repository, and give it with --wordings robomme.toml."
+        )
+    check_names("video mode", [options.get("video", "off")], VIDEO_MODES)
+    check_names("way with long prompts", [options.get("long_prompts", "send")], LONG_PROMPTS)
+    try:
+        plan = Plan(
+            policies=parse_policies(policies),
+            tasks=_task_names(tasks),
+            settings="all" if means_all(settings) else parse_names("setting", settings),
+            forms=parse_names("form", forms),
+            episodes=parse_episodes(episodes, split),
+            policy_seeds=parse_numbers("policy seed", policy_seeds),
+            stages=parse_stage_sets(stages),
+            retry_on=_error_kinds(retry_on),
+            devices=parse_names("device", devices) if devices else (),
+            **options,  # type: ignore[arg-type]
+        )
+    except ValidationError as error:
+        raise _explain(error) from error
+    return plan.checked()
+
+
+def _explain(error: ValidationError) -> InvalidValueError:
+    first = error.errors()[0]
+    cause = first.get("ctx", {}).get("error")
+    if isinstance(cause, InvalidValueError):
+        return cause
+    name = ".".join(str(part) for part in first["loc"])
+    return InvalidValueError(f"{name} is {first['input']!r}: {first['msg']}.")
+
+
+def _task_names(text: str) -> tuple[str, ...]:
+    return task_registry.find_tasks(parse_names("task", text))
+
+
+def _error_kinds(text: str) -> tuple[ErrorKind, ...]:
+    if text.strip().lower() == "none":
+        return ()
+    names = parse_names("kind of error", text)
+    check_names("kind of error", names, ERROR_KINDS)
+    return tuple(kind for kind in ERROR_KINDS if kind in names)

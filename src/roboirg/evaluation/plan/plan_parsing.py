@@ -1,0 +1,194 @@
+"""Parse names, numbers and ranges from a command line or a plan file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Sequence
+
+from roboirg import language
+from roboirg.core.episode import SPLITS, Split
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.tasks.splits import splits
+
+ALL = "all"
+"""The name that selects everything."""
+
+_NAME = r"[\w.+ -]+"
+"""Of a policy: it becomes part of names of files."""
+_MAX_NUMBERS = 10_000
+_MAX_DIGITS = 18
+_MAX_QUOTED_LENGTH = 40
+_NUMBERS_HINT = "write numbers and ranges such as 0,3,5-9"
+_EPISODES_HINT = f"{_NUMBERS_HINT}, or all"
+
+
+def parse_names(kind: str, text: str) -> tuple[str, ...]:
+    """Parse names separated by commas; repeated names count once.
+
+    Args:
+        kind: what the names are, for the error.
+        text: as typed.
+
+    Raises:
+        InvalidValueError: there is none.
+    """
+    names = tuple(dict.fromkeys(word.strip() for word in text.split(",") if word.strip()))
+    if not names:
+        raise InvalidValueError(f"No {kind} was given.")
+    return names
+
+
+def parse_policies(specs: Iterable[str]) -> tuple[str, ...]:
+    """Parse policies; one text may hold several names separated by commas.
+
+    Raises:
+        InvalidValueError: there is none, or ``NAME=SPEC`` has a name that is not allowed.
+    """
+    # Addresses and their options may contain commas.
+    parts = (
+        (spec.strip(),) if "://" in spec or "?" in spec else parse_names("policy", spec)
+        for spec in specs
+    )
+    policies = tuple(dict.fromkeys(name for names in parts for name in names))
+    if not policies:
+        raise InvalidValueError("No policy was given.")
+    for policy in policies:
+        name, equals, _ = policy.partition("=")
+        # Addresses have ":" or "?" before the first "=".
+        if equals and not re.search("[:?]", name) and not re.fullmatch(_NAME, name):
+            raise InvalidValueError(
+                f"The name of a policy is {name!r} (in {policy!r}); a name has letters, digits, "
+                "blanks and any of . _ + - only."
+            )
+    return policies
+
+
+def name_and_spec(policy: str) -> tuple[str, str]:
+    """Split ``NAME=SPEC`` into name and spec; without a name, the spec is the name."""
+    found = re.fullmatch(rf"({_NAME})=(.+)", policy)
+    return (policy, policy) if found is None else (found[1].strip(), found[2].strip())
+
+
+def means_all(text: str) -> bool:
+    """Return whether a list of names contains ``all``."""
+    return ALL in (word.strip().lower() for word in text.split(","))
+
+
+def parse_splits(text: str) -> tuple[Split, ...]:
+    """Return the splits of a name: train, val or test, or ``all`` of them.
+
+    Raises:
+        UnknownNameError: there is no such split of fixed episodes.
+    """
+    return SPLITS if means_all(text) else (splits.check_fixed_split(text),)
+
+
+def parse_episodes(text: str, split: str = "test") -> tuple[int, ...]:
+    """Parse episodes: ``4`` is the first four; with a comma or a dash it is a list of positions.
+
+    ``all`` is every episode of a split of fixed episodes.
+
+    Raises:
+        UnknownNameError: there is no such split.
+        InvalidValueError: the text is neither a number nor a list, or the split has fewer episodes.
+    """
+    size = splits.split_size(split)
+    if means_all(text):
+        if split not in SPLITS:
+            raise InvalidValueError(
+                f"The split {split!r} has {size:,} episodes; say how many with --episodes."
+            )
+        return tuple(range(size))
+    found = re.fullmatch(r"\s*(-?)(\d+)\s*", text)
+    if found is None:
+        ranges = _parse_ranges("episode", text, _EPISODES_HINT)
+    else:
+        count = _number("number of episodes", found[2])
+        if found[1] or count == 0:
+            alone = "" if count else "; for episode 0 alone write '0,'"
+            raise InvalidValueError(
+                f"The number of episodes is {text.strip()}; it must be at least 1{alone}."
+            )
+        ranges = [range(count)]
+    for numbers in ranges:
+        if numbers[-1] >= size:
+            raise InvalidValueError(
+                f"There is no episode {numbers[-1]}: split {split!r} has episodes 0 to {size - 1}."
+            )
+    return _union(ranges)
+
+
+def parse_stages(text: str) -> tuple[int, ...]:
+    """Parse stages of the contextual setting, such as ``1,5``.
+
+    Raises:
+        InvalidValueError: the text is not a list of numbers.
+    """
+    sets = "; ".join(",".join(map(str, stages)) for stages in language.STAGE_SETS)
+    return _union(_parse_ranges("list of stages", text, f"the possible lists are {sets}"))
+
+
+def parse_stage_sets(text: str) -> tuple[tuple[int, ...], ...]:
+    """Parse several lists of stages, such as ``1,5; 1-5``.
+
+    Raises:
+        InvalidValueError: one of them is not a list of numbers.
+    """
+    return tuple(dict.fromkeys(map(parse_stages, text.split(";"))))
+
+
+def parse_numbers(kind: str, text: str) -> tuple[int, ...]:
+    """Parse numbers and ranges separated by commas, such as ``0,3,5-9``.
+
+    Raises:
+        InvalidValueError: the text is something else, or a very long list.
+    """
+    return _union(_parse_ranges(kind, text, _NUMBERS_HINT))
+
+
+def _parse_ranges(kind: str, text: str, hint: str) -> list[range]:
+    ranges = []
+    for part in parse_names(kind, text):
+        found = re.fullmatch(r"(\d+)(?:\s*-\s*(\d+))?", part)
+        first, last = (-1, -2) if found is None else _ends(kind, found[1], found[2])
+        if last < first:
+            raise InvalidValueError(f"{_shorten(part)!r} is not a valid {kind}; {hint}.")
+        ranges.append(range(first, last + 1))
+    return ranges
+
+
+def _ends(kind: str, first: str, last: str | None) -> tuple[int, int]:
+    return _number(kind, first), _number(kind, last or first)
+
+
+def _number(kind: str, digits: str) -> int:
+    if len(digits) > _MAX_DIGITS:
+        raise InvalidValueError(
+            f"The {kind} {_shorten(digits)} has {len(digits)} digits; "
+            f"it must have at most {_MAX_DIGITS}."
+        )
+    return int(digits)
+
+
+def _union(ranges: Sequence[range]) -> tuple[int, ...]:
+    count = sum(map(len, ranges))
+    if count > _MAX_NUMBERS:
+        raise InvalidValueError(
+            f"The list has {count:,} numbers; at most {_MAX_NUMBERS:,} are allowed."
+        )
+    return tuple(dict.fromkeys(number for numbers in ranges for number in numbers))
+
+
+def _shorten(text: str) -> str:
+    return text if len(text) <= _MAX_QUOTED_LENGTH else f"{text[:_MAX_QUOTED_LENGTH]}…"
+
+
+def check_names(kind: str, names: Iterable[object], known: Collection[str]) -> None:
+    """Raise if one of the names is unknown.
+
+    Raises:
+        UnknownNameError: likewise; the message suggests the nearest.
+    """
+    for name in names:
+        if name not in known:
+            raise UnknownNameError(kind, str(name), known)

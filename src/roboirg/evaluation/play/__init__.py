@@ -1,0 +1,1 @@
+"""One episode, played by a policy: the calls, their limits, the record and the video."""

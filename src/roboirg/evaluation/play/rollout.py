@@ -1,0 +1,356 @@
+"""Play one job and return its record.
+
+| what goes wrong | outcome | kind of error |
+| --- | --- | --- |
+| the policy breaks the task's rules or runs out of steps | failure | |
+| the policy raises or calls `sys.exit` | error | policy |
+| the policy's action cannot be executed | error | invalid_action |
+| the policy's server answers too late or not at all | error | timeout, connection |
+| the environment or the demonstration raises | error | environment |
+| the instruction is too long for the policy, and such episodes are refused | error | prompt |
+| no Vulkan device, a missing dependency | none: the run stops | |
+| a video cannot be written, a policy cannot report its costs | unchanged | |
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from roboirg import policies
+from roboirg.core.actions import ActionSpace
+from roboirg.core.delivery import SpokenInstruction
+from roboirg.evaluation.episode_errors import (
+    EpisodeError,
+    EpisodeLostError,
+    format_cause,
+    one_line,
+)
+from roboirg.evaluation.hosting.host_pool import HostAddress, HostSettings
+from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
+from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_here
+from roboirg.evaluation.play.call_guard import CallGuard
+from roboirg.evaluation.play.policy_environment import EnvRequirements, env_requirements, make_env
+from roboirg.evaluation.play.prompt_shares import audit_job, too_long_text
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, utc_now
+from roboirg.evaluation.play.video_writer import FrameSink, VideoWriter
+from roboirg.evaluation.policy_calls import next_actions, policy_metadata, policy_usage
+from roboirg.evaluation.records.action_log import write_actions
+from roboirg.evaluation.records.film import VideoMode, VideoOptions
+from roboirg.evaluation.records.record import Job, Record
+from roboirg.language.wordings.wording_store import open_wordings
+from roboirg.policies.by_name.loading import needs_host
+from roboirg.policies.contract.base import Policy, PrivilegedPolicy, close_policy, tell_policy
+from roboirg.policies.contract.random_state import episode_policy_seed
+from roboirg.policies.prompt_length.declared_limit import prompt_limit
+from roboirg.tasks.splits.splits import get_episode
+
+if TYPE_CHECKING:
+    from roboirg.envs.environment import RoboIRGEnv
+
+PlayJob = Callable[[Job], Record]
+"""Function that plays one job. Executors send it to other processes, so it must be picklable."""
+
+VIDEO_FOLDER = "videos"
+NO_RENDER_DEVICE = "none"
+"""Name of the device of an environment that renders nothing."""
+
+MAX_LOSSES = 20
+"""How often an episode is played again because other episodes broke the policy's process."""
+
+
+@dataclass(frozen=True, slots=True)
+class EpisodeRunner:
+    """Plays jobs with the simulator and real policies.
+
+    Attributes:
+        folder: output folder of the run; videos go to ``videos/`` in it.
+        video: which episodes get a video.
+        options: format of the videos.
+        policy_timeout_s: seconds that one call of the policy may take, if a supervisor watches.
+        plan: fingerprint of the plan, for the records.
+        hosting: how policies get processes of their own; None for policies in the world's process.
+        hosts: where to ask for them; an executor sets it.
+        refuse_long: whether an episode is not played if its prompt is longer than what the policy's
+            model reads.
+    """
+
+    folder: Path
+    video: VideoMode = "off"
+    options: VideoOptions = field(default_factory=VideoOptions)
+    policy_timeout_s: float | None = None
+    plan: str | None = None
+    hosting: HostSettings | None = None
+    hosts: HostAddress | None = None
+    refuse_long: bool = False
+
+    def in_folder(self, folder: Path) -> EpisodeRunner:
+        """Return a copy that writes its videos to another folder."""
+        return replace(self, folder=folder)
+
+    def with_hosts(self, hosts: HostAddress) -> EpisodeRunner:
+        """Return a copy that asks these hosts."""
+        return replace(self, hosts=hosts)
+
+    def __call__(self, job: Job) -> Record:
+        """Play one job.
+
+        Raises:
+            RenderDeviceError: no Vulkan device can render.
+            MissingDependencyError: a package has to be installed first.
+        """
+        started_at, start = utc_now(), time.monotonic()
+        writer, result = self._play(job)
+        video = self._finish_video(writer, result)
+        error = None if writer is None else writer.error
+        log = result.action_log
+        return make_record(
+            job,
+            result,
+            video=video,
+            video_error=None if error is None else one_line(error),
+            started_at=started_at,
+            duration_s=round(time.monotonic() - start, 3),
+            plan=self.plan,
+            action_log=None if log is None else write_actions(log, self.folder),
+        )
+
+    def _play(self, job: Job) -> tuple[VideoWriter | None, RolloutResult]:
+        """Play a job, again from its beginning if the policy's process is lost meanwhile."""
+        alone = False
+        for losses in range(1, MAX_LOSSES + 1):
+            writer = None
+            if self.video != "off":
+                writer = VideoWriter(self.folder / VIDEO_FOLDER / f"{job.slug}.mp4", self.options)
+            try:
+                return writer, play_episode(
+                    job,
+                    writer,
+                    self.policy_timeout_s,
+                    self.hosts,
+                    alone=alone,
+                    refuse_long=self.refuse_long,
+                )
+            except EpisodeLostError as error:
+                alone = alone or error.alone
+                if losses == MAX_LOSSES:
+                    result, message = RolloutResult(), f"{error}, {losses} times in a row"
+                    result.record_error(error.kind, format_cause(error.kind, message))
+                    return writer, result
+                if writer is not None:
+                    writer.discard()
+        raise AssertionError("the last loss returns")
+
+    def _finish_video(self, writer: VideoWriter | None, result: RolloutResult) -> str | None:
+        """Keep or discard the video; return its path relative to the folder, or None."""
+        if writer is None:
+            return None
+        wanted = self.video == "all" or result.outcome != "success"
+        if wanted and writer.finish():
+            return writer.path.relative_to(self.folder).as_posix()
+        writer.discard()
+        return None
+
+
+def play_episode(
+    job: Job,
+    writer: FrameSink | None = None,
+    policy_timeout_s: float | None = None,
+    hosts: HostAddress | None = None,
+    *,
+    alone: bool = False,
+    refuse_long: bool = False,
+) -> RolloutResult:
+    """Play one job; errors of the policy or the environment end up in the result.
+
+    Args:
+        job: what to play.
+        writer: gets the frames of a video.
+        policy_timeout_s: seconds that one call of the policy may take, if a supervisor watches.
+        hosts: where policies have processes of their own; None to run them in this process.
+        alone: whether a hosted policy must not be asked about this episode together with others.
+        refuse_long: whether not to play an episode whose prompt will be cut.
+
+    Raises:
+        EpisodeLostError: the policy's process was lost; the episode can be played again.
+        RenderDeviceError: no Vulkan device can render.
+        MissingDependencyError: a package has to be installed first.
+        InvalidValueError: the job's wording file is missing or has changed.
+    """
+    if job.wordings is not None:
+        open_wordings(job.wordings_file, job.wordings)
+    result = RolloutResult()
+    guard = CallGuard(result, policy_timeout_s, is_hosted=hosts is not None)
+    policy: Policy | None = None
+    try:
+        if hosts is not None and needs_host(job.policy_spec):
+            with guard.policy("policy's constructor", "policy_load"):
+                policy = _load_hosted(job, hosts, result, alone=alone)
+        if policy is None:
+            guard = CallGuard(result, policy_timeout_s)
+            result.policy = describe_here(job.policy_spec)
+            with guard.policy("policy's constructor", "policy_load"):
+                policy = load_policy(job)
+        with guard.policy("policy's constructor", "policy_load"):
+            needs = env_requirements(policy, job)
+            result.prompt_limit = prompt_limit(policy)
+        if refuse_long:
+            _refuse_long_prompt(job, result)
+        play_with(policy, job, needs, result, guard, writer)
+    except EpisodeError as error:
+        result.record_error(error.kind, error.cause, error.details)
+    finally:
+        if policy is not None:
+            _close_policy(policy, result, guard)
+    return result
+
+
+def play_with(
+    policy: Policy,
+    job: Job,
+    needs: EnvRequirements,
+    result: RolloutResult,
+    guard: CallGuard,
+    writer: FrameSink | None = None,
+) -> None:
+    """Play one job with a loaded policy, which is not closed.
+
+    Args:
+        policy: answers the observations.
+        job: what to play.
+        needs: what the environment offers.
+        result: is filled in.
+        guard: attributes errors and measures calls.
+        writer: gets the frames of a video.
+
+    Raises:
+        EpisodeError: the environment raised, or the policy, or an action cannot be executed.
+    """
+    env, broke = None, False
+    try:
+        with guard.environment("env_reset"):
+            env = make_env(job, needs)
+        _play_to_end(env, policy, needs.actions, job, writer, result, guard)
+    except EpisodeError as error:
+        broke = error.kind == "environment"
+        raise
+    finally:
+        if env is not None:
+            if result.action_space is not None and not broke:
+                result.end_state = env.session.state_numbers(), env.session.state_hash()
+            env.close()
+
+
+def _refuse_long_prompt(job: Job, result: RolloutResult) -> None:
+    """Raise an `EpisodeError` if the instruction is longer than what the policy's model reads."""
+    if result.prompt_limit is None:
+        return
+    if message := too_long_text(*audit_job(job, result.prompt_limit)):
+        raise EpisodeError("prompt", message, "")
+
+
+def load_policy(job: Job) -> Policy:
+    """Return a new policy object, so that no state of an earlier episode remains."""
+    return policies.make_policy(job.policy_spec, seed=_policy_seed(job))
+
+
+def _load_hosted(
+    job: Job, hosts: HostAddress, result: RolloutResult, *, alone: bool
+) -> HostedPolicy | None:
+    """Return a new policy object in its host; None if it is privileged and must run here."""
+    policy = HostedPolicy(hosts, job.policy_spec, _policy_seed(job), alone=alone)
+    if policy.is_privileged:
+        return None
+    result.policy = PolicyDescription(policy.version, is_privileged=False)
+    return policy
+
+
+def _policy_seed(job: Job) -> int:
+    episode = get_episode(job.task, job.split, job.episode)
+    return episode_policy_seed(job.policy_seed, episode.seed)
+
+
+def _play_to_end(
+    env: RoboIRGEnv,
+    policy: Policy,
+    actions: ActionSpace,
+    job: Job,
+    writer: FrameSink | None,
+    result: RolloutResult,
+    guard: CallGuard,
+) -> None:
+    """Play the environment's episode with the policy to its end."""
+    with guard.environment("env_reset"):
+        result.instruction = env.instruction
+        first = SpokenInstruction(env.instruction.turns, job.delivery).prompt
+        if writer is not None:
+            writer.caption, writer.longest_caption = first, env.instruction.text
+            env.set_frame_hook(writer.add_frame, every=writer.options.every)
+        observation, info = env.reset()
+        if writer is not None:
+            writer.add_frame(env)  # the policy's first observation
+        device = str(env.render_device)
+        result.render_device = None if device == NO_RENDER_DEVICE else device
+        result.demonstration_steps = len(info["demonstration"]["joint_positions"])
+        result.demonstration_source = info["demonstration_source"]
+        result.policy_start_step = int(info["elapsed_steps"])
+        result.add_events(info)
+        result.heard += info.get("heard", ())
+    with guard.policy("policy's reset()", "policy_reset"):
+        if isinstance(policy, PrivilegedPolicy):
+            policy.attach(env)
+        policy.reset(first, info["demonstration"])
+        result.policy_metadata = policy_metadata(policy)
+    result.action_space = actions.name
+    status, cause = "ongoing", None
+    while status == "ongoing":
+        with guard.policy("policy's act()", "policy_act"):
+            rows = next_actions(policy, observation, actions)
+        with guard.environment("env_step"):
+            done = env.executed_actions
+            observation, *_, info = env.step_chunk(rows)
+            result.answers.append(rows[: env.executed_actions - done])
+        result.steps = int(info["steps"])
+        result.add_events(info)
+        if info.get("heard"):
+            _tell(policy, info["heard"], writer, result, guard)
+        status, cause = info["status"], info.get("cause")
+    if not result.record_status(status, cause, job.max_steps):
+        result.cause = f"environment: the episode ended with status {status!r}"
+
+
+def _tell(
+    policy: Policy,
+    utterances: Sequence[Mapping[str, Any]],
+    writer: FrameSink | None,
+    result: RolloutResult,
+    guard: CallGuard,
+) -> None:
+    """Tell the policy what has just been said, and write it under the video."""
+    result.heard += utterances
+    if writer is not None:
+        writer.caption = " ".join(one["text"] for one in result.heard)
+    with guard.policy("policy's hear()", "policy_hear"):
+        tell_policy(policy, utterances)
+        result.policy_metadata = policy_metadata(policy)
+
+
+def _close_policy(policy: Policy, result: RolloutResult, guard: CallGuard) -> None:
+    """Read the policy's costs and close it; errors there do not change the outcome.
+
+    Raises:
+        EpisodeLostError: the policy's process was lost before it told the costs.
+    """
+    try:
+        with guard.policy("policy's close()", "policy_close"):
+            try:
+                result.usage = policy_usage(policy)
+            finally:
+                close_policy(policy)
+    except EpisodeError as error:
+        result.details = result.details or error.details
+    if isinstance(policy, HostedPolicy):
+        result.timings["policy_wait"] = round(policy.waited_s, 6)

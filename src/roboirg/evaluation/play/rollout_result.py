@@ -1,0 +1,300 @@
+"""The result of one rollout, and the record made from it."""
+
+from __future__ import annotations
+
+import datetime as dt
+import importlib.metadata
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from itertools import zip_longest
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import JsonValue
+
+from roboirg import language
+from roboirg.core.actions import find_action_space
+from roboirg.core.conditions import Fact
+from roboirg.core.delivery import TURNS, PromptVerdict
+from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
+from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.core.observations import DemonstrationSource
+from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_policy
+from roboirg.evaluation.play.code_fingerprint import code_fingerprint
+from roboirg.evaluation.play.job_instruction import instruct_job
+from roboirg.evaluation.play.prompt_shares import audit_job, audit_prompt
+from roboirg.evaluation.records.action_log import ActionLog
+from roboirg.evaluation.records.record import (
+    Attribution,
+    ErrorKind,
+    EventRecord,
+    Job,
+    MentionSpan,
+    Outcome,
+    PromptAudit,
+    Record,
+    UtteranceRecord,
+)
+from roboirg.judging import Event, attribute_failure
+from roboirg.language.settings import EXPLICIT
+from roboirg.policies.by_name.loading import server_version
+from roboirg.policies.prompt_length.prompt_audit import PromptLimit
+from roboirg.tasks.splits.splits import get_episode
+from roboirg.util.processor import processor_family
+
+UNDECLARED: PromptVerdict = "unknown"
+"""Verdict on the prompts of a policy that declares no limit."""
+
+
+@dataclass
+class RolloutResult:
+    """What happened in an episode; filled in step by step, so that an error keeps what came before.
+
+    Attributes:
+        outcome: success, failure or error.
+        error: kind of the error; read only if the outcome is one.
+        cause: why it is not a success.
+        timed_out: whether the policy used up its steps.
+        steps: control steps of the policy.
+        demonstration_steps: frames of the video shown before the policy's turn.
+        demonstration_source: whose actions it shows: recorded, planned or none.
+        policy_start_step: control steps of the episode before the policy's turn.
+        elapsed_steps: control steps of the episode in all.
+        instruction: what the policy was told; None if the episode did not get that far.
+        heard: what the policy has heard so far, in order: ``text`` and ``step``.
+        events: facts that became true or ceased to be.
+        render_device: the driver's name; None if nothing was rendered.
+        details: traceback of an error.
+        policy: its version and whether it is privileged; None if it was never loaded.
+        prompt_limit: what the policy declares about its prompt; None if it declares nothing.
+        policy_metadata: what the policy reports about itself.
+        action_space: name of the action space; None if the episode did not get that far.
+        answers: what was executed of each answer of the policy.
+        end_state: the state after the last of them, in numbers and as a hash; None before.
+        usage: what the policy reports that the episode cost.
+        timings: seconds spent in the policy and in the environment, by phase.
+    """
+
+    outcome: Outcome = "error"
+    error: ErrorKind | None = "environment"
+    cause: str | None = "environment: the episode did not begin"
+    timed_out: bool = False
+    steps: int = 0
+    demonstration_steps: int = 0
+    demonstration_source: DemonstrationSource = "none"
+    policy_start_step: int = 0
+    elapsed_steps: int = 0
+    instruction: language.Instruction | None = None
+    heard: list[Mapping[str, Any]] = field(default_factory=list)
+    events: list[EventRecord] = field(default_factory=list)
+    render_device: str | None = None
+    details: str | None = None
+    policy: PolicyDescription | None = None
+    prompt_limit: PromptLimit | None = None
+    policy_metadata: dict[str, JsonValue] = field(default_factory=dict)
+    action_space: str | None = None
+    answers: list[NDArray[np.float64]] = field(default_factory=list)
+    end_state: tuple[NDArray[np.float64], str] | None = None
+    usage: dict[str, float] = field(default_factory=dict)
+    timings: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def action_log(self) -> ActionLog | None:
+        """The executed actions; None if the policy's turn never came, or the world broke."""
+        if self.action_space is None or self.end_state is None:
+            return None
+        starts = np.cumsum([0, *map(len, self.answers)], dtype=np.int32)[:-1]
+        width = find_action_space(self.action_space).size
+        rows = np.concatenate([np.empty((0, width)), *self.answers])
+        return ActionLog(self.action_space, rows, starts, self.end_state[0])
+
+    def record_error(self, kind: ErrorKind, cause: str, details: str | None = None) -> None:
+        """Record that the episode ended in an error and cannot be judged."""
+        self.outcome, self.error, self.cause, self.details = "error", kind, cause, details
+
+    def record_status(self, status: str, cause: str | None, max_steps: int) -> bool:
+        """Record the final status. Returns False while the episode is running.
+
+        Args:
+            status: as the environment reports it.
+            cause: of a failure, if the environment gives one.
+            max_steps: the policy's limit, for the cause of a timeout.
+        """
+        if status == "success":
+            self.outcome, self.cause = "success", None
+        elif status == "timeout":
+            self.outcome, self.timed_out = "failure", True
+            self.cause = cause or f"not done after {max_steps} steps"
+        elif status == "failure":
+            self.outcome, self.cause = "failure", cause or "the judge gave no cause"
+        else:
+            return False
+        return True
+
+    def add_events(self, info: Mapping[str, Any]) -> None:
+        """Add the events and the elapsed steps in an environment's info."""
+        self.elapsed_steps = int(info.get("elapsed_steps", self.elapsed_steps))
+        for event in info.get("events", ()):
+            place = event.get("place")
+            self.events.append(
+                EventRecord(
+                    step=int(event["step"]) - self.policy_start_step,
+                    kind=str(event["kind"]),
+                    subject=str(event["subject"]),
+                    place=None if place is None else str(place),
+                    holds=bool(event.get("holds", True)),
+                )
+            )
+
+
+_COPIED = (
+    "outcome",
+    "cause",
+    "steps",
+    "demonstration_steps",
+    "demonstration_source",
+    "policy_metadata",
+    "details",
+    "render_device",
+    "usage",
+    "timings",
+)
+"""Fields that a record has from the result as they are."""
+
+
+def make_record(
+    job: Job,
+    result: RolloutResult,
+    *,
+    started_at: str,
+    duration_s: float = 0.0,
+    video: str | None = None,
+    video_error: str | None = None,
+    plan: str | None = None,
+    action_log: str | None = None,
+) -> Record:
+    """Return the record of a job; needs no simulator.
+
+    Args:
+        job: what was played.
+        result: how it went.
+        started_at: ISO 8601, UTC.
+        duration_s: wall-clock seconds.
+        video: path of the video relative to the records file.
+        video_error: why the requested video could not be written.
+        plan: fingerprint of the plan.
+        action_log: digest of the stored actions.
+    """
+    episode = get_episode(job.task, job.split, job.episode)
+    # An episode that failed before its reset has a record with the words it would have had.
+    instruction = result.instruction or instruct_job(job)
+    explicit = instruct_job(job.model_copy(update={"setting": EXPLICIT}))
+    policy = result.policy or _describe(job)
+    utterances = _utterances(job, instruction, result)
+    prompt, verdict = _audit(job, instruction, utterances, result)
+    return Record(
+        **dict(job),
+        **{name: getattr(result, name) for name in _COPIED},
+        seed=episode.seed,
+        difficulty=episode.difficulty,
+        error=result.error if result.outcome == "error" else None,
+        attribution=_attribution(episode, result, instruction),
+        instruction=utterances,
+        prompt=prompt,
+        prompt_verdict=verdict,
+        mentions=tuple(MentionSpan(**asdict(one)) for one in instruction.mentions),
+        command=explicit.text,
+        goal=dict(episode.goal.as_mapping()),
+        # Exactly what a reader of the file gets.
+        metadata=json.loads(json.dumps(dict(instruction.metadata))),
+        privileged=policy.is_privileged,
+        policy_version=policy.version,
+        server_version=server_version(result.policy_metadata),
+        action_log=action_log,
+        end_state=None if result.end_state is None else result.end_state[1],
+        events=tuple(result.events),
+        video=video,
+        video_error=video_error,
+        **_versions(),
+        processor=processor_family(),
+        plan=plan,
+        started_at=started_at,
+        duration_s=duration_s,
+    )
+
+
+def _audit(
+    job: Job,
+    instruction: language.Instruction,
+    utterances: Sequence[UtteranceRecord],
+    result: RolloutResult,
+) -> tuple[PromptAudit | None, PromptVerdict]:
+    """Return what of the instruction reached the policy's model, and the verdict."""
+    if result.prompt_limit is None:
+        return None, UNDECLARED
+    steps = [one.step for one in utterances]
+    if steps == [None] * len(steps):  # it ended before anything was said
+        return audit_job(job, result.prompt_limit, instruction)
+    return audit_prompt(instruction, steps, result.prompt_limit)
+
+
+def _versions() -> dict[str, Any]:
+    """Return the versions of what made a record, by its fields."""
+    return {
+        "language_version": str(language.LANGUAGE_VERSION),
+        "environment_version": ENVIRONMENT_VERSION,
+        "package_version": importlib.metadata.version("roboirgbench"),
+        "code": code_fingerprint(),
+    }
+
+
+def _describe(job: Job) -> PolicyDescription:
+    try:
+        return describe_policy(job.policy_spec)
+    except (InvalidValueError, MissingDependencyError):
+        return PolicyDescription("unknown", is_privileged=False)
+
+
+def _utterances(
+    job: Job, instruction: language.Instruction, result: RolloutResult
+) -> tuple[UtteranceRecord, ...]:
+    """Return the utterances with the steps at which the policy heard them."""
+    steps: list[int | None] = [0] * len(instruction.utterances)
+    if job.delivery == TURNS:
+        steps = [int(one["step"]) for one in result.heard]
+    return tuple(
+        UtteranceRecord(**asdict(one), step=step)
+        for one, step in zip_longest(instruction.utterances, steps)
+    )
+
+
+def _attribution(
+    episode: Episode, result: RolloutResult, instruction: language.Instruction
+) -> Attribution | None:
+    """Return why the episode failed; None if it did not or the cause is unclear."""
+    if result.outcome != "failure":
+        return None
+    found = attribute_failure(
+        episode,
+        [
+            Event(
+                event.step + result.policy_start_step,
+                Fact(event.kind, event.subject, event.place),
+                event.holds,
+            )
+            for event in result.events
+        ],
+        timed_out=result.timed_out,
+        policy_start_step=result.policy_start_step,
+        elapsed_steps=result.elapsed_steps,
+        cause=result.cause,
+        mirrored=language.mirrored_objects(episode, instruction),
+    )
+    return None if found is None else Attribution(**found._asdict())
+
+
+def utc_now() -> str:
+    """Return the time in ISO 8601, to the second."""
+    return dt.datetime.now(dt.UTC).isoformat(timespec="seconds")

@@ -1,0 +1,269 @@
+"""Videos of episodes: small H.264 files that appear under their name only when complete."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.errors import MissingDependencyError, RenderDeviceError
+from roboirg.core.extras import extra_needed
+from roboirg.evaluation.records.film import LAST_FRAME_REPEATS, VideoOptions
+from roboirg.util.text_overlay import draw_text, wrap_text
+
+if TYPE_CHECKING:
+    from av.container import OutputContainer
+    from av.video.stream import VideoStream
+
+Frame = NDArray[np.uint8]
+
+DEMONSTRATION_COLOR = (255, 176, 32)
+"""RGB of the border around the frames of the demonstration."""
+
+BORDER = 6
+GAP = 4
+"""Pixels of the black line between two pictures; even, because H.264 needs an even width."""
+
+POSTER_SUFFIX = ".jpg"
+_PARTIAL_SUFFIX = ".part"
+
+_TEXT_SCALE, _TEXT_LINE, _TEXT_MARGIN = 0.4, 16, 6
+_MAX_LINES = 12
+_TEXT_COLOR, _BACKGROUND = (31, 35, 40), 255
+
+
+class PictureSource(Protocol):
+    """Source of camera pictures, such as the environment."""
+
+    def picture(self, camera: str) -> Frame:
+        """Return the camera's current picture, uint8 (256, 256, 3)."""
+
+
+class FrameSink(Protocol):
+    """Takes the frames of an episode while it is played.
+
+    Attributes:
+        options: tell how often there is a frame.
+        caption: what was said so far.
+        longest_caption: everything that will have been said.
+    """
+
+    options: VideoOptions
+    caption: str
+    longest_caption: str
+
+    def add_frame(self, source: PictureSource, is_demonstration: bool = False) -> None:
+        """Take the current pictures."""
+
+
+def check_video_support() -> None:
+    """Check that videos can be written.
+
+    Raises:
+        MissingDependencyError: PyAV is not installed.
+    """
+    with extra_needed("All but --video off needs PyAV", "sim"):
+        import av  # noqa: F401 - an extra, and slow to import
+
+
+def compose_frame(
+    pictures: Sequence[Frame],
+    caption: str = "",
+    *,
+    is_demonstration: bool = False,
+    longest_caption: str = "",
+) -> Frame:
+    """Return one frame with the pictures side by side and a line between them.
+
+    Args:
+        pictures: uint8 (height, width, 3), all of one height.
+        caption: text below the pictures, wrapped into lines.
+        is_demonstration: draw the border that marks the demonstration.
+        longest_caption: text for which there is room, as all frames of a video have one size.
+    """
+    line = np.zeros((pictures[0].shape[0], GAP, 3), np.uint8)
+    parts = [part for picture in pictures for part in (line, picture)][1:]
+    frame: Frame = np.concatenate(parts, axis=1)
+    if is_demonstration:
+        color = np.array(DEMONSTRATION_COLOR, np.uint8)
+        frame[:BORDER] = frame[-BORDER:] = color
+        frame[:, :BORDER] = frame[:, -BORDER:] = color
+    if not caption:
+        return frame
+    return np.concatenate([frame, _caption_bar(caption, frame.shape[1], longest_caption)])
+
+
+@functools.lru_cache(maxsize=8)
+def _caption_bar(caption: str, width: int, longest: str) -> Frame:
+    """Return a caption as an image; its height is even, because H.264 needs that."""
+    lines, room = (
+        wrap_text(text, width - 2 * _TEXT_MARGIN, _TEXT_SCALE)[:_MAX_LINES]
+        for text in (caption, longest)
+    )
+    height = max(len(lines), len(room)) * _TEXT_LINE + 2 * _TEXT_MARGIN
+    bar: Frame = np.full((height, width, 3), _BACKGROUND, np.uint8)
+    for number, text in enumerate(lines, start=1):
+        draw_text(bar, text, _TEXT_MARGIN, number * _TEXT_LINE, _TEXT_SCALE, _TEXT_COLOR)
+    return bar
+
+
+@dataclass
+class VideoWriter:
+    """Writes one video. Nothing exists under `path` until `finish`.
+
+    An error of FFmpeg or the disk ends the video, never the episode: it is kept in `error`, and
+    later frames are ignored.
+
+    Args:
+        path: of the finished MP4; a poster of the last frame gets the same name with ``.jpg``.
+        options: format of the video.
+
+    Attributes:
+        caption: text below the pictures; set before the first frame.
+        longest_caption: text for which there is room below the pictures, if the caption grows.
+        error: why the video could not be written, or None.
+    """
+
+    path: Path
+    options: VideoOptions = field(default_factory=VideoOptions)
+    caption: str = field(default="", init=False)
+    longest_caption: str = field(default="", init=False)
+    error: Exception | None = field(default=None, init=False)
+    _container: OutputContainer | None = field(default=None, init=False, repr=False)
+    _stream: VideoStream | None = field(default=None, init=False, repr=False)
+    _last: Frame | None = field(default=None, init=False, repr=False)
+
+    @property
+    def partial(self) -> Path:
+        """Path of the unfinished video; a later video of the same name overwrites it."""
+        return self.path.with_name(f".{self.path.name}{_PARTIAL_SUFFIX}")
+
+    def add_frame(self, source: PictureSource, is_demonstration: bool = False) -> None:
+        """Add a frame with the current pictures.
+
+        Raises:
+            RenderDeviceError: no Vulkan device can render.
+            MissingDependencyError: a package has to be installed first.
+        """
+        if self.error is not None:
+            return
+        try:
+            pictures = [source.picture(camera) for camera in self.options.cameras]
+            frame = compose_frame(
+                pictures,
+                self.caption,
+                is_demonstration=is_demonstration,
+                longest_caption=self.longest_caption,
+            )
+            self._encode(frame)
+        except (RenderDeviceError, MissingDependencyError):
+            raise
+        except Exception as error:  # noqa: BLE001 - see the class
+            self._abandon(error)
+
+    def finish(self) -> bool:
+        """Complete the video. Returns False if it has no frame or could not be written."""
+        if self._last is None:
+            return False
+        poster = self.path.with_suffix(POSTER_SUFFIX)
+        try:
+            for _ in range(LAST_FRAME_REPEATS):
+                self._encode(self._last)
+            last = self._last
+            self._close()
+            write_poster(last, poster)
+            self.partial.replace(self.path)
+        except Exception as error:  # noqa: BLE001 - see the class
+            self._abandon(error)
+            with contextlib.suppress(OSError):
+                poster.unlink(missing_ok=True)
+            return False
+        return True
+
+    def discard(self) -> None:
+        """Delete an unfinished video; never raises."""
+        container = self._container
+        self._container = self._stream = self._last = None
+        if container is not None:
+            with contextlib.suppress(Exception):
+                container.close()
+        with contextlib.suppress(OSError):
+            self.partial.unlink(missing_ok=True)
+
+    def _abandon(self, error: Exception) -> None:
+        self.error = error
+        self.discard()
+
+    def _encode(self, frame: Frame) -> None:
+        """Encode a frame, uint8 (height, width, 3), both even; all of one size."""
+        container, stream = self._open(frame)
+        import av
+
+        self._last = frame
+        container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="rgb24")))
+
+    def _open(self, frame: Frame) -> tuple[OutputContainer, VideoStream]:
+        if self._container is not None and self._stream is not None:
+            return self._container, self._stream
+        import av
+
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        # The index goes to the front, so that a player can start before it has read the whole file.
+        container = av.open(
+            str(self.partial), "w", format="mp4", options={"movflags": "+faststart"}
+        )
+        stream = container.add_stream("libx264", rate=Fraction(self.options.rate))
+        stream.height, stream.width = frame.shape[:2]
+        stream.pix_fmt = "yuv420p"
+        stream.options = {"crf": str(self.options.quality), "preset": "veryfast"}
+        stream.codec_context.thread_count = 1
+        self._container, self._stream = container, stream
+        return container, stream
+
+    def _close(self) -> None:
+        container, stream = self._container, self._stream
+        if container is not None and stream is not None:
+            container.mux(stream.encode(None))
+            container.close()
+        self._container = self._stream = None
+
+
+@contextlib.contextmanager
+def without_unfinished_videos(folder: Path) -> Iterator[None]:
+    """Delete what processes that died left of videos, before and after the body.
+
+    Args:
+        folder: of the videos, to which no other run writes.
+    """
+    _delete_unfinished(folder)
+    try:
+        yield
+    finally:
+        _delete_unfinished(folder)
+
+
+def _delete_unfinished(folder: Path) -> None:
+    for left in folder.glob(f".*{_PARTIAL_SUFFIX}"):
+        with contextlib.suppress(OSError):
+            left.unlink()
+
+
+def write_poster(frame: Frame, path: Path) -> None:
+    """Write one frame as a JPEG."""
+    import av
+
+    options: dict[str, Any] = {"update": "1"}
+    with av.open(str(path), "w", format="image2", options=options) as container:
+        stream = container.add_stream("mjpeg", rate=1)
+        stream.height, stream.width = frame.shape[:2]
+        stream.pix_fmt = "yuvj420p"
+        picture = av.VideoFrame.from_ndarray(frame, format="rgb24")
+        container.mux(stream.encode(picture))
+        container.mux(stream.encode(None))

@@ -1,0 +1,144 @@
+"""The actions of an episode, in a file beside the records, so that anyone can play them again.
+
+A file is named after the SHA-256 of its content, and the record holds that name. `numpy.load` reads
+it: ``space`` (name of the action space), ``rows`` (n, 8 or 7), ``requests`` (k,) and ``end_state``.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import re
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.actions import check_chunk, find_action_space
+from roboirg.core.errors import InvalidActionError, UnknownNameError
+from roboirg.evaluation.records.record_codec import StoreError
+from roboirg.util.atomic_write import write_atomically
+
+ACTION_FOLDER = "actions"
+_SUFFIX = ".npz"
+_DIGEST = re.compile("[0-9a-f]{64}")
+_MAX_BYTES = 16_777_216
+"""Largest content that is unpacked; an episode of 1300 steps has less than 0.2 MB."""
+
+
+@dataclass(frozen=True, eq=False)
+class ActionLog:
+    """What a policy did in an episode, and where that left the world.
+
+    Attributes:
+        space: name of the action space.
+        rows: the executed actions, (n, size).
+        requests: for each answer of the policy, in order, the index of its first row, (k,).
+        end_state: positions and velocities of the robot's joints and of all objects at the end, as
+            in `EpisodeSession.state_numbers`, (m,).
+    """
+
+    space: str
+    rows: NDArray[np.float64]
+    requests: NDArray[np.int32]
+    end_state: NDArray[np.float64]
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the content, in hexadecimal; it does not depend on the compression."""
+        digest = hashlib.sha256(self.space.encode())
+        for array in (self.rows, self.requests, self.end_state):
+            digest.update(f"|{array.shape}|".encode())
+            digest.update(np.ascontiguousarray(array).tobytes())
+        return digest.hexdigest()
+
+    def chunks(self) -> list[NDArray[np.float64]]:
+        """Return the rows of each answer of the policy."""
+        return np.split(self.rows, self.requests[1:])
+
+
+def action_path(folder: Path, digest: str) -> Path:
+    """Return where the actions with this digest are in the folder of a run.
+
+    Raises:
+        StoreError: it is not a digest, so it would be another file's name.
+    """
+    if not _DIGEST.fullmatch(digest):
+        raise StoreError(f"{digest!r} is no digest of actions: 64 hexadecimal digits.")
+    return folder / ACTION_FOLDER / digest[:2] / f"{digest}{_SUFFIX}"
+
+
+def write_actions(log: ActionLog, folder: Path) -> str:
+    """Store the actions of an episode in the folder of a run; return their digest.
+
+    Raises:
+        InvalidValueError: the file cannot be written.
+    """
+    digest = log.digest
+    path = action_path(folder, digest)
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(path, _pack(log))
+    return digest
+
+
+def read_actions(folder: Path, digest: str) -> ActionLog:
+    """Read the actions with this digest from the folder of a run.
+
+    Raises:
+        StoreError: the file is missing, is no action log, or has another content than its name
+            says; or the digest is none.
+    """
+    path = action_path(folder, digest)
+    try:
+        log = _unpack(path.read_bytes())
+    except FileNotFoundError:
+        raise StoreError(f"The actions {path} are missing.") from None
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        raise StoreError(f"{path} is no action log: {error}") from error
+    except (InvalidActionError, UnknownNameError) as error:
+        raise StoreError(f"{path} is no action log: {error}") from error
+    if log.digest != digest:
+        raise StoreError(f"{path} has another content than its name says: {log.digest}.")
+    return log
+
+
+def _pack(log: ActionLog) -> bytes:
+    file = io.BytesIO()
+    # Column by column: the numbers of one joint resemble each other, so they take less space.
+    arrays = {
+        "space": np.array(log.space),
+        "rows": _shortest(np.asfortranarray(log.rows)),
+        "requests": log.requests,
+        "end_state": _shortest(log.end_state),
+    }
+    np.savez_compressed(file, allow_pickle=False, **arrays)
+    return file.getvalue()
+
+
+def _shortest(numbers: NDArray[np.float64]) -> NDArray[np.floating]:
+    """Return the numbers as float32 if none of them changes, which is so for most policies."""
+    short = numbers.astype(np.float32)
+    return short if np.array_equal(short, numbers) else numbers
+
+
+def _unpack(content: bytes) -> ActionLog:
+    file = io.BytesIO(content)
+    with zipfile.ZipFile(file) as archive:
+        size = sum(one.file_size for one in archive.infolist())
+    if size > _MAX_BYTES:
+        raise ValueError(f"it unpacks to {size:,} bytes; at most {_MAX_BYTES:,} are read.")
+    with np.load(file, allow_pickle=False) as arrays:
+        space = str(arrays["space"])
+        rows = np.ascontiguousarray(arrays["rows"], dtype=np.float64)
+        requests = arrays["requests"].astype(np.int32)
+        end_state = arrays["end_state"].astype(np.float64)
+    if rows.size:
+        check_chunk(rows, find_action_space(space))
+    if requests.ndim != 1 or not np.array_equal(np.unique(requests), requests):
+        raise ValueError("the answers of the policy are not in order.")
+    if len(requests) and not 0 == requests[0] <= requests[-1] <= len(rows):
+        raise ValueError("the answers of the policy do not begin with its rows.")
+    return ActionLog(space, rows, requests, end_state)

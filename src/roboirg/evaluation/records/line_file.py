@@ -1,0 +1,180 @@
+"""Files of JSON lines that are only appended to, and survive that their writer is killed.
+
+- When `AppendFile.extend` returns, its lines are on the disk (one write each, then fsync).
+- Killing the process at any moment loses at most lines whose `extend` has not returned. A torn last
+  line is never read; the next writer moves it to a file of its own (copied and synced there before
+  it is removed here).
+- There is one writer at a time: the lock is the kernel's (`flock`), so it is released when its
+  owner dies and never goes stale.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple, TypeVar
+
+from roboirg.evaluation.records.record_codec import DamagedLineError, StoreError
+from roboirg.util.atomic_write import sync_to_disk
+
+LOCK_FILE = ".lock"
+
+_BUFFER = 1 << 20
+"""Bytes to read at a time."""
+
+Parsed = TypeVar("Parsed")
+
+
+class LinePlace(NamedTuple):
+    """Where a line is: its number from 1, its first byte, and its bytes without the newline."""
+
+    number: int
+    start: int
+    size: int
+
+
+class LineFile:
+    """Reads a file of JSON lines, to which another process may be writing.
+
+    Attributes:
+        place: of the line that `parse` yielded last.
+        torn: bytes of an unfinished last line, set by `parse`.
+        damaged: numbers of lines that are not JSON, set by `parse`.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.place = LinePlace(0, 0, 0)
+        self.torn = b""
+        self.damaged: list[int] = []
+
+    def parse(self, parse_line: Callable[[bytes, Path, int], Parsed]) -> Iterator[Parsed]:
+        """Yield `parse_line` of each line, path and line number; nothing if there is no file.
+
+        Raises:
+            StoreError: the file cannot be read, or `parse_line` raises it.
+        """
+        try:
+            file = self._path.open("rb", buffering=_BUFFER)
+        except FileNotFoundError:
+            return
+        except OSError as error:
+            raise StoreError(f"Cannot read {self._path}: {error.strerror}.") from error
+        with file:
+            start = 0
+            for number, line in enumerate(file, start=1):
+                # No proper prefix of a JSON object is valid JSON: if the last line lacks only its
+                # newline, the record is complete.
+                if not line.endswith(b"\n") and not _is_json(line):
+                    self.torn = line
+                    return
+                content = line.removesuffix(b"\n")
+                self.place = LinePlace(number, start, len(content))
+                start += len(line)
+                try:
+                    yield parse_line(content, self._path, number)
+                except DamagedLineError:
+                    self.damaged.append(number)
+
+
+class AppendFile:
+    """A file of lines, open for appending by this process only.
+
+    Args:
+        folder: of the file; created if it does not exist. It has one writer at a time.
+        name: of the file.
+        torn_name: of the file that gets unfinished lines.
+        read: called under the lock with the lines that are there, all of which it parses.
+
+    Raises:
+        StoreError: another process writes to the folder, it cannot be written, or `read` raises it.
+    """
+
+    def __init__(
+        self, folder: Path, name: str, torn_name: str, read: Callable[[LineFile], None]
+    ) -> None:
+        self.path = folder / name
+        self._folder, self._torn_path = folder, folder / torn_name
+        with contextlib.ExitStack() as undo:
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+                self._lock = os.open(folder / LOCK_FILE, os.O_RDWR | os.O_CREAT, 0o644)
+                undo.callback(os.close, self._lock)
+                self._take_lock()
+                lines = LineFile(self.path)
+                read(lines)
+                self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+                undo.callback(os.close, self._file)
+                self._repair_tail(lines.torn)
+                sync_to_disk(folder)
+            except OSError as error:
+                raise StoreError(f"Cannot write to {folder}: {error.strerror}.") from error
+            undo.pop_all()
+
+    def extend(self, lines: Iterable[bytes]) -> None:
+        """Write lines, given without newlines; when this returns, all are on disk.
+
+        Raises:
+            StoreError: they cannot be written, or `lines` raises it; the file is unchanged.
+        """
+        size = os.fstat(self._file).st_size
+        try:
+            for line in lines:
+                _write_all(self._file, line + b"\n")
+            os.fsync(self._file)
+        except Exception as error:  # not an interrupt: what is written by then is complete
+            os.ftruncate(self._file, size)
+            if isinstance(error, OSError):
+                raise StoreError(f"Cannot write to {self.path}: {error.strerror}.") from error
+            raise
+
+    def close(self) -> None:
+        """Close the file and release the lock."""
+        os.close(self._file)
+        os.close(self._lock)
+
+    def _take_lock(self) -> None:
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            owner = os.pread(self._lock, 32, 0).decode().strip() or "unknown"
+            raise StoreError(
+                f"{self._folder} is being written by another run (process {owner}); "
+                f"wait for it, stop it, or choose another --out."
+            ) from None
+        os.ftruncate(self._lock, 0)
+        os.pwrite(self._lock, f"{os.getpid()}\n".encode(), 0)
+
+    def _repair_tail(self, torn: bytes) -> None:
+        """Move a torn line aside, so that the file is empty or ends in a newline."""
+        file, size = self._file, os.fstat(self._file).st_size
+        if torn:
+            aside = os.open(self._torn_path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+            try:
+                _write_all(aside, torn + b"\n")
+                os.fsync(aside)
+            finally:
+                os.close(aside)
+            os.ftruncate(file, size - len(torn))
+        elif size and os.pread(file, 1, size - 1) != b"\n":
+            # Killed between the last byte of a line and its newline: the line is complete.
+            _write_all(file, b"\n")
+        os.fsync(file)
+
+
+def _is_json(line: bytes) -> bool:
+    try:
+        json.loads(line)
+    except ValueError:
+        return False
+    return True
+
+
+def _write_all(descriptor: int, data: bytes) -> None:
+    # One system call, unless the disk is full or a signal interrupts it.
+    while data:
+        data = data[os.write(descriptor, data) :]

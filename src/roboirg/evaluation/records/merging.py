@@ -1,0 +1,186 @@
+"""Merge several runs into one folder."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.records.action_log import action_path
+from roboirg.evaluation.records.episode_log import log_path, logged_slugs
+from roboirg.evaluation.records.plan_files import PLAN_FILE, earlier_plans, keep_earlier_plan
+from roboirg.evaluation.records.record_codec import (
+    RecordIndexEntry,
+    StoreError,
+    identity_key,
+    read_line,
+)
+from roboirg.evaluation.records.store import RecordStore, StoredRun
+
+
+class MergeSummary(NamedTuple):
+    """Result of a merge.
+
+    Attributes:
+        added: number of records added to the folder.
+        duplicates: number of records whose episode was already there.
+        conflicts: duplicates with another verdict than the one kept.
+    """
+
+    added: int
+    duplicates: int
+    conflicts: tuple[RecordIndexEntry, ...]
+
+
+class _MergeEntry(RecordIndexEntry, frozen=True):
+    """An index entry with the path of the video and the digest of the actions."""
+
+    video: str | None = None
+    action_log: str | None = None
+
+
+_decoder = msgspec.json.Decoder(_MergeEntry)
+
+
+def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
+    """Copy the records, videos and logs of several runs into one folder.
+
+    If several runs have the same episode, the first verdict is kept; a verdict replaces an error.
+    Records are checked and copied one by one; the memory holds only their index entries.
+
+    Args:
+        folders: output folders of the runs; they are not changed.
+        out: destination; may already hold records.
+
+    Raises:
+        InvalidValueError: `out` is one of the runs.
+        StoreError: a file cannot be read or written, or versions differ.
+    """
+    if out.resolve() in {folder.resolve() for folder in folders}:
+        raise InvalidValueError(f"{out} is one of the runs to be merged; choose another --out.")
+    runs = [(folder, StoredRun(folder, _read_entry)) for folder in folders]
+    entries = [(folder, run.newest) for folder, run in runs]
+    _check_versions(entries)
+    added, duplicates = 0, 0
+    conflicts: list[RecordIndexEntry] = []
+    with RecordStore(out) as store:
+        _keep_plans(folders, out)
+        kept = dict(store.stored)
+        _check_versions([(out, kept.values()), *entries])
+        for folder, run in runs:
+            wanted = []
+            for one in run.newest:
+                before = kept.get(identity_key(one))
+                if before is not None:
+                    duplicates += 1
+                    if before.outcome != "error":
+                        if one.outcome not in ("error", before.outcome):
+                            conflicts.append(one)
+                        continue
+                    if one.outcome == "error":
+                        continue
+                wanted.append(one)
+                kept[identity_key(one)] = one
+                added += before is None
+            store.extend(_lines(run, wanted, folder, out))
+    return MergeSummary(added, duplicates, tuple(conflicts))
+
+
+def _keep_plans(folders: Sequence[Path], out: Path) -> None:
+    """Keep the plans of all runs, so that it can be told which episodes are missing."""
+    for folder in folders:
+        for path in (folder / PLAN_FILE, *earlier_plans(folder)):
+            if path.is_file():
+                keep_earlier_plan(path.read_bytes(), out)
+
+
+def _read_entry(line: bytes, path: Path, number: int) -> _MergeEntry:
+    """Check that a line is a whole record and return its entry."""
+    read_line(line, path, number)
+    return _decoder.decode(line)
+
+
+def _check_versions(runs: Sequence[tuple[Path, Iterable[RecordIndexEntry]]]) -> None:
+    """Refuse records of different versions, as a run does."""
+    first: dict[object, tuple[Path, object]] = {}
+    for folder, entries in runs:
+        for one in entries:
+            for what, value in (
+                (("language version",), one.language_version),
+                (("environment version",), one.environment_version),
+                (("version", "of policy", one.policy), one.policy_version),
+                *_server_version(one),
+                (("seed", "of", one.task, one.split, one.episode), one.seed),
+            ):
+                there, expected = first.setdefault(what, (folder, value))
+                if value != expected:
+                    raise StoreError(
+                        f"{folder} and {there} cannot be merged: the "
+                        f"{' '.join(map(str, what))} is {value!r} in the first and "
+                        f"{expected!r} in the second."
+                    )
+
+
+def _server_version(record: RecordIndexEntry) -> Iterator[tuple[tuple[object, ...], object]]:
+    """Yield the version of the policy's server, if the episode has a verdict."""
+    if record.outcome != "error":
+        yield ("version", "of the server of", record.policy), record.server_version
+
+
+def _lines(
+    run: StoredRun[_MergeEntry], wanted: Sequence[_MergeEntry], source: Path, target: Path
+) -> Iterator[bytes]:
+    """Yield the lines of records and copy their videos, logs and actions.
+
+    A video whose file is missing is removed from its line.
+    """
+    logs = logged_slugs(source)
+    for one, line in zip(wanted, run.lines(wanted), strict=True):
+        if logs and (slug := one.slug) in logs:
+            _copy_log(log_path(source, slug), log_path(target, slug))
+        if one.action_log is not None:
+            _copy_actions(one.action_log, source, target)
+        if one.video is None or _copy_video(one.video, source, target):
+            yield line
+        else:
+            record = next(run.records([one]))
+            yield record.model_copy(update={"video": None}).model_dump_json().encode()
+
+
+def _copy_video(name: str, source: Path, target: Path) -> bool:
+    """Copy a video and its poster; return whether the video exists."""
+    video, copy = source / name, target / name
+    if not video.is_file():
+        return False
+    if not copy.exists():
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        _copy_file(video, copy)
+        with contextlib.suppress(FileNotFoundError):
+            _copy_file(video.with_suffix(".jpg"), copy.with_suffix(".jpg"))
+    return True
+
+
+def _copy_actions(digest: str, source: Path, target: Path) -> None:
+    actions, copy = action_path(source, digest), action_path(target, digest)
+    if actions.is_file() and not copy.exists():
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        _copy_file(actions, copy)
+
+
+def _copy_log(log: Path, copy: Path) -> None:
+    copy.parent.mkdir(parents=True, exist_ok=True)
+    copy.unlink(missing_ok=True)  # of an error that this record replaces
+    _copy_file(log, copy)
+
+
+def _copy_file(path: Path, copy: Path) -> None:
+    try:
+        os.link(path, copy)  # takes no space on the same disk
+    except OSError:
+        shutil.copyfile(path, copy)

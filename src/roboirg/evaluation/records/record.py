@@ -1,0 +1,400 @@
+"""Data of one episode: what to play (`Job`), the verdict (`Result`), and everything (`Record`).
+
+A record is one JSON object with everything that reports and statistics need, so they never start
+the simulator. It depends only on its job, not on the worker, the order, or what ran before, except
+for the fields in `NON_DETERMINISTIC_FIELDS`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import operator
+import re
+from collections.abc import Mapping
+from typing import Literal, Self, get_args
+
+from pydantic import BaseModel, ConfigDict, JsonValue, model_validator
+
+from roboirg.core.delivery import PromptVerdict
+from roboirg.core.instruction_options import (
+    ALL_STAGES,
+    DEFAULT_DELIVERY,
+    DEFAULT_DISTRACTOR,
+    DEFAULT_DISTRACTORS,
+    DEFAULT_FRAME,
+    DEFAULT_REASONING,
+    DEFAULT_RIVAL,
+    InstructionOptions,
+)
+from roboirg.core.observations import DemonstrationFrames, DemonstrationSource
+
+SCHEMA_VERSION: Literal[3] = 3
+
+Outcome = Literal["success", "failure", "error"]
+
+ErrorKind = Literal[
+    "policy", "invalid_action", "timeout", "connection", "environment", "infrastructure", "prompt"
+]
+"""What an error is due to: the policy raised; its action cannot be executed; a time limit was
+exceeded; a server could not be reached; the environment raised; a process or machine was lost; the
+instruction is longer than what the policy's model reads, and such episodes were not to be played.
+"""
+
+ERROR_KINDS: tuple[ErrorKind, ...] = get_args(ErrorKind)
+
+FailureKind = Literal["grounding", "execution"]
+
+DEFAULT_MAX_STEPS = 1300
+DEFAULT_MESHES = "faithful"
+
+NON_DETERMINISTIC_FIELDS = frozenset(
+    {
+        "attempt",
+        "code",
+        "details",
+        "duration_s",
+        "plan",
+        "processor",
+        "spec",
+        "started_at",
+        "timings",
+        "usage",
+        "video",
+        "video_error",
+        "wordings_file",
+    }
+)
+"""Fields that may differ when the same command runs twice: times, costs, paths, attempts, …"""
+
+
+class _RecordModel(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Job(_RecordModel):
+    """One episode to play. All fields but `spec` and `wordings_file` identify its record.
+
+    Attributes:
+        policy: name of the policy, often its spec.
+        task: name of the task.
+        split: train, val, test or random.
+        episode: 0-based position in the split.
+        setting: name of the setting.
+        form: implicit or resolved. The explicit setting is its own resolved form and is always
+            played as ``implicit``.
+        stages: stages of the discourse; the default if the setting does not read them.
+        distractor: kind of distractor; the default if the setting does not read it.
+        distractors: number of distractors; the default if the setting does not read it.
+        frame: frame of reference; the default if the setting does not read it.
+        delivery: ``prompt`` or ``turns``; the default if the setting does not read it.
+        rival: ``none`` or ``drawn``; the default if the setting does not read it.
+        reasoning: ``plain`` or ``open``; the default if the setting does not read it.
+        policy_seed: seed chosen for the run; the policy's seed is derived from it and the episode.
+        max_steps: the policy's limit, control steps.
+        actions: required action space; None for the policy's own.
+        demonstration_frames: which frames of the video the policy gets; None for its own choice.
+        observe_every: control steps between observations; None for the policy's own choice.
+        meshes: faithful or light.
+        wordings: name and fingerprint of the wording file whose commands are used, for example
+            ``robomme@1a2b3c4d``; None for our own.
+        wordings_file: path of that file; not part of the identity, because a file may be moved.
+        spec: spec of the policy if that is not its name; not part of the identity, because an
+            address may change.
+    """
+
+    policy: str
+    task: str
+    split: str
+    episode: int
+    setting: str
+    form: str = "implicit"
+    stages: tuple[int, ...] = ALL_STAGES
+    distractor: str = DEFAULT_DISTRACTOR
+    distractors: int = DEFAULT_DISTRACTORS
+    frame: str = DEFAULT_FRAME
+    delivery: str = DEFAULT_DELIVERY
+    rival: str = DEFAULT_RIVAL
+    reasoning: str = DEFAULT_REASONING
+    policy_seed: int = 0
+    max_steps: int = DEFAULT_MAX_STEPS
+    actions: str | None = None
+    demonstration_frames: DemonstrationFrames | None = None
+    observe_every: int | None = None
+    meshes: str = DEFAULT_MESHES
+    wordings: str | None = None
+    wordings_file: str | None = None
+    spec: str | None = None
+
+    @property
+    def options(self) -> InstructionOptions:
+        """The options of its instruction, without `wordings`.
+
+        Wordings tell runs apart, as a step limit does: the columns of tables are the same in all.
+        """
+        return options_of(self)
+
+    @property
+    def policy_spec(self) -> str:
+        """Spec of the policy: a built-in name, ``package.module:Class``, or an address."""
+        return self.spec or self.policy
+
+    @property
+    def slug(self) -> str:
+        """Short unique name that is safe in file names."""
+        # Only from the identity, so that a record (which is a job) has its job's slug.
+        return slug_of({name: getattr(self, name) for name in IDENTITY})
+
+
+IDENTITY = tuple(name for name in Job.model_fields if name not in {"spec", "wordings_file"})
+"""The fields that identify a job."""
+
+
+_OPTIONS = tuple(name for name in InstructionOptions._fields if name != "wordings")
+_read_options = operator.attrgetter(*_OPTIONS)
+
+
+def options_of(record: object) -> InstructionOptions:
+    """Return the instruction options among a record's attributes, without `wordings`."""
+    return InstructionOptions(**dict(zip(_OPTIONS, _read_options(record), strict=True)))
+
+
+def slug_of(identity: Mapping[str, object]) -> str:
+    """Return the slug of a job, given the fields in `IDENTITY` in their order."""
+    names = ("policy", "task", "split", "episode", "setting", "form")
+    words = "-".join(str(identity[name]) for name in names)
+    readable = re.sub(r"[^A-Za-z0-9]+", "-", words).strip("-")[:100]
+    digest = hashlib.sha256(repr(list(identity.items())).encode()).hexdigest()
+    return f"{readable}-{digest[:8]}"
+
+
+class UtteranceRecord(_RecordModel):
+    """One utterance and its stage in the discourse.
+
+    Attributes:
+        stage: its part in the discourse.
+        text: its words.
+        step: control step of the policy's turn at which it was heard; 0 is before its first step,
+            and before the video if there is one; None if the episode ended before.
+    """
+
+    stage: str
+    text: str
+    step: int | None = 0
+
+
+class MentionSpan(_RecordModel):
+    """A span of an utterance that introduces a slot value or refers back to one.
+
+    Attributes:
+        utterance: index of the utterance.
+        start: first character of the span.
+        end: one past the last.
+        role: ``antecedent`` or ``anaphor``.
+        expression: class of an anaphor; None for an antecedent.
+        slot: name of the goal slot.
+        value: value of the slot.
+    """
+
+    utterance: int
+    start: int
+    end: int
+    role: str
+    expression: str | None
+    slot: str
+    value: str | int
+
+
+class EventRecord(_RecordModel):
+    """A fact that became true or false during the episode.
+
+    Attributes:
+        step: control steps since the policy's turn began; at most 0 in the demonstration.
+        kind: as in `roboirg.core.episode.Fact`.
+        subject: name of the object.
+        place: name of the place, if the kind has one.
+        holds: whether it became true; otherwise it became false.
+    """
+
+    step: int
+    kind: str
+    subject: str
+    place: str | None = None
+    holds: bool = True
+
+
+class Attribution(_RecordModel):
+    """Why an episode failed, concluded from its events.
+
+    Attributes:
+        kind: ``grounding`` (the policy did the wrong thing) or ``execution`` (it tried the right
+            thing and did not succeed).
+        failure: subtype, as in `roboirg.judging.failure_attribution`.
+        subject: name of the object concerned, if there is one.
+        step: control step of the policy's turn at which the failure showed, if there is one.
+        sentence: explanation in words.
+    """
+
+    kind: FailureKind
+    failure: str
+    subject: str | None = None
+    step: int | None = None
+    sentence: str
+
+
+class PromptAudit(_RecordModel):
+    """What of the instruction reached the policy's language model, by the limit it declares.
+
+    Attributes:
+        limit: tokens that the model reads of a message.
+        needed: tokens that the longest message needs, at least and at most.
+        tokenizer: name of the file of the tokenizer that counted; None for bounds without one.
+        reached: for each utterance, the characters from its beginning that can have arrived; an
+            utterance that was not said yet is not counted here.
+        lost: indices of the mentions that certainly did not arrive whole.
+    """
+
+    limit: int
+    needed: tuple[int, int]
+    tokenizer: str | None = None
+    reached: tuple[int, ...]
+    lost: tuple[int, ...] = ()
+
+    @property
+    def sent(self) -> tuple[int, int]:
+        """Tokens of the longest message that the model reads, at least and at most."""
+        return min(self.needed[0], self.limit), min(self.needed[1], self.limit)
+
+
+REAL_TRIAL = "real_trial"
+"""Key of a study's trial in a record's ``policy_metadata``."""
+TWIN = "twin"
+"""Name of the robot of a study that is played in simulation."""
+
+
+def real_robot(trial: object) -> str | None:
+    """Return the robot of a trial's metadata; None if there is none or it is the twin."""
+    robot = trial.get("robot") if isinstance(trial, dict) else None
+    return None if robot in (None, TWIN) else str(robot)
+
+
+class Result(Job):
+    """Verdict on a job, without instruction and events: everything that rates are computed from.
+
+    Attributes:
+        seed: seed of the episode's scene.
+        difficulty: easy, medium or hard.
+        outcome: success, failure (due to the policy) or error (the episode could not be judged;
+            never counted as a failure).
+        error: kind of error; None if the outcome is not an error.
+        cause: why it failed or ended in an error, in words.
+        attribution: of a failure; None if the reason is unclear.
+        steps: control steps that the policy played.
+        demonstration_steps: frames of the video before the policy's turn, one per control step;
+            0 without a video.
+        demonstration_source: whose actions the video shows: RoboMME's (``recorded``), the oracle's
+            (``planned``), or ``none``.
+        privileged: whether the policy has access to the simulator's state (it has ``attach``).
+        policy_version: distinguishes versions of a policy of the same name.
+        server_version: the version that the policy's server told; None if there is no server, or
+            it told none, or the episode ended before.
+        language_version: version of the instruction generator.
+        environment_version: version of scenes, rules and physics.
+        package_version: version of roboirg.
+        code: fingerprint of the package's files.
+        plan: fingerprint of the plan.
+        attempt: number of the attempt, from 1.
+        prompt_verdict: whether all that was said reached the policy's language model.
+    """
+
+    seed: int
+    difficulty: str
+    outcome: Outcome
+    error: ErrorKind | None = None
+    cause: str | None = None
+    attribution: Attribution | None = None
+    steps: int = 0
+    demonstration_steps: int = 0
+    demonstration_source: DemonstrationSource = "none"
+    privileged: bool
+    policy_version: str = "unknown"
+    server_version: str | None = None
+    language_version: str
+    environment_version: int
+    package_version: str
+    code: str = "unknown"
+    plan: str | None = None
+    attempt: int = 1
+    prompt_verdict: PromptVerdict = "unknown"
+
+    @model_validator(mode="after")
+    def _refuse_success_with_cause(self) -> Self:
+        if self.outcome == "success" and self.cause is not None:
+            raise ValueError(f"a success has no cause, but there is {self.cause!r}")
+        return self
+
+    @property
+    def identity(self) -> Job:
+        """The job of this result, without the policy's spec."""
+        return Job(**{name: getattr(self, name) for name in IDENTITY})
+
+    @property
+    def robot(self) -> str | None:
+        """The real robot that played it; None in simulation, a study's twin included."""
+        return None
+
+
+class Record(Result):
+    """Everything that is stored of an episode.
+
+    Attributes:
+        schema_version: version of this list of fields.
+        instruction: the utterances that the policy was given.
+        mentions: the referring expressions in them.
+        prompt: what of them reached its language model; None if the policy declares no limit.
+        command: the same task in the explicit setting.
+        goal: what the instruction conveys, a value for each slot.
+        metadata: of the instruction: reasoning pattern, relation, stages, landmarks, ….
+        policy_metadata: what the policy reports about itself: checkpoint, server, model, ….
+        action_log: digest of the executed actions, as in `roboirg.evaluation.records.action_log`;
+            None if they were not kept.
+        end_state: hash of the state in which the episode left the world and the judge; None if it
+            did not come to an end.
+        events: facts that became true or false, in order.
+        usage: what models queried by the policy cost: ``calls``, ``input_tokens``,
+            ``output_tokens``, ``cost_usd``.
+        timings: wall-clock seconds by phase: ``policy_load``, ``policy_act``, ``env_step``, ….
+        video: path of the video relative to the records file, or None.
+        video_error: why the requested video could not be written, or None.
+        details: traceback of an error, or None.
+        render_device: the driver's name of the render device; None if nothing was rendered.
+        processor: architecture, maker and family of the processor that simulated it, which decide
+            the last bits of `end_state`; None in records from before this was kept.
+        started_at: ISO 8601, UTC.
+        duration_s: wall-clock seconds.
+    """
+
+    schema_version: Literal[3] = SCHEMA_VERSION
+    instruction: tuple[UtteranceRecord, ...]
+    mentions: tuple[MentionSpan, ...] = ()
+    prompt: PromptAudit | None = None
+    command: str
+    goal: dict[str, str | int | tuple[str, ...] | tuple[int, ...]]
+    metadata: dict[str, JsonValue]
+    policy_metadata: dict[str, JsonValue] = {}
+    action_log: str | None = None
+    end_state: str | None = None
+    events: tuple[EventRecord, ...] = ()
+    usage: dict[str, float] = {}
+    timings: dict[str, float] = {}
+    video: str | None = None
+    video_error: str | None = None
+    details: str | None = None
+    render_device: str | None = None
+    processor: str | None = None
+    started_at: str
+    duration_s: float
+
+    @property
+    def robot(self) -> str | None:
+        """The real robot that played it; None in simulation, a study's twin included."""
+        return real_robot(self.policy_metadata.get(REAL_TRIAL))

@@ -1,0 +1,66 @@
+"""The versions that policies' servers tell: verdicts of two of them are not mixed in one folder.
+
+Episodes that ended in an error are in no rate, so they do not count; and one that ended before its
+server told a version belongs to the version of the folder's verdicts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+
+from roboirg.evaluation.records.record import Result
+from roboirg.evaluation.records.record_codec import RecordIndexEntry, StoreError
+
+Stored = TypeVar("Stored")
+
+
+def told_versions(records: Iterable[Result | RecordIndexEntry]) -> dict[str, str | None]:
+    """Return what the server of each policy with a verdict told; None if it told nothing."""
+    return {one.policy: one.server_version for one in records if one.outcome != "error"}
+
+
+def check_told_version(
+    folder: Path, told: Mapping[str, str | None], record: Result | RecordIndexEntry
+) -> None:
+    """Refuse a verdict of another version than the folder's.
+
+    Args:
+        folder: for the message.
+        told: of the folder's records, as from `told_versions`.
+        record: to be added.
+
+    Raises:
+        StoreError: the version differs.
+    """
+    before, now = told.get(record.policy, record.server_version), record.server_version
+    if record.outcome != "error" and before != now:
+        raise StoreError(
+            f"{folder} holds episodes of {record.policy} whose server told {_name(before)}, but "
+            f"now it tells {_name(now)}; choose another --out."
+        )
+
+
+def adopt_told_versions(records: Iterable[Stored]) -> tuple[Stored, ...]:
+    """Return the records; errors without a version get that of the same policy's verdicts."""
+    found: list[Any] = list(records)
+    told = told_versions(found)
+    return tuple(
+        _with_version(one, told[one.policy])
+        if one.outcome == "error" and one.server_version is None and told.get(one.policy)
+        else one
+        for one in found
+    )
+
+
+def _with_version(record: Any, version: str | None) -> Any:  # noqa: ANN401 - a model or a struct
+    if isinstance(record, msgspec.Struct):
+        return msgspec.structs.replace(record, server_version=version)
+    return record.model_copy(update={"server_version": version})
+
+
+def _name(version: str | None) -> str:
+    return "no version" if version is None else f"version {version}"

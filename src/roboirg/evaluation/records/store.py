@@ -1,0 +1,268 @@
+"""Storage of records as JSON lines, one record each, in a file that is only appended to.
+
+Guaranteed on a local POSIX file system, beside what `line_file` guarantees:
+
+- A damaged line in the middle is skipped and reported; all other lines are read.
+- Verdicts of two versions of a policy's server do not get into one file.
+
+Not guaranteed: anything on network file systems whose `flock` or fsync do not work as specified;
+that lines are in the order of the plan (they are in the order in which episodes finished).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Generic, NamedTuple, Self, TypeVar
+
+from roboirg.evaluation.records.line_file import AppendFile, LineFile, LinePlace
+from roboirg.evaluation.records.record import Job, Record
+from roboirg.evaluation.records.record_codec import (
+    EpisodeSummary,
+    RecordIndexEntry,
+    RecordKey,
+    StoredInstruction,
+    StoreError,
+    identity_key,
+    read_index_entry,
+    read_instruction,
+    read_line,
+    read_summary,
+)
+from roboirg.evaluation.records.server_versions import (
+    adopt_told_versions,
+    check_told_version,
+    told_versions,
+)
+
+__all__ = [
+    "RecordStore",
+    "StoreContents",
+    "StoreError",
+    "StoredRun",
+    "read_contents",
+    "read_records",
+    "read_results",
+]
+
+RECORDS_FILE = "records.jsonl"
+TORN_FILE = "records.torn"
+
+_BUFFER = 1 << 20
+"""Bytes to read at a time."""
+
+Parsed = TypeVar("Parsed")
+Identified = TypeVar("Identified", bound=Job | RecordIndexEntry)
+
+
+class StoreContents(NamedTuple):
+    """Contents of a records file.
+
+    Attributes:
+        records: all records, in the order of the file.
+        torn: bytes of an unfinished last line, usually empty.
+        damaged: numbers of the lines that are not JSON, usually none.
+    """
+
+    records: tuple[Record, ...]
+    torn: bytes
+    damaged: tuple[int, ...] = ()
+
+
+class RecordStore:
+    """The records of one output folder, open for appending by this process only.
+
+    Use as a context manager. It keeps a `RecordIndexEntry` of each record in memory, not the record
+    itself.
+
+    Args:
+        folder: created if it does not exist.
+
+    Attributes:
+        stored: index entries by identity, the newest of each.
+        torn: bytes of an unfinished line that were moved aside when the file was opened.
+        damaged: numbers of the lines that are not JSON; their episodes count as not played.
+
+    Raises:
+        StoreError: another process writes to the folder, or a line is not a record.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.path = folder / RECORDS_FILE
+        self.stored: dict[RecordKey, RecordIndexEntry] = {}
+        self._told: dict[str, str | None] = {}
+        self._file = AppendFile(folder, RECORDS_FILE, TORN_FILE, self._read)
+
+    def append(self, record: Record) -> None:
+        """Write one record; when this returns, it is on disk.
+
+        Raises:
+            StoreError: the record cannot be written, or the policy's server is now another version
+                than in earlier verdicts; the file is unchanged.
+        """
+        self.extend([record.model_dump_json().encode()])
+
+    def extend(self, lines: Iterable[bytes]) -> None:
+        """Write records as JSON lines, without newlines; when this returns, all are on disk.
+
+        Raises:
+            StoreError: a record cannot be written, a line is not one, or a policy's server is now
+                another version than in earlier verdicts; the file is unchanged.
+        """
+        added: dict[RecordKey, RecordIndexEntry] = {}
+        told = dict(self._told)
+
+        def checked() -> Iterator[bytes]:
+            for line in lines:
+                entry = read_index_entry(line, self.path, 0)
+                check_told_version(self.folder, told, entry)
+                told.update(told_versions([entry]))
+                added[identity_key(entry)] = entry
+                yield line
+
+        self._file.extend(checked())
+        self.stored |= added
+        self._told = told
+
+    def _read(self, lines: LineFile) -> None:
+        self.stored = {identity_key(one): one for one in lines.parse(read_index_entry)}
+        self.torn, self.damaged = lines.torn, tuple(lines.damaged)
+        self._told = told_versions(self.stored.values())
+
+    def close(self) -> None:
+        """Close the file and release the lock."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        self.close()
+
+
+def read_contents(path: Path) -> StoreContents:
+    """Read a whole records file; takes no lock, so a run may be writing to it.
+
+    Raises:
+        StoreError: a line is not a record of this schema version.
+    """
+    lines = LineFile(path)
+    records = tuple(lines.parse(read_line))
+    return StoreContents(records, lines.torn, tuple(lines.damaged))
+
+
+def read_records(folder: Path) -> tuple[Record, ...]:
+    """Read the records of a run's folder: the newest of each identity, in the order of the file.
+
+    An episode that ended in an error before the server told its version has that of the others.
+
+    Raises:
+        StoreError: there are none, or a line is not a record of this schema version.
+    """
+    return StoredRun(folder, read_line).newest
+
+
+def read_results(folder: Path) -> tuple[EpisodeSummary, ...]:
+    """Read the results of a run's folder: like `read_records`, but much faster and smaller.
+
+    Raises:
+        StoreError: there are none, or a line is not a record of this schema version.
+    """
+    return read_summaries(folder).newest
+
+
+def read_summaries(folder: Path) -> StoredRun[EpisodeSummary]:
+    """Read the summaries of a run's folder; its records are read again one by one.
+
+    Raises:
+        StoreError: there are none, or a line is not a record of this schema version.
+    """
+    return StoredRun(folder, read_summary)
+
+
+def read_instructions(folder: Path) -> Iterator[StoredInstruction]:
+    """Yield what tells the instructions of a run apart, one record after the other.
+
+    Nothing is kept, so records that were written again come twice.
+
+    Raises:
+        StoreError: the file cannot be read, or a line is not a record of this schema version.
+    """
+    return LineFile(folder / RECORDS_FILE).parse(read_instruction)
+
+
+def read_index(folder: Path) -> dict[RecordKey, RecordIndexEntry]:
+    """Read the index entries of a run's folder, the newest of each; empty if there is no run.
+
+    Raises:
+        StoreError: the file cannot be read, or a line is not a record of this schema version.
+    """
+    return {
+        identity_key(one): one for one in LineFile(folder / RECORDS_FILE).parse(read_index_entry)
+    }
+
+
+class StoredRun(Generic[Identified]):
+    """The newest record of each identity in a run's folder, of which only a part is in memory.
+
+    Takes no lock, so a run may be writing to the folder.
+
+    Args:
+        folder: of the run.
+        parse_line: returns what is kept of a line, given its bytes, path and number.
+
+    Attributes:
+        newest: what is kept of each record, in the order of the file.
+        replaced: of earlier records of the same episodes.
+
+    Raises:
+        StoreError: there are no records, or a line is not a record of this schema version.
+    """
+
+    def __init__(self, folder: Path, parse_line: Callable[[bytes, Path, int], Identified]) -> None:
+        self._path = folder / RECORDS_FILE
+        lines = LineFile(self._path)
+        kept: dict[RecordKey, tuple[Identified, LinePlace]] = {}
+        self.replaced: list[Identified] = []
+        for one in lines.parse(parse_line):
+            key = identity_key(one)
+            if key in kept:
+                self.replaced.append(kept[key][0])
+            kept[key] = (one, lines.place)
+        if not kept:
+            raise StoreError(
+                f"There are no records in {folder}; give the --out folder of a `roboirg run`."
+            )
+        self.newest: tuple[Identified, ...] = adopt_told_versions(one for one, _ in kept.values())
+        self._places = {key: place for key, (_, place) in kept.items()}
+
+    def lines(self, wanted: Iterable[Identified]) -> Iterator[bytes]:
+        """Yield the lines of some records, without newlines."""
+        with self._path.open("rb", buffering=_BUFFER) as file:
+            for place in (self._places[identity_key(one)] for one in wanted):
+                file.seek(place.start)
+                yield file.read(place.size)
+
+    def records(self, wanted: Iterable[Identified]) -> Iterator[Record]:
+        """Yield some whole records, each read when it is asked for.
+
+        Raises:
+            StoreError: a line is not a record.
+        """
+        return self._parsed(wanted, read_line)
+
+    def instructions(self) -> Iterator[StoredInstruction]:
+        """Yield what tells the instructions of all records apart, each read when it is asked for.
+
+        Raises:
+            StoreError: a line is not a record.
+        """
+        return self._parsed(self.newest, read_instruction)
+
+    def _parsed(
+        self, wanted: Iterable[Identified], parse_line: Callable[[bytes, Path, int], Parsed]
+    ) -> Iterator[Parsed]:
+        wanted = list(wanted)
+        for one, line in zip(wanted, self.lines(wanted), strict=True):
+            yield parse_line(line, self._path, self._places[identity_key(one)].number)

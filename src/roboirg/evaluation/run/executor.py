@@ -1,0 +1,129 @@
+"""Executors: play jobs in this process or in worker processes.
+
+An executor gets jobs and a function that plays one, and yields one record for each job in the order
+in which they finish. Storing records and retrying errors is the caller's task. To write your own,
+implement `Executor`; `roboirg.evaluation.run.ray_cluster` is one for many machines.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import wait
+from typing import Protocol
+
+from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.evaluation.hosting.host_pool import open_hosts
+from roboirg.evaluation.play.rollout import PlayJob
+from roboirg.evaluation.records.record import Job, Record
+from roboirg.evaluation.run.workers import MAX_FAILED_STARTS, POLL_S, Worker
+from roboirg.util.processor import core_count
+
+NO_TIMEOUT_S = float("inf")
+
+
+class Executor(Protocol):
+    """Interface of an executor."""
+
+    def run(self, jobs: Sequence[Job], play: PlayJob) -> Iterator[Record]:
+        """Yield one record for each job as they finish; closing the iterator stops the rest.
+
+        Raises:
+            RoboIRGError: an error that would end every other job too (no Vulkan device, …).
+        """
+
+
+@dataclass(frozen=True, slots=True)
+class InProcess:
+    """Plays one job after the other in this process, for debugging.
+
+    There is no supervisor: a crash ends the run, and a hanging call is never ended.
+    """
+
+    def run(self, jobs: Sequence[Job], play: PlayJob) -> Iterator[Record]:
+        """Yield one record for each job, in order."""
+        with open_hosts(play) as hosted:
+            yield from map(hosted, jobs)
+
+
+@dataclass(frozen=True, slots=True)
+class LocalProcesses:
+    """Plays jobs in worker processes on this machine.
+
+    If a worker dies (segmentation fault, out of memory) or hangs, its job gets an error record, the
+    worker is replaced, and the others go on. Workers exit with their parent, however it dies.
+
+    Args:
+        workers: most worker processes at a time, at least 1.
+        episode_timeout_s: how long an episode may take.
+
+    Raises:
+        InvalidValueError: fewer than one worker.
+    """
+
+    workers: int
+    episode_timeout_s: float = NO_TIMEOUT_S
+
+    def __post_init__(self) -> None:
+        if self.workers < 1:
+            raise InvalidValueError(f"workers is {self.workers}; it must be at least 1.")
+
+    def run(self, jobs: Sequence[Job], play: PlayJob) -> Iterator[Record]:
+        """Yield one record for each job as they finish.
+
+        Raises:
+            RoboIRGError: no worker can start, or an error would end every other job too.
+        """
+        with open_hosts(play) as hosted:
+            yield from self._run(jobs, hosted)
+
+    def _run(self, jobs: Sequence[Job], play: PlayJob) -> Iterator[Record]:
+        waiting, failed_starts = deque(jobs), 0
+        # With a process on every core, more threads in Mesa would not help.
+        limit_threads = self.workers >= core_count()
+        active: list[Worker] = []
+        released: list[Worker] = []
+        try:
+            while waiting or active:
+                while waiting and len(active) < self.workers:
+                    job = waiting.popleft()
+                    active.append(Worker.start(play, job, limit_threads=limit_threads))
+                for worker, record in self._finished(active):
+                    failed_starts = failed_starts + 1 if worker.failed_to_start else 0
+                    if failed_starts >= MAX_FAILED_STARTS * self.workers:
+                        raise RoboIRGError(f"No worker process can start ({record.cause}).")
+                    if worker.is_dead:
+                        active.remove(worker)
+                    elif waiting:
+                        worker.assign(waiting.popleft())
+                    else:
+                        active.remove(worker)
+                        released.append(worker)
+                        worker.child.connection.close()  # it may exit
+                    yield record
+        finally:
+            for worker in active:
+                worker.child.kill()
+            for worker in (*active, *released):
+                worker.child.close()
+
+    def _finished(self, active: list[Worker]) -> Iterator[tuple[Worker, Record]]:
+        """Wait up to `POLL_S`; yield every worker whose job has finished or timed out."""
+        ready = wait([worker.child.connection for worker in active], POLL_S)
+        for worker in tuple(active):
+            if worker.child.connection in ready:
+                yield worker, worker.receive()
+            elif (record := worker.kill_if_overdue(self.episode_timeout_s)) is not None:
+                yield worker, record
+
+
+def choose_executor(workers: int | None, episode_timeout_s: float = NO_TIMEOUT_S) -> Executor:
+    """Return the executor for a number of workers: None for one per core, 0 for this process.
+
+    Raises:
+        InvalidValueError: a negative number.
+    """
+    if workers == 0:
+        return InProcess()
+    return LocalProcesses(core_count() if workers is None else workers, episode_timeout_s)

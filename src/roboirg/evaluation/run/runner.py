@@ -1,0 +1,331 @@
+"""Run a plan: play the episodes that are not stored yet and store their records."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import threading
+from collections import Counter
+from collections.abc import Generator, Iterable, Iterator, Sequence
+from pathlib import Path
+from types import FrameType
+from typing import NamedTuple
+
+from roboirg.core.episode import ENVIRONMENT_VERSION
+from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.episode_errors import MAX_CAUSE_LENGTH, format_cause
+from roboirg.evaluation.hosting.policy_descriptions import describe_policy
+from roboirg.evaluation.plan.plan import Plan, write_plan
+from roboirg.evaluation.play.rollout import VIDEO_FOLDER, EpisodeRunner, PlayJob
+from roboirg.evaluation.play.video_writer import check_video_support, without_unfinished_videos
+from roboirg.evaluation.records.record import Job, Record
+from roboirg.evaluation.records.record_codec import RecordIndexEntry, identity_key
+from roboirg.evaluation.records.store import (
+    RECORDS_FILE,
+    TORN_FILE,
+    RecordStore,
+    StoreError,
+    read_index,
+)
+from roboirg.evaluation.run.executor import Executor
+from roboirg.evaluation.run.progress import Reporter, SilentReporter
+from roboirg.language import LANGUAGE_VERSION
+from roboirg.tasks.splits.splits import get_episode
+from roboirg.util.plain_text import counted
+
+UNREACHABLE_AFTER = 20
+"""After this many consecutive connection errors, skip the rest of this policy."""
+
+
+class Terminated(KeyboardInterrupt):
+    """The process received SIGTERM; handled like Ctrl-C."""
+
+
+class RunSummary(NamedTuple):
+    """Result of a run.
+
+    Attributes:
+        total: number of jobs in the plan.
+        played: number of episodes played in this run, retries not counted.
+        errors: records of the plan whose outcome is an error.
+        missing: number of jobs of the plan without a record.
+        torn_bytes: length of an unfinished line that was moved to ``records.torn``.
+        video_errors: why videos of new records could not be written.
+        unreachable: policies skipped after too many connection errors.
+    """
+
+    total: int
+    played: int
+    errors: tuple[RecordIndexEntry, ...]
+    missing: int
+    torn_bytes: int
+    video_errors: tuple[str, ...]
+    unreachable: tuple[str, ...]
+
+
+def run_plan(
+    plan: Plan,
+    folder: Path,
+    play: PlayJob,
+    executor: Executor,
+    *,
+    retry_errors: bool = True,
+    reporter: Reporter | None = None,
+) -> RunSummary:
+    """Play the jobs of a plan that the folder lacks; store each record as soon as it arrives.
+
+    An episode that ends in an error of a kind in `Plan.retry_on` is retried after all others, at
+    most `Plan.tries` times in all; the newest record counts.
+
+    Args:
+        plan: what to play.
+        folder: output folder of the run; holds the records.
+        play: plays one job.
+        executor: where jobs are played.
+        retry_errors: play jobs again whose newest record is an error.
+        reporter: is told of every record, and first of any damage in the file.
+
+    Raises:
+        StoreError: another run writes to the folder, the records cannot be read or written, or
+            they belong to another version of language, environment, scene or policy.
+        RoboIRGError: an error that would end every episode (no Vulkan device, …).
+        KeyboardInterrupt: Ctrl-C, or SIGTERM as `Terminated`; all finished episodes are stored.
+    """
+    reporter = reporter or SilentReporter()
+    jobs = plan.jobs()
+    films = without_unfinished_videos(folder / VIDEO_FOLDER)
+    with _sigterm_interrupts(), RecordStore(folder) as store, films:
+        _report_damage(store, reporter)
+        _check_versions(store.stored.values(), folder)
+        _check_policies(plan, store.stored.values(), folder)
+        write_plan(plan, folder)
+        keys = [identity_key(job) for job in jobs]
+        todo = [
+            job
+            for job, key in zip(jobs, keys, strict=True)
+            if _should_play(store.stored.get(key), retry_errors=retry_errors)
+        ]
+        reporter.start(len(jobs), len(jobs) - len(todo))
+        loop = _RunLoop(plan, store, reporter)
+        loop.play(todo, play, executor)
+        found = [store.stored.get(key) for key in keys]
+        return RunSummary(
+            total=len(jobs),
+            played=len(loop.tries),
+            errors=tuple(one for one in found if one is not None and one.outcome == "error"),
+            missing=found.count(None),
+            torn_bytes=len(store.torn),
+            video_errors=tuple(loop.video_errors),
+            unreachable=tuple(loop.unreachable),
+        )
+
+
+def episode_runner(plan: Plan, folder: Path) -> EpisodeRunner:
+    """Return what plays a plan's jobs into a folder.
+
+    Raises:
+        MissingDependencyError: the plan wants videos, which cannot be written.
+    """
+    if plan.video != "off":
+        check_video_support()
+    return EpisodeRunner(
+        folder,
+        plan.video,
+        policy_timeout_s=plan.policy_timeout_s,
+        plan=plan.fingerprint,
+        hosting=plan.hosting,
+        refuse_long=plan.long_prompts == "refuse",
+    )
+
+
+def check_run(plan: Plan, folder: Path) -> None:
+    """Check what `run_plan` checks before it plays, and write nothing.
+
+    Raises:
+        StoreError: the folder cannot be written, or its records belong to another version of
+            language, environment, scene or policy.
+    """
+    _check_writable(folder)
+    records = read_index(folder).values()
+    _check_versions(records, folder)
+    _check_policies(plan, records, folder)
+
+
+def _check_writable(folder: Path) -> None:
+    """Check that a run's folder can be written, or made; nothing is.
+
+    Raises:
+        StoreError: it cannot.
+    """
+    place = next(one for one in (folder, *folder.absolute().parents) if one.exists())
+    records = folder / RECORDS_FILE
+    if not place.is_dir():
+        raise StoreError(f"Cannot write to {folder}: {place} is not a folder.")
+    if not os.access(place, os.W_OK | os.X_OK) or (
+        records.exists() and not os.access(records, os.W_OK)
+    ):
+        raise StoreError(f"Cannot write to {folder}: Permission denied.")
+
+
+class _RunLoop:
+    """Plays the jobs of a run, stores their records and retries errors.
+
+    Attributes:
+        tries: how often each job was played in this run.
+        video_errors: why videos could not be written.
+        unreachable: policies skipped after too many connection errors.
+    """
+
+    def __init__(self, plan: Plan, store: RecordStore, reporter: Reporter) -> None:
+        self._plan, self._store, self._reporter = plan, store, reporter
+        self._connection_errors: Counter[str] = Counter()
+        self.tries: Counter[Job] = Counter()
+        self.video_errors: list[str] = []
+        self.unreachable: list[str] = []
+
+    def play(self, todo: Sequence[Job], play: PlayJob, executor: Executor) -> None:
+        """Play jobs, and retry those that ended in an error of a retryable kind."""
+        while todo:
+            todo = self._play_once(todo, play, executor)
+
+    def _play_once(self, todo: Sequence[Job], play: PlayJob, executor: Executor) -> list[Job]:
+        """Play jobs once. Returns the jobs to play next."""
+        open_jobs, again = {identity_key(job): job for job in todo}, []
+        with contextlib.closing(_iterate(executor, todo, play)) as records:
+            for record in records:
+                job = open_jobs.pop(identity_key(record))
+                self._store_record(job, record)
+                if self._should_retry(job, record):
+                    again.append(job)
+                if self._count_connection_error(record):
+                    # Start again with the jobs of the other policies.
+                    self._report_unreachable(record)
+                    again += open_jobs.values()
+                    break
+        return [job for job in again if job.policy not in self.unreachable]
+
+    def _store_record(self, job: Job, record: Record) -> None:
+        record = _refuse_contradiction(record)
+        before = self._store.stored.get(identity_key(job))
+        if before is not None:
+            record = record.model_copy(update={"attempt": before.attempt + 1})
+        self._store.append(record)
+        self.tries[job] += 1
+        self._reporter.advance(record, is_new=self.tries[job] == 1)
+        if record.video_error:
+            self.video_errors.append(record.video_error)
+
+    def _should_retry(self, job: Job, record: Record) -> bool:
+        return record.error in self._plan.retry_on and self.tries[job] < self._plan.tries
+
+    def _count_connection_error(self, record: Record) -> bool:
+        """Count consecutive connection errors of a policy. Returns True at the limit."""
+        if record.error == "connection":
+            self._connection_errors[record.policy] += 1
+        else:
+            self._connection_errors[record.policy] = 0
+        return self._connection_errors[record.policy] >= UNREACHABLE_AFTER
+
+    def _report_unreachable(self, record: Record) -> None:
+        self.unreachable.append(record.policy)
+        self._reporter.warn(
+            f"{record.policy} could not be reached in {UNREACHABLE_AFTER} episodes in a row "
+            f"({record.cause}); this run skips its remaining episodes."
+        )
+
+
+def _refuse_contradiction(record: Record) -> Record:
+    """Return a record; a success with a cause becomes an error.
+
+    Only code in the world's process can write one, such as a policy that patches the judge.
+    """
+    if record.outcome != "success" or record.cause is None:
+        return record
+    cause = format_cause("policy", f"a success came with a cause ({record.cause})")
+    refused = {"outcome": "error", "error": "policy", "cause": cause[:MAX_CAUSE_LENGTH]}
+    return record.model_copy(update=refused)
+
+
+def _should_play(stored: RecordIndexEntry | None, *, retry_errors: bool) -> bool:
+    return stored is None or (retry_errors and stored.outcome == "error")
+
+
+def _report_damage(store: RecordStore, reporter: Reporter) -> None:
+    if store.torn:
+        reporter.warn(
+            f"An earlier run was stopped while it wrote a record; moved the unfinished line "
+            f"({counted(len(store.torn), 'byte')}) to {store.folder / TORN_FILE}."
+        )
+    if store.damaged:
+        reporter.warn(
+            f"{store.path} has {counted(len(store.damaged), 'damaged line')}, first line "
+            f"{store.damaged[0]}; their episodes are played again."
+        )
+
+
+def _check_versions(records: Iterable[RecordIndexEntry], folder: Path) -> None:
+    """Refuse records of another language or environment version: rates must not mix them."""
+    records = tuple(records)
+    for language in {record.language_version for record in records} - {LANGUAGE_VERSION}:
+        raise StoreError(
+            f"{folder} holds episodes of language version {language}, but this roboirg has "
+            f"version {LANGUAGE_VERSION}; choose another --out."
+        )
+    for world in {record.environment_version for record in records} - {ENVIRONMENT_VERSION}:
+        raise StoreError(
+            f"{folder} holds episodes of environment version {world}, but this roboirg has "
+            f"version {ENVIRONMENT_VERSION}; choose another --out."
+        )
+    for task, split, episode, seed in {
+        (record.task, record.split, record.episode, record.seed) for record in records
+    }:
+        expected = _seed(task, split, episode)
+        if seed != expected:
+            raise StoreError(
+                f"{folder} holds {task} {split}/{episode} with scene seed {seed}, but this roboirg "
+                f"has {expected}; choose another --out."
+            )
+
+
+def _check_policies(plan: Plan, records: Iterable[RecordIndexEntry], folder: Path) -> None:
+    """Refuse records of another version of a policy of the same name."""
+    specs = plan.specs
+    for policy, version in {(record.policy, record.policy_version) for record in records}:
+        now = describe_policy(specs[policy]).version if policy in specs else version
+        if version != now:
+            raise StoreError(
+                f"{folder} holds episodes of {policy} version {version}, but the policy is now "
+                f"version {now}; choose another --out."
+            )
+
+
+def _seed(task: str, split: str, episode: int) -> str | int:
+    """Return the seed of an episode's scene, or a phrase if there is no such episode."""
+    try:
+        return get_episode(task, split, episode).seed
+    except InvalidValueError:
+        return "no such episode"
+
+
+def _iterate(
+    executor: Executor, jobs: Sequence[Job], play: PlayJob
+) -> Generator[Record, None, None]:
+    yield from executor.run(jobs, play)
+
+
+@contextlib.contextmanager
+def _sigterm_interrupts() -> Iterator[None]:
+    """Treat SIGTERM like Ctrl-C: end the workers and keep the records."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # only the main thread can handle signals
+        return
+
+    def interrupt(_number: int, _frame: FrameType | None) -> None:
+        raise Terminated
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

@@ -1,0 +1,246 @@
+"""The splits: RoboMME's published episodes, and the sampled ones beside them.
+
+The episodes of the benchmark's train, val and test splits are RoboMME's (`published_episodes`).
+Sampled are the six that RoboMME's data lacks, the tasks of the suite ``real`` or of another
+package, the split ``random`` and private splits. The seed of a sampled episode is ``base + 100 *
+index + rejected``, in a private split a keyed hash; its difficulties repeat easy, easy, medium,
+hard. The base depends on split and task; `rejected` is the number of seeds passed over: those
+without a valid scene and, in the first three splits, those with a setting that cannot be expressed
+and those that the oracle does not solve. ``splits.json`` holds these numbers, with a fingerprint of
+the episodes of each task that detects changes of scenes; ``roboirg build-splits`` writes it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import itertools
+import json
+import operator
+from collections.abc import Iterable, Iterator, Mapping
+from importlib import resources
+from typing import NamedTuple, SupportsIndex
+
+import numpy as np
+
+from roboirg.core.episode import SPLITS, Difficulty, Episode, Goal, Scene, Split
+from roboirg.core.errors import InvalidValueError, SceneRejectedError, UnknownNameError
+from roboirg.tasks import Task, get_task
+from roboirg.tasks.splits.fingerprint import fingerprint
+from roboirg.tasks.splits.private_splits import RANDOM, check_salt, is_private, private_seed
+from roboirg.tasks.splits.published_episodes import published_episode
+from roboirg.tasks.splits.recordings import is_recorded
+
+SIZES: Mapping[Split, int] = {"train": 100, "val": 50, "test": 50, "random": 1_000_000}
+CYCLE: tuple[Difficulty, ...] = ("easy", "easy", "medium", "hard")
+BASE_SEEDS: Mapping[Split, tuple[int, int]] = {
+    "train": (0, 1000),
+    "val": (1_000_000, 10_000),
+    "test": (500_000, 10_000),
+    "random": (10_000_000, 0),
+}
+"""First seed of a split, and what the task's code adds per unit (train, val, test: RoboMME's)."""
+SEED_STRIDE = 100
+MAX_REJECTED = SEED_STRIDE - 1
+"""Limit of seeds passed over for an episode; the seed after that belongs to the next episode."""
+SPLITS_FILE = "splits.json"
+
+
+class TaskSplits(NamedTuple):
+    """Shipped data of the splits of a task.
+
+    Attributes:
+        sha256: fingerprint of all its episodes, see `roboirg.tasks.splits.fingerprint`.
+        passed_over: numbers of seeds passed over, by sampled episode (``"train/3"``), without
+            zeros.
+    """
+
+    sha256: str
+    passed_over: Mapping[str, int]
+
+
+def slot_seed(task: Task, split: Split, index: int) -> int:
+    """Return the first seed to try for a sampled episode."""
+    base, by_code = BASE_SEEDS[split]
+    return base + by_code * task.code + SEED_STRIDE * index
+
+
+def slot_difficulty(index: int) -> Difficulty:
+    """Return the difficulty of a sampled episode; all splits share the cycle."""
+    return CYCLE[index % len(CYCLE)]
+
+
+def slot_key(split: Split, index: int) -> str:
+    """Return the name of an episode among those of its task, for example ``"test/3"``."""
+    return f"{split}/{index}"
+
+
+def check_split(split: str) -> Split:
+    """Return the name as a split whose episodes this process can draw.
+
+    Raises:
+        UnknownNameError: there is no such split.
+        MissingSaltError: it is private, and its salt is not known.
+    """
+    check_salt(split)
+    return split if is_private(split) else _known_split(split, tuple(SIZES))
+
+
+def split_size(split: str) -> int:
+    """Return the number of episodes in a split.
+
+    Raises:
+        UnknownNameError: there is no such split.
+        MissingSaltError: it is private, and its salt is not known.
+    """
+    checked = check_split(split)
+    return SIZES[RANDOM if is_private(checked) else checked]
+
+
+def check_fixed_split(split: str) -> Split:
+    """Return the name as a split of a fixed number of episodes: train, val or test.
+
+    Raises:
+        UnknownNameError: it is none.
+    """
+    return _known_split(split, SPLITS)
+
+
+def make_episode(
+    task_name: str, seed: int, difficulty: Difficulty, split: Split = "random", index: int = 0
+) -> Episode:
+    """Make the episode of a seed, whether or not it belongs to a split.
+
+    Raises:
+        UnknownNameError: there is no such task.
+        SceneRejectedError: the seed yields no valid scene.
+    """
+    task = get_task(task_name)
+    scene, goal = task.sample(np.random.default_rng(seed), difficulty)
+    return assemble_episode(task, seed, difficulty, scene, goal, split=split, index=index)
+
+
+def assemble_episode(
+    task: Task,
+    seed: int,
+    difficulty: Difficulty,
+    scene: Scene,
+    goal: Goal,
+    *,
+    split: Split,
+    index: int,
+    recorded: bool = False,
+) -> Episode:
+    """Return the episode of a scene and a goal, with the stages that follow from them."""
+    return Episode(
+        task=task.name,
+        split=split,
+        index=index,
+        seed=seed,
+        difficulty=difficulty,
+        scene=scene,
+        goal=goal,
+        stages=task.stages(scene, goal),
+        demonstration=task.demonstration(scene),
+        recorded=recorded,
+    )
+
+
+@functools.cache
+def shipped_splits() -> Mapping[str, TaskSplits]:
+    """Return the shipped data of the splits, by task."""
+    text = resources.files("roboirg.tasks.splits").joinpath(SPLITS_FILE).read_text(encoding="utf-8")
+    return {task: TaskSplits(**entry) for task, entry in json.loads(text).items()}
+
+
+def splits_text(splits: Mapping[str, TaskSplits]) -> str:
+    """Return the text of ``splits.json``: JSON with a line for each task."""
+    lines = [f"{json.dumps(task)}: {json.dumps(entry._asdict())}" for task, entry in splits.items()]
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def get_episode(task_name: str, split: str, index: SupportsIndex) -> Episode:
+    """Return episode number `index` (from 0) of a split of a task.
+
+    Random episodes, and those of a task that is not in ``splits.json``, such as one of another
+    package, use the first seed that gives a scene.
+
+    Raises:
+        UnknownNameError: there is no such task or split.
+        MissingSaltError: the split is private, and its salt is not known.
+        InvalidValueError: the split has no episode of that number.
+        SceneRejectedError: no seed of the episode gives a scene.
+    """
+    task, split_name = get_task(task_name), check_split(split)
+    return _episode(task.name, split_name, _check_index(split_name, index))
+
+
+def split_episodes(tasks: Iterable[str], splits: Iterable[Split]) -> Iterator[Episode]:
+    """Yield all episodes of tasks in splits."""
+    for task, split in itertools.product(tasks, splits):
+        for index in range(split_size(split)):
+            yield get_episode(task, split, index)
+
+
+def fingerprint_of(task_name: str, passed_over: Mapping[str, int]) -> str:
+    """Return the fingerprint of all episodes of a task, given the numbers of seeds passed over.
+
+    Raises:
+        SceneRejectedError: one of the seeds yields no valid scene.
+    """
+    return fingerprint(
+        _published(task_name, split, index)
+        or _sampled(task_name, split, index, passed_over.get(slot_key(split, index), 0))
+        for split in SPLITS
+        for index in range(SIZES[split])
+    )
+
+
+def _known_split(split: str, splits: tuple[Split, ...]) -> Split:
+    for known in splits:
+        if split == known:
+            return known
+    raise UnknownNameError("split", split, splits)
+
+
+def _check_index(split: Split, index: SupportsIndex) -> int:
+    size = split_size(split)
+    number = -1
+    if not isinstance(index, bool):
+        with contextlib.suppress(TypeError):
+            number = operator.index(index)
+    if not 0 <= number < size:
+        raise InvalidValueError(
+            f"There is no episode {index!r}: split {split!r} has episodes 0 to {size - 1}."
+        )
+    return number
+
+
+@functools.lru_cache(maxsize=4096)
+def _episode(task: str, split: Split, index: int) -> Episode:
+    published = _published(task, split, index)
+    if published is not None:
+        return published
+    entry = shipped_splits().get(task)
+    if entry is not None and split in SPLITS:
+        return _sampled(task, split, index, entry.passed_over.get(slot_key(split, index), 0))
+    for passed_over in range(MAX_REJECTED):
+        with contextlib.suppress(SceneRejectedError):
+            return _sampled(task, split, index, passed_over)
+    return _sampled(task, split, index, MAX_REJECTED)
+
+
+def _published(task: str, split: Split, index: int) -> Episode | None:
+    found = published_episode(task, split, index)
+    if found is None:
+        return None
+    recorded = is_recorded(task, split, index)
+    return assemble_episode(get_task(task), *found, split=split, index=index, recorded=recorded)
+
+
+def _sampled(task: str, split: Split, index: int, passed_over: int) -> Episode:
+    if is_private(split):
+        seed = private_seed(task, split, index, passed_over)
+    else:
+        seed = slot_seed(get_task(task), split, index) + passed_over
+    return make_episode(task, seed, slot_difficulty(index), split, index)
