@@ -6,8 +6,13 @@ import pytest
 
 from roboirg.apps.show.contact_sheet import SheetPanel, compose_sheet, evenly_spaced, write_png
 from roboirg.apps.show.episode_text import describe_motions, describe_video, fact_words
-from roboirg.apps.show.key_events import KeyEvents
-from roboirg.apps.show.playthrough import MAX_MOMENTS, MIN_MOMENTS, choose_moments, play_through
+from roboirg.apps.show.playthrough import (
+    MAX_MOMENTS,
+    MIN_MOMENTS,
+    KeyEvents,
+    choose_moments,
+    play_through,
+)
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Scene
 from roboirg.core.errors import InvalidValueError

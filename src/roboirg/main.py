@@ -16,17 +16,16 @@ import typer
 from roboirg import apps
 from roboirg.cli import (
     demo_commands,
-    episode_commands,
+    export_commands,
     look_commands,
     policy_commands,
     report_commands,
     run_commands,
 )
-from roboirg.cli.export_commands import export_app
 from roboirg.cli.missing_extras import describe_missing
 from roboirg.cli.run_commands import INTERRUPTED, USAGE_ERROR
 from roboirg.core.errors import RoboIRGError
-from roboirg.core.printable import printable
+from roboirg.core.plain_text import printable
 from roboirg.core.version import __version__
 
 # Heavy modules are imported inside the commands, so that --help is fast.
@@ -87,9 +86,9 @@ def _add_commands() -> None:
     app.command("fetch-models")(look_commands.fetch_models)
     app.command("tasks")(look_commands.list_tasks)
     app.command(cls=policy_commands.ProtocolHelpCommand)(policy_commands.serve)
-    app.add_typer(export_app, name="export")
-    export_app.command("episodes")(episode_commands.export_episodes)
-    export_app.command("records")(run_commands.export_records)
+    app.add_typer(export_commands.export_app, name="export")
+    export_commands.export_app.command("episodes")(export_commands.export_episodes)
+    export_commands.export_app.command("records")(export_commands.export_records)
     for application in pkgutil.iter_modules(apps.__path__):
         importlib.import_module(f"{apps.__name__}.{application.name}.commands").add_commands(app)
 

@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roboirg.evaluation.analysis.stats.cells import CellResults, Trial
-from roboirg.evaluation.analysis.stats.multiple_testing import holm
 from roboirg.evaluation.analysis.stats.paired_tests import (
     Overlap,
     Pairs,
+    holm,
     measure_gap,
     sign_flip_test,
 )

@@ -14,7 +14,7 @@ from roboirg.apps.demonstrations.trajectory import PictureFile, load_trajectory
 from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec, record_trajectory
 from roboirg.envs.factory import make
 from roboirg.policies import make_policy, play
-from roboirg.policies.builtin.varied_oracle import VariedOraclePolicy
+from roboirg.policies.builtin.oracle_policy import VariedOraclePolicy
 from roboirg.tasks.splits.splits import get_episode
 
 pytestmark = pytest.mark.sim

@@ -22,7 +22,7 @@ from roboirg.apps.split_search import seed_selection
 from roboirg.apps.split_search.seed_selection import EpisodeSlot, check_words
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.figures import expression_counts, expression_figure
+from roboirg.evaluation.analysis.figures import expressions
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.language import (
     FORMS,
@@ -151,9 +151,9 @@ def test_statistics_figure_and_export_have_the_setting(register, tmp_path):
     dummies = [one for one in (row(*one) for one in found) if one["setting"] == "dummy"]
     assert len(dummies) == 2 * sum(episode.difficulty != "easy" for episode in episodes)
     said = [one for _, one in found if one.form == "implicit"]
-    assert expression_counts.scene_counts(said)["dummy"] == len(dummies) / 2
+    assert expressions.scene_counts(said)["dummy"] == len(dummies) / 2
     assert "dummy" in printed(*statistics_tables.overview_tables(said))
-    _, picture = expression_figure.write_figure(said, tmp_path, "expressions", "A title")
+    _, picture = expressions.write_figure(said, tmp_path, "expressions", "A title")
     assert DUMMY.color in picture.read_text()
 
 

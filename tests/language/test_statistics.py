@@ -9,7 +9,7 @@ from rich.console import Console
 
 from roboirg.apps.language_lab import corpus_statistics, statistics_tables
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
-from roboirg.evaluation.analysis.figures import expression_counts, expression_figure
+from roboirg.evaluation.analysis.figures import expressions
 from roboirg.language import setting_names
 from roboirg.language.settings import settings_of
 from roboirg.language.variants import instructions
@@ -26,9 +26,9 @@ def said():
 
 
 def test_expressions_are_counted_once_per_scene():
-    counts = expression_counts.expression_counts(said())
-    assert expression_counts.expression_counts(said() * 2) == counts
-    scenes = expression_counts.scene_counts(said() * 2)
+    counts = expressions.expression_counts(said())
+    assert expressions.expression_counts(said() * 2) == counts
+    scenes = expressions.scene_counts(said() * 2)
     assert scenes["direct"] == 50 * len(TASKS)
     assert scenes["spatial"] == 50 * sum(
         "spatial" in settings_of(one) for one in every_task().values()
@@ -40,7 +40,7 @@ def test_expressions_are_counted_once_per_scene():
     assert set(counts["direct"]) == {"it", "them", "that", "then", "former", "latter"}
     assert {"pair", "that", "each", "other"} == set(counts["reasoning"])
     assert {"there", *ranks} == set(counts["spatial"])
-    order = expression_counts.expression_order(counts)
+    order = expressions.expression_order(counts)
     assert set(order) == {name for by_class in counts.values() for name in by_class}
     assert order.index("it") < order.index("former") < order.index("there")
 
@@ -64,7 +64,7 @@ def test_the_tables_hold_the_counts():
     for table in statistics_tables.overview_tables(said()):
         console.print(table)
     text = console.file.getvalue()
-    counts = expression_counts.expression_counts(said())
+    counts = expressions.expression_counts(said())
     row = next(
         line for line in text.splitlines() if line.startswith("│ spatial") and "." not in line
     )
@@ -79,8 +79,8 @@ def test_the_tables_hold_the_counts():
 
 def test_the_figure_is_drawn_the_same_every_time(tmp_path):
     pytest.importorskip("matplotlib")
-    first = expression_figure.write_figure(said(), tmp_path / "one", "expressions", "A title")
-    second = expression_figure.write_figure(said(), tmp_path / "two", "expressions", "A title")
+    first = expressions.write_figure(said(), tmp_path / "one", "expressions", "A title")
+    second = expressions.write_figure(said(), tmp_path / "two", "expressions", "A title")
     assert [path.name for path in first] == ["expressions.png", "expressions.svg"]
     for one, two in zip(first, second, strict=True):
         assert one.read_bytes() == two.read_bytes()
@@ -89,14 +89,14 @@ def test_the_figure_is_drawn_the_same_every_time(tmp_path):
 
 def test_no_words_give_an_empty_figure(tmp_path):
     pytest.importorskip("matplotlib")
-    assert expression_figure.write_figure((), tmp_path, "none", "Nothing")[0].exists()
+    assert expressions.write_figure((), tmp_path, "none", "Nothing")[0].exists()
 
 
 def test_a_folder_that_cannot_be_is_one_sentence(tmp_path):
     pytest.importorskip("matplotlib")
     (tmp_path / "file").touch()
     with pytest.raises(InvalidValueError, match="Cannot write"):
-        expression_figure.write_figure(said()[:5], tmp_path / "file" / "folder", "name", "title")
+        expressions.write_figure(said()[:5], tmp_path / "file" / "folder", "name", "title")
 
 
 def test_without_matplotlib_one_sentence_says_what_to_install(monkeypatch):

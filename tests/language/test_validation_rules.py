@@ -24,11 +24,11 @@ from roboirg.apps.language_lab.validation.episode_checks import (
 from roboirg.apps.language_lab.validation.validation_tables import validation_tables
 from roboirg.core.episode import SPLITS
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.plain_text import counted
 from roboirg.language import Utterance, expressible, instruct, instruct_with
 from roboirg.reader import interpret
 from roboirg.tasks import every_task, get_task
 from roboirg.tasks.splits.splits import SIZES, get_episode, slot_seed
-from roboirg.util.plain_text import counted
 
 EPISODE = get_episode("PickXtimes", "test", 3)
 

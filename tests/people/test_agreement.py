@@ -2,9 +2,13 @@
 
 import pytest
 
-from roboirg.apps.people.agreement import krippendorff_alpha, pairwise_agreement
 from roboirg.apps.people.listener_answers import AnswerUndone, PersonAnswered, PersonJoined
-from roboirg.apps.people.listener_tables import person_table, setting_table
+from roboirg.apps.people.listener_tables import (
+    krippendorff_alpha,
+    pairwise_agreement,
+    person_table,
+    setting_table,
+)
 
 # Krippendorff (2011), Computing Krippendorff's alpha-reliability, example C: four observers,
 # twelve units, some of them missing; nominal alpha 0.743.

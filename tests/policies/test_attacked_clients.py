@@ -18,7 +18,7 @@ from attackers import (
 from wire_servers import WireServer
 
 from roboirg.core.errors import PolicyServerError
-from roboirg.core.printable import printable
+from roboirg.core.plain_text import printable
 from roboirg.policies.remote.message_codec import CodecError, unpack
 from roboirg.policies.remote.message_size import MAX_DEPTH, MAX_ELEMENTS
 from roboirg.policies.vlm.model_content import ChatTurn

@@ -12,7 +12,7 @@ from planning_fakes import decoded
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import DemonstrationFrames
-from roboirg.policies.planners.keyframes import MAX_GAP, merge_keyframes
+from roboirg.policies.planners.memer import MAX_GAP, merge_keyframes
 from roboirg.policies.planners.observation_merging import (
     DemonstrationSubset,
     merge_cameras,

@@ -17,7 +17,7 @@ from roboirg.cli.options import (
     Stages,
     Wordings,
 )
-from roboirg.util.plain_text import counted
+from roboirg.core.plain_text import counted
 
 
 def doctor() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_type_hints
@@ -116,3 +117,8 @@ def check_output_file(path: Path) -> None:
     """
     if path.is_dir() or not path.parent.is_dir():
         raise InvalidValueError(f"{str(path)!r} is not a file in an existing folder.")
+
+
+def add_working_directory() -> None:
+    """Add the working directory to the import path, as `python -m` does."""
+    sys.path.insert(0, str(Path.cwd()))

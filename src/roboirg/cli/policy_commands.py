@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from roboirg.cli.import_path import add_working_directory
+from roboirg.cli.options import add_working_directory
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.util.web.connection_table import ConnectionLimits
 from roboirg.util.web.request_origin import LOOPBACK, LOOPBACK_NAMES

@@ -11,11 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from roboirg.cli import plan_options as options
-from roboirg.cli.import_path import add_working_directory
-from roboirg.cli.options import Workers, check_output_file, spread
+from roboirg.cli.options import Workers, add_working_directory, spread
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.core.printable import printable
-from roboirg.util.plain_text import counted
+from roboirg.core.plain_text import counted, printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -112,23 +110,6 @@ def merge(
             f"{first.outcome}.",
             err=True,
         )
-
-
-def export_records(
-    run: Folder,
-    out: Annotated[Path, typer.Option(help="Parquet file to write.")],
-) -> None:
-    """Export the records of a run as a Parquet table (columns: see docs/running.md)."""
-    from roboirg.evaluation.records.parquet import write_parquet
-    from roboirg.evaluation.records.record_codec import read_index_entry
-    from roboirg.evaluation.records.store import StoredRun
-    from roboirg.util.parquet_support import check_parquet_support
-
-    check_parquet_support()
-    check_output_file(out)
-    stored = StoredRun(folder_of(run), read_index_entry)
-    count = write_parquet(stored.records(stored.newest), out)
-    typer.echo(f"{counted(count, 'record')}: {out}")
 
 
 def folder_of(text: str) -> Path:

@@ -19,7 +19,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
-from roboirg.core.printable import printable
+from roboirg.core.plain_text import printable
 
 
 class RoboIRGError(Exception):

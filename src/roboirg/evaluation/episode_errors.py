@@ -15,9 +15,8 @@ from roboirg.core.errors import (
     RenderDeviceError,
     RoboIRGError,
 )
-from roboirg.core.printable import printable
+from roboirg.core.plain_text import clip_text, printable
 from roboirg.evaluation.records.record import ErrorKind
-from roboirg.util.plain_text import clip_text
 
 ErrorSource = Literal["policy", "environment"]
 

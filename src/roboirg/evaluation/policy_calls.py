@@ -13,8 +13,8 @@ from pydantic import JsonValue
 from roboirg.core.actions import ActionSpace, check_chunk
 from roboirg.core.errors import InvalidActionError, InvalidValueError
 from roboirg.core.observations import Observation
+from roboirg.core.plain_text import is_encodable
 from roboirg.policies.contract.base import Policy
-from roboirg.util.plain_text import is_encodable
 
 MAX_ROWS = 10_000
 """Most actions that a policy may return at once; an episode has 1300 steps."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,11 @@ from numpy.typing import NDArray
 
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Scene
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.core.observations import CAMERAS
 from roboirg.simulation import bodies, physics_settings
 from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.fact_detection import FactDetector
-from roboirg.simulation.fork_check import check_drawing_process
 from roboirg.simulation.motion_player import MotionContext, MotionPlayer
 from roboirg.simulation.panda import Panda
 from roboirg.simulation.rendering.render_device import render_system
@@ -114,3 +114,22 @@ class World:
         if self._cameras is None:
             raise InvalidValueError("This world was built without pictures (visible=False).")
         return self._cameras
+
+
+_drawing_processes: set[int] = set()
+"""This process, if it has drawn; after a fork, the parent."""
+
+
+def check_drawing_process() -> None:
+    """Remember that this process draws.
+
+    Raises:
+        RoboIRGError: a process from which it was forked had drawn.
+    """
+    if _drawing_processes - {os.getpid()}:
+        raise RoboIRGError(
+            "This process was forked from one that had drawn pictures, and the renderer's threads "
+            "do not survive that; start it otherwise, as with AsyncVectorEnv(..., "
+            "context='spawn') or roboirg.make_vec."
+        )
+    _drawing_processes.add(os.getpid())

@@ -25,6 +25,7 @@ from roboirg.core.episode import (
 )
 from roboirg.core.footprints import Obstacle, Region
 from roboirg.core.motions import Away, Motion, Vanish
+from roboirg.core.plain_text import counted
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
@@ -38,7 +39,6 @@ from roboirg.tasks.shared.fixtures import (
     draw_number,
 )
 from roboirg.tasks.task import Commands, Task, Wording
-from roboirg.util.plain_text import counted
 
 COLORS_PRESENT: dict[Difficulty, int] = {"easy": 1, "medium": 2, "hard": 3}
 CUBES: dict[Difficulty, tuple[int, int]] = {"easy": (4, 6), "medium": (8, 10), "hard": (10, 12)}

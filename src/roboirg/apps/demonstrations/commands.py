@@ -19,7 +19,7 @@ from roboirg.cli.options import (
     check_output_file,
     spread,
 )
-from roboirg.util.plain_text import counted
+from roboirg.core.plain_text import counted
 
 if TYPE_CHECKING:
     from roboirg.apps.demonstrations.export_plan import ExportPlan

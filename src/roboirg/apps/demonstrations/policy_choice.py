@@ -6,7 +6,7 @@ from roboirg.apps.demonstrations.export_plan import ORACLE, RecordingJob
 from roboirg.core.errors import MotionPlanningError
 from roboirg.envs.factory import make
 from roboirg.policies import Policy, make_policy, play
-from roboirg.policies.builtin.varied_oracle import VariedOraclePolicy
+from roboirg.policies.builtin.oracle_policy import VariedOraclePolicy
 
 MAX_DRAWS = 20
 """Seeds to try for a variation that succeeds."""

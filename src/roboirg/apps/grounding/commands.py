@@ -20,7 +20,7 @@ from roboirg.cli.options import (
     spread,
 )
 from roboirg.core.errors import InvalidValueError
-from roboirg.util.plain_text import counted
+from roboirg.core.plain_text import counted
 
 if TYPE_CHECKING:
     from roboirg.apps.grounding.answer_scores import GroundingScore

@@ -10,10 +10,10 @@ from pathlib import Path
 
 from roboirg.apps.grounding.answer_scores import GroundingScore, JudgedItem, hidden_fields
 from roboirg.apps.grounding.score_tables import QUESTIONS, breakdown_tables, score_table
+from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
 from roboirg.evaluation.analysis.tables.table import Column, Entry, Row, Table
 from roboirg.evaluation.grounding_items.verdicts import right_reply
-from roboirg.util.plain_text import counted
 
 NO_ANSWER = "no answer"
 MOST_MISTAKES = 40

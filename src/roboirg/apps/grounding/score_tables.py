@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
 
 from roboirg.apps.grounding.answer_scores import GroundingScore, ScoreRow, score_rows
+from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.stats.breakdowns import Breakdown, InstructionKey, Labels
 from roboirg.evaluation.analysis.stats.intervals import Interval
 from roboirg.evaluation.analysis.stats.option_labels import options_label
@@ -13,7 +14,6 @@ from roboirg.evaluation.analysis.stats.rates import p_text, points
 from roboirg.evaluation.analysis.tables.breakdown_table import make_breakdown_table
 from roboirg.evaluation.analysis.tables.table import NOT_APPLICABLE, Column, Entry, Row, Table
 from roboirg.evaluation.grounding_items.grounding_item import GroundingItem
-from roboirg.util.plain_text import counted
 
 COLUMNS = tuple(
     map(

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.util.plain_text import counted
+from roboirg.core.plain_text import counted
 
 
 def import_results(

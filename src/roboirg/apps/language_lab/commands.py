@@ -25,7 +25,7 @@ from roboirg.cli.options import (
     spread,
 )
 from roboirg.core.errors import InvalidValueError, RoboIRGError
-from roboirg.util.plain_text import counted
+from roboirg.core.plain_text import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -96,7 +96,7 @@ def stats(
     """Count words, referring expressions, patterns, relations and landmarks."""
     from roboirg.apps.language_lab.statistics_tables import overview_tables
     from roboirg.core.instruction_options import InstructionOptions
-    from roboirg.evaluation.analysis.figures.expression_figure import write_figure
+    from roboirg.evaluation.analysis.figures.expressions import write_figure
     from roboirg.evaluation.plan.plan_parsing import parse_splits
     from roboirg.language.variants import instructions
     from roboirg.tasks.splits.splits import split_episodes

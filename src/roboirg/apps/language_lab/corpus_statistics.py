@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple, cast
 
-from roboirg.evaluation.analysis.figures.expression_counts import ClassCounts
+from roboirg.evaluation.analysis.figures.expressions import ClassCounts
 from roboirg.language.instruction import Instruction
 from roboirg.language.token_counts import SHORT_LIMIT, USUAL_LIMIT, count_tokens
 

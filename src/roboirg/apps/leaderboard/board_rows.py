@@ -13,13 +13,12 @@ from roboirg.apps.leaderboard.pack_checks import PackCheck
 from roboirg.evaluation.analysis.published import MAX_STEPS, published_rows
 from roboirg.evaluation.analysis.stats.cells import Cells, PolicyRun, clustered_interval, gather
 from roboirg.evaluation.analysis.stats.intervals import SEED
-from roboirg.evaluation.analysis.stats.multiple_testing import holm
 from roboirg.evaluation.analysis.stats.option_labels import (
     has_default_options,
     setting_sort_key,
     words_label,
 )
-from roboirg.evaluation.analysis.stats.paired_tests import Pairs, measure_gap
+from roboirg.evaluation.analysis.stats.paired_tests import Pairs, holm, measure_gap
 from roboirg.evaluation.analysis.stats.run_summary import ALL as ALL_SCOPE
 from roboirg.evaluation.analysis.stats.run_summary import ScopeResults, group_by_scope
 from roboirg.evaluation.records.record import Job

@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboirg.cli.import_path import add_working_directory
-from roboirg.cli.options import Salt, Workers, check_output_file
+from roboirg.cli.options import Salt, Workers, add_working_directory, check_output_file
 from roboirg.cli.progress_bar import progress_bar
 from roboirg.cli.run_commands import USAGE_ERROR, Folder, folder_of, report_problems
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.printable import printable
-from roboirg.util.plain_text import counted
+from roboirg.core.plain_text import counted, printable
 
 if TYPE_CHECKING:
     from roboirg.apps.leaderboard.repeats import RepeatedEpisode

@@ -13,10 +13,10 @@ from roboirg.apps.leaderboard.record_check import ReplayVerdict
 from roboirg.apps.leaderboard.run_verification import Verification, verify_run
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
+from roboirg.core.plain_text import counted
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.tasks.splits.private_splits import MissingSaltError
 from roboirg.util.atomic_write import write_atomically
-from roboirg.util.plain_text import counted
 
 CHECKS_FILE = "checks.json"
 _BLOCK = 1 << 20

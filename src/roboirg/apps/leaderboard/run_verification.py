@@ -17,6 +17,7 @@ from roboirg.apps.leaderboard.record_check import (
 )
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.plain_text import counted
 from roboirg.evaluation.plan.plan import read_earlier_plans, read_plans
 from roboirg.evaluation.records.record_codec import EpisodeSummary, identity_key
 from roboirg.evaluation.records.store import StoredRun, read_summaries
@@ -24,7 +25,6 @@ from roboirg.language.generator import find_refusal
 from roboirg.tasks.splits.private_splits import check_salt
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.parallel_map import parallel_map
-from roboirg.util.plain_text import counted
 
 Progress = Callable[[int, int], object]
 

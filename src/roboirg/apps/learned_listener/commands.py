@@ -10,7 +10,7 @@ import typer
 
 from roboirg.cli.options import Settings, Tasks, Workers, check_output_file, spread
 from roboirg.core.errors import InvalidValueError
-from roboirg.util.plain_text import counted
+from roboirg.core.plain_text import counted
 
 if TYPE_CHECKING:
     from roboirg.apps.learned_listener.listener_training import TrainingPlan

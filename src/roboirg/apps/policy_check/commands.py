@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from roboirg.cli.import_path import add_working_directory
+from roboirg.cli.options import add_working_directory
 from roboirg.cli.policy_commands import PolicySpec, ProtocolHelpCommand
 from roboirg.cli.run_commands import USAGE_ERROR
 

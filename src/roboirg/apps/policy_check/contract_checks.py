@@ -29,6 +29,7 @@ from roboirg.apps.policy_check.synthetic_episodes import SyntheticEpisodes
 from roboirg.apps.policy_check.turn_check import largest_difference, play_in_turns
 from roboirg.core.actions import check_chunk
 from roboirg.core.errors import MissingDependencyError, RoboIRGError
+from roboirg.core.plain_text import counted
 from roboirg.policies.by_name.loading import needs_host
 from roboirg.policies.contract.base import tell_policy
 from roboirg.policies.contract.requirements import (
@@ -39,7 +40,6 @@ from roboirg.policies.contract.requirements import (
     wanted_depth,
     wanted_history,
 )
-from roboirg.util.plain_text import counted
 
 
 def check_loading(player: PolicyPlayer) -> Iterator[CheckResult]:

@@ -36,8 +36,8 @@ from roboirg.apps.policy_check.influence_checks import (
     check_video,
 )
 from roboirg.apps.policy_check.policy_player import PolicyPlayer
+from roboirg.core.plain_text import counted
 from roboirg.policies.contract.base import Policy
-from roboirg.util.plain_text import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -106,7 +106,7 @@ def print_check_results(results: list[CheckResult], console: Console) -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    from roboirg.core.printable import printable
+    from roboirg.core.plain_text import printable
 
     styles = {PASS: "green", FAIL: "bold red", WARN: "bold yellow", NOTE: "yellow"}
     table = Table(box=None, pad_edge=False)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboirg.util.plain_text import counted
+from roboirg.core.plain_text import counted
 
 if TYPE_CHECKING:
     from roboirg.apps.real.pages.operator_console import OperatorConsole

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from roboirg.apps.show.contact_sheet import SheetPanel, compose_sheet, evenly_spaced, write_png
-from roboirg.apps.show.key_events import KeyEvents
 from roboirg.core.episode import Episode
 from roboirg.core.errors import MotionPlanningError
+from roboirg.core.motions import Away, Motion, Swap
 from roboirg.core.observations import CAMERAS
 from roboirg.envs.factory import make
 from roboirg.judging import Status, plain_subgoal
@@ -138,3 +138,41 @@ def choose_moments(ranks: Sequence[int]) -> tuple[int, ...]:
         room = max(0, (MIN_MOMENTS if rank == _FILLER else MAX_MOMENTS) - len(chosen))
         chosen += [candidates[number] for number in evenly_spaced(len(candidates), room)]
     return tuple(sorted(chosen))
+
+
+class KeyEvents:
+    """Reports, step by step, the objects that move by themselves.
+
+    Args:
+        motions: scripted motions of the scene.
+    """
+
+    def __init__(self, motions: Sequence[Motion]) -> None:
+        self._swaps = [motion for motion in motions if isinstance(motion, Swap)]
+        self._appearances: dict[int, list[str]] = {}
+        for motion in motions:
+            if isinstance(motion, Away) and motion.under is None:
+                self._appearances.setdefault(motion.end + 1, []).append(motion.subject)
+        self._stage_starts: dict[int, int] = {}
+
+    def at(self, step: int, stage: int) -> str | None:
+        """Return the event after a control step, or None; call for every step.
+
+        Args:
+            step: control steps since reset.
+            stage: index of the current stage.
+        """
+        self._stage_starts.setdefault(stage, step)
+        for swap in self._swaps:
+            begin = 0 if swap.stage is None else self._stage_starts.get(swap.stage)
+            # Halfway, they are farthest from the straight line.
+            if begin is not None and step == begin + swap.start + swap.steps // 2 + 1:
+                return f"{_plain(swap.first)} and {_plain(swap.second)} change places"
+        names = self._appearances.get(step)
+        if not names:
+            return None
+        return f"{', '.join(map(_plain, names))} {'appears' if len(names) == 1 else 'appear'}"
+
+
+def _plain(name: str) -> str:
+    return name.replace("_", " ")

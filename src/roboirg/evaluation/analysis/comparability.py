@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from roboirg.core.episode import ENVIRONMENT_VERSION
+from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.published import MAX_STEPS, TRIALS, published_tasks
 from roboirg.evaluation.analysis.stats.cells import CellKey, CellResults, PolicyRun
 from roboirg.evaluation.analysis.stats.option_labels import words_label
 from roboirg.evaluation.records.record import DEFAULT_MESHES
 from roboirg.language.settings import EXPLICIT
 from roboirg.language.worded_command import ROBOMME_NAME
-from roboirg.util.plain_text import counted
 
 Differences = tuple[str, ...]
 """What differs from the published rate; empty if the two can be compared."""

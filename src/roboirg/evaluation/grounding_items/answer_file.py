@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.plain_text import clip_text
 from roboirg.evaluation.grounding_items.grounding_item import (
     QUESTION_KINDS,
     GroundingItem,
     QuestionKind,
 )
 from roboirg.util.atomic_write import write_atomically
-from roboirg.util.plain_text import clip_text
 
 _MAX_QUOTE = 60
 _FIELDS: dict[str, QuestionKind] = {"answer": "slots", "choice": "choice", "points": "points"}

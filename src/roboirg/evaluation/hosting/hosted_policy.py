@@ -22,6 +22,7 @@ from pydantic import JsonValue
 
 from roboirg.core.errors import MissingDependencyError
 from roboirg.core.observations import Demonstration, Observation
+from roboirg.core.plain_text import clip_text
 from roboirg.evaluation.episode_errors import (
     MAX_DETAILS_LENGTH,
     EpisodeError,
@@ -42,7 +43,6 @@ from roboirg.evaluation.hosting.payload import (
 from roboirg.evaluation.records.record import ERROR_KINDS
 from roboirg.policies.contract.policy_urls import is_url
 from roboirg.policies.contract.requirements import REQUIREMENTS
-from roboirg.util.plain_text import clip_text
 
 _DRAWN = ("_rgb", "_depth")
 """How the fields of a demonstration end that are drawn when they are read."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.core.plain_text import clip_text
 from roboirg.evaluation.hosting.host_process import MISSING
 from roboirg.evaluation.hosting.policy_child import ChildLostError, PolicyChild
 from roboirg.policies.by_name.loading import (
@@ -18,7 +19,6 @@ from roboirg.policies.prompt_length.declared_limit import (
     prompt_needs,
     prompt_needs_of,
 )
-from roboirg.util.plain_text import clip_text
 
 _MAX_LENGTH = 2000
 

@@ -27,6 +27,7 @@ from roboirg.core.observations import (
     check_demonstration_frames,
     check_observe_every,
 )
+from roboirg.core.plain_text import is_encodable
 from roboirg.core.word_pools import POOLS
 from roboirg.evaluation.hosting.host_pool import DEFAULT_BATCH, HostSettings
 from roboirg.evaluation.hosting.policy_descriptions import describe_policy
@@ -40,7 +41,6 @@ from roboirg.language.settings import EXPLICIT, all_settings
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.tasks.splits import splits
 from roboirg.tasks.splits.private_splits import MissingSaltError, is_private
-from roboirg.util.plain_text import is_encodable
 from roboirg.util.short_hash import short_hash
 
 REQUIRED = "required"

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import datetime as dt
+import functools
+import hashlib
 import importlib.metadata
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import zip_longest
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,7 +25,6 @@ from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.observations import DemonstrationSource
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_policy
-from roboirg.evaluation.play.code_fingerprint import code_fingerprint
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.play.prompt_shares import audit_job, audit_prompt
 from roboirg.evaluation.records.action_log import ActionLog
@@ -43,6 +45,7 @@ from roboirg.policies.by_name.loading import server_version
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.processor import processor_family
+from roboirg.util.short_hash import DIGITS
 
 UNDECLARED: PromptVerdict = "unknown"
 """Verdict on the prompts of a policy that declares no limit."""
@@ -298,3 +301,14 @@ def _attribution(
 def utc_now() -> str:
     """Return the time in ISO 8601, to the second."""
     return dt.datetime.now(dt.UTC).isoformat(timespec="seconds")
+
+
+@functools.cache
+def code_fingerprint() -> str:
+    """Return a shortened SHA-256 of the names and bytes of the package's Python files."""
+    digest = hashlib.sha256()
+    root = Path(__file__).parents[2]
+    for path in sorted(root.rglob("*.py")):
+        digest.update(f"{path.relative_to(root).as_posix()}\0".encode())
+        digest.update(path.read_bytes() + b"\0")
+    return digest.hexdigest()[:DIGITS]

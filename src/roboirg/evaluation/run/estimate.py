@@ -7,10 +7,10 @@ from collections.abc import Iterable, Mapping
 from statistics import fmean
 from typing import NamedTuple
 
+from roboirg.core.plain_text import counted
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.record_codec import RecordIndexEntry
 from roboirg.evaluation.run.world_speed import WorldSpeed
-from roboirg.util.plain_text import counted
 
 ORACLE_STEPS = 236
 """Mean control steps of the oracle over the test split."""

@@ -13,9 +13,8 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
-from roboirg.core.printable import printable
+from roboirg.core.plain_text import counted, printable
 from roboirg.evaluation.records.record import Record
-from roboirg.util.plain_text import counted
 
 _MINUTE = 60
 

@@ -25,6 +25,7 @@ from typing import Any, NamedTuple, Protocol, Self, cast, runtime_checkable
 
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.extras import extra_needed
+from roboirg.core.plain_text import counted
 from roboirg.evaluation.episode_errors import format_cause
 from roboirg.evaluation.hosting.host_pool import (
     HostAddress,
@@ -38,7 +39,6 @@ from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.run.executor import NO_TIMEOUT_S
 from roboirg.evaluation.run.workers import MAX_FAILED_STARTS, WorkerSlot
 from roboirg.tasks.splits.private_splits import known_salt, use_salt
-from roboirg.util.plain_text import counted
 
 POLL_S = 1.0
 NO_CPU_TIMEOUT_S = 300.0

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.plain_text import counted
 from roboirg.evaluation.episode_errors import MAX_CAUSE_LENGTH, format_cause
 from roboirg.evaluation.hosting.policy_descriptions import describe_policy
 from roboirg.evaluation.plan.plan import Plan, write_plan
@@ -32,7 +33,6 @@ from roboirg.evaluation.run.executor import Executor
 from roboirg.evaluation.run.progress import Reporter, SilentReporter
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.tasks.splits.splits import get_episode
-from roboirg.util.plain_text import counted
 
 UNREACHABLE_AFTER = 20
 """After this many consecutive connection errors, skip the rest of this policy."""

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.plain_text import clip_text
 from roboirg.policies.by_name import policy_specs
 from roboirg.policies.by_name.policy_classes import (
     BUILTIN,
@@ -18,7 +19,6 @@ from roboirg.policies.by_name.policy_classes import (
 from roboirg.policies.by_name.systems import find_system
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.policy_urls import is_url, parse_query
-from roboirg.util.plain_text import clip_text
 from roboirg.util.short_hash import short_hash
 
 _MAX_VERSION_LENGTH = 200

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 from pydantic import BaseModel, Field
 
 from roboirg.core.observations import Demonstration, Observation
-from roboirg.policies.planners.keyframes import MAX_GAP, merge_keyframes
 from roboirg.policies.planners.points import parse_boxes
 from roboirg.policies.planners.qwen import VIDEO_FRAMES
 from roboirg.policies.planners.vlm_planner import (
@@ -24,6 +23,8 @@ from roboirg.util.media import Clip, Picture, Pixels
 
 RECENT = 8
 STRIDE = 2
+MAX_GAP = 8
+"""Largest gap between neighbors of a group, control steps (MME-VLA; a comment there says 10)."""
 
 
 class MemerOptions(VLMPlannerOptions):
@@ -156,3 +157,22 @@ def _parser(count: int) -> Callable[[str], KeyframeChoice]:
         return KeyframeChoice(subgoal, tuple(positions))
 
     return parse
+
+
+def merge_keyframes(steps: Iterable[int], near: int = MAX_GAP) -> tuple[int, ...]:
+    """Replace each group of near steps by its middle one, of two the later.
+
+    Args:
+        steps: of the frames, in any order, possibly repeated.
+        near: largest gap between neighbors of a group.
+
+    Returns:
+        Some of `steps`, ascending.
+    """
+    groups: list[list[int]] = []
+    for step in sorted(set(steps)):
+        if groups and step - groups[-1][-1] <= near:
+            groups[-1].append(step)
+        else:
+            groups.append([step])
+    return tuple(group[len(group) // 2] for group in groups)

@@ -25,6 +25,7 @@ from roboirg.apps.language_lab.robomme.template_search import find_templates
 from roboirg.apps.language_lab.robomme.wording_writer import wording_text
 from roboirg.apps.language_lab.validation.episode_checks import check_episode
 from roboirg.core.episode import DIFFICULTIES, Episode, Goal, Split
+from roboirg.core.plain_text import counted
 from roboirg.language.settings import EXPLICIT, settings_of
 from roboirg.language.worded_command import (
     ROBOMME_NAME,
@@ -40,7 +41,6 @@ from roboirg.reader import interpret
 from roboirg.tasks import Task, all_tasks
 from roboirg.tasks.splits.published_episodes import published_episode
 from roboirg.tasks.splits.splits import SIZES
-from roboirg.util.plain_text import counted
 
 SPLIT: Split = "train"
 READ_SCENES = 8

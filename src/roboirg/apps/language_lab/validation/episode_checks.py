@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import functools
+from collections import Counter
 from collections.abc import Callable, Iterator
 
 from roboirg.apps.language_lab.validation.leaks import find_leaks
-from roboirg.apps.language_lab.validation.necessity import only_candidate
 from roboirg.apps.language_lab.validation.pairing import unpaired
 from roboirg.apps.language_lab.validation.validation_results import (
     CommandGroup,
@@ -16,7 +16,7 @@ from roboirg.apps.language_lab.validation.validation_results import (
     SceneGroup,
     ValidationResults,
 )
-from roboirg.core.episode import Episode
+from roboirg.core.episode import Episode, Goal
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.generator import expressible, find_refusal, instruct_with
 from roboirg.language.instruction import Instruction
@@ -146,3 +146,27 @@ def _add_violations(
         RuleViolation(rule, episode.task, setting, episode.key, episode.seed, words)
         for rule, words in violations
     ]
+
+
+_NUMBER_SLOTS = ("repeats", "counts")
+
+
+def only_candidate(episode: Episode, instruction: Instruction) -> bool:
+    """Return whether the scene leaves one goal with the numbers that the command states.
+
+    It does if all cubes have the same color. In BinFill it also does if only one choice of colors
+    has enough cubes, or if the goal wants all colors in equal numbers.
+    """
+    if not all_settings()[instruction.setting].hides_only_color(instruction):
+        return False
+    candidates = get_task(episode.task).goals(episode.scene)
+    wanted = _numbers(episode.goal)
+    return sum(_numbers(goal) == wanted for goal in candidates) == 1
+
+
+def _numbers(goal: Goal) -> Counter[int]:
+    found: Counter[int] = Counter()
+    for slot, value in goal.slots:
+        if slot in _NUMBER_SLOTS:
+            found.update(goal.numbers(slot) if isinstance(value, tuple) else [goal.number(slot)])
+    return found

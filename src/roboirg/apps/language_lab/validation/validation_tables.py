@@ -14,9 +14,9 @@ from roboirg.apps.language_lab.validation.validation_results import (
     ValidationResults,
 )
 from roboirg.core.episode import DIFFICULTIES
+from roboirg.core.plain_text import counted
 from roboirg.language.settings import setting_names
 from roboirg.tasks import every_task
-from roboirg.util.plain_text import counted
 
 Group = TypeVar("Group", CommandGroup, SceneGroup)
 

@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING
 
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.figures.figure_data import FigureData, summaries_by_key
 from roboirg.evaluation.analysis.figures.figure_style import (
     GHOST,
@@ -19,7 +20,6 @@ from roboirg.evaluation.analysis.published import published_rows
 from roboirg.evaluation.analysis.stats.cells import Cells, PolicyRun
 from roboirg.evaluation.analysis.stats.option_labels import has_default_options, setting_sort_key
 from roboirg.evaluation.analysis.stats.run_summary import ALL, ScopeKey
-from roboirg.util.plain_text import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from roboirg.core.fact_traits import fact_traits
+from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.page.episode_videos import EpisodeVideo
 from roboirg.evaluation.analysis.page.reconstruction import names_of, stages_of
 from roboirg.evaluation.analysis.stats.option_labels import words_label
 from roboirg.evaluation.records.record import EventRecord, Record
 from roboirg.language.settings import EXPLICIT
-from roboirg.util.plain_text import counted
 
 EMBEDDED = "#"
 """Stands for a video that is part of the page."""

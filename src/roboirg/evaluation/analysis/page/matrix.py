@@ -9,6 +9,7 @@ import numpy as np
 
 from roboirg.core.episode import DIFFICULTIES
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.page.columns import setting_label
 from roboirg.evaluation.analysis.page.entries import EpisodeEntries, gather_run
 from roboirg.evaluation.analysis.stats.cells import (
@@ -29,7 +30,6 @@ from roboirg.evaluation.analysis.stats.run_summary import (
     summarize,
 )
 from roboirg.tasks import all_tasks
-from roboirg.util.plain_text import counted
 
 
 class MatrixRow(NamedTuple):

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.page.entries import EpisodeEntries, Run
 from roboirg.evaluation.analysis.stats.cells import FAIRNESS, EvalConditions, PolicyRun, Versions
 from roboirg.evaluation.analysis.stats.comparison import compare
@@ -18,7 +19,6 @@ from roboirg.evaluation.analysis.stats.heard_rates import count_heard, heard_not
 from roboirg.evaluation.analysis.stats.intervals import SEED
 from roboirg.language.settings import EXPLICIT
 from roboirg.tasks.splits.private_splits import SALT_VARIABLE, MissingSaltError, check_salt
-from roboirg.util.plain_text import counted
 
 MAX_COMPARISONS = 6
 """Pairs of policies that are compared in words."""

@@ -15,9 +15,8 @@ from roboirg.evaluation.analysis.stats.cells import (
     clustered_interval,
 )
 from roboirg.evaluation.analysis.stats.intervals import Interval
-from roboirg.evaluation.analysis.stats.multiple_testing import holm
 from roboirg.evaluation.analysis.stats.option_labels import REFERENCE, options_sort_key
-from roboirg.evaluation.analysis.stats.paired_tests import Gap, measure_gap
+from roboirg.evaluation.analysis.stats.paired_tests import Gap, holm, measure_gap
 from roboirg.evaluation.analysis.stats.run_summary import ALL, ScopeResults, group_by_scope
 
 

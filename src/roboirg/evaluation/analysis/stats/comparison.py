@@ -13,9 +13,8 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.stats.breakdowns import Labels, cells_by_label
 from roboirg.evaluation.analysis.stats.cells import FAIRNESS, CellResults, Cells, PolicyRun
 from roboirg.evaluation.analysis.stats.intervals import ALPHA
-from roboirg.evaluation.analysis.stats.multiple_testing import holm
 from roboirg.evaluation.analysis.stats.option_labels import REFERENCE, options_sort_key
-from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, measure_gap
+from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, holm, measure_gap
 from roboirg.evaluation.analysis.stats.power import episodes_needed, smallest_gap
 
 Verdict = Literal["first", "second", "open"]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 
+from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.stats.comparison import Comparison, ComparisonResult
 from roboirg.evaluation.analysis.stats.flips import Flips
 from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.analysis.stats.power import MAX_EPISODES, POWER
 from roboirg.evaluation.analysis.stats.rates import p_text, points
-from roboirg.util.plain_text import counted
 
 
 def sentences(

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.plain_text import counted
 from roboirg.core.word_pools import POOLS
 from roboirg.language import STAGE_SETS
 from roboirg.language.settings import EXPLICIT, all_settings, setting_names
-from roboirg.util.plain_text import counted
 
 REFERENCE = InstructionOptions(EXPLICIT)
 """The options that every gap refers to."""

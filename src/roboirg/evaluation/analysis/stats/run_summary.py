@@ -23,12 +23,12 @@ from roboirg.evaluation.analysis.stats.cells import (
     clustered_interval,
 )
 from roboirg.evaluation.analysis.stats.intervals import Interval
-from roboirg.evaluation.analysis.stats.multiple_testing import holm
 from roboirg.evaluation.analysis.stats.option_labels import REFERENCE
 from roboirg.evaluation.analysis.stats.paired_tests import (
     Gap,
     Overlap,
     Pairs,
+    holm,
     measure_gap,
     pooled_overlap,
 )

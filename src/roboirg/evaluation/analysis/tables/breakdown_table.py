@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.stats.breakdown_rows import BreakdownRow, break_down
 from roboirg.evaluation.analysis.stats.breakdowns import UNKNOWN, Breakdown, Labels
 from roboirg.evaluation.analysis.stats.cells import (
@@ -26,7 +27,6 @@ from roboirg.evaluation.analysis.tables.table import (
     Row,
     Table,
 )
-from roboirg.util.plain_text import counted
 
 COLUMNS = tuple(map(Column, ("episodes", "success", "gap", "95 % interval", "p")))
 

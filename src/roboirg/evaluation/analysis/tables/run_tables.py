@@ -10,7 +10,7 @@ from rich.table import Table as Grid
 from rich.text import Text
 
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.printable import printable
+from roboirg.core.plain_text import counted, printable
 from roboirg.evaluation.analysis.comparability import (
     AllDifferences,
     comparison_notes,
@@ -47,7 +47,6 @@ from roboirg.evaluation.analysis.tables.table_notes import where_played
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.record_codec import AnyResult
 from roboirg.util.console_width import line_width, widen
-from roboirg.util.plain_text import counted
 
 NO_GAP = "–"
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.comparability import AllDifferences, comparison_notes
 from roboirg.evaluation.analysis.published import TRIALS, RateTable
 from roboirg.evaluation.analysis.stats.cells import (
@@ -29,7 +30,6 @@ from roboirg.evaluation.analysis.tables.table import (
     Entry,
     Row,
 )
-from roboirg.util.plain_text import counted
 
 RATES_NOTE = (
     "Success rate in percent, the mean over policy seeds; averages are unweighted means over tasks."

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from roboirg.core.actions import JOINT_ANGLE, check_chunk, find_action_space
 from roboirg.core.errors import InvalidActionError, PolicyReplyError
 from roboirg.core.observations import CAMERAS, Demonstration, Observation
-from roboirg.core.printable import printable
+from roboirg.core.plain_text import printable
 from roboirg.policies.contract.policy_urls import read_options, split_url
 from roboirg.policies.remote.client.server_session import ServerSession
 from roboirg.policies.remote.endpoints import RemoteOptions, read_endpoints

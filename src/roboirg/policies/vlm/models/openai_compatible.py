@@ -14,9 +14,13 @@ from roboirg.core.errors import (
 )
 from roboirg.core.extras import extra_needed
 from roboirg.policies.vlm.model_content import ChatTurn, Part
-from roboirg.policies.vlm.models.bounded_wait import call_with_timeout, timeout_error
 from roboirg.policies.vlm.models.model import ModelOptions, ModelQuery, ModelReply
-from roboirg.policies.vlm.models.response_limits import PLAIN_HEADERS, limit_response
+from roboirg.policies.vlm.models.response_limits import (
+    PLAIN_HEADERS,
+    call_with_timeout,
+    limit_response,
+    timeout_error,
+)
 from roboirg.util.media import Clip, Picture, encode_png, sample_evenly
 
 OPENAI = "https://api.openai.com/v1"

@@ -1,14 +1,18 @@
-"""Size limits of the responses that the providers' client libraries read.
+"""Limits of the responses that the providers' client libraries read: their size and their time.
 
-The libraries have none, and unpack whatever is compressed. Both HTTP libraries that they use,
-httpx and httpx2, call a hook with each response before its body is read.
+The libraries have no limit of size, and unpack whatever is compressed. Both HTTP libraries that
+they use, httpx and httpx2, call a hook with each response before its body is read.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future
+from typing import Any, TypeVar
 
+from roboirg.core.errors import PolicyTimeoutError
+from roboirg.core.waiting import waiting
 from roboirg.policies.remote.endpoints import MIB
 
 MAX_RESPONSE_BYTES = 64 * MIB
@@ -39,3 +43,38 @@ def limit_response(response: Any) -> None:  # noqa: ANN401 - of either library
     # The libraries check the class, and each has its own.
     limited = {"__iter__": pieces, "close": lambda _self: stream.close()}
     response.stream = type("LimitedStream", (base,), limited)()
+
+
+Value = TypeVar("Value")
+
+
+def call_with_timeout(seconds: float, call: Callable[[], Value], what: str) -> Value:
+    """Return the result of a call, if it comes in time.
+
+    The limits of HTTP clients apply to single reads; this one applies to the whole reply. A call
+    that takes longer continues in a daemon thread.
+
+    Raises:
+        PolicyTimeoutError: it does not; the message names `what`.
+    """
+    future: Future[Value] = Future()
+
+    def work() -> None:
+        try:
+            future.set_result(call())
+        except BaseException as error:  # noqa: BLE001 - raised again in the waiting thread
+            future.set_exception(error)
+
+    threading.Thread(target=work, daemon=True, name=f"query of {what}").start()
+    try:
+        with waiting(f"the reply of {what}"):
+            return future.result(timeout=seconds)
+    except TimeoutError:
+        if future.done():  # raised by the call
+            raise
+        raise timeout_error(what, seconds) from None
+
+
+def timeout_error(what: str, seconds: float) -> PolicyTimeoutError:
+    """Return the error for a reply that took too long."""
+    return PolicyTimeoutError(f"{what} did not answer within {seconds:g} s.")
