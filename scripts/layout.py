@@ -1,11 +1,8 @@
-"""Print the figures of the package's layout, read from its imports; with --out, draw it.
+"""Print the figures of the package's layout, read from its imports.
 
 A room is a folder or module at the top of `src/roboirg`; an arrow says that one room imports
 another, at any level of nesting. Inside a room, an import runs back up where folders or files
-import each other in a circle.
-
-    python scripts/layout.py
-    python scripts/layout.py --out docs/images/layout.svg
+import each other in a circle. `scripts/draw_layout.py` draws the rooms.
 """
 
 from __future__ import annotations
@@ -179,7 +176,7 @@ def imports_between_applications() -> list[Import]:
         one
         for one in imports()
         if _within(one.source, APPS)
-        and _within(one.target, f"{APPS}")
+        and _within(one.target, APPS)
         and _child(one.source, APPS) != _child(one.target, APPS)
     ]
 
@@ -231,3 +228,16 @@ def lines_by_room() -> dict[str, int]:
     for name in modules():
         found[room_of(name)] += lines_of(name)
     return dict(sorted(found.items(), key=lambda one: -one[1]))
+
+
+def main() -> None:
+    """Print the figures, then the lines of each room."""
+    for name, count in figures().items():
+        print(f"{count:>7,} {name}")
+    print("\nlines by room")
+    for room, count in lines_by_room().items():
+        print(f"{count:>7,} {room}")
+
+
+if __name__ == "__main__":
+    main()

@@ -7,6 +7,7 @@ import tokenize
 from collections import defaultdict
 from pathlib import Path
 
+import draw_layout
 import layout
 import pytest
 
@@ -99,6 +100,22 @@ def imported_below(room):
         reached |= new
         left += new
     return reached
+
+
+def test_records_are_read_without_tasks_or_words():
+    folder = "roboirg.evaluation.records"
+    found = [
+        f"{one.source} imports {one.target}"
+        for one in layout.imports()
+        if one.source.startswith(folder) and not one.target.startswith(folder)
+        if layout.room_of(one.target) not in ("core", "util")
+    ]
+    check_empty(found)
+
+
+def test_the_picture_of_the_layout_is_up_to_date():
+    drawn = draw_layout.FILE.read_text(encoding="utf-8")
+    assert drawn == draw_layout.picture(), "draw it anew: python scripts/draw_layout.py"
 
 
 def test_nothing_below_the_environments_imports_gymnasium():

@@ -1,4 +1,4 @@
-"""The ``roboirg`` command.
+"""The ``roboirg`` command: the commands of `cli`, and those of the applications.
 
 Exit codes: 0 success; 2 invalid usage, or episodes ended in errors (one sentence on stderr);
 130 stopped by Ctrl-C, 143 by SIGTERM.

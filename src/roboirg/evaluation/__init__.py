@@ -1,1 +1,1 @@
-"""Evaluation: plans, rollouts and the runner that stores their records."""
+"""Plans, runs and records of episodes, and all that follows from records."""
