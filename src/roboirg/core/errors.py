@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 
 from roboirg.core.plain_text import printable
@@ -41,6 +40,8 @@ class UnknownNameError(InvalidValueError):
 
     def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
         names = list(known)
+        import difflib  # here, because only a mistake needs it
+
         close = difflib.get_close_matches(
             str(name).lower(), [known_name.lower() for known_name in names], n=1
         )

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
-import shlex
-import shutil
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -53,6 +50,10 @@ def install_command(extra: str) -> str:
 
 def _pip() -> str:
     """Return ``pip`` if the shell's belongs to this Python, otherwise the long form."""
+    # Imported here, as in the next function: only a failed import needs them.
+    import shlex
+    import shutil
+
     found = shutil.which("pip")
     if found and Path(found).parent == Path(sys.executable).parent:
         return "pip"
@@ -61,7 +62,7 @@ def _pip() -> str:
 
 def _origin() -> str | None:
     """Return the address that pip noted when it did not install from an index (PEP 610)."""
-    # Imported here, because it takes longer than all of `roboirg.core`.
+    import json
     from importlib import metadata
 
     try:

@@ -8,8 +8,6 @@ site's.
 
 from __future__ import annotations
 
-import ipaddress
-import socket
 from collections.abc import Collection, Sequence
 from urllib.parse import urlsplit
 
@@ -42,11 +40,15 @@ def is_own_host(host: str, names: Collection[str]) -> bool:
 
 def names_of_this_machine() -> frozenset[str]:
     """Return the names under which clients reach this machine; a network may have more."""
+    import socket  # here, because `roboirg --help` needs the names of loopback only
+
     name = socket.gethostname().lower()
     return frozenset({*LOOPBACK_NAMES, name, name.partition(".")[0]})
 
 
 def _is_address(name: str) -> bool:
+    import ipaddress
+
     try:
         ipaddress.ip_address(name)
     except ValueError:
