@@ -1,11 +1,13 @@
-"""Shared by all tests: Hypothesis's profile, no cache but a test's own, Ctrl-C, a browser."""
+"""Shared by all tests: Hypothesis's profile, a cache that starts empty, Ctrl-C, a browser."""
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 import signal
 import subprocess
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
@@ -20,18 +22,50 @@ settings.register_profile(
 )
 settings.load_profile("roboirg")
 
-# What an earlier version left in the user's cache must not decide a test.
-os.environ["ROBOIRG_CACHE"] = "off"
+# One thread draws, as in the worker processes of a run: several workers test side by side.
+os.environ.setdefault("LP_NUM_THREADS", "1")
 
 # A shell starts background jobs with SIGINT ignored, which programs under test would inherit.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+MARKERS = ("slow", "sim", "browser")
+"""Those by which scripts/test_costs.py groups tests."""
 
 OpenPage = Callable[..., AbstractContextManager[Any]]
 
 WAIT_S = 300.0
 """Time limit of every wait for a browser, a server or a process, long enough for a busy machine."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Give the processes of a session one cache.
+
+    It starts empty: what an earlier version left must not decide a test.
+    """
+    if not hasattr(config, "workerinput"):  # pytest-xdist's workers inherit it
+        folder = tempfile.TemporaryDirectory(prefix="roboirg-tests-", ignore_cleanup_errors=True)
+        os.environ["ROBOIRG_CACHE"] = folder.name
+        config.add_cleanup(folder.cleanup)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Note the markers of each test in the JUnit XML."""
+    for item in items:
+        found = [name for name in MARKERS if item.get_closest_marker(name) is not None]
+        item.user_properties.append(("markers", " ".join(found)))
+
+
+def pytest_collection_finish() -> None:
+    """Spare the garbage collector what stays until the end: all tests and their modules."""
+    gc.freeze()
+
+
+@pytest.fixture
+def without_cache(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For what must be made twice to be compared, or from nothing."""
+    monkeypatch.setenv("ROBOIRG_CACHE", "off")
 
 
 @pytest.fixture(scope="session")

@@ -22,6 +22,7 @@ pytestmark = pytest.mark.sim
 EPISODE = ("VideoUnmask", "train", 0)
 
 
+@pytest.mark.usefixtures("without_cache")
 def test_pictures_are_the_simulators_bit_for_bit_and_actions_replay(tmp_path):
     """The same actions in a new world lead to the same pictures, states and verdict."""
     path, episode = tmp_path / "one.zip", get_episode(*EPISODE)

@@ -139,6 +139,7 @@ def kill_in_the_middle(folder: Path, *words: str) -> None:
     child.wait()
 
 
+@pytest.mark.usefixtures("without_cache")
 def test_workers_and_kills_leave_no_trace_in_the_records(tmp_path: Path) -> None:
     folders = [tmp_path / name for name in ("one", "two", "killed")]
     words = [

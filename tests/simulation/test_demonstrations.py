@@ -24,7 +24,7 @@ from roboirg.simulation.video import demonstration_cache, frame_sequence
 from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 
-pytestmark = pytest.mark.sim
+pytestmark = [pytest.mark.sim, pytest.mark.usefixtures("without_cache")]
 
 VIDEO_TASKS = tuple(task for task in all_tasks() if get_episode(task, "test", 0).demonstration)
 SHORT = "VideoUnmask"
