@@ -3,10 +3,10 @@
 PYTHON := .venv/bin/python
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test integrations lint docs demo card clean
+.PHONY: help setup test test-slow test-all integrations lint docs demo card clean
 
 help: ## list the targets
-	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 21
 
 setup: ## make .venv and see to a Vulkan driver; quick when there is nothing to do
 	@scripts/setup
@@ -16,9 +16,18 @@ lint: setup ## ruff and mypy
 	$(PYTHON) -m ruff format --check .
 	$(PYTHON) -m mypy
 
-# Two workers: every one that renders takes a core and 0.5 GiB.
-test: lint ## lint, then every test
-	$(PYTHON) -m pytest -n 2
+# Two workers: every one that renders takes a core and 0.5 GiB. What the tests of a file make for
+# all of them is made once. scripts/test_costs.py reads the report.
+PYTEST = $(PYTHON) -m pytest -n 2 --dist loadfile --junitxml build/$@.xml
+
+test: lint ## lint, then every test but the slow ones
+	$(PYTEST) -m "not slow"
+
+test-slow: setup ## the slow tests alone
+	$(PYTEST) -m slow
+
+test-all: lint ## lint, then every test
+	$(PYTEST)
 
 integrations: ## the plug-ins in the real LeRobot, vla-eval and Inspect, in environments of their own
 	@scripts/test-integrations
