@@ -35,20 +35,23 @@ from wire_episode import INSTRUCTION, moment, video
 def peak():
     return int(open("/proc/self/status").read().split("VmHWM:")[1].split()[0]) // 1024
 
-before, found = peak(), ["no error", ""]
-try:
-    policy = make_policy(sys.argv[1], 0)
+before = peak()
+for line in sys.stdin:
+    bad, good = line.split()
+    found = ["no error", ""]
+    try:
+        policy = make_policy(bad, 0)
+        policy.reset(INSTRUCTION, video(0))
+        policy.act(moment(0, history=()))
+    except Exception as error:
+        found = [type(error).__name__, str(error)]
+    finally:
+        policy.close()
+    took = peak() - before
+    policy = make_policy(good, 0)
     policy.reset(INSTRUCTION, video(0))
-    policy.act(moment(0, history=()))
-except Exception as error:
-    found = [type(error).__name__, str(error)]
-finally:
+    print(json.dumps([*found, took, len(policy.act(moment(0, history=())))]), flush=True)
     policy.close()
-print(json.dumps([*found, peak() - before]))
-policy = make_policy(sys.argv[2], 0)
-policy.reset(INSTRUCTION, video(0))
-print(len(policy.act(moment(0, history=()))))
-policy.close()
 """
 
 
@@ -64,13 +67,15 @@ class Served:
     def __init__(self, process, url):
         self.process, self.url = process, url
         self.port = int(url.rsplit(":", 1)[1])
+        self._first_peak = self.status("VmHWM")
 
     def status(self, name):
         with open(f"/proc/{self.process.pid}/status") as file:  # noqa: PTH123
             return int(file.read().split(f"{name}:")[1].split()[0])
 
-    def peak_mib(self):
-        return self.status("VmHWM") // 1024
+    def grown_mib(self):
+        """The most memory, MiB, that the process has taken since it began to serve."""
+        return (self.status("VmHWM") - self._first_peak) // 1024
 
     def is_healthy(self):
         address = f"http://127.0.0.1:{self.port}/healthz"
@@ -142,19 +147,40 @@ def answering(answer):
         thread.join()
 
 
-def attacked(url, good):
-    """Play an episode at a bad server and then one at a good one, in a process of its own.
+class Attacked:
+    """Clients in a process of its own, which outlives all attacks."""
 
-    Returns the first one's error, its message, and the memory that it took, MiB.
-    """
-    done = subprocess.run(
-        [sys.executable, "-c", CLIENT, url, good],
-        capture_output=True, text=True, timeout=PATIENCE, env=environment(), check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    first, rows = done.stdout.splitlines()
-    assert int(rows) > 0
-    return json.loads(first)
+    def __init__(self, process):
+        self.process = process
+
+    def play(self, bad, good):
+        """Play an episode at a bad server and then one at a good one.
+
+        Returns the first one's error, its message, and the most memory, MiB, that the process has
+        taken since it began.
+        """
+        impatient = threading.Timer(PATIENCE, self.process.kill)
+        impatient.start()
+        print(bad, good, file=self.process.stdin, flush=True)
+        line = self.process.stdout.readline()
+        impatient.cancel()
+        assert line, f"the client has ended with {self.process.wait()}"
+        *found, rows = json.loads(line)
+        assert rows > 0
+        return found
+
+
+@contextmanager
+def attacked():
+    """Yield clients to be attacked; their errors are printed."""
+    with subprocess.Popen(
+        [sys.executable, "-c", CLIENT],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment(),
+    ) as process:  # fmt: skip
+        try:
+            yield Attacked(process)
+        finally:
+            process.kill()
 
 
 def read_head(peer):

@@ -201,25 +201,31 @@ def good():
         yield f"openpi://{server.place}"
 
 
+@pytest.fixture(scope="module")
+def clients():
+    with attacked() as found:
+        yield found
+
+
 @pytest.mark.parametrize("attack", WEBSOCKET, ids=[one[0] for one in WEBSOCKET])
-def test_a_bad_websocket_server_is_an_error_in_time_and_within_memory(attack, good):
-    check(attack, "openpi", good)
+def test_a_bad_websocket_server_is_an_error_in_time_and_within_memory(attack, clients, good):
+    check(attack, "openpi", clients, good)
 
 
 @pytest.mark.parametrize("attack", WEBSOCKET[:1], ids=["maps"])
-def test_a_bad_model_server_of_vla_eval_is_an_error_within_memory(attack, good):
-    check(attack, "vla-eval", good)
+def test_a_bad_model_server_of_vla_eval_is_an_error_within_memory(attack, clients, good):
+    check(attack, "vla-eval", clients, good)
 
 
 @pytest.mark.parametrize("attack", HTTP, ids=[one[0] for one in HTTP])
-def test_a_bad_http_server_is_an_error_in_time_and_within_memory(attack, good):
-    check(attack, "challenge+http", good)
+def test_a_bad_http_server_is_an_error_in_time_and_within_memory(attack, clients, good):
+    check(attack, "challenge+http", clients, good)
 
 
-def check(attack, scheme, good):
+def check(attack, scheme, clients, good):
     _, answer, options, kind, words = attack
     with answering(answer) as place:
-        error, message, mib = attacked(f"{scheme}://{place}{options}", good)
+        error, message, mib = clients.play(f"{scheme}://{place}{options}", good)
     if options == QUICK:  # on a loaded machine even the connection may take too long
         assert error in (TIMEOUT, CONNECTION)
         assert words in message or "tried for 1 s" in message

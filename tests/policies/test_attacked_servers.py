@@ -4,6 +4,7 @@ import contextlib
 import struct
 import threading
 import time
+from functools import cache
 from types import SimpleNamespace
 
 import httpx
@@ -33,6 +34,36 @@ from roboirg.util.web.connection_table import ConnectionLimits, ConnectionTable
 GIB = 1 << 30
 SCHEMES = [scheme for scheme, protocol in protocols_by_scheme().items() if protocol.service]
 WEBSOCKETS = [scheme for scheme in SCHEMES if "http" not in scheme]
+FAMILIES = ("openpi", "challenge+http")
+"""One protocol on websockets and one on HTTP: others share the code that listens and reads."""
+ALL_SCHEMES = [
+    pytest.param(scheme, marks=[] if scheme in FAMILIES else pytest.mark.slow) for scheme in SCHEMES
+]
+
+
+@pytest.fixture(scope="module")
+def shared():
+    """Return a function that serves a protocol with options, once for all tests."""
+    with contextlib.ExitStack() as stack:
+
+        @cache
+        def serve(scheme, *options, **variables):
+            return stack.enter_context(serving(scheme, *options, **variables))
+
+        yield serve
+
+
+def locked(shared, scheme):
+    return shared(scheme, "--api-key-env", "KEY", KEY="sesame")
+
+
+def hasty(shared, scheme):
+    limits = ("--request-timeout-s", "1", "--message-timeout-s", "1", "--idle-timeout-s", "2")
+    return shared(scheme, *limits)
+
+
+def lenient(shared, scheme):
+    return shared(scheme, "--allow-host", "Robot-Lab")
 
 
 def begin(url):
@@ -46,11 +77,10 @@ def go_on(policy):
     assert len(policy.act(moment(1, history=(moment(1),)))) > 0
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", ALL_SCHEMES)
 def test_300_idle_connections_keep_nothing_from_an_episode(scheme):
     with serving(scheme) as server, contextlib.ExitStack() as idle:
         policy = begin(server.url)
-        before = server.peak_mib()
         whole = opening(scheme)
         for number in range(300):
             data = (b"", whole[:-20], whole)[number % 3]
@@ -61,12 +91,12 @@ def test_300_idle_connections_keep_nothing_from_an_episode(scheme):
         go_on(policy)
         policy.close()
         begin(server.url).close()
-        assert server.peak_mib() - before <= MAX_MIB
+        assert server.grown_mib() <= MAX_MIB
         assert server.status("Threads") < 100
         assert server.process.poll() is None
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", ALL_SCHEMES)
 def test_a_process_without_free_descriptors_serves_on(scheme):
     with (
         serving(scheme, "--max-connections", "1000", files=60) as server,
@@ -81,132 +111,129 @@ def test_a_process_without_free_descriptors_serves_on(scheme):
         assert server.process.poll() is None
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_half_a_request_is_not_waited_for(scheme):
-    with serving(
-        scheme, "--request-timeout-s", "1", "--message-timeout-s", "1", "--idle-timeout-s", "2"
-    ) as server:
-        whole = opening(scheme)
-        half = [b"", whole[:1], whole[:-2]]
+@pytest.mark.parametrize("scheme", ALL_SCHEMES)
+def test_half_a_request_is_not_waited_for(shared, scheme):
+    server = hasty(shared, scheme)
+    whole = opening(scheme)
+    half = [b"", whole[:1], whole[:-2]]
+    if "http" in scheme:
+        half.append(b"POST /reset HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9\r\n\r\nx")
+        half.append(whole)  # and no second request
+    else:
+        half.append(whole)
+        half.append(whole + frame(b"\x80" * 1000, mask=True)[:-1])
+        half.append(whole + frame(b"\x80", final=False, mask=True))
+    with contextlib.ExitStack() as opened:
+        for raw in [opened.enter_context(server.connect(data)) for data in half]:
+            read_all(raw)  # ends
+    assert server.is_healthy()
+
+
+@pytest.mark.parametrize("scheme", ALL_SCHEMES)
+def test_dripped_requests_are_not_waited_for(shared, scheme):
+    server = hasty(shared, scheme)
+    whole = opening(scheme, headers=f"X-Y: {'z' * 3000}\r\n")
+    with server.connect() as raw, contextlib.suppress(ConnectionError):
+        for byte in whole:
+            raw.sendall(bytes([byte]))
+            time.sleep(0.05)
+        pytest.fail("the server has waited for the whole head")
+    assert server.is_healthy()
+
+
+@pytest.mark.parametrize("scheme", ALL_SCHEMES)
+def test_a_body_without_a_key_is_not_read(shared, scheme):
+    server = locked(shared, scheme)
+    data = b"\0" * (1 << 20)
+    if "http" in scheme:
+        head = f"POST /infer HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: {GIB}\r\n\r\n"
+    else:
+        head = opening(scheme).decode()
+    raw = server.connect(head.encode())
+
+    def send():
+        with contextlib.suppress(OSError):
+            for _ in range(1024):
+                raw.sendall(data)
+
+    sender = threading.Thread(target=send)
+    sender.start()
+    answer = read_all(raw)
+    raw.close()
+    sender.join()
+    # A websocket's client waits for the answer before it sends more; of one that does not,
+    # the connection is cut.
+    assert answer.startswith(b"HTTP/1.1 401 ") or ("http" not in scheme and not answer)
+    assert server.grown_mib() <= MAX_MIB
+    assert server.is_healthy()
+
+
+@pytest.mark.parametrize("scheme", ALL_SCHEMES)
+def test_a_malformed_request_gets_an_answer(shared, scheme):
+    server = lenient(shared, scheme)
+    for headers, status in (
+        ("Content-Length: \xb2\r\n", 400),
+        (f"Content-Length: {'9' * 5000}\r\n", 400),
+        ("Content-Length: -1\r\n", 400),
+        (f"X: {'y' * 70_000}\r\n", 431),
+    ):
         if "http" in scheme:
-            half.append(b"POST /reset HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9\r\n\r\nx")
-            half.append(whole)  # and no second request
+            request = f"POST /reset HTTP/1.1\r\nHost: 127.0.0.1\r\n{headers}\r\n"
         else:
-            half.append(whole)
-            half.append(whole + frame(b"\x80" * 1000, mask=True)[:-1])
-            half.append(whole + frame(b"\x80", final=False, mask=True))
-        for data in half:
-            with server.connect(data) as raw:
-                read_all(raw)  # ends
-        assert server.is_healthy()
+            request = f"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n{UPGRADE}{headers}\r\n"
+        with server.connect(request.encode("latin-1")) as raw:
+            assert raw.recv(65536).startswith(f"HTTP/1.1 {status} ".encode()), headers
+    assert server.is_healthy()
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_dripped_requests_are_not_waited_for(scheme):
-    with serving(scheme, "--request-timeout-s", "1") as server:
-        whole = opening(scheme, headers=f"X-Y: {'z' * 3000}\r\n")
-        with server.connect() as raw, contextlib.suppress(ConnectionError):
-            for byte in whole:
-                raw.sendall(bytes([byte]))
-                time.sleep(0.05)
-            pytest.fail("the server has waited for the whole head")
-        assert server.is_healthy()
+def test_a_body_is_asked_for_only_with_the_key(shared):
+    server = locked(shared, "challenge+http")
+    head = (
+        "POST /infer HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 1\r\nExpect: 100-continue\r\n"
+    )
+    with server.connect(f"{head}\r\n".encode()) as raw:
+        assert raw.recv(65536).startswith(b"HTTP/1.1 401 ")
+    with server.connect(f"{head}Authorization: Api-Key sesame\r\n\r\n".encode()) as raw:
+        assert raw.recv(65536) == b"HTTP/1.1 100 Continue\r\n\r\n"
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_a_body_without_a_key_is_not_read(scheme):
-    with serving(scheme, "--api-key-env", "KEY", KEY="sesame") as server:
-        before, data = server.peak_mib(), b"\0" * (1 << 20)
-        if "http" in scheme:
-            head = f"POST /infer HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: {GIB}\r\n\r\n"
-        else:
-            head = opening(scheme).decode()
-        raw = server.connect(head.encode())
-
-        def send():
-            with contextlib.suppress(OSError):
-                for _ in range(1024):
-                    raw.sendall(data)
-
-        sender = threading.Thread(target=send)
-        sender.start()
-        answer = read_all(raw)
-        raw.close()
-        sender.join()
-        # A websocket's client waits for the answer before it sends more; of one that does not,
-        # the connection is cut.
-        assert answer.startswith(b"HTTP/1.1 401 ") or ("http" not in scheme and not answer)
-        assert server.peak_mib() - before <= MAX_MIB
-        assert server.is_healthy()
+def test_metadata_need_no_key_over_http_as_the_challenges_client_sends_none(shared):
+    server = locked(shared, "challenge+http")
+    address = f"http://127.0.0.1:{server.port}"
+    found = httpx.get(f"{address}/metadata", trust_env=False)
+    assert unpack(found.content)["policy"] == "random"
+    assert httpx.post(f"{address}/reset", trust_env=False).status_code == 401
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_a_malformed_request_gets_an_answer(scheme):
-    with serving(scheme) as server:
-        for headers, status in (
-            ("Content-Length: \xb2\r\n", 400),
-            (f"Content-Length: {'9' * 5000}\r\n", 400),
-            ("Content-Length: -1\r\n", 400),
-            (f"X: {'y' * 70_000}\r\n", 431),
-        ):
-            if "http" in scheme:
-                request = f"POST /reset HTTP/1.1\r\nHost: 127.0.0.1\r\n{headers}\r\n"
-            else:
-                request = f"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n{UPGRADE}{headers}\r\n"
-            with server.connect(request.encode("latin-1")) as raw:
-                assert raw.recv(65536).startswith(f"HTTP/1.1 {status} ".encode()), headers
-        assert server.is_healthy()
+@pytest.mark.parametrize("scheme", ALL_SCHEMES)
+def test_pages_of_other_sites_are_refused(shared, scheme):
+    server = lenient(shared, scheme)
+    port = server.port
+    for host, headers, welcome in (
+        (f"127.0.0.1:{port}", "", True),
+        ("localhost:9", "", True),  # through a tunnel
+        ("192.0.2.7", "", True),
+        ("[::1]:8000", "", True),
+        ("robot-lab:8000", "", True),
+        (f"127.0.0.1:{port}", f"Origin: http://127.0.0.1:{port}\r\n", True),
+        (f"127.0.0.1:{port}", "Origin: http://evil.example\r\n", False),
+        (f"127.0.0.1:{port}", "Origin: null\r\n", False),
+        (f"127.0.0.1:{port}", f"Origin: https://127.0.0.1:{port}\r\n", False),
+        (f"evil.example:{port}", "", False),
+        (f"evil.example:{port}", f"Origin: http://evil.example:{port}\r\n", False),
+        ("127.0.0.1.evil.example", "", False),
+        ("evil.example@127.0.0.1", "", False),
+        ("127.0.0.1/evil.example", "", False),
+        (f"127.0.0.1:{port}", "Host: evil.example\r\n", False),
+        ("127.0.0.1:x", "", False),
+        ("", "", False),
+    ):
+        with server.connect(opening(scheme, host, headers)) as raw:
+            status = int(raw.recv(65536).split()[1])
+        assert (status == 403) is not welcome, (host, headers, status)
 
 
-def test_a_body_is_asked_for_only_with_the_key():
-    with serving("challenge+http", "--api-key-env", "KEY", KEY="sesame") as server:
-        head = (
-            "POST /infer HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 1\r\n"
-            "Expect: 100-continue\r\n"
-        )
-        with server.connect(f"{head}\r\n".encode()) as raw:
-            assert raw.recv(65536).startswith(b"HTTP/1.1 401 ")
-        with server.connect(f"{head}Authorization: Api-Key sesame\r\n\r\n".encode()) as raw:
-            assert raw.recv(65536) == b"HTTP/1.1 100 Continue\r\n\r\n"
-
-
-def test_metadata_need_no_key_over_http_as_the_challenges_client_sends_none():
-    with serving("challenge+http", "--api-key-env", "KEY", KEY="sesame") as server:
-        address = f"http://127.0.0.1:{server.port}"
-        found = httpx.get(f"{address}/metadata", trust_env=False)
-        assert unpack(found.content)["policy"] == "random"
-        assert httpx.post(f"{address}/reset", trust_env=False).status_code == 401
-
-
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_pages_of_other_sites_are_refused(scheme):
-    with serving(scheme, "--allow-host", "Robot-Lab") as server:
-        port = server.port
-        for host, headers, welcome in (
-            (f"127.0.0.1:{port}", "", True),
-            ("localhost:9", "", True),  # through a tunnel
-            ("192.0.2.7", "", True),
-            ("[::1]:8000", "", True),
-            ("robot-lab:8000", "", True),
-            (f"127.0.0.1:{port}", f"Origin: http://127.0.0.1:{port}\r\n", True),
-            (f"127.0.0.1:{port}", "Origin: http://evil.example\r\n", False),
-            (f"127.0.0.1:{port}", "Origin: null\r\n", False),
-            (f"127.0.0.1:{port}", f"Origin: https://127.0.0.1:{port}\r\n", False),
-            (f"evil.example:{port}", "", False),
-            (f"evil.example:{port}", f"Origin: http://evil.example:{port}\r\n", False),
-            ("127.0.0.1.evil.example", "", False),
-            ("evil.example@127.0.0.1", "", False),
-            ("127.0.0.1/evil.example", "", False),
-            (f"127.0.0.1:{port}", "Host: evil.example\r\n", False),
-            ("127.0.0.1:x", "", False),
-            ("", "", False),
-        ):
-            with server.connect(opening(scheme, host, headers)) as raw:
-                status = int(raw.recv(65536).split()[1])
-            assert (status == 403) is not welcome, (host, headers, status)
-
-
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", ALL_SCHEMES)
 def test_one_connection_too_many_is_refused_while_all_others_play(scheme):
     with serving(scheme, "--max-connections", "2") as server:
         playing = [begin(f"{server.url}?shared=yes") for _ in range(2)]
@@ -300,8 +327,8 @@ def test_a_key_is_not_shown():
     assert "sesame" not in repr(ServerOptions(key="sesame"))
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_a_message_is_as_large_as_a_video_needs_and_no_larger(scheme):
+@pytest.mark.parametrize("scheme", ALL_SCHEMES)
+def test_a_message_is_as_large_as_a_video_needs_and_no_larger(shared, scheme):
     service = protocols_by_scheme()[scheme].service
     if scheme == "openpi":  # shows no video
         assert service.max_request_bytes == 64 << 20
@@ -313,17 +340,17 @@ def test_a_message_is_as_large_as_a_video_needs_and_no_larger(scheme):
         lists = {name: [value] * 10 for name, value in step.items() if name != "instruction"}
         longest = 1187 * len(pack(lists)) / 10
         assert longest < service.max_request_bytes < 1.3 * longest
-    with serving(scheme) as server:
-        before, size = server.peak_mib(), service.max_request_bytes + 1
-        if "http" in scheme:
-            head = f"POST /infer HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: {size}\r\n\r\n"
-            with server.connect(head.encode()) as raw:
-                assert read_all(raw).startswith(b"HTTP/1.1 413 ")
-        else:
-            header = struct.pack("!BBQ", 0x82, 0xFF, size) + b"\0\0\0\0"
-            with server.connect(opening(scheme)) as raw:
-                assert raw.recv(65536).startswith(b"HTTP/1.1 101 ")
-                raw.sendall(header)
-                assert struct.pack("!H", 1009) in read_all(raw)
-        assert server.peak_mib() - before <= MAX_MIB
-        assert server.is_healthy()
+    server = lenient(shared, scheme)
+    size = service.max_request_bytes + 1
+    if "http" in scheme:
+        head = f"POST /infer HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: {size}\r\n\r\n"
+        with server.connect(head.encode()) as raw:
+            assert read_all(raw).startswith(b"HTTP/1.1 413 ")
+    else:
+        header = struct.pack("!BBQ", 0x82, 0xFF, size) + b"\0\0\0\0"
+        with server.connect(opening(scheme)) as raw:
+            assert raw.recv(65536).startswith(b"HTTP/1.1 101 ")
+            raw.sendall(header)
+            assert struct.pack("!H", 1009) in read_all(raw)
+    assert server.grown_mib() <= MAX_MIB
+    assert server.is_healthy()
