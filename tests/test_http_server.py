@@ -196,7 +196,7 @@ def test_half_a_request_is_not_waited_for(make, tmp_path, capfd):
     server.connections.limits = ConnectionLimits(request_s=0.5, body_s=0.5, idle_s=0.5)
     with running(server) as port:
         host = f"Host: 127.0.0.1:{port}\r\n"
-        for request in (
+        halves = (
             "",
             "GET",
             f"GET {path} HTTP/1.1\r\nHost: 127",
@@ -204,9 +204,14 @@ def test_half_a_request_is_not_waited_for(make, tmp_path, capfd):
             f"POST /score HTTP/1.1\r\n{host}Content-Length: 60000\r\n\r\nchoice=",
             f"POST /reset HTTP/1.1\r\n{host}Content-Length: 60000\r\n\r\nx",
             f"GET {path} HTTP/1.1\r\n{host}\r\n",
-        ):
-            with socket.create_connection(("127.0.0.1", port), timeout=600) as raw:
-                raw.sendall(request.encode())
+        )
+        with contextlib.ExitStack() as opened:
+            waiting = []
+            for request in halves:
+                raw = socket.create_connection(("127.0.0.1", port), timeout=600)
+                opened.enter_context(raw).sendall(request.encode())
+                waiting.append(raw)
+            for raw in waiting:
                 while raw.recv(65536):
                     pass
         # A client that does not take in what it asked for.

@@ -19,6 +19,7 @@ def notebook(request):
     return nbformat.read(request.param, as_version=4)
 
 
+@pytest.mark.slow
 @pytest.mark.sim
 def test_a_notebook_runs(notebook, tmp_path, monkeypatch):
     # Shell lines call `roboirg`, which lies beside this Python.

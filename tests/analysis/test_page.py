@@ -131,6 +131,7 @@ def focused(page: Any, what: str = "innerText") -> str:
     return str(page.evaluate(f"document.activeElement.{what}"))
 
 
+@pytest.mark.slow
 def test_every_filter_filters(page: Any) -> None:
     everything = len(records())
     assert shown(page) == everything

@@ -21,7 +21,7 @@ from roboirg.evaluation.records.store import read_records
 from roboirg.evaluation.run.executor import choose_executor
 from roboirg.evaluation.run.runner import run_plan
 
-pytestmark = pytest.mark.sim
+pytestmark = [pytest.mark.sim, pytest.mark.slow]
 
 PLAN = make_plan(
     ("listener", "forgetful"),

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from evaluation_fakes import comparable, is_alive, worker_pids
 from hosting_fakes import PaperRunner, paper_plan, paper_runner
+from selection import slow_but
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError
@@ -197,7 +198,9 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[Job, dict[
 
 
 @pytest.mark.parametrize("policy", ["Dice", "BatchedDice"])
-@pytest.mark.parametrize(("workers", "batch"), [(0, 16), (1, 16), (4, 1), (4, 3), (16, 16)])
+@pytest.mark.parametrize(
+    ("workers", "batch"), slow_but([(0, 16), (4, 3)], [(0, 16), (1, 16), (4, 1), (4, 3), (16, 16)])
+)
 def test_records_do_not_depend_on_workers_or_batches(
     tmp_path: Path, alone: Any, policy: str, workers: int, batch: int
 ) -> None:
@@ -403,6 +406,7 @@ def host_pids(supervisor: int) -> list[int]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("policy", ["Dice", "BatchedDice"])
 def test_killed_hosts_worlds_and_supervisors_lose_and_double_nothing(
     tmp_path: Path, policy: str

@@ -47,6 +47,7 @@ def play(folder: Path, names: tuple[str, ...], **options: Any) -> dict[str, list
     return found
 
 
+@pytest.mark.slow
 def test_what_a_policy_breaks_is_its_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -227,6 +227,7 @@ def test_the_option_reaches_the_processes_of_a_command(tmp_path: Path) -> None:
     assert SALT.encode() not in contents(tmp_path)
 
 
+@pytest.mark.slow
 def test_workers_of_a_cluster_get_the_salt_of_the_command(tmp_path: Path) -> None:
     ray = pytest.importorskip("ray")
     with tempfile.TemporaryDirectory(prefix="ray-") as logs:  # short: sockets are in it

@@ -202,6 +202,7 @@ class Cutting(Served):
 '''
 
 
+@pytest.mark.slow
 @pytest.mark.sim
 def test_a_server_that_cuts_is_told_from_one_that_hears_everything_and_fails(
     tmp_path: Path,

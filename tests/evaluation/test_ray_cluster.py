@@ -20,6 +20,8 @@ from roboirg.evaluation.run.executor import InProcess, LocalProcesses
 from roboirg.evaluation.run.ray_cluster import RayCluster
 from roboirg.evaluation.run.runner import run_plan
 
+pytestmark = pytest.mark.slow
+
 ray = pytest.importorskip("ray")
 
 PLAN = small_plan(10)

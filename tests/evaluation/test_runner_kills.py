@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 import evaluation_fakes
+import pytest
 from evaluation_fakes import FakePlay, comparable, is_alive, small_plan, worker_pids
 
 from roboirg.evaluation.records.store import RECORDS_FILE, read_contents, read_records
@@ -22,6 +23,7 @@ EPISODES, SEEDS = 25, max(1, KILLS // 12)
 """Two records each; more than the kills let through, so that the run is always being killed."""
 
 
+@pytest.mark.slow
 def test_after_any_number_of_sigkills_the_records_are_those_of_an_undisturbed_run(
     tmp_path: Path,
 ) -> None:

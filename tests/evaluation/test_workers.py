@@ -65,7 +65,7 @@ def play(plan: Plan, folder: Path) -> tuple[RunSummary, dict[Job, Record]]:
     return summary, {record.identity: record for record in read_records(folder)}
 
 
-@pytest.fixture(params=["own", "shared"])
+@pytest.fixture(params=["own", pytest.param("shared", marks=pytest.mark.slow)])
 def plan(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Plan:
     monkeypatch.syspath_prepend(Path(chaos_policy.__file__).parent)
     return plan_of_chaos().model_copy(update={"policy_process": request.param})
@@ -169,6 +169,7 @@ def test_processes_that_cannot_start_end_the_run(tmp_path: Path) -> None:
     assert len(read_records(tmp_path)) < 10
 
 
+@pytest.mark.slow
 def test_a_queue_is_not_the_policys_time_and_a_timeout_says_what_was_waited_for(
     tmp_path: Path,
 ) -> None:

@@ -49,6 +49,7 @@ class MyPolicy:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("count", "mode", "workers"), BATCHES)
 def test_the_page_s_program_has_the_outcomes_of_our_runner(
     table, ours, tmp_path, count, mode, workers

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from language_variants import PAIRS, TASKS, first_episodes
+from selection import slow_but
 from typer.testing import CliRunner
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
@@ -229,9 +230,10 @@ def test_vocabularies_hold_every_goal_of_the_test_split():
                 assert len(values_in(content)) <= vocabulary[slot].longest
 
 
+@pytest.mark.parametrize("episodes", slow_but([2], [2, 8]))
 @pytest.mark.parametrize(("task", "setting"), PAIRS)
-def test_shares_of_every_setting(task, setting):
-    for episode in first_episodes(task, "test", 8):
+def test_shares_of_every_setting(task, setting, episodes):
+    for episode in first_episodes(task, "test", episodes):
         for options in expressible_options(episode):
             if options.setting != setting:
                 continue

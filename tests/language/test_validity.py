@@ -7,6 +7,7 @@ import functools
 
 import pytest
 from language_variants import SPATIAL_TASKS, TASKS, random_episodes
+from selection import slow_but
 
 from roboirg.apps.language_lab.validation import Batch, ValidationResults, validate_batch
 from roboirg.language import expressible, instruct
@@ -20,21 +21,22 @@ RANDOM_SCENES = 24
 
 
 @functools.cache
-def results(task: str, split: str) -> ValidationResults:
-    """Results for the test split of a task, or for random scenes."""
-    return validate_batch(Batch(task, split, 0, amount(split)))
+def results(task: str, split: str, episodes: int) -> ValidationResults:
+    """Results for the first episodes of a split of a task, or for random scenes."""
+    return validate_batch(Batch(task, split, 0, episodes))
 
 
-def amount(split: str) -> int:
-    return RANDOM_SCENES if split == "random" else SIZES[split]
+ALL = (("random", RANDOM_SCENES), ("test", SIZES["test"]))
 
 
 @pytest.mark.parametrize("task", TASKS)
-@pytest.mark.parametrize("split", ["test", "random"])
-def test_every_instruction_is_valid(task, split):
-    found = results(task, split)
+@pytest.mark.parametrize(
+    ("split", "episodes"),
+    slow_but([("random", 6), ("test", 6)], [("random", 6), ("test", 6), *ALL]),
+)
+def test_every_instruction_is_valid(task, split, episodes):
+    found = results(task, split, episodes)
     assert not found.failures
-    episodes = amount(split)
     read = {setting: found.texts[task, setting] for setting in settings_of(get_task(task))}
     rivals, open_ones = told(found, task, "direct", "drawn"), told(found, task, "reasoning", "open")
     # Two forms; four sets of stages with two kinds of distractors, or with a rival; two frames.
@@ -74,8 +76,8 @@ def test_long_contexts_are_read_back(task, distractor, distractors):
 def exceptions(task):
     """Groups of scenes that leave one candidate, with their share."""
     total = ValidationResults()
-    for split in ("test", "random"):
-        total.add(results(task, split))
+    for split, episodes in ALL:
+        total.add(results(task, split, episodes))
     return {
         (group.difficulty, group.pattern or group.setting): count / total.commands[group]
         for group, count in total.exceptions.items()
@@ -83,6 +85,7 @@ def exceptions(task):
     }
 
 
+@pytest.mark.slow
 def test_the_exceptions_of_necessity_are_the_named_ones():
     easy = {("easy", "spatial"): 1.0, ("easy", "color exclusion"): 1.0}
     assert exceptions("PickXtimes") == exceptions("SwingXtimes") == easy

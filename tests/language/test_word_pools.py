@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import pytest
 from language_variants import TASKS, split_episodes
+from selection import slow_but
 from typer.testing import CliRunner
 
 from roboirg import main as cli
@@ -138,13 +139,13 @@ def test_every_setting_begins_in_many_ways(setting):
 
 @pytest.mark.parametrize("pool", POOLS)
 @pytest.mark.parametrize("task", TASKS)
-def test_every_split_is_valid_in_the_words_of_either_pool(task, pool):
+@pytest.mark.parametrize("episodes", slow_but([3], [3, 12]))
+def test_every_split_is_valid_in_the_words_of_either_pool(task, pool, episodes):
     for split in ("train", "test"):
-        found = validate_batch(Batch(task, split, 0, 12, wordings=pool))
+        found = validate_batch(Batch(task, split, 0, episodes, wordings=pool))
         assert not found.failures
-        assert (
-            2 * 12 <= found.texts[task, "direct"] <= 4 * 12
-        )  # with a rival, too, where there is one
+        # With a rival, too, where there is one.
+        assert 2 * episodes <= found.texts[task, "direct"] <= 4 * episodes
 
 
 @pytest.mark.parametrize("pool", POOLS)

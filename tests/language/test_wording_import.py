@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from selection import slow_but
 from typer.testing import CliRunner
 from wording_stand_ins import (
     STYLES,
@@ -57,7 +58,7 @@ def opened(task: str, commands: TaskWordings) -> str:
     return register_wordings(Wordings("own", task, {task: commands}))
 
 
-@pytest.mark.parametrize("style", STYLES)
+@pytest.mark.parametrize("style", slow_but(["sentences_in_words"], STYLES))
 def test_every_task_is_imported_with_all_settings(style):
     found = imported(style)
     assert not found.refused
@@ -65,7 +66,7 @@ def test_every_task_is_imported_with_all_settings(style):
     assert not any(one.own for one in found.wordings.tasks.values())
 
 
-@pytest.mark.parametrize("style", STYLES)
+@pytest.mark.parametrize("style", slow_but(["sentences_in_words"], STYLES))
 @pytest.mark.parametrize("task", TASKS)
 def test_every_goal_has_the_sentence_of_the_source(style, task):
     wordings = imported(style).wordings.tasks[task]
@@ -75,7 +76,7 @@ def test_every_goal_has_the_sentence_of_the_source(style, task):
         assert command.state(goal) == sentence(style, task, goal)
 
 
-@pytest.mark.parametrize("style", STYLES)
+@pytest.mark.parametrize("style", slow_but(["sentences_in_words"], STYLES))
 @pytest.mark.parametrize("task", TASKS)
 def test_every_instruction_is_valid(style, task):
     identity = imported(style).wordings.identity
@@ -156,6 +157,7 @@ def test_a_pronoun_stands_between_verb_and_particle():
     ]
 
 
+@pytest.mark.slow
 def test_an_unreadable_template_is_refused_with_its_reason(tmp_path):
     clone = make_clone(tmp_path, "sentences_in_words")
     file = clone / goal_sentences.FILE

@@ -91,6 +91,7 @@ class Person:
             page.click(".actions button.main")
 
 
+@pytest.mark.slow
 def test_forty_questions_with_a_kill_and_a_closed_browser(tmp_path, monkeypatch, browser, wait_s):
     folder, port = tmp_path / "study", free_port()
     study = make_study(folder, monkeypatch, tasks=TASKS, episodes="5", people=2)

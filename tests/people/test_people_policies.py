@@ -85,6 +85,7 @@ def test_two_people_are_played_apart_and_again_by_the_log(tmp_path, monkeypatch)
     assert FormAnswer((), {}).category == "[[], {}]"
 
 
+@pytest.mark.slow
 @pytest.mark.sim
 def test_random_answers_succeed_as_far_as_they_are_right(tmp_path, monkeypatch):
     folder = tmp_path / "study"

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from planning_fakes import KEY, KEY_VARIABLE, TOKENS, decoded, fake_vlm, golden, model_options
+from selection import slow_but
 
 import roboirg
 from roboirg.core.errors import InvalidValueError
@@ -430,7 +431,7 @@ def test_the_oracles_subgoals_are_those_of_the_episode():
 
 
 @pytest.mark.sim
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", slow_but(["qwen"], KINDS))
 def test_planners_play_whole_episodes(kind):
     with fake_vlm([ANSWERS[kind]]) as server:
         more = {"observe_every": 8} if kind == "gemini" else {}

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from expert_world import record
 from planning_fakes import fake_vlm
+from selection import slow_but
 from wire_servers import CHUNK, MmeVlaServer
 
 from roboirg.apps.policy_check.check_result import FAIL, NOTE, PASS, WARN
@@ -60,7 +61,7 @@ def check_system(name, server_class, **options):
         return check_policy(f"system:{name}?{place}{model}", **options)
 
 
-@pytest.mark.parametrize("name", all_systems())
+@pytest.mark.parametrize("name", slow_but(["GroundSG-QwenVL", "FrameS-Modul"], all_systems()))
 def test_nothing_is_found_in_a_system(name, monkeypatch):
     monkeypatch.setenv("GOOGLE_API_KEY", "secret")
     results = check_system(name, SystemServer, record_expert=record)

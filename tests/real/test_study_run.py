@@ -8,6 +8,7 @@ import time
 
 import pytest
 from real_start import start
+from selection import slow_but
 
 from roboirg.apps.real.control.interruption import Interruption
 from roboirg.apps.real.pages.study_figure import bar_series, write_figure
@@ -163,7 +164,7 @@ def test_a_signal_ends_the_run_also_where_python_drops_the_exception(sign, monke
             signal.signal(one, handler)
 
 
-@pytest.mark.parametrize("sign", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("sign", slow_but([signal.SIGTERM], [signal.SIGINT, signal.SIGTERM]))
 def test_a_run_that_is_told_to_end_keeps_what_was_played(sign, tmp_path):
     finished(
         "plan", *OPTIONS, "--trials", 1, "--demonstrations", 0, "--no-sheet", "--out", tmp_path

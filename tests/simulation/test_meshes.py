@@ -137,6 +137,7 @@ def test_damaged_meshes_are_made_anew_and_told(right):
     assert {path.name: path.read_bytes() for path in cache.iterdir()} == sound
 
 
+@pytest.mark.slow
 @pytest.mark.sim
 def test_a_kill_while_meshes_are_written_leaves_no_bad_entry(right, cache):
     sound, picture = right

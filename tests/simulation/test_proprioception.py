@@ -21,12 +21,25 @@ def angles_by_scipy(pose):
         return Rotation.from_quat([x, y, z, w]).as_euler("xyz")
 
 
-@settings(max_examples=2000)
-@given(st.tuples(number, number, number, number))
-def test_angles_are_those_of_scipy(quaternion):
+def check_angles(quaternion):
     assume(np.linalg.norm(quaternion) > 1e-3)
     pose = sapien.Pose(q=quaternion)
     assert euler_angles(pose).tobytes() == angles_by_scipy(pose).tobytes()
+
+
+quaternions = st.tuples(number, number, number, number)
+
+
+@given(quaternions)
+def test_angles_are_those_of_scipy(quaternion):
+    check_angles(quaternion)
+
+
+@pytest.mark.slow
+@settings(max_examples=2000)
+@given(quaternions)
+def test_very_many_angles_are_those_of_scipy(quaternion):
+    check_angles(quaternion)
 
 
 turned = st.floats(-50.0, 50.0) | st.integers(-40, 40).map(lambda number: number * np.pi / 4)

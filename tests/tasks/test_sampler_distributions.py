@@ -19,6 +19,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.stats import chi2_contingency, ks_2samp
+from selection import slow_but
 
 from roboirg.core.episode import DIFFICULTIES, SPLITS, Goal, Scene
 from roboirg.core.errors import SceneRejectedError
@@ -202,6 +203,7 @@ def differing(task, difficulty, ours):
     return {key: p for key, p in found.items() if p < share}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("difficulty", DIFFICULTIES)
 @pytest.mark.parametrize("task", TASKS)
 def test_random_scenes_are_distributed_as_published_ones(task, difficulty):
@@ -219,7 +221,7 @@ def test_gaps_around_whole_squares_are_found_out(monkeypatch, module, task):
 
 
 @pytest.mark.parametrize("task", ["VideoPlaceButton", "VideoPlaceOrder"])
-@pytest.mark.parametrize("difficulty", DIFFICULTIES)
+@pytest.mark.parametrize("difficulty", slow_but(["easy"], DIFFICULTIES))
 def test_cubes_that_avoid_the_site_are_found_out(task, difficulty):
     free = [(scene, goal) for scene, goal in sampled(task, difficulty) if site_is_free(scene)]
     assert "cube to site" in differing(task, difficulty, free)
