@@ -27,7 +27,7 @@ from roboirg.evaluation.records.store import RecordStore
 from roboirg.main import app, main
 
 ROOT = Path(__file__).parent.parent
-ELSEWHERE = {"integrations.md": "tests/integrations, by `make integrations`"}
+ELSEWHERE = {"integrations.md": "tests/apps/integrations, by `make integrations`"}
 """Pages whose blocks other tests run."""
 PAGES = [
     page

@@ -21,7 +21,7 @@ from roboirg.apps.bench.bench_runner import (
 from roboirg.apps.bench.measures import Measure
 from roboirg.core.errors import InvalidValueError
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[3]
 
 
 def test_a_row_whose_package_is_not_installed_says_so(tmp_path: Path) -> None:
