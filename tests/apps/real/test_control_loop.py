@@ -248,8 +248,10 @@ def test_in_real_time_too_a_killed_policy_stops_the_arm_within_a_period():
     assert result.cause == "infrastructure: the process died of signal 9"
     # A period, and what a busy machine needs to notice a dead process.
     assert robot.first_stop_after(killed[0]) - killed[0] <= PERIOD + 0.05
-    moments = [when for when, kind, _ in robot.log if kind == "command"]
-    assert np.diff(moments).min() > 0.5 * PERIOD
+    gaps = np.diff([when for when, kind, _ in robot.log if kind == "command"])
+    # A busy machine may log a command late; the one after it then only seems early.
+    punctual = gaps[:-1] < 1.5 * PERIOD
+    assert (gaps[1:][punctual] > 0.5 * PERIOD).all()
 
 
 def test_after_a_late_command_comes_a_whole_period():
