@@ -68,6 +68,7 @@ def texts(path: Path) -> str:
     return path.read_text()
 
 
+@pytest.mark.slow
 def test_all_figures_that_apply_are_written_and_are_the_same_again(tmp_path: Path) -> None:
     paths = write_figures(content(planned=PLAN.jobs()), tmp_path / "a" / "b")
     names = {path.name for path in paths}

@@ -463,6 +463,7 @@ def test_landmarks_headings_and_names(page: Any) -> None:
     assert len(set(identities)) == len(identities)
 
 
+@pytest.mark.slow
 def test_ten_thousand_episodes_cost_no_more_than_a_page_of_them(
     open_page: Any, tmp_path: Path
 ) -> None:

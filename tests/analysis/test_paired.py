@@ -121,6 +121,7 @@ def test_episodes_that_are_all_alike_leave_room_for_others() -> None:
     assert gap_of(cell("1"), cell("0")).interval is None
 
 
+@pytest.mark.slow
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=60))
 def test_holm_is_that_of_statsmodels(p_values: list[float]) -> None:
     from statsmodels.stats.multitest import multipletests

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import layout
 import pytest
+from selection import slow_but
 
 from roboirg.util.discovery import entry_names
 
@@ -79,7 +80,7 @@ def test_every_kind_of_policy_and_every_application_is_there(everything):
 
 
 @pytest.mark.sim
-@pytest.mark.parametrize("application", APPLICATIONS)
+@pytest.mark.parametrize("application", slow_but(["leaderboard", "people"], APPLICATIONS))
 def test_without_an_application_the_rest_works(application, everything, tmp_path):
     variables = without(application, tmp_path / "src")
     commands, kinds = commands_and_kinds(variables)

@@ -107,6 +107,7 @@ def test_sub_environments_equal_single_ones(mode):
     vector.close()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("without_cache")
 def test_pictures_can_wait_until_they_are_read():
     drawn = roboirg.make_vec("VideoUnmask", 2, **{**OPTIONS, "cameras": ("front", "wrist")})

@@ -121,6 +121,7 @@ def test_a_job_in_our_own_words_opens_no_file(wording_file: Path) -> None:
     assert instruct_job(missing) == own
 
 
+@pytest.mark.slow
 @pytest.mark.sim
 def test_two_workers_play_in_the_words_of_a_file(wording_file: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"

@@ -260,6 +260,7 @@ def test_a_server_that_cuts_is_told_from_one_that_hears_everything_and_fails(
     }
 
 
+@pytest.mark.slow
 def test_a_policy_of_ones_own_declares_its_limit_from_a_process_of_its_own(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(
         "import os\n"

@@ -71,6 +71,7 @@ def plan(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Pla
     return plan_of_chaos().model_copy(update={"policy_process": request.param})
 
 
+@pytest.mark.slow
 @pytest.mark.sim
 def test_a_policy_of_chaos_costs_its_own_episodes_and_nothing_else(
     plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -111,6 +111,7 @@ def right(tmp_path_factory):
     return cache, first
 
 
+@pytest.mark.slow
 @pytest.mark.sim
 def test_two_processes_may_fill_the_cache_at_once(right):
     cache, _ = right

@@ -70,6 +70,7 @@ def test_the_page_s_program_has_the_outcomes_of_our_runner(
     assert sorted(found) == sorted(ours)
 
 
+@pytest.mark.slow
 def test_lerobot_s_batches_have_them_too(table, ours):
     count, replay, found = 2, Replay(table), []
     options = {

@@ -58,6 +58,7 @@ def opened(task: str, commands: TaskWordings) -> str:
     return register_wordings(Wordings("own", task, {task: commands}))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("style", slow_but(["sentences_in_words"], STYLES))
 def test_every_task_is_imported_with_all_settings(style):
     found = imported(style)
@@ -97,6 +98,7 @@ def test_every_instruction_is_valid(style, task):
         assert explicit.text == sentence(style, task, episode.goal, episode.difficulty)
 
 
+@pytest.mark.slow
 def test_referring_expressions_take_the_place_of_the_phrases():
     identity = imported("sentences_in_words").wordings.identity
 

@@ -198,6 +198,7 @@ def test_what_a_pack_says_is_text() -> None:
     assert "&lt;script&gt;alert" in page
 
 
+@pytest.mark.slow
 @pytest.mark.browser
 def test_the_page_of_thirty_runs_sorts_and_filters_without_network(
     open_page: Any, tmp_path: Path, private: str

@@ -183,6 +183,7 @@ def drive(page, wait_s):
     page.wait_for_selector("#verdict", timeout=limit)
 
 
+@pytest.mark.slow
 @pytest.mark.browser
 @pytest.mark.sim
 def test_an_episode_is_driven_in_a_browser(served, open_page, wait_s, monkeypatch, capsys):

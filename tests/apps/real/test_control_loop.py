@@ -289,6 +289,7 @@ def test_a_hanging_loop_is_stopped_by_the_watchdog():
     assert 0.2 <= stopped - last_before <= 0.8
 
 
+@pytest.mark.slow
 def test_a_trial_that_goes_wrong_does_not_end_the_study(tmp_path):
     policies = [f"faulty_policies:{name}" for name in ("Still", "Jumps", "Late", "Leaves")]
     plan = make_study(

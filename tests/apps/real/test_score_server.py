@@ -173,6 +173,7 @@ def key_of(trial, choice):
     return str([one.key for one in failure_choices(trial.episode)].index(choice) + 1)
 
 
+@pytest.mark.slow
 @pytest.mark.browser
 def test_a_study_is_scored_by_keyboard_alone_and_survives_a_kill(browser, tmp_path):
     plan = make_study(

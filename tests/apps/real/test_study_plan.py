@@ -255,6 +255,7 @@ def test_sides_follow_from_colors():
     assert Arrangement("green", "purple").side == "right"
 
 
+@pytest.mark.slow
 def test_nothing_on_the_sheet_is_cut_off_or_overlaps():
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 

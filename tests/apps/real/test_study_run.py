@@ -61,6 +61,7 @@ def study(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_every_trial_was_played_once_and_waits(study):
     plan = read_study(study)
     trial_log = TrialLog.read(plan, study)
@@ -73,6 +74,7 @@ def test_every_trial_was_played_once_and_waits(study):
     assert all(entry.percent is None for row in table.rows for entry in row.entries)
 
 
+@pytest.mark.slow
 @pytest.mark.browser
 def test_scored_in_a_browser_it_is_the_table_that_the_judge_would_have_given(browser, study):
     plan = read_study(study)
