@@ -226,6 +226,7 @@ def test_half_a_request_is_not_waited_for(make, tmp_path, capfd):
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", SERVERS)
 def test_idle_connections_keep_no_one_out(make, tmp_path, capfd):
     server, _, path = make(tmp_path)

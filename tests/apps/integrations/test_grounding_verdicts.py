@@ -85,6 +85,7 @@ def listener_verdict(policy, item):
     return is_right(goal, episode)
 
 
+@pytest.mark.slow
 def test_the_listener_and_our_scores_agree():
     assert len(items()) == NUMBER
     assert 100 < sum(own_verdicts().values()) < 400

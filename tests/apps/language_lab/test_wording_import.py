@@ -77,6 +77,7 @@ def test_every_goal_has_the_sentence_of_the_source(style, task):
         assert command.state(goal) == sentence(style, task, goal)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("style", slow_but(["sentences_in_words"], STYLES))
 @pytest.mark.parametrize("task", TASKS)
 def test_every_instruction_is_valid(style, task):

@@ -61,6 +61,7 @@ def check_system(name, server_class, **options):
         return check_policy(f"system:{name}?{place}{model}", **options)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow_but(["GroundSG-QwenVL", "FrameS-Modul"], all_systems()))
 def test_nothing_is_found_in_a_system(name, monkeypatch):
     monkeypatch.setenv("GOOGLE_API_KEY", "secret")

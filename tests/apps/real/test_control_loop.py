@@ -254,6 +254,7 @@ def test_in_real_time_too_a_killed_policy_stops_the_arm_within_a_period():
     assert (gaps[1:][punctual] > 0.5 * PERIOD).all()
 
 
+@pytest.mark.slow
 def test_after_a_late_command_comes_a_whole_period():
     class Stalling(Watched):
         def observe(self):
