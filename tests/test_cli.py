@@ -509,6 +509,7 @@ def commands(command, words=()):
         yield from commands(inner, (*words, word))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [80, 132])
 def test_help_cuts_no_word_and_is_no_wider_than_the_terminal(
     roboirg, monkeypatch: pytest.MonkeyPatch, width: int

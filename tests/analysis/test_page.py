@@ -158,6 +158,7 @@ def test_every_filter_filters(page: Any) -> None:
     assert shown(page) == expected(policy="forgetful", form="resolved")
 
 
+@pytest.mark.slow
 def test_words_are_searched_in_utterances_and_causes(page: Any) -> None:
     search = page.locator("[name=words]")
     search.fill("WRONG  cube")

@@ -183,6 +183,7 @@ def test_results_are_read_without_the_salt(tmp_path: Path) -> None:
         assert isinstance(done.exception, MissingSaltError)
 
 
+@pytest.mark.slow
 @pytest.mark.sim
 def test_no_policy_and_no_file_has_the_salt(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

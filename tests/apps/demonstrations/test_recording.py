@@ -73,6 +73,7 @@ def test_an_export_without_pictures_replays_exactly(tmp_path, make_plan):
     assert changed.largest > 0.01
 
 
+@pytest.mark.slow
 def test_variations_differ_and_succeed():
     episode = get_episode("PickXtimes", "train", 0)
     steps = []

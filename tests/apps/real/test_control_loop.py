@@ -122,6 +122,7 @@ def test_a_late_policy_is_waited_for_at_rest_and_then_given_up():
     assert np.abs(joints - robot._hold[:7]).max() < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("worker", [PolicyThread, PolicyProcess])
 def test_in_virtual_time_a_slow_machine_is_not_a_slow_policy(worker):
     result, _, loop = play("Slow", limits=Limits(policy_timeout_s=0.05), worker=worker())

@@ -16,6 +16,7 @@ from roboirg.evaluation.records.record import NON_DETERMINISTIC_FIELDS
 pytestmark = pytest.mark.sim
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("task", ["PutInBox", "PickByCount"])
 def test_a_trial_on_the_twin_is_the_episode_of_simulation(task, tmp_path):
     plan = make_study(
@@ -71,6 +72,7 @@ def test_cameras_take_pictures_at_their_rate_and_draw_what_is_read():
     twin.close()
 
 
+@pytest.mark.slow
 def test_the_twin_judges_and_its_commands_are_within_the_limits(tmp_path):
     assert isinstance(Twin(), JudgingRobot)
     plan = make_study(("oracle",), tasks=("PickByCount",), settings=("explicit",), trials=8)
