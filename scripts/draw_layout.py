@@ -24,15 +24,19 @@ CHARACTER = 6.1
 """Width of a character of the small text, in pixels."""
 
 
-def rooms_by_floor() -> list[list[str]]:
-    """Return the rooms of each floor, the ground first; all of the ground stand on one floor."""
-    graph = {
-        room: [other for other in others if other not in GROUND]
+def arrows_above_ground() -> dict[str, set[str]]:
+    """Return the rooms that each room imports, without the ground and what only hands on."""
+    return {
+        room: set(others) - set(GROUND)
         for room, others in layout.arrows().items()
         if room not in (*GROUND, *FACE)
     }
+
+
+def rooms_by_floor() -> list[list[str]]:
+    """Return the rooms of each floor, the ground first; all of the ground stand on one floor."""
     floors: dict[int, list[str]] = defaultdict(list)
-    for room, floor in layout.floors(graph).items():
+    for room, floor in layout.floors(arrows_above_ground()).items():
         floors[floor + 1].append(room)
     return [list(GROUND), *(sorted(floors[number]) for number in sorted(floors))]
 
@@ -54,11 +58,7 @@ def in_order(rooms: list[str], above: dict[str, float]) -> list[str]:
 
 def drawn_arrows() -> Iterator[tuple[str, str]]:
     """Yield the arrows to draw: without those that a longer way implies."""
-    graph = {
-        room: {other for other in others if other not in GROUND}
-        for room, others in layout.arrows().items()
-        if room not in (*GROUND, *FACE)
-    }
+    graph = arrows_above_ground()
 
     def reached(room: str) -> set[str]:
         return graph[room] | {far for other in graph[room] for far in reached(other)}
