@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -26,7 +25,7 @@ def demo(
     workers: Workers = None,
 ) -> None:
     """Play three built-in policies on every task and setting, record videos, write a report."""
-    from roboirg.evaluation.analysis.page.report import check_report_support
+    from roboirg.evaluation.analysis.page.report import check_report_support, write_report
     from roboirg.evaluation.plan.plan_maker import make_plan
     from roboirg.evaluation.run.executor import choose_executor
 
@@ -35,11 +34,5 @@ def demo(
     check_report_support()
     summary = run_commands.play(plan, folder, choose_executor(workers), retry=True)
     run_commands.print_tables_of(folder, run_commands.planned_jobs(folder))
-    typer.echo(_write_page(folder, videos=True))
+    typer.echo(write_report(folder, planned=run_commands.planned_jobs(folder), videos=True))
     run_commands.report_problems(summary, folder)
-
-
-def _write_page(folder: Path, *, videos: bool) -> Path:
-    from roboirg.evaluation.analysis.page.report import write_report
-
-    return write_report(folder, planned=run_commands.planned_jobs(folder), videos=videos)
