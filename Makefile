@@ -39,7 +39,7 @@ demo: setup ## the main job: three policies, every task and setting; ends with a
 	.venv/bin/roboirg demo --out runs/demo
 
 card: setup ## write docs/language-card.md anew, after a change of words or episodes
-	.venv/bin/roboirg language card --out docs/language-card.md
+	$(PYTHON) scripts/write_language_card.py
 
 clean: ## remove what the tools left behind; .venv and runs stay
 	rm -rf build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -107,7 +107,7 @@ def test_what_is_wrong_is_one_sentence_and_exit_code_2(
     "words",
     [
         ("run",), ("play",), ("report",), ("report", "nowhere"), ("report", ""),
-        ("instruct", "PickXtimes"), ("instruct", "PickXtimes", "-1"), ("demo", "--out", " "),
+        ("show", "PickXtimes"), ("show", "PickXtimes", "-1"), ("demo", "--out", " "),
     ],
 )  # fmt: skip
 def test_wrong_usage_is_one_sentence_and_exit_code_2(roboirg, words: tuple[str, ...]) -> None:
@@ -239,11 +239,15 @@ def test_tasks_are_listed(roboirg) -> None:
 
 
 def test_instructions_are_printed(roboirg) -> None:
-    said = roboirg("instruct", "PickXtimes", "3", "--setting", "contextual", "--stages", "1,5")
+    said = roboirg(
+        "show", "PickXtimes", "3", "--words", "--settings", "contextual", "--stages", "1,5"
+    )
     words = [line.split()[0] for line in said.out.splitlines()]
     assert words == ["contextual", "introduction", "command"]
-    assert re.search(r"explicit \(\d+ tokens\):", roboirg("instruct", "VideoUnmask", "0").out)
-    wrong = roboirg("instruct", "VideoUnmask", "99")
+    assert re.search(
+        r"explicit \(\d+ tokens\):", roboirg("show", "VideoUnmask", "0", "--words").out
+    )
+    wrong = roboirg("show", "VideoUnmask", "99", "--words")
     assert (wrong.code, wrong.err.count("\n")) == (2, 1)
 
 
@@ -259,38 +263,9 @@ def test_failures_are_named_below_the_table(
     assert "and 5 more" in roboirg("report", tmp_path).out
 
 
-def test_splits_are_built_anew_for_what_is_named(
-    roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from roboirg.apps.split_search import seed_selection
-    from roboirg.tasks.splits.splits import shipped_splits, splits_text
-
-    def find(slots, workers):
-        assert workers == 0
-        # Backwards: no order of ending may matter.
-        return (
-            seed_selection.find_seed(slot, seed_selection.check_words) for slot in reversed(slots)
-        )
-
-    monkeypatch.setattr(seed_selection, "find_seeds", find)
-    tasks = "VideoPlaceOrder,PickXtimes,PutInBox"
-    words = ("build-splits", "--tasks", tasks, "--split", "val", "--workers", 0)
-    said = roboirg(*words)
-    assert (said.code, said.out) == (0, splits_text(shipped_splits()))
-    assert re.search(r"VideoPlaceOrder\W+easy\W+\d", said.err)
-    assert "[50/52]" in said.err  # the other 98 are published
-    said = roboirg(*words, "--out", tmp_path / "splits.json")
-    assert (said.code, said.out) == (0, "")
-    assert (tmp_path / "splits.json").read_text() == splits_text(shipped_splits())
-
-
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (("build-splits", "--tasks", "PickXtime"), "There is no task 'PickXtime'"),
-        (("build-splits", "--split", "dev"), "There is no split 'dev'"),
-        (("build-splits", "--workers", "-1"), "workers is -1"),
-        (("build-splits", "--out", "nowhere/splits.json"), "There is no folder for 'nowhere/"),
         (("show", "PickXtime", "0"), "There is no task 'PickXtime'"),
         (("show", "PickXtimes", "50"), "There is no episode 50"),
         (("show", "PickXtimes", "0", "--split", "dev"), "There is no split 'dev'"),
@@ -495,10 +470,10 @@ def test_runs_are_merged_and_exported(roboirg, tmp_path: Path, canned: type[Cann
         words = ("--tasks", "StopCube", "--settings", "explicit", "--episodes", episodes)
         out = ("--workers", "0", "--out", tmp_path / name)
         assert roboirg("run", "--policy", "random", *words, *out).code == 0
-    said = roboirg("merge", tmp_path / "a", tmp_path / "b", "--out", tmp_path / "c")
+    said = roboirg("records", "merge", tmp_path / "a", tmp_path / "b", "--out", tmp_path / "c")
     assert said.out.startswith("Added 5 records to")
     assert "1 already there" in said.out
-    said = roboirg("export", "records", tmp_path / "c", "--out", tmp_path / "c.parquet")
+    said = roboirg("records", "export", tmp_path / "c", "--out", tmp_path / "c.parquet")
     assert said.out.startswith("5 records:")
 
 

@@ -42,10 +42,11 @@ sys.__stdout__.write(json.dumps(found))
 
 NEEDS = {
     "bench": "sim", "run": "sim", "show": "sim", "demo": "report", "report": "report",
-    "view": "report", "figures": "report", "compare": "report", "serve": "remote",
-    "export records": "export", "real run": "sim", "real score": "report",
+    "figures": "report", "compare": "report", "serve": "remote",
+    "records export": "export", "real run": "sim", "real score": "report",
     "export demonstrations": "sim", "export grounding": "sim",
-    "repeat": "sim", "board": "report", "language shortcuts": "report", "real figure": "report",
+    "leaderboard repeat": "sim", "leaderboard board": "report",
+    "language shortcuts": "report", "real figure": "report",
     "listen plan": "sim",
 }  # fmt: skip
 """The extra of each command that cannot do its work without one; all others work."""

@@ -55,7 +55,8 @@ def test_no_task_s_episodes_have_drifted(task):
         fingerprint_of(task, shipped_splits()[task].passed_over) == shipped_splits()[task].sha256
     ), (
         f"The episodes of {task} are not those for which the splits were built; if that is wanted, "
-        f"run: roboirg build-splits --tasks {task} --out src/roboirg/tasks/splits/splits.json"
+        f"run: python scripts/build_splits.py --tasks {task} "
+        "--out src/roboirg/tasks/splits/splits.json"
     )
     assert fingerprint(episodes(task)) == shipped_splits()[task].sha256
 

@@ -54,14 +54,13 @@ def wrong_words(command, words):
 
 RIGHT = {
     "fetch-models": ["--wheel", "nowhere"],
-    "wordings import-robomme": ["nowhere", "--out", "words.toml"],
-    "verify": ["nowhere"],
+    "language import-robomme": ["nowhere", "--out", "words.toml"],
+    "leaderboard verify": ["nowhere"],
     "replay": ["nowhere"],
     "score grounding": ["nowhere", "--data", "nowhere"],
-    "import-results": ["lerobot", "nowhere", "--out", "out", "--policy", "p"],
+    "records import": ["lerobot", "nowhere", "--out", "out", "--policy", "p"],
     "listen serve": ["nowhere"],
-    "listen play": ["nowhere"],
-    "listen table": ["nowhere"],
+    "listen results": ["nowhere"],
     "drive": ["PickXtimes", "0", "--port", "99999"],
     "learn listener": ["--out", "out"],
     "learn study": ["--out", "out"],

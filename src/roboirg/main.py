@@ -19,6 +19,7 @@ from roboirg.cli import (
     export_commands,
     look_commands,
     policy_commands,
+    records_commands,
     report_commands,
     run_commands,
 )
@@ -74,10 +75,7 @@ def _add_commands() -> None:
         run_commands.run,
         demo_commands.demo,
         look_commands.doctor,
-        look_commands.instruct,
-        run_commands.merge,
         report_commands.report,
-        report_commands.view,
         report_commands.tables,
         report_commands.figures,
         report_commands.compare,
@@ -87,8 +85,7 @@ def _add_commands() -> None:
     app.command("tasks")(look_commands.list_tasks)
     app.command(cls=policy_commands.ProtocolHelpCommand)(policy_commands.serve)
     app.add_typer(export_commands.export_app, name="export")
-    export_commands.export_app.command("episodes")(export_commands.export_episodes)
-    export_commands.export_app.command("records")(export_commands.export_records)
+    app.add_typer(records_commands.records_app, name="records")
     for application in pkgutil.iter_modules(apps.__path__):
         importlib.import_module(f"{apps.__name__}.{application.name}.commands").add_commands(app)
 

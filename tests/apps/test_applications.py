@@ -76,7 +76,13 @@ def test_every_kind_of_policy_and_every_application_is_there(everything):
     commands, kinds = everything
     assert kinds == set(entry_names("roboirg.policy_kinds")) == {"learned", "people", "recorded"}
     assert len(APPLICATIONS) >= 10
-    assert {"run", "tables", "export records", "verify", "listen plan"} <= commands.keys()
+    assert {
+        "run",
+        "tables",
+        "records export",
+        "leaderboard verify",
+        "listen plan",
+    } <= commands.keys()
 
 
 @pytest.mark.sim

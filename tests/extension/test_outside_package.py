@@ -126,7 +126,7 @@ def test_words_of_the_new_setting_are_validated(roboirg, names):
     tasks = f"{task},{WITH_SETTING}"
     said = roboirg("language", "validate", "--tasks", tasks, "--split", "none", "--seeds", "6")
     assert {task, setting} <= set(said.replace("│", " ").split())
-    assert setting in roboirg("instruct", WITH_SETTING, "0", "--setting", setting)
+    assert setting in roboirg("show", WITH_SETTING, "0", "--words", "--settings", setting)
     roboirg("language", "card", "--out", "card.md")
     assert f"### {WITH_SETTING}, {setting}" in (roboirg.folder / "card.md").read_text()
     roboirg(

@@ -7,9 +7,12 @@ import sys
 from pathlib import Path
 
 import pytest
+import seed_selection
+import write_language_card as card
 from rich.console import Console
+from seed_selection import EpisodeSlot, check_words
 
-from roboirg.apps.language_lab import card, statistics_tables
+from roboirg.apps.language_lab import statistics_tables
 from roboirg.apps.language_lab.validation import (
     Batch,
     check_episode,
@@ -18,8 +21,6 @@ from roboirg.apps.language_lab.validation import (
 )
 from roboirg.apps.language_lab.validation.validation_tables import validation_tables
 from roboirg.apps.show.episode_text import instructions_table
-from roboirg.apps.split_search import seed_selection
-from roboirg.apps.split_search.seed_selection import EpisodeSlot, check_words
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.figures import expressions
@@ -95,7 +96,7 @@ def test_a_refusal_says_why_wherever_it_shows(register):
     assert find_refusals(EPISODE) == {"dummy": REASON}
     with pytest.raises(InvalidValueError, match=f"dummy setting cannot express .*{REASON}"):
         instruct(EPISODE, "dummy")
-    assert REASON in printed(instructions_table(EPISODE))
+    assert REASON in printed(instructions_table(EPISODE, ["dummy"], InstructionOptions()))
     plan = make_plan(["listener"], tasks="PickXtimes", settings="all", episodes="0,3")
     assert ["dummy" in plan.settings_of("PickXtimes", index) for index in (0, 3)] == [False, True]
 

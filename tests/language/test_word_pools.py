@@ -168,7 +168,7 @@ def call(*words):
 def test_the_commands_take_a_pool(pool, tmp_path):
     episode = get_episode("StopCube", "test", 0)
     expected = instruct(episode, wordings=pool).text
-    assert expected in call("instruct", "StopCube", "0", "--wordings", pool)
+    assert expected in call("show", "StopCube", "0", "--words", "--wordings", pool)
     out = tmp_path / "rows.jsonl"
     call(
         *("export", "instructions", "--out", str(out), "--wordings", pool),

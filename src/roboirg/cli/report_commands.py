@@ -1,4 +1,4 @@
-"""The commands that show results: ``report``, ``view``, ``tables``, ``figures``, ``compare``."""
+"""The commands that show results: ``report``, ``tables``, ``figures``, ``compare``."""
 
 from __future__ import annotations
 
@@ -37,6 +37,13 @@ def report(
         str | None, typer.Option(help="Another run, to compare with episode by episode.")
     ] = None,
     videos: Annotated[bool, typer.Option(help="Embed the videos in the page.")] = True,
+    serve: Annotated[
+        bool,
+        typer.Option("--serve", help="Write no file: serve the page and videos until Ctrl-C."),
+    ] = False,
+    port: Annotated[
+        int, typer.Option(help="Port on loopback for --serve; 0 chooses a free one.")
+    ] = 0,
 ) -> None:
     """Print the table of a run and write RUN/report.html, one self-contained page."""
     from roboirg.cli import run_commands
@@ -44,6 +51,9 @@ def report(
     from roboirg.evaluation.analysis.page.report import check_report_support, write_report
 
     path, other = run_commands.folder_of(folder), None if against is None else Path(against)
+    if serve:
+        _serve(path, port, against)
+        return
     check_report_support()
     planned = run_commands.planned_jobs(path)
     with progress_bar("episodes of the page") as progress:
@@ -59,23 +69,21 @@ def report(
     typer.echo(page)
 
 
-def view(
-    folder: Annotated[str, typer.Argument(help="The --out folder of a run.", metavar="RUN")],
-    port: Annotated[int, typer.Option(help="Port on loopback; 0 chooses a free one.")] = 0,
-) -> None:
-    """Serve the page of a run with its videos on this machine, until Ctrl-C."""
+def _serve(folder: Path, port: int, against: str | None) -> None:
+    """Serve the page of a run with its videos on this machine."""
     from roboirg.cli import run_commands
     from roboirg.cli.progress_bar import progress_bar
     from roboirg.evaluation.analysis.page.page_server import PageServer
     from roboirg.evaluation.analysis.page.report import make_view
 
-    path = run_commands.folder_of(folder)
+    if against is not None:
+        raise InvalidValueError(f"--serve shows one run; leave out --against {against}.")
 
     def make_page() -> str:
         with progress_bar("episodes of the page") as progress:
-            return make_view(path, run_commands.planned_jobs(path), progress)
+            return make_view(folder, run_commands.planned_jobs(folder), progress)
 
-    with PageServer(path, make_page, port) as server:
+    with PageServer(folder, make_page, port) as server:
         # Problems of the run are errors here, not in the browser.
         server.page()
         typer.echo(f"{server.address}  Press Ctrl-C to stop.")

@@ -91,27 +91,6 @@ def run(
     report_problems(summary, folder)
 
 
-def merge(
-    runs: Annotated[list[str], typer.Argument(help="Output folders of runs.")],
-    out: Annotated[str, typer.Option(help="Folder for all their records and videos.")],
-) -> None:
-    """Merge the records and videos of several runs into one folder."""
-    from roboirg.evaluation.records.merging import merge_runs
-
-    merged = merge_runs([folder_of(run) for run in runs], folder_of(out))
-    typer.echo(
-        f"Added {counted(merged.added, 'record')} to {out}; {merged.duplicates:,} already there."
-    )
-    if merged.conflicts:
-        first = merged.conflicts[0]
-        typer.echo(
-            f"The verdicts of {counted(len(merged.conflicts), 'episode')} differ between runs; "
-            f"kept the first verdict of each. For example, not kept: {first.slug}: "
-            f"{first.outcome}.",
-            err=True,
-        )
-
-
 def folder_of(text: str) -> Path:
     """Return the path of a folder.
 

@@ -128,7 +128,7 @@ def test_tables_read_imported_records(tmp_path):
     runner = CliRunner()
     made = runner.invoke(
         app,
-        ["import-results", "lerobot", str(path), "--out", str(run), "--policy", "smolvla",
+        ["records", "import", "lerobot", str(path), "--out", str(run), "--policy", "smolvla",
          "--set", "max_steps=900"],
         catch_exceptions=False,
     )  # fmt: skip
@@ -158,7 +158,7 @@ def test_wrong_files_are_refused_in_a_sentence(tmp_path):
     runner = CliRunner()
     wrong = runner.invoke(
         app,
-        ["import-results", "lerobot", str(path), "--out", str(tmp_path / "run"), "--policy", "x",
+        ["records", "import", "lerobot", str(path), "--out", str(tmp_path / "run"), "--policy", "x",
          "--set", "colour=red"],
     )  # fmt: skip
     assert "no field 'colour'" in str(wrong.exception)

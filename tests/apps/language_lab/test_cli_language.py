@@ -11,7 +11,6 @@ import pytest
 from typer.testing import CliRunner
 
 from roboirg import main as cli
-from roboirg.apps.language_lab import card
 from roboirg.apps.language_lab.validation import RuleViolation, ValidationResults
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 
@@ -37,7 +36,7 @@ text = "press the button to stop the cube when it reaches the target for {visit}
 def test_instructions_in_words_from_outside(tmp_path: Path):
     file, out = tmp_path / "test.toml", tmp_path / "rows.jsonl"
     file.write_text(WORDINGS)
-    said = call("instruct", "StopCube", "0", "--wordings", file)
+    said = call("show", "StopCube", "0", "--words", "--wordings", file)
     assert said.count("press the button to stop the cube when it reaches the target for") == 4
     call("export", "instructions", "--out", out, "--wordings", file, "--forms", "implicit")
     rows = [json.loads(line) for line in out.read_text().splitlines()]
@@ -48,7 +47,7 @@ def test_instructions_in_words_from_outside(tmp_path: Path):
     checked = ("--split", "val", "--seeds", "4", "--wordings", file, "--workers", "0")
     assert "StopCube" in call("language", "validate", *checked)
     with pytest.raises(InvalidValueError, match="have no commands of BinFill"):
-        call("instruct", "BinFill", "0", "--wordings", file)
+        call("show", "BinFill", "0", "--words", "--wordings", file)
 
 
 def test_validation_finds_what_words_from_outside_break(tmp_path: Path):
@@ -172,9 +171,3 @@ def test_a_broken_rule_is_told_and_ends_with_a_sentence(monkeypatch: pytest.Monk
     assert isinstance(result.exception, RoboIRGError)
     assert "Found 1 broken rule in 1 text." in str(result.exception)
     assert "no leak: PickXtimes/test/0, seed 7, direct: [red]ly" in result.output
-
-
-def test_the_card_goes_to_a_file_or_the_terminal(tmp_path: Path):
-    assert call("language", "card") == card.language_card()
-    call("language", "card", "--out", tmp_path / "card.md")
-    assert (tmp_path / "card.md").read_text() == card.language_card()

@@ -187,7 +187,7 @@ def test_checks_are_remembered_until_the_pack_changes(
 
 
 def test_a_folder_without_packs_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InvalidValueError, match="roboirg pack"):
+    with pytest.raises(InvalidValueError, match="roboirg leaderboard pack"):
         read_packs(tmp_path)
 
 

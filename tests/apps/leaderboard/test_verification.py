@@ -152,25 +152,27 @@ def cli() -> CliRunner:
 
 
 def test_the_command_tells_what_does_not_hold(honest: Path, tmp_path: Path, cli: CliRunner) -> None:
-    good = cli.invoke(app, ["verify", str(honest), "--workers", "0", "--sample", "10%"])
+    good = cli.invoke(
+        app, ["leaderboard", "verify", str(honest), "--workers", "0", "--sample", "10%"]
+    )
     assert good.exit_code == 0, good.output
     assert "All of it holds." in good.output
     forged = tmp_path / "forged"
     shutil.copytree(honest, forged)
     assert forge(forged, FORGERIES["failure to success"], random.Random(0))
-    bad = cli.invoke(app, ["verify", str(forged), "--workers", "0"])
+    bad = cli.invoke(app, ["leaderboard", "verify", str(forged), "--workers", "0"])
     assert bad.exit_code == 2
     lines = (forged / "records.jsonl").read_text().splitlines()
     assert json.loads(lines[0])["schema_version"] == 3
     assert "outcome: the record says 'success'; it should be 'failure'" in bad.output
-    wrong = cli.invoke(app, ["verify", str(honest), "--sample", "many"])
+    wrong = cli.invoke(app, ["leaderboard", "verify", str(honest), "--sample", "many"])
     assert wrong.exit_code != 0
 
 
 def test_a_repeated_run_shows_no_flip(honest: Path, tmp_path: Path, cli: CliRunner) -> None:
     out = str(tmp_path / "again")
-    done = cli.invoke(app, ["repeat", str(honest), "--out", out, "--workers", "0"])
+    done = cli.invoke(app, ["leaderboard", "repeat", str(honest), "--out", out, "--workers", "0"])
     assert done.exit_code == 0, done.output
     assert "0 of 4 verdicts changed." in done.output
-    refused = cli.invoke(app, ["repeat", str(honest), "--out", str(honest)])
+    refused = cli.invoke(app, ["leaderboard", "repeat", str(honest), "--out", str(honest)])
     assert refused.exit_code != 0

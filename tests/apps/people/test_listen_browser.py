@@ -150,7 +150,17 @@ def test_forty_questions_with_a_kill_and_a_closed_browser(tmp_path, monkeypatch,
 
 def check_played(folder):
     """Play the answers; they give the oracle's success and the tables."""
-    command = [sys.executable, "-m", "roboirg", "listen", "play", folder, "--workers", "0"]
+    command = [
+        sys.executable,
+        "-m",
+        "roboirg",
+        "listen",
+        "results",
+        folder,
+        "--play",
+        "--workers",
+        "0",
+    ]
     done = subprocess.run(command, capture_output=True, text=True, env=os.environ, check=False)
     assert done.returncode == 0, done.stderr
     records = read_records(folder / "run")

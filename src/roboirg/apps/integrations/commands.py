@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from roboirg.cli.records_commands import records_app
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.plain_text import counted
 
@@ -48,4 +49,5 @@ def _field(text: str) -> tuple[str, str]:
 
 
 def add_commands(app: typer.Typer) -> None:
-    app.command()(import_results)
+    del app  # the group is part of it already
+    records_app.command("import")(import_results)

@@ -42,7 +42,7 @@ _LINE_EVERY = 200
 """Without a terminal, print a line after this many batches."""
 
 
-language_app = typer.Typer(no_args_is_help=True, help="Count, validate and show the instructions.")
+language_app = typer.Typer(no_args_is_help=True, help="Count, validate and score the instructions.")
 
 
 @spread
@@ -155,20 +155,6 @@ def validate_instructions(
         raise RoboIRGError(f"Found {broken} in {counted(texts, 'text')}.")
 
 
-@language_app.command()
-def card(
-    out: Annotated[Path | None, typer.Option(help="Write to this file instead of stdout.")] = None,
-) -> None:
-    """Write the language card: an example of every variant, in Markdown."""
-    from roboirg.apps.language_lab.card import language_card
-    from roboirg.util.atomic_write import write_atomically
-
-    if out is None:
-        typer.echo(language_card(), nl=False)
-    else:
-        write_atomically(out, language_card())
-
-
 @language_app.command("shortcuts")
 @spread
 def score_shortcuts(
@@ -243,16 +229,7 @@ def _console() -> Console:
     return console
 
 
-wordings_app = typer.Typer(no_args_is_help=True, help="Use the commands of others.")
-
-
-@wordings_app.callback()
-def _wordings() -> None:
-    # With a callback, a single command keeps its name.
-    pass
-
-
-@wordings_app.command("import-robomme")
+@language_app.command("import-robomme")
 def import_robomme(
     path: Annotated[Path, typer.Argument(help="Folder of a clone of RoboMME's repository.")],
     out: Annotated[Path, typer.Option(help="Wording file to write, TOML.")],
@@ -281,4 +258,3 @@ def import_robomme(
 def add_commands(app: typer.Typer) -> None:
     export_app.command("instructions")(export_instructions)
     app.add_typer(language_app, name="language")
-    app.add_typer(wordings_app, name="wordings")

@@ -55,7 +55,8 @@ def read_packs(
     paths = sorted(folder.glob(f"*{PACK_SUFFIX}"))
     if not paths:
         raise InvalidValueError(
-            f"There are no packed runs (*{PACK_SUFFIX}) in {folder}; make them with `roboirg pack`."
+            f"There are no packed runs (*{PACK_SUFFIX}) in {folder}; make them with "
+            "`roboirg leaderboard pack`."
         )
     packs = []
     for count, path in enumerate(paths, start=1):

@@ -59,7 +59,7 @@ class PackedRun(NamedTuple):
         name: of the file.
         results: of its records.
         planned: jobs of its plans.
-        check: what `roboirg verify` found; None if it was not asked.
+        check: what `roboirg leaderboard verify` found; None if it was not asked.
     """
 
     name: str

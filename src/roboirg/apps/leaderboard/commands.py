@@ -219,5 +219,7 @@ def _print_flips(episodes: tuple[RepeatedEpisode, ...]) -> None:
 
 
 def add_commands(app: typer.Typer) -> None:
+    group = typer.Typer(no_args_is_help=True, help="Verify, pack, rank and repeat runs.")
     for command in (verify, pack, board, repeat):
-        app.command()(command)
+        group.command()(command)
+    app.add_typer(group, name="leaderboard")

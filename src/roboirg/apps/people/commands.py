@@ -135,23 +135,29 @@ def serve_study(
     _serve(server, "Press Ctrl-C to stop; all answers are stored.")
 
 
-@listen_app.command("play")
-def play_answers(folder: Study, workers: Workers = None) -> None:
-    """Play what people answered with the oracle's hands; records are in FOLDER/run."""
+@listen_app.command("results")
+def print_results(
+    folder: Study,
+    play: Annotated[
+        bool, typer.Option("--play", help="Let the oracle's hands play the answers first.")
+    ] = False,
+    workers: Workers = None,
+) -> None:
+    """Print how far people agree, how long they take, whether they pay attention.
+
+    Records of what --play plays are in FOLDER/run.
+    """
     from roboirg.apps.people.people_run import RUN, answered_plan
     from roboirg.evaluation.run.executor import choose_executor
 
+    if not play:
+        _print_listeners(folder)
+        return
     made, out = answered_plan(folder), folder.absolute() / RUN
     summary = run_commands.play(made, out, choose_executor(workers), retry=True)
     run_commands.print_tables_of(out, made.jobs())
     _print_listeners(folder)
     run_commands.report_problems(summary, out)
-
-
-@listen_app.command("table")
-def print_listeners(folder: Study) -> None:
-    """Print how far people agree, how long they take, and whether they pay attention."""
-    _print_listeners(folder)
 
 
 def _print_listeners(folder: Path) -> None:

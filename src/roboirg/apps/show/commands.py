@@ -1,42 +1,83 @@
-"""The command that draws an episode: ``roboirg show``."""
+"""The command that shows an episode: ``roboirg show``."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboirg.cli.options import (
-    Split,
-)
+from roboirg.cli.names import known_settings
+from roboirg.cli.options import DEFAULT_WORDS, Settings, Split, WordChoices, spread
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.plain_text import counted
+
+if TYPE_CHECKING:
+    from roboirg.core.episode import Episode
+    from roboirg.core.instruction_options import InstructionOptions
 
 
+@spread
 def show(
     task: Annotated[str, typer.Argument(help="Name of the task.")],
     episode: Annotated[int, typer.Argument(help="Position in the split, from 0.")],
     split: Split = "test",
+    words: Annotated[
+        bool, typer.Option("--words", help="Print the instructions only, with their lengths.")
+    ] = False,
+    settings: Settings = "all",
+    choices: WordChoices = DEFAULT_WORDS,
+    distractors: Annotated[int, typer.Option(help="Number of distractors.")] = 1,
     out: Annotated[
         str | None, typer.Option(help="PNG file to write; TASK-SPLIT-EPISODE.png by default.")
     ] = None,
 ) -> None:
     """Print an episode's scene and instructions, and draw how the oracle plays it."""
+    from roboirg.language import settings_of
+    from roboirg.tasks import get_task
+    from roboirg.tasks.splits.splits import get_episode
+
+    found = get_episode(task, split, episode)
+    options = choices.instruction_options()._replace(distractors=distractors)
+    possible, chosen = settings_of(get_task(task)), known_settings(settings)
+    shown = [name for name in chosen if name in possible] or chosen
+    if words:
+        _print_words(found, shown, options)
+    else:
+        path = Path(f"{task}-{split}-{episode}.png" if out is None else out)
+        _draw(found, shown, options, path)
+
+
+def _print_words(episode: Episode, settings: Sequence[str], options: InstructionOptions) -> None:
+    """Print what is said in each setting, and how many tokens it needs."""
+    from roboirg.language.generator import instruct_with
+    from roboirg.language.token_counts import count_tokens
+
+    for name in settings:
+        instruction = instruct_with(episode, options._replace(setting=name))
+        length = counted(count_tokens(instruction.text), "token")
+        typer.echo(f"{typer.style(name, bold=True)} ({length}):")
+        for utterance in instruction.utterances:
+            typer.echo(f"  {utterance.stage:<13} {utterance.text}")
+
+
+def _draw(
+    episode: Episode, settings: Sequence[str], options: InstructionOptions, path: Path
+) -> None:
+    """Print the scene and the instructions, and draw the oracle's episode."""
     from rich.console import Console
 
     from roboirg.apps.show.episode_text import print_episode
     from roboirg.apps.show.playthrough import draw_sheet
     from roboirg.envs.factory import check_simulator
-    from roboirg.tasks.splits.splits import get_episode
 
-    found = get_episode(task, split, episode)
-    path = Path(f"{task}-{split}-{episode}.png" if out is None else out)
     if path.suffix.lower() != ".png" or path.is_dir():
         raise InvalidValueError(f"{str(path)!r} is not a valid picture file; it must end in .png.")
     check_simulator()
     console = Console()
-    print_episode(found, console)
-    verdict = draw_sheet(found, path)
+    print_episode(episode, settings, options, console)
+    verdict = draw_sheet(episode, path)
     console.print(f"[bold]the oracle[/] {verdict}", highlight=False)
     typer.echo(path)
 

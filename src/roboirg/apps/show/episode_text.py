@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from rich import box
 from rich.console import Console
@@ -12,10 +13,10 @@ from rich.table import Table
 
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Episode, Scene, SceneObject
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.motions import Away, Glow, Motion, Point, Shuttle, Swap, Vanish
 from roboirg.judging import plain_subgoal
-from roboirg.language import find_refusals, instruct, settings_of
-from roboirg.tasks import get_task
+from roboirg.language.generator import find_refusal, instruct_with
 
 MINIMUM_WIDTH = 100
 """Columns if the output is not a terminal."""
@@ -23,8 +24,10 @@ MINIMUM_WIDTH = 100
 _RELATIONS = {"placed": "placed on", "binned": "in", "stopped": "stopped on", "hovering": "over"}
 
 
-def print_episode(episode: Episode, console: Console) -> None:
-    """Print objects, motions, video, goal, and the instruction in each setting."""
+def print_episode(
+    episode: Episode, settings: Sequence[str], options: InstructionOptions, console: Console
+) -> None:
+    """Print objects, motions, video, goal, and the instruction in some settings."""
     if not console.is_terminal:
         console.width = max(console.width, MINIMUM_WIDTH)
     console.print(
@@ -35,7 +38,7 @@ def print_episode(episode: Episode, console: Console) -> None:
     _print_list("the video shows", describe_video(episode), console)
     goal = ", ".join(f"{slot} {_value(value)}" for slot, value in episode.goal.slots)
     _print_list("goal", [goal], console)
-    console.print(instructions_table(episode))
+    console.print(instructions_table(episode, settings, options))
 
 
 def objects_table(scene: Scene) -> Table:
@@ -75,19 +78,21 @@ def fact_words(fact: Fact) -> str:
     return " ".join(part for part in (fact.subject, fact.traits.state, fact.place) if part)
 
 
-def instructions_table(episode: Episode) -> Table:
-    """Return a table of the instruction in every setting, implicit and resolved."""
+def instructions_table(
+    episode: Episode, settings: Sequence[str], options: InstructionOptions
+) -> Table:
+    """Return a table of the instruction in each setting, implicit and resolved."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_lines=False)
     table.add_column("setting", style="bold")
     table.add_column("form", style="dim")
     table.add_column("instruction", overflow="fold")
-    refusals = find_refusals(episode)
-    for setting in settings_of(get_task(episode.task)):
-        if setting in refusals:
-            table.add_row(setting, "", f"cannot express the episode: {escape(refusals[setting])}")
+    for setting in settings:
+        chosen = options._replace(setting=setting)
+        if refusal := find_refusal(episode, chosen):
+            table.add_row(setting, "", f"cannot express the episode: {escape(refusal)}")
             continue
         for form in ("implicit",) if setting == "explicit" else ("implicit", "resolved"):
-            text = instruct(episode, setting, form).text
+            text = instruct_with(episode, chosen._replace(form=form)).text
             table.add_row(setting if form == "implicit" else "", form, escape(text))
     return table
 

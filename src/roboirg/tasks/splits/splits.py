@@ -7,7 +7,7 @@ index + rejected``, in a private split a keyed hash; its difficulties repeat eas
 hard. The base depends on split and task; `rejected` is the number of seeds passed over: those
 without a valid scene and, in the first three splits, those with a setting that cannot be expressed
 and those that the oracle does not solve. ``splits.json`` holds these numbers, with a fingerprint of
-the episodes of each task that detects changes of scenes; ``roboirg build-splits`` writes it.
+the episodes of each task that detects changes of scenes; ``scripts/build_splits.py`` writes it.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ def sentences(
         yield (
             "How much a policy differs from itself is not known of "
             f"{' and '.join(name for name, own in zip(names, flips, strict=True) if not own)}: "
-            "`roboirg repeat RUN --out AGAIN` measures it."
+            "`roboirg leaderboard repeat RUN --out AGAIN` measures it."
         )
 
 

@@ -70,7 +70,9 @@ def read_flips(folder: Path) -> Flips:
     except FileNotFoundError:
         return {}
     except (OSError, ValueError, TypeError, KeyError) as error:
-        raise StoreError(f"{path} is damaged; `roboirg repeat` writes it again.") from error
+        raise StoreError(
+            f"{path} is damaged; `roboirg leaderboard repeat` writes it again."
+        ) from error
 
 
 def _options(fields: Mapping[str, Any]) -> InstructionOptions:

@@ -2,7 +2,7 @@
 
 import os
 
-from roboirg.apps.split_search.seed_selection import Rejection
+from seed_selection import Rejection
 
 
 def take_the_third(slot, seed):

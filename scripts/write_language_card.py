@@ -1,9 +1,13 @@
-"""The language card: an example of every variant, written by the generator itself."""
+"""Write docs/language-card.md: an example of every variant, in the generator's own words.
+
+python scripts/write_language_card.py
+"""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from roboirg.core.episode import Episode
@@ -17,6 +21,7 @@ from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.splits.splits import get_episode
 
 SPLIT = "test"
+PAGE = Path(__file__).parent.parent / "docs" / "language-card.md"
 
 _INTRODUCTION = """\
 # Language card
@@ -130,3 +135,7 @@ def marked(instruction: Instruction) -> str:
 
 def _sign(mention: Mention) -> str:
     return "**" if mention.role == "anaphor" else "*"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(language_card(), encoding="utf-8")

@@ -6,9 +6,7 @@ from collections import Counter
 
 import pytest
 from rich.console import Console
-from seed_selection_fakes import die, refuse, take_the_third
-
-from roboirg.apps.split_search.seed_selection import (
+from seed_selection import (
     ACCEPTANCE_SETTINGS,
     EpisodeSlot,
     Rejection,
@@ -21,7 +19,9 @@ from roboirg.apps.split_search.seed_selection import (
     find_seeds,
     merge_splits,
 )
-from roboirg.apps.split_search.seed_summary import cause_lines, follow_progress, print_summary
+from seed_selection_fakes import die, refuse, take_the_third
+from seed_summary import cause_lines, follow_progress, print_summary
+
 from roboirg.core.episode import SPLITS
 from roboirg.core.errors import InvalidValueError, RoboIRGError, SceneRejectedError
 from roboirg.language import expressible, find_refusals

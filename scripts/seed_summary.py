@@ -9,8 +9,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from seed_selection import REASONS, EpisodeSlot, SelectedSeed
 
-from roboirg.apps.split_search.seed_selection import REASONS, EpisodeSlot, SelectedSeed
 from roboirg.core.episode import DIFFICULTIES
 from roboirg.util.console_width import widen
 

@@ -1,0 +1,54 @@
+"""Select the seeds of the splits again.
+
+python scripts/build_splits.py --out src/roboirg/tasks/splits/splits.json
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import seed_selection
+import typer
+from seed_summary import follow_progress, print_summary
+
+from roboirg.cli.options import Tasks, Workers
+from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.evaluation.plan.plan_parsing import parse_names, parse_splits
+from roboirg.tasks import find_tasks
+from roboirg.tasks.splits import splits
+from roboirg.util.atomic_write import write_atomically
+from roboirg.util.console_width import progress_console
+from roboirg.util.processor import core_count
+
+
+def build_splits(
+    tasks: Tasks = "all",
+    split: Annotated[str, typer.Option(help="train, val, test or all.")] = "all",
+    workers: Workers = None,
+    out: Annotated[str | None, typer.Option(help="Write to this file instead of stdout.")] = None,
+) -> None:
+    """Select the seeds of the splits again; tasks and splits not named stay unchanged."""
+    names = find_tasks(parse_names("task", tasks))
+    wanted = parse_splits(split)
+    seed_selection.check_kept_splits(names, wanted, splits.shipped_splits())
+    if out is not None and not Path(out).parent.is_dir():
+        raise InvalidValueError(f"There is no folder for {out!r}; create it first.")
+    slots = seed_selection.episode_slots(names, wanted)
+    console = progress_console(stderr=True)
+    count = core_count() if workers is None else workers
+    found = follow_progress(seed_selection.find_seeds(slots, count), slots, console)
+    print_summary(found, console)
+    text = splits.splits_text(seed_selection.merge_splits(names, found, splits.shipped_splits()))
+    if out is None:
+        typer.echo(text, nl=False)
+    else:
+        write_atomically(Path(out), text)
+
+
+if __name__ == "__main__":
+    try:
+        typer.run(build_splits)
+    except RoboIRGError as error:
+        sys.exit(str(error))

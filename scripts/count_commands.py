@@ -1,0 +1,53 @@
+"""Print the commands with their options and arguments, and how many there are of each.
+
+python scripts/count_commands.py
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import typer.main
+
+from roboirg.main import app
+
+MOST_ENTRIES, MOST_COMMANDS, MOST_PARAMETERS = 26, 40, 200
+"""What a reader can find their way in: entries of ``roboirg --help``, commands in all, options and
+arguments in all."""
+
+
+class CommandCount(NamedTuple):
+    """A command and the names of its options and arguments, ``--help`` left out."""
+
+    words: str
+    parameters: tuple[str, ...]
+
+
+def commands() -> tuple[CommandCount, ...]:
+    """Return all commands; the first, without words, has the options of ``roboirg`` itself."""
+    return tuple(_walk(typer.main.get_command(app), ()))
+
+
+def entries() -> int:
+    """Return the number of commands and groups of ``roboirg --help``."""
+    return len(getattr(typer.main.get_command(app), "commands", {}))
+
+
+def _walk(command: Any, words: tuple[str, ...]) -> Iterator[CommandCount]:  # noqa: ANN401
+    group = getattr(command, "commands", {})
+    if not group or not words:
+        names = tuple(one.opts[0] for one in command.params if one.name != "help")
+        yield CommandCount(" ".join(words), names)
+    for name, inner in sorted(group.items()):
+        yield from _walk(inner, (*words, name))
+
+
+if __name__ == "__main__":
+    found = commands()
+    for one in found:
+        print(f"{len(one.parameters):3} {one.words or 'roboirg'}: {' '.join(one.parameters)}")
+    total = sum(len(one.parameters) for one in found)
+    print(f"{entries()} entries at the top (at most {MOST_ENTRIES})")
+    print(f"{len(found) - 1} commands (at most {MOST_COMMANDS})")
+    print(f"{total} options and arguments (at most {MOST_PARAMETERS})")

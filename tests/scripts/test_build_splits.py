@@ -1,0 +1,43 @@
+"""The script that selects the seeds of the splits again."""
+
+import re
+
+import build_splits
+import pytest
+import seed_selection
+
+from roboirg.core.errors import RoboIRGError
+from roboirg.tasks.splits.splits import shipped_splits, splits_text
+
+
+def test_splits_are_built_anew_for_what_is_named(tmp_path, monkeypatch, capsys):
+    def find(slots, workers):
+        assert workers == 0
+        # Backwards: no order of ending may matter.
+        return (
+            seed_selection.find_seed(slot, seed_selection.check_words) for slot in reversed(slots)
+        )
+
+    monkeypatch.setattr(seed_selection, "find_seeds", find)
+    chosen = {"tasks": "VideoPlaceOrder,PickXtimes,PutInBox", "split": "val", "workers": 0}
+    build_splits.build_splits(**chosen)
+    printed = capsys.readouterr()
+    assert printed.out == splits_text(shipped_splits())
+    assert re.search(r"VideoPlaceOrder\W+easy\W+\d", printed.err)
+    assert "[50/52]" in printed.err  # the other 98 are published
+    build_splits.build_splits(**chosen, out=str(tmp_path / "splits.json"))
+    assert (tmp_path / "splits.json").read_text() == splits_text(shipped_splits())
+
+
+@pytest.mark.parametrize(
+    ("chosen", "sentence"),
+    [
+        ({"tasks": "PickXtime"}, "There is no task 'PickXtime'"),
+        ({"split": "dev"}, "There is no split 'dev'"),
+        ({"workers": -1}, "workers is -1"),
+        ({"out": "nowhere/splits.json"}, "There is no folder for 'nowhere/"),
+    ],
+)
+def test_what_is_wrong_is_refused(chosen, sentence):
+    with pytest.raises(RoboIRGError, match=re.escape(sentence)):
+        build_splits.build_splits(**chosen)
