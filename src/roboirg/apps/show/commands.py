@@ -35,11 +35,13 @@ def show(
 ) -> None:
     """Print an episode's scene and instructions, and draw how the oracle plays it."""
     from roboirg.language import settings_of
+    from roboirg.language.generator import check_options
     from roboirg.tasks import get_task
     from roboirg.tasks.splits.splits import get_episode
 
     found = get_episode(task, split, episode)
     options = choices.instruction_options()._replace(distractors=distractors)
+    check_options(options)
     possible, chosen = settings_of(get_task(task)), known_settings(settings)
     shown = [name for name in chosen if name in possible] or chosen
     if words:
