@@ -63,7 +63,6 @@ RIGHT = {
     "listen results": ["nowhere"],
     "drive": ["PickXtimes", "0", "--port", "99999"],
     "learn listener": ["--out", "out"],
-    "learn study": ["--out", "out"],
     "learn answers": ["nowhere", "--data", "nowhere", "--out", "out"],
 }
 """Words for commands whose work needs what is not there: files, or a library."""

@@ -73,7 +73,6 @@ def words_of(folder, run):
         "score grounding": ["--help"],
         "records import": ["--help"],
         "learn listener": ["--help"],
-        "learn study": ["--help"],
         "learn answers": ["--help"],
         "listen plan": [f"{folder}/listeners", "--people", "1", "--tasks", "StopCube",
                         "--episodes", "1", "--practice", "0", "--checks", "0", "--settings",

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboirg.cli.options import Settings, Tasks, Workers, check_output_file, spread
+from roboirg.cli.options import Settings, Tasks, Workers, check_output_file
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
 
@@ -26,33 +26,29 @@ _Without = Annotated[
 ]
 
 
-class TrainingChoices(NamedTuple):
-    """Options of a training; a parameter of commands, see `spread`."""
-
-    scenes: Annotated[
-        int, typer.Option(min=0, help="Random scenes of each task beyond the train split.")
-    ] = 300
-    goals: Annotated[
-        int, typer.Option(min=1, help="Goals of each scene that are told by place.")
-    ] = 4
-    detector_epochs: Annotated[int, typer.Option(min=1, help="Passes over the pictures.")] = 6
-    reader_epochs: Annotated[int, typer.Option(min=1, help="Passes over the instructions.")] = 12
-    seed: Annotated[int, typer.Option(help="Of initial weights and order.")] = 0
-
-
-_DEFAULT_TRAINING = TrainingChoices()
-
-
 @learn_app.command("listener")
-@spread
 def learn_listener(
-    out: Annotated[Path, typer.Option(help="File for what it has learned.")],
+    out: Annotated[Path, typer.Option(help="File for what it has learned; with --study a folder.")],
     tasks: Tasks = "all",
     settings: Settings = "all",
     words: _Words = "train",
     rivals: _Rivals = False,
-    training: TrainingChoices = _DEFAULT_TRAINING,
+    scenes: Annotated[
+        int, typer.Option(min=0, help="Random scenes of each task beyond the train split.")
+    ] = 300,
+    epochs: Annotated[
+        int, typer.Option(min=2, help="Passes over the instructions; half as many over pictures.")
+    ] = 12,
+    seed: Annotated[int, typer.Option(help="Of initial weights and order.")] = 0,
     without: _Without = "none",
+    study: Annotated[
+        bool,
+        typer.Option(
+            "--study",
+            help="Train listeners that get or lack settings, video, pictures or words, and compare "
+            "them in tables and a figure.",
+        ),
+    ] = False,
     workers: Workers = None,
 ) -> None:
     """Train a listener on the train split: pictures with free labels, then instructions."""
@@ -60,30 +56,22 @@ def learn_listener(
     from roboirg.util.processor import core_count
 
     check_learn_support()
+    plan = _plan(tasks, settings, words, without)._replace(
+        rivals=rivals, scenes=scenes, detector_epochs=epochs // 2, reader_epochs=epochs, seed=seed
+    )
+    count = core_count() if workers is None else workers
+    if study:
+        _run_study(plan, out, count)
+        return
     from roboirg.apps.learned_listener.learned_model import save_model
     from roboirg.apps.learned_listener.listener_training import train_listener
 
     check_output_file(out)
-    plan = _plan(tasks, settings, words, without)._replace(rivals=rivals, **training._asdict())
-    count = core_count() if workers is None else workers
     save_model(train_listener(plan, count, _print_tenths()), out)
     typer.echo(f"{out}, {out.stat().st_size / 2**20:.1f} MiB")
 
 
-@learn_app.command("study")
-@spread
-def learn_study(
-    out: Annotated[Path, typer.Option(help="Folder for listeners, tables and figure.")],
-    tasks: Tasks = "all",
-    words: _Words = "train",
-    training: TrainingChoices = _DEFAULT_TRAINING,
-    workers: Workers = None,
-) -> None:
-    """Train listeners that get or lack settings, video, pictures or words, and compare them."""
-    from roboirg.apps.learned_listener.learned_listener import check_learn_support
-    from roboirg.util.processor import core_count
-
-    check_learn_support()
+def _run_study(plan: TrainingPlan, out: Path, workers: int) -> None:
     from roboirg.apps.learned_listener.listener_study import run_study
     from roboirg.apps.learned_listener.study_report import (
         save_study_figure,
@@ -92,13 +80,13 @@ def learn_study(
     )
 
     if out.exists() and not out.is_dir():
-        raise InvalidValueError(f"{str(out)!r} is a file; --out needs a folder.")
+        raise InvalidValueError(f"{str(out)!r} is a file; --study needs a folder as --out.")
     out.mkdir(parents=True, exist_ok=True)
-    plan = _plan(tasks, "all", words, "none")._replace(**training._asdict())
-    count = core_count() if workers is None else workers
-    cells = study_cells(run_study(plan, out, count, _print_tenths()))
+    cells = study_cells(run_study(plan, out, workers, _print_tenths()))
     page = out / "study.md"
-    page.write_text(study_text(cells, {"words": words, **training._asdict()}), encoding="utf-8")
+    about = plan._asdict().items()
+    shown = {name: value for name, value in about if name not in ("tasks", "settings", "without")}
+    page.write_text(study_text(cells, shown), encoding="utf-8")
     save_study_figure(cells, out)
     typer.echo(str(page))
 
