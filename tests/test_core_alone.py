@@ -46,7 +46,7 @@ NEEDS = {
     "records export": "export", "real run": "sim", "real score": "report",
     "export demonstrations": "sim", "export grounding": "sim",
     "leaderboard repeat": "sim", "leaderboard board": "report",
-    "language shortcuts": "report", "real figure": "report",
+    "language shortcuts": "report",
     "listen plan": "sim",
 }  # fmt: skip
 """The extra of each command that cannot do its work without one; all others work."""

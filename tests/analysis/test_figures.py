@@ -298,3 +298,15 @@ def test_the_command_draws_what_it_is_asked_for(tmp_path: Path) -> None:
     assert str(out / "averages.pdf") in done.output
     assert set(FIGURES) >= {"averages", "failures"}
     assert InstructionOptions("explicit") in {options for _, _, options in content().cells}
+
+
+def test_the_real_robot_s_figure_has_a_panel_per_task(
+    tmp_path: Path, published_like: Callable[..., list[Result]]
+) -> None:
+    found = content(published_like("real"))
+    write_figures(found, tmp_path, ["real"], published=True)
+    drawn = texts(tmp_path / "real.svg")
+    for words in ("PutInBox", "PickByCount", "explicit", "success, %", "(published)"):
+        assert words in drawn
+    with pytest.raises(InvalidValueError, match="nothing to draw for real"):
+        write_figures(content(results()), tmp_path, ["real"])

@@ -88,6 +88,5 @@ def words_of(folder, run):
                       "--demonstrations", "1", "--out", f"{folder}/study"],
         "real run": [f"{folder}/study"],
         "real score": [f"{folder}/study"],
-        "real figure": [run, "--out", f"{folder}/figures"],
         "language import-robomme": ["--help"],
     }  # fmt: skip

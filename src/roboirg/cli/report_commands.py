@@ -99,8 +99,8 @@ def figures(
     which: Annotated[
         str,
         typer.Option(
-            help="averages, forms, expressions, context, failures (several separated by commas), "
-            "or all that apply."
+            help="averages, forms, expressions, context, failures, real (several separated by "
+            "commas), or all that apply."
         ),
     ] = _ALL,
     published: Annotated[bool, typer.Option(help="Add the paper's values.")] = False,

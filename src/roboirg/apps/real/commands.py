@@ -169,22 +169,6 @@ def score(
         server.server_close()
 
 
-@real_app.command()
-def figure(
-    runs: Annotated[list[str], typer.Argument(help="Folders of studies.", metavar="RUN")],
-    out: Annotated[str, typer.Option(help="Folder for real.png and real.svg.")],
-    published: Annotated[bool, typer.Option(help="Show the paper's results beside these.")] = True,
-) -> None:
-    """Draw success by setting, with 95 % intervals, as PNG and SVG."""
-    from roboirg.apps.real.pages.study_figure import write_figure
-    from roboirg.evaluation.analysis.stats.cells import gather
-    from roboirg.evaluation.records.store import read_results
-
-    samples = gather([(name, read_results(Path(name))) for name in runs])
-    for path in write_figure(samples, Path(out), published=published):
-        typer.echo(path)
-
-
 def _play(study: Study, console: OperatorConsole, policies: list[str], *, retry: bool) -> None:
     """Play a study and print a summary; exits with 2 if a trial ended in an error."""
     from roboirg.apps.real.control.interruption import Interruption

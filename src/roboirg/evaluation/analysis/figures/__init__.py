@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FIGURES", "FigureData", "draw_figure", "write_figures"]
 
-FIGURES = ("averages", "forms", "expressions", "context", "failures")
+FIGURES = ("averages", "forms", "expressions", "context", "failures", "real")
 
 
 def write_figures(
@@ -61,7 +61,7 @@ def _written(name: str, content: FigureData, folder: Path, *, published: bool) -
 
 
 def draw_figure(name: str, content: FigureData, *, published: bool = False) -> Figure | None:
-    """Draw averages, forms, context or failures; return None without data.
+    """Draw one of `FIGURES` but the expressions; return None without data.
 
     Raises:
         MissingDependencyError: matplotlib is not installed.
@@ -79,6 +79,7 @@ def _drawn(name: str, content: FigureData, *, published: bool) -> Figure | None:
     from roboirg.evaluation.analysis.figures.context import draw_context
     from roboirg.evaluation.analysis.figures.failures import draw_failures
     from roboirg.evaluation.analysis.figures.forms import draw_forms
+    from roboirg.evaluation.analysis.figures.real_robot import draw_real_robot
 
     match name:
         case "averages":
@@ -87,4 +88,6 @@ def _drawn(name: str, content: FigureData, *, published: bool) -> Figure | None:
             return draw_context(content, published=published)
         case "forms":
             return draw_forms(content)
+        case "real":
+            return draw_real_robot(content, published=published)
     return draw_failures(content)

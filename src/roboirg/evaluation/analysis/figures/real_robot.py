@@ -1,32 +1,32 @@
-"""Draw success rates by setting, of a study beside the paper's."""
+"""Success by setting of studies with a real robot or its twin, next to the paper's."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from roboirg.apps.real.pages.trial_sheet import check_sheet_support
-from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.analysis.figures.figure_data import FigureData
+from roboirg.evaluation.analysis.figures.figure_style import (
+    COLORS,
+    PAGE_INCHES,
+    clear_axes,
+    legend_below,
+    new_figure,
+)
 from roboirg.evaluation.analysis.published import TRIALS
-from roboirg.evaluation.analysis.stats.cells import Cells
 from roboirg.evaluation.analysis.stats.intervals import wilson_interval
 from roboirg.evaluation.analysis.stats.option_labels import setting_sort_key
 from roboirg.evaluation.analysis.tables.paper_tables import make_table
 from roboirg.evaluation.analysis.tables.table import Row, Table
-from roboirg.evaluation.records.store import StoreError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-FORMATS = ("png", "svg")
-NAME = "real"
-COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-"""Palette of Okabe and Ito, safe for color-blind readers."""
 PUBLISHED_COLORS = ("#777777", "#aaaaaa")
 HATCH = "//"
-PANEL_INCHES = (5.2, 3.4)
-DOTS_PER_INCH = 200
+PANEL_HEIGHT = 2.6
+"""In inches."""
 
 
 class Bar(NamedTuple):
@@ -73,47 +73,23 @@ def bar_series(table: Table) -> tuple[Series, ...]:
     return tuple(sorted(found.values(), key=lambda one: one.published))
 
 
-def write_figure(samples: Cells, folder: Path, *, published: bool = True) -> tuple[Path, ...]:
-    """Draw success by setting, a panel for each task, as PNG and SVG.
+def draw_real_robot(content: FigureData, *, published: bool) -> Figure | None:
+    """Draw success of real-robot tasks by setting, a panel for each task; None without verdicts.
 
     Args:
-        samples: of the studies.
-        folder: created if it is missing.
-        published: whether to draw the paper's values beside them.
-
-    Returns:
-        The paths of the files.
-
-    Raises:
-        InvalidValueError: no trial has a verdict.
-        MissingDependencyError: matplotlib is not installed.
-        StoreError: the files cannot be written.
+        content: of the studies.
+        published: whether to draw the paper's values next to them.
     """
-    check_sheet_support()
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
-    table = make_table("real", samples, published=published)
+    table = make_table("real", content.cells, published=published)
     series = bar_series(table)
-    if not any(one.bars for one in series):
-        raise InvalidValueError("The runs have no trial of a real-robot task with a verdict.")
+    if not any(one.bars for one in series if not one.published):
+        return None
     tasks = [column.name for column in table.columns if not column.averages]
-    figure = Figure(figsize=(PANEL_INCHES[0] * len(tasks), PANEL_INCHES[1]), layout="constrained")
+    figure = new_figure(PAGE_INCHES, PANEL_HEIGHT)
     for number, task in enumerate(tasks, 1):
         _draw(figure.add_subplot(1, len(tasks), number), task, series)
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 4))
-    paths = tuple(folder / f"{NAME}.{kind}" for kind in FORMATS)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with mpl.rc_context({"svg.hashsalt": NAME}):
-            for path in paths:
-                # Without the date, so that the same records give the same file.
-                metadata = {"Date": None} if path.suffix == ".svg" else {}
-                figure.savefig(path, dpi=DOTS_PER_INCH, metadata=metadata)
-    except OSError as error:
-        raise StoreError(f"Cannot write to {folder}: {error.strerror}.") from error
-    return paths
+    legend_below(figure, figure.axes[0])
+    return figure
 
 
 def _bars(table: Table, row: Row, *, published: bool) -> list[tuple[str, Bar]]:
@@ -156,7 +132,7 @@ def _draw(axes: Axes, task: str, series: Sequence[Series]) -> None:
             error_kw={"elinewidth": 0.8, "capsize": 2.0},
         )  # fmt: skip
     axes.set_xticks(range(len(settings)), settings)
+    clear_axes(axes, grid="y")
     axes.set_ylim(0, 105)
     axes.set_title(task)
     axes.set_ylabel("success, %")
-    axes.spines[["top", "right"]].set_visible(False)
