@@ -181,7 +181,7 @@ def test_run_then_report(roboirg, tmp_path: Path) -> None:
     said = roboirg(*command)
     assert said.code == 0, said.err
     lines = (tmp_path / "records.jsonl").read_text().splitlines()
-    assert "[1/10] random PickXtimes test/0 explicit: success" in said.out
+    assert "[1/10] random PickXtimes test/0 direct: success" in said.out
     assert len(lines) == 10
     keys = {"policy", "task", "split", "episode", "seed", "difficulty", "setting", "form"}
     assert keys | {"policy_seed", "outcome", "cause", "steps"} <= set(json.loads(lines[0]))

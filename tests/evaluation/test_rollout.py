@@ -121,7 +121,7 @@ class PaperInsider(PaperPolicy):
 def stage(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
     def play(world: PaperWorld, policy: Any) -> RolloutResult:
         monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: world)
-        monkeypatch.setattr(rollout, "load_policy", lambda _job: policy)
+        monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: policy)
         return play_episode(JOB)
 
     return play
@@ -244,7 +244,7 @@ def test_videos_are_kept_as_asked(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, mode: Any, status: str, kept: bool
 ) -> None:
     monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: PaperWorld(5, status))
-    monkeypatch.setattr(rollout, "load_policy", lambda _job: PaperPolicy())
+    monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
     record = EpisodeRunner(tmp_path, mode, VideoOptions(cameras=("front",)))(JOB)
     assert (record.video is not None) == kept
     files = sorted(path.suffix for path in tmp_path.rglob("*") if path.is_file())
@@ -279,7 +279,7 @@ def test_a_video_that_cannot_be_written_does_not_change_the_verdict(
 
     monkeypatch.setattr(VideoWriter, "_encode", add)
     monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: PaperWorld(5))
-    monkeypatch.setattr(rollout, "load_policy", lambda _job: PaperPolicy())
+    monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
     options = VideoOptions(cameras=("front",))
     record = EpisodeRunner(tmp_path, "all", options)(JOB)
     assert (record.outcome, record.steps, record.video) == ("success", 5, None)
@@ -292,7 +292,7 @@ def test_a_video_folder_that_is_a_file_does_not_change_the_verdict(
 ) -> None:
     (tmp_path / "videos").touch()
     monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: PaperWorld(5))
-    monkeypatch.setattr(rollout, "load_policy", lambda _job: PaperPolicy())
+    monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
     record = EpisodeRunner(tmp_path, "all", VideoOptions(cameras=("front",)))(JOB)
     assert (record.outcome, record.video) == ("success", None)
     assert "FileExistsError" in str(record.video_error)
@@ -392,7 +392,7 @@ def test_a_record_holds_what_was_heard_when(
 ) -> None:
     world, policy = TellingWorld((0, 3, 6, 6), length=10), policy_class()
     monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: world)
-    monkeypatch.setattr(rollout, "load_policy", lambda _job: policy)
+    monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: policy)
     turns = world.instruction.turns
     record = EpisodeRunner(tmp_path)(TURNS)
     assert record.outcome == "success"
@@ -419,7 +419,7 @@ def test_the_caption_grows_as_utterances_are_heard(
 
     world = TellingWorld((0, 3, 6, 6, 9), length=11)
     monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: world)
-    monkeypatch.setattr(rollout, "load_policy", lambda _job: PaperPolicy())
+    monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
     play_episode(TURNS, Captions(tmp_path / "x.mp4"))
     counts = [1, 1, *[1] * 3, *[2] * 3, *[4] * 3, *[5] * 2]  # video, first frame, chunks of 3
     assert captions == [" ".join(world.instruction.turns[:count]) for count in counts]
@@ -433,7 +433,7 @@ def test_what_a_policy_raises_while_it_hears_is_its_error(
             raise ValueError(f"no ears for {text} at {step}")
 
     monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: TellingWorld((0, 3), 9))
-    monkeypatch.setattr(rollout, "load_policy", lambda _job: Deaf())
+    monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: Deaf())
     result = play_episode(TURNS)
     assert (result.outcome, result.error) == ("error", "policy")
     assert "no ears for" in str(result.cause)

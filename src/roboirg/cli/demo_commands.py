@@ -30,7 +30,7 @@ def demo(
     from roboirg.evaluation.run.executor import choose_executor
 
     folder = run_commands.folder_of(out)
-    plan = make_plan(DEMO_POLICIES, episodes=episodes, video=video)
+    plan = make_plan(DEMO_POLICIES, episodes=episodes, video=video, seed_secret="")
     check_report_support()
     summary = run_commands.play(plan, folder, choose_executor(workers), retry=True)
     run_commands.print_tables_of(folder, run_commands.planned_jobs(folder))

@@ -106,6 +106,7 @@ def play(
     plan: Plan, out: Path, executor: Executor, *, retry: bool, on_record: str | None = None
 ) -> RunSummary:
     """Play a plan with a progress bar; exits the process when it is interrupted."""
+    from roboirg.evaluation.plan.plan import with_secret
     from roboirg.evaluation.run.progress import ConsoleReporter
     from roboirg.evaluation.run.record_hook import CommandHook, HookedReporter
     from roboirg.evaluation.run.runner import Terminated, episode_runner, run_plan
@@ -113,6 +114,7 @@ def play(
     from roboirg.util.freed_memory import keep_freed_memory
 
     keep_freed_memory()
+    plan = with_secret(plan, out)
     play_job = episode_runner(plan, out)
     try:
         with ConsoleReporter(progress_console()) as shown, contextlib.ExitStack() as stack:

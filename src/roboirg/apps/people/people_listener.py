@@ -16,12 +16,12 @@ from roboirg.core.episode import Goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.policies.by_name.policy_specs import Build, PolicyKind
-from roboirg.policies.contract.random_state import episode_policy_seed
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.util.short_hash import short_hash
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
+    from roboirg.evaluation.records.record import Job
 
 STUDY_FILE = "study.json"
 
@@ -29,12 +29,12 @@ STUDY_FILE = "study.json"
 class PeopleListener(ScriptedPolicy):
     """Executes the goals that people named in a study; only the hands are privileged.
 
-    The run's policy seed tells which of the people who were asked about an episode is heard. If
-    the answer means no goal of the scene, the robot holds still.
+    The job's policy seed is the number of the person who is heard, of those who were asked about an
+    episode. If the answer means no goal of the scene, the robot holds still.
 
     Args:
         folder: of the study.
-        seed: of the episode, which `episode_policy_seed` made of the run's policy seed.
+        seed: not used.
 
     Raises:
         InvalidValueError: the folder holds no study.
@@ -47,6 +47,11 @@ class PeopleListener(ScriptedPolicy):
         self.version = study_version(folder)
         self._folder = folder
         self._answer: PersonAnswered | None = None
+        self._person = 0
+
+    def take_job(self, job: Job) -> None:
+        """Learn which person is heard."""
+        self._person = job.policy_seed
 
     @property
     def metadata(self) -> dict[str, Any]:
@@ -78,7 +83,7 @@ class PeopleListener(ScriptedPolicy):
             if (
                 (one.task, one.split, one.episode, one.setting, one.form) == wanted
                 and one.kind == "item"
-                and episode_policy_seed(one.policy_seed, episode.seed) == self.seed
+                and one.policy_seed == self._person
             ):
                 return one
         raise InvalidValueError(

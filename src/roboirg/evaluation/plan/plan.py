@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import secrets
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -71,6 +72,8 @@ class Plan(BaseModel):
         split: train, val, test, random, or the name of a private split.
         episodes: 0-based positions in the split.
         policy_seeds: every seed plays every episode.
+        seed_secret: text from which, with the policy seed and the scene, policies' seeds are made;
+            None draws one when the run begins, or takes that of the run's folder.
         stages: sets of stages for settings that read them; every set is played.
         distractor: kind of distractor, for settings that read it.
         distractors: number of distractors, for settings that read it.
@@ -108,6 +111,7 @@ class Plan(BaseModel):
     split: str = "test"
     episodes: tuple[int, ...]
     policy_seeds: tuple[int, ...] = (0,)
+    seed_secret: str | None = None
     stages: tuple[tuple[int, ...], ...] = (ALL_STAGES,)
     distractor: str = DEFAULT_DISTRACTOR
     distractors: int = DEFAULT_DISTRACTORS
@@ -216,7 +220,11 @@ class Plan(BaseModel):
         return self
 
     def jobs(self) -> tuple[Job, ...]:
-        """Return every job, ordered by policy, task, episode, setting, form, stages and seed."""
+        """Return every job, ordered by policy, task, episode, setting, form, stages and seed.
+
+        Of a scene, what leaves the goal implicit comes first: a policy that keeps what it heard
+        has not heard the explicit command of the scene yet.
+        """
         # The settings of an episode are slow to find, so all policies share them.
         settings = {
             (task, episode): self.settings_of(task, episode)
@@ -254,29 +262,29 @@ class Plan(BaseModel):
         seeds: tuple[int, ...],
     ) -> Iterator[Job]:
         name, spec = policy
-        for setting in settings:
-            for options in self._options_of(setting):
-                if self._is_left_out(task, episode, options):
-                    continue
-                job = Job(
-                    policy=name,
-                    task=task,
-                    split=self.split,
-                    episode=episode,
-                    **options._replace(wordings=self.wordings_identity)._asdict(),
-                    wordings_file=self.wordings,
-                    policy_seed=seeds[0],
-                    max_steps=self.max_steps,
-                    actions=self.actions,
-                    demonstration_frames=self.demonstration_frames,
-                    observe_every=self.observe_every,
-                    meshes=self.meshes,
-                    spec=None if spec == name else spec,
-                )
-                yield job
-                # Copying is faster, and there may be very many.
-                for seed in seeds[1:]:
-                    yield job.model_copy(update={"policy_seed": seed})
+        said = [options for setting in settings for options in self._options_of(setting)]
+        for options in sorted(said, key=_names_the_goal):
+            if self._is_left_out(task, episode, options):
+                continue
+            job = Job(
+                policy=name,
+                task=task,
+                split=self.split,
+                episode=episode,
+                **options._replace(wordings=self.wordings_identity)._asdict(),
+                wordings_file=self.wordings,
+                policy_seed=seeds[0],
+                max_steps=self.max_steps,
+                actions=self.actions,
+                demonstration_frames=self.demonstration_frames,
+                observe_every=self.observe_every,
+                meshes=self.meshes,
+                spec=None if spec == name else spec,
+            )
+            yield job
+            # Copying is faster, and there may be very many.
+            for seed in seeds[1:]:
+                yield job.model_copy(update={"policy_seed": seed})
 
     def _options_of(self, setting: str) -> Iterator[InstructionOptions]:
         """Yield the instruction options to play in a setting.
@@ -355,6 +363,22 @@ class Plan(BaseModel):
                 raise InvalidValueError(
                     f"{task} has no {setting} setting; its settings are {', '.join(has)}."
                 )
+
+
+def _names_the_goal(options: InstructionOptions) -> bool:
+    return options.setting == EXPLICIT or options.form == "resolved"
+
+
+def with_secret(plan: Plan, folder: Path) -> Plan:
+    """Return a plan whose `seed_secret` is known: its own, the folder's, or a new one.
+
+    A run that began without one goes on without.
+    """
+    if plan.seed_secret is not None:
+        return plan
+    before = read_plan(folder)
+    secret = secrets.token_hex(16) if before is None else before.seed_secret or ""
+    return plan.model_copy(update={"seed_secret": secret})
 
 
 def write_plan(plan: Plan, folder: Path) -> None:

@@ -76,6 +76,7 @@ class EpisodeRunner:
         hosts: where to ask for them; an executor sets it.
         refuse_long: whether an episode is not played if its prompt is longer than what the policy's
             model reads.
+        seed_secret: of the run, for the policies' seeds.
     """
 
     folder: Path
@@ -86,6 +87,7 @@ class EpisodeRunner:
     hosting: HostSettings | None = None
     hosts: HostAddress | None = None
     refuse_long: bool = False
+    seed_secret: str = ""
 
     def in_folder(self, folder: Path) -> EpisodeRunner:
         """Return a copy that writes its videos to another folder."""
@@ -133,6 +135,7 @@ class EpisodeRunner:
                     self.hosts,
                     alone=alone,
                     refuse_long=self.refuse_long,
+                    seed_secret=self.seed_secret,
                 )
             except EpisodeLostError as error:
                 alone = alone or error.alone
@@ -163,6 +166,7 @@ def play_episode(
     *,
     alone: bool = False,
     refuse_long: bool = False,
+    seed_secret: str = "",
 ) -> RolloutResult:
     """Play one job; errors of the policy or the environment end up in the result.
 
@@ -173,6 +177,7 @@ def play_episode(
         hosts: where policies have processes of their own; None to run them in this process.
         alone: whether a hosted policy must not be asked about this episode together with others.
         refuse_long: whether not to play an episode whose prompt will be cut.
+        seed_secret: of the run, for the policy's seed.
 
     Raises:
         EpisodeLostError: the policy's process was lost; the episode can be played again.
@@ -188,12 +193,13 @@ def play_episode(
     try:
         if hosts is not None and needs_host(job.policy_spec):
             with guard.policy("policy's constructor", "policy_load"):
-                policy = _load_hosted(job, hosts, result, alone=alone)
+                seed = _policy_seed(job, seed_secret)
+                policy = _load_hosted(job, hosts, result, seed, alone=alone)
         if policy is None:
             guard = CallGuard(result, policy_timeout_s)
             result.policy = describe_here(job.policy_spec)
             with guard.policy("policy's constructor", "policy_load"):
-                policy = load_policy(job)
+                policy = load_policy(job, seed_secret)
         with guard.policy("policy's constructor", "policy_load"):
             needs = env_requirements(policy, job)
             result.prompt_limit = prompt_limit(policy)
@@ -252,25 +258,28 @@ def _refuse_long_prompt(job: Job, result: RolloutResult) -> None:
         raise EpisodeError("prompt", message, "")
 
 
-def load_policy(job: Job) -> Policy:
+def load_policy(job: Job, seed_secret: str = "") -> Policy:
     """Return a new policy object, so that no state of an earlier episode remains."""
-    return policies.make_policy(job.policy_spec, seed=_policy_seed(job))
+    policy = policies.make_policy(job.policy_spec, seed=_policy_seed(job, seed_secret))
+    if callable(take := getattr(policy, "take_job", None)):
+        take(job)  # of ours that look up what somebody did in this episode
+    return policy
 
 
 def _load_hosted(
-    job: Job, hosts: HostAddress, result: RolloutResult, *, alone: bool
+    job: Job, hosts: HostAddress, result: RolloutResult, seed: int, *, alone: bool
 ) -> HostedPolicy | None:
     """Return a new policy object in its host; None if it is privileged and must run here."""
-    policy = HostedPolicy(hosts, job.policy_spec, _policy_seed(job), alone=alone)
+    policy = HostedPolicy(hosts, job.policy_spec, seed, alone=alone)
     if policy.is_privileged:
         return None
     result.policy = PolicyDescription(policy.version, is_privileged=False)
     return policy
 
 
-def _policy_seed(job: Job) -> int:
+def _policy_seed(job: Job, secret: str) -> int:
     episode = get_episode(job.task, job.split, job.episode)
-    return episode_policy_seed(job.policy_seed, episode.seed)
+    return episode_policy_seed(job.policy_seed, episode.seed, secret)
 
 
 def _play_to_end(

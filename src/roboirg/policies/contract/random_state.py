@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import random
 import sys
 from types import TracebackType
@@ -10,14 +11,19 @@ from typing import Any, ClassVar
 import numpy as np
 
 
-def episode_policy_seed(policy_seed: int, episode_seed: int) -> int:
+def episode_policy_seed(policy_seed: int, episode_seed: int, secret: str = "") -> int:
     """Return a policy's seed in an episode: the same in every setting, another in every episode.
 
     Args:
         policy_seed: of the run.
         episode_seed: of the episode's scene.
+        secret: of the run; who does not know it cannot find the episode from the seed.
+
+    Returns:
+        A number below 2**32.
     """
-    return int(np.random.SeedSequence((policy_seed, episode_seed)).generate_state(1)[0])
+    text = f"{secret}|{policy_seed}|{episode_seed}"
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "big")
 
 
 class RandomState:
