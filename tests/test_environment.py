@@ -23,10 +23,11 @@ from roboirg.envs.env_settings import EnvSettings
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.envs.registration import environment_id
 from roboirg.envs.vector.vector_environment import RoboIRGVectorEnv
-from roboirg.evaluation.play.policy_environment import EnvRequirements, make_env
+from roboirg.evaluation.play.policy_environment import make_env
 from roboirg.evaluation.records.record import Job
 from roboirg.policies import make_policy, play
 from roboirg.policies.builtin.scripted import ScriptedPolicy
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.physics_settings import HOME_ACTION
 from roboirg.tasks import every_task, get_task
@@ -187,7 +188,7 @@ def test_an_environment_without_what_a_policy_looks_at_is_refused(attribute):
 def test_runs_give_policies_their_action_space():
     job = Job(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
     for space in ACTION_SPACES.values():
-        env = make_env(job, EnvRequirements((), space))
+        env = make_env(job, PolicyNeeds(cameras=(), actions=space.name))
         assert env.actions == space.name
         assert np.array_equal(env.action_space.low, space.low)
 
@@ -368,7 +369,7 @@ def test_policies_are_shown_what_they_ask_for():
     job = Job(
         policy=f"{__name__}:Choosy", task="PickXtimes", split="test", episode=2, setting="direct"
     )
-    env = make_env(job, EnvRequirements((), ACTION_SPACES["joint_angle"], "none", 5))
+    env = make_env(job, PolicyNeeds(cameras=(), demonstration_frames="none", observe_every=5))
     env.max_steps = 20
     play(env, policy)
     assert policy.seen == [3, 0, 1, 1]

@@ -32,7 +32,7 @@ from roboirg.evaluation.records.store import RECORDS_FILE, read_contents, read_r
 from roboirg.evaluation.run.executor import Executor, InProcess, LocalProcesses
 from roboirg.evaluation.run.runner import run_plan
 from roboirg.policies.by_name.loading import is_foreign, needs_host
-from roboirg.policies.contract.requirements import wanted_cameras, wanted_history
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 
 KILLS = int(os.environ.get("ROBOIRG_TEST_KILLS", "24"))
 
@@ -96,6 +96,8 @@ def test_a_hosted_policy_gets_what_a_policy_gets(
         """
 class It:
     observe_every = 4
+    depth = grounded = True  # pixels of subgoals are for privileged policies only
+    prompt_tokens = property(lambda self: 7)
     def __init__(self, seed=0):
         self.metadata = {"seed": seed}
     def reset(self, instruction, demonstration):
@@ -116,8 +118,7 @@ class It:
 """,
     )
     policy = HostedPolicy(pool.address, spec, 5)
-    assert (wanted_history(policy), wanted_cameras(policy)) == (4, ("front", "wrist"))
-    assert not hasattr(policy, "cameras")  # it has not said which
+    assert PolicyNeeds.of(policy) == PolicyNeeds(observe_every=4, depth=True, prompt_tokens=7)
     frames = np.random.default_rng(0).integers(0, 255, (30, 256, 256, 3), np.uint8)
     assert frames.nbytes > 2 * BLOCK_SIZE
     policy.reset("Pick it.", {"front_rgb": frames, "joint_positions": np.zeros((30, 7))})
@@ -306,12 +307,15 @@ def test_a_policy_is_described_without_being_imported(
         """
 class It:
     version = "step-\\ud800" + "7" * 500
+    prompt_tokens = 9
+    cameras = property(lambda self: ("front",))
     def reset(self, instruction, demonstration): pass
     def act(self, observation): pass
 """,
     )
     found = describe_policy(spec)
     assert found.version == "step-?" + "7" * 194
+    assert found.needs == PolicyNeeds(prompt_tokens=9)
     assert not found.is_privileged
     assert "versioned" not in sys.modules
     assert describe_policy("oracle").is_privileged

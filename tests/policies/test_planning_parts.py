@@ -12,12 +12,14 @@ from planning_fakes import decoded
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import DemonstrationFrames
-from roboirg.policies.planners.memer import MAX_GAP, merge_keyframes
-from roboirg.policies.planners.observation_merging import (
-    DemonstrationSubset,
+from roboirg.policies.contract.policy_needs import (
     merge_cameras,
     merge_demonstration_frames,
     merge_observe_every,
+)
+from roboirg.policies.planners.memer import MAX_GAP, merge_keyframes
+from roboirg.policies.planners.observation_merging import (
+    DemonstrationSubset,
     select_history,
 )
 from roboirg.policies.planners.points import (

@@ -16,12 +16,7 @@ from roboirg.policies import Policy, PrivilegedPolicy, load_policy_class, make_p
 from roboirg.policies.by_name import policy_specs
 from roboirg.policies.by_name.loading import is_privileged, policy_version
 from roboirg.policies.by_name.systems import all_systems, find_system, load_system
-from roboirg.policies.contract.requirements import (
-    wanted_cameras,
-    wanted_demonstration_frames,
-    wanted_history,
-    wanted_history_cameras,
-)
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 from roboirg.policies.vlm.vlm_listener import VLMListener
 from roboirg.tasks.splits.splits import get_episode
@@ -99,10 +94,7 @@ def test_a_spec_overrides_entries():
 @pytest.mark.parametrize("spec", [*(f"system:{name}" for name in PAPER), LISTENER])
 def test_a_factory_has_what_a_class_would_have(spec):
     factory, policy = load_policy_class(spec), make_policy(spec, 5)
-    for wanted in (wanted_cameras, wanted_demonstration_frames, wanted_history):
-        assert wanted(factory) == wanted(policy)
-    assert factory.actions == policy.actions if hasattr(policy, "actions") else True
-    assert factory.grounded == getattr(policy, "grounded", False)
+    assert PolicyNeeds.of(factory) == PolicyNeeds.of(policy)
     assert hasattr(factory, "attach") == hasattr(policy, "attach") == is_privileged(spec)
     assert policy_version(spec) == factory.version == policy.version != "unknown"
     assert factory.version == load_policy_class(spec).version
@@ -255,11 +247,7 @@ def test_every_system_plays_a_whole_episode(name):
         env = roboirg.make(
             "PickXtimes",
             setting="direct",
-            cameras=wanted_cameras(policy),
-            demonstration_frames=wanted_demonstration_frames(policy),
-            observe_every=wanted_history(policy),
-            history_cameras=wanted_history_cameras(policy),
-            grounded=getattr(policy, "grounded", False),
+            **PolicyNeeds.of(policy).env_options,
             max_steps=40,
         )
         try:

@@ -11,14 +11,7 @@ from roboirg.policies import Policy, PrivilegedPolicy, load_policy_class, make_p
 from roboirg.policies.builtin.listeners import ForgetfulPolicy, ListenerPolicy
 from roboirg.policies.by_name.loading import is_privileged, policy_version
 from roboirg.policies.by_name.policy_classes import BUILTIN
-from roboirg.policies.contract.requirements import (
-    wanted_actions,
-    wanted_calibration,
-    wanted_cameras,
-    wanted_demonstration_frames,
-    wanted_depth,
-    wanted_history,
-)
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.tasks import every_task
 
 
@@ -144,23 +137,23 @@ def test_wrong_cameras_are_told_before_anything_starts(monkeypatch, cameras, wor
 
 def test_cameras_may_be_a_list_or_a_property(monkeypatch):
     monkeypatch.setattr(Silent, "cameras", ["wrist"], raising=False)
-    assert wanted_cameras(load_policy_class(f"{__name__}:Silent")) == ("wrist",)
+    assert PolicyNeeds.of(load_policy_class(f"{__name__}:Silent")).cameras == ("wrist",)
     monkeypatch.setattr(Silent, "cameras", property(lambda _self: ("front",)))
-    assert wanted_cameras(make_policy(f"{__name__}:Silent", 0)) == ("front",)
-    assert wanted_cameras(Deaf) == ("front", "wrist")
+    assert PolicyNeeds.of(make_policy(f"{__name__}:Silent", 0)).cameras == ("front",)
+    assert PolicyNeeds.of(Deaf).cameras == ("front", "wrist")
 
 
 def test_a_policy_says_in_which_action_space_it_acts(monkeypatch):
-    assert wanted_actions(Silent) is JOINT_ANGLE
+    assert PolicyNeeds.of(Silent).action_space is JOINT_ANGLE
     monkeypatch.setattr(Silent, "actions", "waypoint", raising=False)
-    assert wanted_actions(load_policy_class(f"{__name__}:Silent")) is WAYPOINT
+    assert PolicyNeeds.of(load_policy_class(f"{__name__}:Silent")).action_space is WAYPOINT
     monkeypatch.setattr(Silent, "actions", property(lambda _self: "waypoint"))
-    assert wanted_actions(make_policy(f"{__name__}:Silent", 0)) is WAYPOINT
+    assert PolicyNeeds.of(make_policy(f"{__name__}:Silent", 0)).action_space is WAYPOINT
 
 
 @pytest.mark.parametrize("name", BUILTIN)
 def test_built_in_policies_move_joints(name):
-    assert wanted_actions(load_policy_class(name)) is JOINT_ANGLE
+    assert PolicyNeeds.of(load_policy_class(name)).action_space is JOINT_ANGLE
 
 
 @pytest.mark.parametrize(
@@ -196,21 +189,19 @@ def test_a_wrong_wish_for_frames_is_told_before_anything_starts(
 
 
 def test_a_policy_says_which_frames_it_wants(monkeypatch):
-    assert (wanted_demonstration_frames(Silent), wanted_history(Silent)) == ("all", None)
+    assert PolicyNeeds.of(Silent) == PolicyNeeds()
     for wish in ("none", 4):
         monkeypatch.setattr(Silent, "demonstration_frames", wish, raising=False)
-        assert wanted_demonstration_frames(load_policy_class(f"{__name__}:Silent")) == wish
+        assert PolicyNeeds.of(load_policy_class(f"{__name__}:Silent")).demonstration_frames == wish
     monkeypatch.setattr(Silent, "observe_every", property(lambda _self: 8), raising=False)
-    assert wanted_history(make_policy(f"{__name__}:Silent", 0)) == 8
+    assert PolicyNeeds.of(make_policy(f"{__name__}:Silent", 0)).observe_every == 8
 
 
-@pytest.mark.parametrize(
-    ("attribute", "wanted"), [("depth", wanted_depth), ("calibration", wanted_calibration)]
-)
-def test_depth_and_matrices_are_wishes_and_need_a_camera(monkeypatch, attribute, wanted):
-    assert not wanted(Silent)
+@pytest.mark.parametrize("attribute", ["depth", "calibration"])
+def test_depth_and_matrices_are_wishes_and_need_a_camera(monkeypatch, attribute):
+    assert not getattr(PolicyNeeds.of(Silent), attribute)
     monkeypatch.setattr(Silent, attribute, True, raising=False)
-    assert wanted(load_policy_class(f"{__name__}:Silent"))
+    assert getattr(PolicyNeeds.of(load_policy_class(f"{__name__}:Silent")), attribute)
     monkeypatch.setattr(Silent, "cameras", (), raising=False)
     with pytest.raises(InvalidValueError, match=f"{attribute} is True, but cameras is "):
         load_policy_class(f"{__name__}:Silent")

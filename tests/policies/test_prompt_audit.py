@@ -12,9 +12,11 @@ from hypothesis import strategies as st
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.language.token_counts import count_tokens
+from roboirg.policies.by_name.loading import policy_needs
 from roboirg.policies.by_name.systems import all_systems
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.lerobot_policy import LeRobotPolicy
-from roboirg.policies.prompt_length.declared_limit import prompt_limit, prompt_needs_of
+from roboirg.policies.prompt_length.declared_limit import prompt_limit
 from roboirg.policies.prompt_length.prompt_audit import (
     PromptLimit,
     Tokens,
@@ -34,7 +36,7 @@ ORDER = ("cut", "unknown", "heard")
 
 
 def prompt_limit_of(spec):
-    return prompt_limit(prompt_needs_of(spec))
+    return prompt_limit(policy_needs(spec))
 
 
 def halves(text):
@@ -215,11 +217,11 @@ def test_limits_are_attributes_of_own_policies():
     class Mine:
         prompt_tokens, prompt_added = 64, 3
 
-    assert prompt_limit(Mine) == PromptLimit(64, 3)
+    assert prompt_limit(PolicyNeeds.of(Mine)) == PromptLimit(64, 3)
     for attribute, value in (("prompt_tokens", "64"), ("prompt_tokens", True), ("tokenizer", 3)):
         wrong = type("Wrong", (Mine,), {attribute: value})
         with pytest.raises(InvalidValueError, match=f"{attribute} is {value!r}"):
-            prompt_limit(wrong)
+            PolicyNeeds.of(wrong)
 
 
 def test_the_systems_of_the_paper_have_limits():
@@ -246,8 +248,9 @@ def test_a_lerobot_checkpoint_says_its_limit_itself(tmp_path):
 
 def test_optional_libraries_are_imported_when_they_are_used():
     code = (
-        "import sys; import roboirg.policies.prompt_length.declared_limit as d;"
-        "d.prompt_needs_of('openpi://localhost:1?prompt_tokens=64');"
+        "import sys; from roboirg.policies.by_name.loading import policy_needs;"
+        "from roboirg.policies.prompt_length.declared_limit import prompt_limit;"
+        "prompt_limit(policy_needs('openpi://localhost:1?prompt_tokens=64'));"
         "sys.exit(bool({'sentencepiece', 'tokenizers'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -13,7 +13,7 @@ import numpy as np
 
 from roboirg.apps.policy_check.expert_episode import ExpertEpisode, ExpertMoment
 from roboirg.core.actions import JOINT_HIGH, JOINT_LOW
-from roboirg.policies.contract.requirements import wanted_history
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 
 MOMENTS, ROWS, SIDE, LATENT = 20, 16, 8, 4
 REST = np.array([0.0, 0.2, 0.0, -2.1, 0.0, 2.4, 0.8])
@@ -57,7 +57,7 @@ def record(policy, rows):
     """Stand in for the simulator: the same episode for every policy, cut to its chunks."""
     whole = expert_episode()
     moments = [one._replace(actions=one.actions[:rows]) for one in whole.moments]
-    if wanted_history(policy):
+    if PolicyNeeds.of(policy).observe_every:
         shown = [{**one.observation, "history": (one.observation,)} for one in moments]
         moments = [m._replace(observation=o) for m, o in zip(moments, shown, strict=True)]
     return whole._replace(moments=moments)

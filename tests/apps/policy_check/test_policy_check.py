@@ -13,6 +13,7 @@ from roboirg.apps.policy_check.commands import check_policy as command
 from roboirg.apps.policy_check.policy_check import check_policy
 from roboirg.apps.policy_check.synthetic_episodes import SyntheticEpisodes
 from roboirg.core.observations import CAMERAS
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 
 
 class Sound:
@@ -214,7 +215,8 @@ def test_what_cannot_be_tried_is_told(spec, words):
 @pytest.mark.parametrize("frames", ["all", "none", 4])
 @pytest.mark.parametrize("every", [None, 1, 4])
 def test_made_up_episodes_are_what_was_asked_for(cameras, frames, every):
-    studio = SyntheticEpisodes(cameras, frames, every)
+    needs = PolicyNeeds(cameras=cameras, demonstration_frames=frames, observe_every=every)
+    studio = SyntheticEpisodes(needs)
     for size in (0, 10):
         episode = studio.episode("Go.", size)
         pictures = {f"{camera}_rgb" for camera in cameras}

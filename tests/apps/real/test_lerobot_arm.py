@@ -116,6 +116,12 @@ def test_privileged_policies_are_for_the_twin(tmp_path):
         study.run()
 
 
+def test_a_policy_by_url_is_refused_for_what_its_options_need(tmp_path):
+    _, study, _ = study_of(tmp_path, ("mme-vla://localhost:1",), lab_arm.LabArm())
+    with pytest.raises(InvalidValueError, match=r"requires observe_every=1; the control loop"):
+        study.run()
+
+
 def test_pictures_are_cut_to_the_middle():
     picture = np.zeros((480, 640, 3), np.uint8)
     picture[:, 80:560] = 200

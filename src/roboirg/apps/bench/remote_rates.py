@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from roboirg.core.observations import CAMERAS, Demonstration, Observation
 from roboirg.envs.factory import make
 from roboirg.policies import Policy, make_policy, play
-from roboirg.policies.contract.requirements import wanted_cameras
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 
 CHUNK = 16
 CHUNKS = 12
@@ -65,7 +65,7 @@ def steps_per_second(policy: Policy) -> float:
     """Return a policy's median rate over some episodes, which is robust against hiccups."""
     env = make(
         "PickXtimes",
-        cameras=wanted_cameras(policy),
+        cameras=PolicyNeeds.of(policy).cameras,
         demonstration_frames="none",
         max_steps=CHUNK * CHUNKS,
     )

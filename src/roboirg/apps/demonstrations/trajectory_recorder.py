@@ -32,7 +32,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import CAMERAS
 from roboirg.envs.factory import make
 from roboirg.policies.contract.base import Policy, PrivilegedPolicy, tell_policy
-from roboirg.policies.contract.requirements import wanted_actions
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.util.atomic_write import replacing
 
 if TYPE_CHECKING:
@@ -151,9 +151,10 @@ def record_trajectory(
     Raises:
         InvalidValueError: the policy has another action space; or the file cannot be written.
     """
-    if wanted_actions(policy).name != "joint_angle":
+    actions = PolicyNeeds.of(policy, "actions").actions
+    if actions != "joint_angle":
         raise InvalidValueError(
-            f"Policy {policy_name!r} acts in {wanted_actions(policy).name!r}; demonstrations hold "
+            f"Policy {policy_name!r} acts in {actions!r}; demonstrations hold "
             "joint angles, so it must act in 'joint_angle'."
         )
     said, is_drawn = options or InstructionOptions(), spec.coding != "none"

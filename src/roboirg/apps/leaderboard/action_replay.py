@@ -8,16 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.core.actions import find_action_space
 from roboirg.core.observations import Observation
 from roboirg.evaluation.episode_errors import EpisodeError
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription
 from roboirg.evaluation.play.call_guard import CallGuard
-from roboirg.evaluation.play.policy_environment import EnvRequirements
 from roboirg.evaluation.play.rollout import play_with
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.action_log import ActionLog
 from roboirg.evaluation.records.record import Job, Record
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 
 
 class ReplayPolicy:
@@ -73,7 +72,7 @@ def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
         InvalidValueError: the job's wording file is missing or has changed.
     """
     job, policy, result = _job(record), ReplayPolicy(log), _unknown_policy()
-    needs = EnvRequirements((), find_action_space(log.space))
+    needs = PolicyNeeds(cameras=(), actions=log.space)
     try:
         play_with(policy, job, needs, result, CallGuard(result, None))
     except EpisodeError as error:

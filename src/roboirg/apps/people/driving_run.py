@@ -11,7 +11,7 @@ from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.episode_errors import EpisodeError
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription
 from roboirg.evaluation.play.call_guard import CallGuard
-from roboirg.evaluation.play.policy_environment import env_requirements
+from roboirg.evaluation.play.policy_environment import job_needs
 from roboirg.evaluation.play.rollout import play_with
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.records.action_log import write_actions
@@ -60,7 +60,7 @@ def _play(job: Job, folder: Path, session: DrivingSession) -> Record | None:
     policy, result = DrivingPolicy(session), RolloutResult()
     result.policy = PolicyDescription(VERSION, is_privileged=False)
     try:
-        needs = env_requirements(policy, job)
+        needs = job_needs(policy, job)
         play_with(policy, job, needs, result, CallGuard(result, None), session)
     except EpisodeError as error:
         if isinstance(error.__cause__, DrivingStoppedError):

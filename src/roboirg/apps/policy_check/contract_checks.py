@@ -25,21 +25,13 @@ from roboirg.apps.policy_check.policy_player import (
     are_equal,
     describe_difference,
 )
-from roboirg.apps.policy_check.synthetic_episodes import SyntheticEpisodes
 from roboirg.apps.policy_check.turn_check import largest_difference, play_in_turns
 from roboirg.core.actions import check_chunk
 from roboirg.core.errors import MissingDependencyError, RoboIRGError
 from roboirg.core.plain_text import counted
 from roboirg.policies.by_name.loading import needs_host
 from roboirg.policies.contract.base import tell_policy
-from roboirg.policies.contract.requirements import (
-    wanted_actions,
-    wanted_calibration,
-    wanted_cameras,
-    wanted_demonstration_frames,
-    wanted_depth,
-    wanted_history,
-)
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 
 
 def check_loading(player: PolicyPlayer) -> Iterator[CheckResult]:
@@ -62,33 +54,17 @@ def check_loading(player: PolicyPlayer) -> Iterator[CheckResult]:
 
 def check_requirements(player: PolicyPlayer) -> Iterator[CheckResult]:
     """Read what the policy requires."""
-    policy = player.policy
     try:
-        player.space = wanted_actions(policy)
-        cameras, frames = wanted_cameras(policy), wanted_demonstration_frames(policy)
-        every = wanted_history(policy)
-        depth, calibration = wanted_depth(policy), wanted_calibration(policy)
+        player.needs = needs = PolicyNeeds.of(player.policy)
     except RoboIRGError as error:
         raise CheckAbortedError("requirements", FAIL, str(error)) from error
-
-    def make_episodes(changed: Any = ()) -> SyntheticEpisodes:  # noqa: ANN401
-        return SyntheticEpisodes(
-            cameras,
-            frames,
-            every,
-            player.seed,
-            depth=depth,
-            calibration=calibration,
-            changed=changed,
-        )
-
-    player.make_episodes = make_episodes
-    more = ", depth" * depth + ", calibration" * calibration
+    more = ", depth" * needs.depth + ", calibration" * needs.calibration
     yield CheckResult(
         "requirements",
         PASS,
-        f"Actions {player.space.name}, cameras {', '.join(cameras) or 'none'}, demonstration "
-        f"frames {frames}, observations every {every or 'chunk'}{more}.",
+        f"Actions {needs.actions}, cameras {', '.join(needs.cameras) or 'none'}, demonstration "
+        f"frames {needs.demonstration_frames}, observations every "
+        f"{needs.observe_every or 'chunk'}{more}.",
     )
 
 

@@ -22,7 +22,6 @@ from roboirg.apps.policy_check.expert_episode import ExpertEpisode, ExpertMoment
 from roboirg.apps.policy_check.picture_formats import change_observation
 from roboirg.apps.policy_check.policy_player import PolicyPlayer
 from roboirg.core.actions import ARM_JOINTS, JOINT_ANGLE, WAYPOINT
-from roboirg.policies.contract.requirements import wanted_cameras
 
 FITS = 0.5
 """Of the error of holding still: a policy below it knows where the expert goes."""
@@ -145,7 +144,7 @@ def _read_answers(
 
 def _change_inputs(player: PolicyPlayer, episode: ExpertEpisode) -> Iterator[_Attempt]:
     """Ask with observations in other forms."""
-    cameras = len(wanted_cameras(player.policy))
+    cameras = len(player.needs.cameras)
     for convention in INPUT_CONVENTIONS:
         if cameras < convention.cameras or (convention.only_local and not player.is_local):
             continue

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
@@ -12,7 +13,7 @@ from roboirg.core.actions import JOINT_ANGLE
 from roboirg.core.observations import Observation
 from roboirg.policies.builtin.oracle_policy import OraclePolicy
 from roboirg.policies.contract.base import Policy
-from roboirg.policies.contract.requirements import REQUIREMENTS, wanted_actions
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -22,9 +23,6 @@ MAX_STEPS = 140
 """Control steps: the expert takes a cube at step 84 and carries it until step 164."""
 MAX_ROWS = 16
 """Rows of a chunk that are compared, at most: the policy is asked again after them."""
-_SHOWN = (
-    "cameras", "demonstration_frames", "observe_every", "history_cameras", "depth", "calibration",
-)  # fmt: skip
 
 
 class ExpertMoment(NamedTuple):
@@ -70,7 +68,7 @@ def record_expert(policy: Policy, rows: int) -> ExpertEpisode:
     """Play the expert in the simulator, and keep what the policy would see.
 
     Args:
-        policy: whose requirements hold.
+        policy: whose needs the environment meets.
         rows: actions in a chunk of the policy.
 
     Raises:
@@ -79,10 +77,11 @@ def record_expert(policy: Policy, rows: int) -> ExpertEpisode:
     """
     from roboirg.envs.factory import make
 
-    options: Any = {name: REQUIREMENTS[name](policy) for name in _SHOWN}
-    env = make(TASK, setting=SETTING, split=SPLIT, episode=EPISODE, **options)
+    needs = PolicyNeeds.of(policy)
+    shown = replace(needs, actions=JOINT_ANGLE.name, grounded=False).env_options
+    env = make(TASK, setting=SETTING, split=SPLIT, episode=EPISODE, **shown)
     poses: list[NDArray[np.float64]] = []
-    if wanted_actions(policy) is not JOINT_ANGLE:
+    if needs.actions != JOINT_ANGLE.name:
         _keep_poses(env, poses)
     try:
         observation, info = env.reset()

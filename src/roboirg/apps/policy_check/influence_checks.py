@@ -13,12 +13,6 @@ import numpy as np
 from roboirg.apps.policy_check.check_result import NOTE, PASS, WARN, CheckResult
 from roboirg.apps.policy_check.policy_player import SECOND, VIDEO_STEPS, PolicyPlayer, are_equal
 from roboirg.apps.policy_check.synthetic_episodes import SyntheticEpisode
-from roboirg.policies.contract.requirements import (
-    wanted_cameras,
-    wanted_demonstration_frames,
-    wanted_depth,
-    wanted_prompt_tokens,
-)
 
 STATE_FIELDS = ("joint_positions", "gripper", "end_effector")
 OTHER_COMMANDS = (
@@ -102,7 +96,7 @@ def check_prompt_end(player: PolicyPlayer) -> Iterator[CheckResult]:
     if _reads_end(player, _ROOM, _UNLIKE_ENDS):
         # It hears the end, but one word there is too little to change an answer.
         return
-    declared = wanted_prompt_tokens(player.policy)
+    declared = player.needs.prompt_tokens
     words = len(_long_prompt(lost, _ENDS[0]).split())
     if declared is not None and words * _MAX_TOKENS_PER_WORD >= declared:
         yield CheckResult(
@@ -122,13 +116,13 @@ def check_prompt_end(player: PolicyPlayer) -> Iterator[CheckResult]:
 
 def check_pictures(player: PolicyPlayer) -> Iterator[CheckResult]:
     """Check that the pictures of each camera that it asks for change the answers."""
-    name, cameras = "pictures", wanted_cameras(player.policy)
+    name, cameras = "pictures", player.needs.cameras
     if not cameras:
         return
     if not _can_compare(player):
         yield from _not_checked(player, name)
         return
-    depth = wanted_depth(player.policy)
+    depth = player.needs.depth
     ignored = [
         camera
         for camera in cameras
@@ -172,9 +166,9 @@ def check_state(player: PolicyPlayer) -> Iterator[CheckResult]:
 def check_video(player: PolicyPlayer) -> Iterator[CheckResult]:
     """Note whether the demonstration changes the answers of a policy that asks for its frames."""
     name = "video"
-    if not _can_compare(player) or wanted_demonstration_frames(player.policy) == "none":
+    if not _can_compare(player) or player.needs.demonstration_frames == "none":
         return
-    if _changes_with_video(player, name, wanted_cameras(player.policy), STATE_FIELDS):
+    if _changes_with_video(player, name, player.needs.cameras, STATE_FIELDS):
         yield CheckResult(name, PASS, "Another video has other actions.")
     else:
         yield CheckResult(

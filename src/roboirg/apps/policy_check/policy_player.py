@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Collection, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
@@ -13,19 +13,17 @@ from numpy.typing import NDArray
 
 from roboirg.apps.policy_check.check_result import FAIL, CheckAbortedError, describe_error
 from roboirg.apps.policy_check.synthetic_episodes import SyntheticEpisode, SyntheticEpisodes
-from roboirg.core.actions import JOINT_ANGLE, ActionSpace, check_chunk
+from roboirg.core.actions import ActionSpace, check_chunk
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.policies.by_name.loading import make_policy
 from roboirg.policies.contract.base import Policy, close_policy
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.policy_urls import is_url
 
 CALLS = 3
 """Calls of `act` in a synthetic episode."""
 VIDEO_STEPS = 40
 FIRST, SECOND = "Put the red cube on the target.", "Press the second button from the left."
-
-MakeEpisodes = Callable[..., SyntheticEpisodes]
-"""Returns synthetic episodes as the policy requires them; see `SyntheticEpisodes` for `changed`."""
 
 
 class SyntheticRollout(NamedTuple):
@@ -50,8 +48,7 @@ class PolicyPlayer:
         seed: of the policy and of the synthetic episodes.
 
     Attributes:
-        space: action space.
-        make_episodes: makes synthetic episodes.
+        needs: of the policy; set by a check.
         repeatable: whether two equal episodes had equal actions; set by a check.
         constant: whether every action was the same one; set by a check.
         explained: whether it is known why targets are not where they should be; set by checks.
@@ -59,8 +56,7 @@ class PolicyPlayer:
 
     def __init__(self, source: str | Policy, seed: int) -> None:
         self.source, self.seed = source, seed
-        self.space: ActionSpace = JOINT_ANGLE
-        self.make_episodes: MakeEpisodes = SyntheticEpisodes
+        self.needs = PolicyNeeds()
         self.repeatable = self.constant = self.explained = False
         self._policy: Policy | None = None
 
@@ -68,6 +64,11 @@ class PolicyPlayer:
     def policy(self) -> Policy:
         """The policy that was made or asked last."""
         return self._policy if self._policy is not None else self.make_fresh()
+
+    @property
+    def space(self) -> ActionSpace:
+        """The policy's action space."""
+        return self.needs.action_space
 
     @property
     def is_local(self) -> bool:
@@ -95,6 +96,10 @@ class PolicyPlayer:
     def expected(self) -> SyntheticRollout:
         """The rollout of the episode with a video, played first by a fresh policy."""
         return self.play("acts with a video", self.with_video)
+
+    def make_episodes(self, changed: Collection[str] = ()) -> SyntheticEpisodes:
+        """Return synthetic episodes as the policy needs them; see there for `changed`."""
+        return SyntheticEpisodes(self.needs, self.seed, changed=changed)
 
     def play(
         self,

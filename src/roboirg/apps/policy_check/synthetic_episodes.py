@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.actions import ARM_JOINTS, JOINT_HIGH, JOINT_LOW, REACH_HIGH, REACH_LOW
-from roboirg.core.observations import CAMERAS, DemonstrationFrames, Observation
+from roboirg.core.observations import Observation
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 
 PICTURE, DEPTH = (256, 256, 3), (256, 256, 1)
 MAX_DEPTH = 2000
@@ -37,33 +38,23 @@ class SyntheticEpisode(NamedTuple):
 
 
 class SyntheticEpisodes:
-    """Makes the inputs that a policy with these requirements receives.
+    """Makes the inputs that a policy with these needs receives.
 
     Args:
-        cameras: whose pictures.
-        demonstration_frames: frames of the video.
-        observe_every: control steps between the observations in ``history``.
+        needs: of the policy.
         seed: of all random values.
-        depth: whether there is depth beside the pictures.
-        calibration: whether there are the cameras' matrices.
         changed: fields that get other values than without this argument; all others keep theirs.
     """
 
     def __init__(
         self,
-        cameras: tuple[str, ...] = CAMERAS,
-        demonstration_frames: DemonstrationFrames = "all",
-        observe_every: int | None = None,
+        needs: PolicyNeeds,
         seed: int = 0,
         *,
-        depth: bool = False,
-        calibration: bool = False,
         changed: Collection[str] = (),
     ) -> None:
-        self._cameras = cameras
-        self._depth, self._calibration = depth, calibration
-        self._frames = demonstration_frames
-        self._every = observe_every
+        self._needs = needs
+        self._frames, self._every = needs.demonstration_frames, needs.observe_every
         self._rng = np.random.default_rng(seed)
         self._changed, self._other_rng = changed, np.random.default_rng([seed, 1])
 
@@ -121,11 +112,11 @@ class SyntheticEpisodes:
     def _draw(self, instruction: str, rng: np.random.Generator) -> dict[str, Any]:
         pictures: dict[str, Any] = {
             f"{camera}_rgb": rng.integers(0, 256, PICTURE, dtype=np.uint8)
-            for camera in self._cameras
+            for camera in self._needs.cameras
         }
-        for camera in self._cameras if self._depth else ():
+        for camera in self._needs.cameras if self._needs.depth else ():
             pictures[f"{camera}_depth"] = rng.integers(0, MAX_DEPTH, DEPTH, dtype=np.int16)
-        for camera in self._cameras if self._calibration else ():
+        for camera in self._needs.cameras if self._needs.calibration else ():
             pictures[f"{camera}_extrinsic"] = rng.uniform(-1, 1, (3, 4)).astype(np.float32)
             pictures[f"{camera}_intrinsic"] = INTRINSIC.copy()
         pose = np.append(rng.uniform(REACH_LOW, REACH_HIGH), rng.uniform(-np.pi, np.pi, 3))

@@ -13,8 +13,8 @@ from roboirg.apps.policy_check.synthetic_episodes import SyntheticEpisode
 from roboirg.core.actions import check_chunk
 from roboirg.policies.by_name.loading import make_policy
 from roboirg.policies.contract.base import close_policy
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.random_state import RandomState
-from roboirg.policies.contract.requirements import wanted_actions
 
 CALLS = 3
 Chunks = list[NDArray[np.float64]]
@@ -39,7 +39,7 @@ def play_in_turns(
                 policies.append(make_policy(spec, seed))
                 given = copy.deepcopy(episode)
                 policies[-1].reset(given.instruction, given.demonstration)
-        space, found = wanted_actions(policies[0]), [Chunks() for _ in episodes]
+        space, found = PolicyNeeds.of(policies[0]).action_space, [Chunks() for _ in episodes]
         for _ in range(CALLS):
             moments = [copy.deepcopy(episode.first) for episode in episodes]
             if together:

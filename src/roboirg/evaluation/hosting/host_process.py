@@ -14,6 +14,7 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
+from dataclasses import asdict
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -21,9 +22,8 @@ from roboirg.core.errors import MissingDependencyError
 from roboirg.evaluation.episode_errors import describe_error, one_line
 from roboirg.evaluation.hosting.hosted_episode import HostedEpisode
 from roboirg.evaluation.hosting.payload import Message, decode, encode
-from roboirg.policies.by_name.loading import is_privileged, load_policy_class, policy_version
+from roboirg.policies.by_name.loading import is_privileged, policy_needs, policy_version
 from roboirg.policies.contract.random_state import RandomState
-from roboirg.policies.prompt_length.declared_limit import prompt_needs_of
 
 MISSING = "missing"
 """Instead of a kind of error: a package is not installed."""
@@ -76,11 +76,10 @@ class HostProcess:
     def _carry_out(self, call: Message, method: str) -> Message:
         session: int = call["session"]
         if method == "describe":
-            load_policy_class(call["spec"])
             return {
+                "needs": asdict(policy_needs(call["spec"])),
                 "version": policy_version(call["spec"]),
                 "privileged": is_privileged(call["spec"]),
-                "prompt": prompt_needs_of(call["spec"])._asdict(),
             }
         if method == "open":
             if is_privileged(call["spec"]):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, replace
 from multiprocessing.shared_memory import SharedMemory
 from typing import Any, cast
 
@@ -18,8 +19,8 @@ from roboirg.evaluation.hosting.payload import (
 from roboirg.evaluation.policy_calls import check_rows, policy_metadata, policy_usage
 from roboirg.policies.by_name.loading import is_privileged, make_policy, policy_version
 from roboirg.policies.contract.base import close_policy, tell_policy
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.random_state import RandomState
-from roboirg.policies.contract.requirements import REQUIREMENTS, wanted_actions
 
 Ask = Callable[[Message], Message]
 """Sends a question to the world of an episode in a call, and returns its answer."""
@@ -92,14 +93,13 @@ class HostedEpisode:
         self.random = RandomState(call["seed"])
         with self.random:
             self.policy = make_policy(call["spec"], call["seed"])
-        self._space = wanted_actions(self.policy)
+        # Pixels of subgoals are for privileged policies, and those have no host.
+        self._needs = replace(PolicyNeeds.of(self.policy), grounded=False)
 
     def describe(self, spec: str) -> Message:
         """Return what the world must know of the policy."""
-        own = {name: one for name, one in REQUIREMENTS.items() if hasattr(self.policy, name)}
         return {
-            "needs": {name: read(self.policy) for name, read in own.items() if name != "actions"},
-            "actions": self._space.name,
+            "needs": asdict(self._needs),
             "version": policy_version(spec),
             "privileged": is_privileged(spec),
             "together": callable(getattr(self.policy, "act_together", None)),
@@ -123,7 +123,7 @@ class HostedEpisode:
 
     def actions(self, rows: Any) -> Message:  # noqa: ANN401 - whatever the policy returned
         """Return a policy's actions, checked, for a message."""
-        chunk = check_rows(rows, self._space)
+        chunk = check_rows(rows, self._needs.action_space)
         latency_s = float(getattr(self.policy, "latency_s", 0.0))
         return {"rows": chunk.tobytes(), "size": chunk.shape[1], "latency_s": latency_s}
 

@@ -41,8 +41,8 @@ from roboirg.evaluation.hosting.payload import (
     pack_payload,
 )
 from roboirg.evaluation.records.record import ERROR_KINDS
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.policy_urls import is_url
-from roboirg.policies.contract.requirements import REQUIREMENTS
 
 _DRAWN = ("_rgb", "_depth")
 """How the fields of a demonstration end that are drawn when they are read."""
@@ -188,12 +188,8 @@ class HostedPolicy:
             return value
 
     def _take_description(self, found: Message) -> None:
-        """Take what the environment must provide, each under the name of the attribute."""
         with _reading():
-            for name in REQUIREMENTS:
-                if name in found["needs"]:
-                    setattr(self, name, found["needs"][name])
-            self.actions = str(found["actions"])
+            PolicyNeeds(**found["needs"]).declare_on(self)
             self.version = clip_text(str(found["version"]), _MAX_TEXT_LENGTH)
             self._reads = tuple(map(str, found["reads"]))
 

@@ -12,13 +12,10 @@ from roboirg.policies.by_name.loading import (
     is_foreign,
     is_privileged,
     load_policy_class,
+    policy_needs,
     policy_version,
 )
-from roboirg.policies.prompt_length.declared_limit import (
-    PromptNeeds,
-    prompt_needs,
-    prompt_needs_of,
-)
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 
 _MAX_LENGTH = 2000
 
@@ -29,12 +26,12 @@ class PolicyDescription(NamedTuple):
     Attributes:
         version: distinguishes versions of a policy of the same name.
         is_privileged: whether it reads the simulator's state.
-        prompt: what it declares about its prompt.
+        needs: what it declares, as far as its class shows.
     """
 
     version: str
     is_privileged: bool
-    prompt: PromptNeeds = PromptNeeds()
+    needs: PolicyNeeds = PolicyNeeds()
 
 
 _known: dict[str, PolicyDescription] = {}
@@ -66,10 +63,10 @@ def know_policy(spec: str) -> None:
 def describe_here(spec: str) -> PolicyDescription:
     """Return the description of a policy of this process; ``unknown`` if it cannot be loaded."""
     try:
-        prompt = prompt_needs_of(spec)
+        needs = policy_needs(spec)
     except InvalidValueError:
-        prompt = PromptNeeds()
-    return PolicyDescription(policy_version(spec), is_privileged(spec), prompt)
+        needs = PolicyNeeds()
+    return PolicyDescription(policy_version(spec), is_privileged(spec), needs)
 
 
 def _describe_ours(spec: str) -> PolicyDescription:
@@ -95,5 +92,5 @@ def _describe_apart(spec: str) -> PolicyDescription:
 
 def _read(value: Any) -> PolicyDescription:  # noqa: ANN401 - as a policy's process sent it
     version = clip_text(str(value["version"]), _MAX_LENGTH)
-    prompt = prompt_needs(PromptNeeds(**value["prompt"]))
-    return PolicyDescription(version, value["privileged"] is True, prompt)
+    needs = PolicyNeeds(**value["needs"])
+    return PolicyDescription(version, value["privileged"] is True, needs)

@@ -112,7 +112,7 @@ def prompt_shares(jobs: Iterable[Job]) -> tuple[PromptShares, ...]:
     verdicts: dict[tuple[object, ...], PromptVerdict] = {}
     for job in jobs:
         if job.policy not in limits:
-            limits[job.policy] = prompt_limit(describe_policy(job.policy_spec).prompt)
+            limits[job.policy] = prompt_limit(describe_policy(job.policy_spec).needs)
         limit = limits[job.policy]
         verdict: PromptVerdict = "unknown"
         if limit is not None:

@@ -33,7 +33,7 @@ from roboirg.evaluation.hosting.host_pool import HostAddress, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_here
 from roboirg.evaluation.play.call_guard import CallGuard
-from roboirg.evaluation.play.policy_environment import EnvRequirements, env_requirements, make_env
+from roboirg.evaluation.play.policy_environment import job_needs, make_env
 from roboirg.evaluation.play.prompt_shares import audit_job, too_long_text
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.play.video_writer import FrameSink, VideoWriter
@@ -44,6 +44,7 @@ from roboirg.evaluation.records.record import Job, Record
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.policies.by_name.loading import needs_host
 from roboirg.policies.contract.base import Policy, PrivilegedPolicy, close_policy, tell_policy
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.random_state import episode_policy_seed
 from roboirg.policies.prompt_length.declared_limit import prompt_limit
 from roboirg.tasks.splits.splits import get_episode
@@ -201,8 +202,8 @@ def play_episode(
             with guard.policy("policy's constructor", "policy_load"):
                 policy = load_policy(job, seed_secret)
         with guard.policy("policy's constructor", "policy_load"):
-            needs = env_requirements(policy, job)
-            result.prompt_limit = prompt_limit(policy)
+            needs = job_needs(policy, job)
+            result.prompt_limit = prompt_limit(needs)
         if refuse_long:
             _refuse_long_prompt(job, result)
         play_with(policy, job, needs, result, guard, writer)
@@ -217,7 +218,7 @@ def play_episode(
 def play_with(
     policy: Policy,
     job: Job,
-    needs: EnvRequirements,
+    needs: PolicyNeeds,
     result: RolloutResult,
     guard: CallGuard,
     writer: FrameSink | None = None,
@@ -239,7 +240,7 @@ def play_with(
     try:
         with guard.environment("env_reset"):
             env = make_env(job, needs)
-        _play_to_end(env, policy, needs.actions, job, writer, result, guard)
+        _play_to_end(env, policy, needs.action_space, job, writer, result, guard)
     except EpisodeError as error:
         broke = error.kind == "environment"
         raise

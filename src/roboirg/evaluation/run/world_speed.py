@@ -8,15 +8,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.core.actions import JOINT_ANGLE
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.observations import CAMERAS, Demonstration, Observation
 from roboirg.evaluation.episode_errors import EpisodeError
 from roboirg.evaluation.play.call_guard import CallGuard
-from roboirg.evaluation.play.policy_environment import EnvRequirements
 from roboirg.evaluation.play.rollout import play_with
 from roboirg.evaluation.play.rollout_result import RolloutResult
 from roboirg.evaluation.records.record import Job
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.tasks.splits.splits import get_episode
 
 MEASURED_STEPS = 64
@@ -107,6 +106,5 @@ def measure_world(jobs: Sequence[Job]) -> WorldSpeed:
 def _timings(job: Job) -> dict[str, float]:
     result = RolloutResult()
     still = job.model_copy(update={"max_steps": MEASURED_STEPS, "actions": None})
-    needs = EnvRequirements(CAMERAS, JOINT_ANGLE)
-    play_with(SwingingPolicy(), still, needs, result, CallGuard(result, None))
+    play_with(SwingingPolicy(), still, PolicyNeeds(), result, CallGuard(result, None))
     return result.timings

@@ -18,6 +18,7 @@ from roboirg.policies.by_name.policy_classes import (
 )
 from roboirg.policies.by_name.systems import find_system
 from roboirg.policies.contract.base import Policy
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.policy_urls import is_url, parse_query
 from roboirg.util.short_hash import short_hash
 
@@ -58,6 +59,16 @@ def make_policy(spec: str, seed: int) -> Policy:
     return make_from_class(spec, load_policy_class(spec), seed)
 
 
+def policy_needs(spec: str) -> PolicyNeeds:
+    """Return what the policy of a spec needs; it is not connected to anything.
+
+    Raises:
+        InvalidValueError: there is no such policy, or it declares something invalid.
+        MissingDependencyError: a library that it needs is not installed.
+    """
+    return PolicyNeeds.of(_declaring(spec))
+
+
 def is_foreign(spec: str) -> bool:
     """Return whether a spec names code that does not come with this package or a protocol.
 
@@ -87,8 +98,7 @@ def needs_host(spec: str) -> bool:
 def is_privileged(spec: str) -> bool:
     """Return whether a spec names a policy that reads the simulator's state."""
     try:
-        policy_class = load_policy_class(spec)
-        return hasattr(policy_class(spec) if is_url(spec) else policy_class, "attach")
+        return hasattr(_declaring(spec), "attach")
     except InvalidValueError:
         return False
 
@@ -114,6 +124,12 @@ def policy_version(spec: str) -> str:
     except (InvalidValueError, OSError, TypeError):
         return "unknown"
     return short_hash(source)
+
+
+def _declaring(spec: str) -> object:
+    """Return what has the attributes of a spec's policies: a class, a factory, or a client."""
+    policy_class = load_policy_class(spec)
+    return policy_class(spec) if is_url(spec) else policy_class
 
 
 def server_version(metadata: Mapping[str, Any]) -> str | None:

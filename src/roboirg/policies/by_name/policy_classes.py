@@ -15,8 +15,8 @@ from typing import Any
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.batch_policy import make_batched, takes_batches
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.policy_urls import is_url
-from roboirg.policies.contract.requirements import REQUIREMENTS
 from roboirg.policies.remote.protocols import protocols_by_scheme
 from roboirg.util.discovery import entry_names
 
@@ -56,7 +56,7 @@ def find_class(spec: str) -> type[Any]:
     """
     if is_url(spec):
         policy_class = _url_class(spec)
-        _check_requirements(spec, policy_class(spec))
+        _check_needs(spec, policy_class(spec))
         return policy_class
     if spec not in BUILTIN and ":" not in spec:
         if (hint := _describe_module(spec)) is not None:
@@ -127,20 +127,15 @@ def _check_class(spec: str, policy_class: type[Any]) -> None:
                 f"Policy {spec!r}: {name}() is called with seed= at most, but needs "
                 f"{parameter.name!r}; give it a default."
             )
-    _check_requirements(spec, policy_class)
+    _check_needs(spec, policy_class)
 
 
-def _check_requirements(spec: str, policy: object) -> None:
-    """Raise if the requirements of a class, or of a policy, are invalid."""
-    for attribute, read in REQUIREMENTS.items():
-        # The value of a property is known only for an object.
-        if not inspect.isclass(policy) or not hasattr(
-            inspect.getattr_static(policy, attribute, ()), "__get__"
-        ):
-            try:
-                read(policy)
-            except InvalidValueError as error:
-                raise InvalidValueError(f"Policy {spec!r}: {error}") from error
+def _check_needs(spec: str, policy: object) -> None:
+    """Raise if the needs of a class, or of a policy, are invalid."""
+    try:
+        PolicyNeeds.of(policy)
+    except InvalidValueError as error:
+        raise InvalidValueError(f"Policy {spec!r}: {error}") from error
 
 
 def _url_class(spec: str) -> type[Any]:

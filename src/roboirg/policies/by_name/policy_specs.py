@@ -21,20 +21,8 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.policies.by_name.policy_classes import KINDS_GROUP
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.option_checking import check_options
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.policy_urls import parse_query
-from roboirg.policies.contract.requirements import (
-    wanted_actions,
-    wanted_calibration,
-    wanted_cameras,
-    wanted_demonstration_frames,
-    wanted_depth,
-    wanted_history,
-    wanted_history_cameras,
-    wanted_lower_case,
-    wanted_prompt_added,
-    wanted_prompt_tokens,
-    wanted_tokenizer,
-)
 from roboirg.policies.vlm.models import ModelOptions
 from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener
 from roboirg.util.discovery import entry_names, find_entry
@@ -73,18 +61,7 @@ class PolicyFactory:
     def __init__(self, spec: str, build: Build, sample: Policy) -> None:
         self.spec, self._build = spec, build
         self.__name__ = spec
-        self.cameras = wanted_cameras(sample)
-        self.actions = wanted_actions(sample).name
-        self.demonstration_frames = wanted_demonstration_frames(sample)
-        self.observe_every = wanted_history(sample)
-        self.history_cameras = wanted_history_cameras(sample)
-        self.depth = wanted_depth(sample)
-        self.calibration = wanted_calibration(sample)
-        self.prompt_tokens = wanted_prompt_tokens(sample)
-        self.prompt_added = wanted_prompt_added(sample)
-        self.tokenizer = wanted_tokenizer(sample)
-        self.lowers_prompt = wanted_lower_case(sample)
-        self.grounded = bool(getattr(sample, "grounded", False))
+        PolicyNeeds.of(sample).declare_on(self)
         self.version = str(getattr(sample, "version", "unknown"))
 
     def __call__(self, seed: int = 0) -> Policy:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Observation
 from roboirg.policies.contract.base import Policy, PrivilegedPolicy, tell_policy
-from roboirg.policies.contract.requirements import REQUIREMENTS, wanted_actions
+from roboirg.policies.contract.policy_needs import ENV_NEEDS, PolicyNeeds
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -37,22 +37,22 @@ def play(env: RoboIRGEnv, policy: Policy) -> dict[str, Any]:
 
 
 def _check(env: RoboIRGEnv, policy: Policy) -> None:
-    """Raise if the environment does not meet the policy's requirements."""
-    wanted = wanted_actions(policy).name
-    if wanted != env.actions:
+    """Raise if the environment does not meet the policy's needs."""
+    needs = PolicyNeeds.of(policy, *ENV_NEEDS)
+    if needs.actions != env.actions:
         raise InvalidValueError(
-            f"{type(policy).__name__} acts in {wanted!r}, but the environment takes "
-            f"{env.actions!r}; make it with actions={wanted!r}."
+            f"{type(policy).__name__} acts in {needs.actions!r}, but the environment takes "
+            f"{env.actions!r}; make it with actions={needs.actions!r}."
         )
     for attribute in ("demonstration_frames", "observe_every", "history_cameras"):
-        value, given = REQUIREMENTS[attribute](policy), getattr(env, attribute)
+        value, given = getattr(needs, attribute), getattr(env, attribute)
         if hasattr(policy, attribute) and value != given:
             raise InvalidValueError(
                 f"{type(policy).__name__} needs {attribute}={value!r}, but the environment has "
                 f"{given!r}; make it with {attribute}={value!r}."
             )
     for attribute in ("depth", "calibration"):
-        if REQUIREMENTS[attribute](policy) and not getattr(env, attribute):
+        if getattr(needs, attribute) and not getattr(env, attribute):
             raise InvalidValueError(
                 f"{type(policy).__name__} needs {attribute}=True, but the environment has none; "
                 f"make it with {attribute}=True."

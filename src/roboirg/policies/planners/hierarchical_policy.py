@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,26 +10,11 @@ from numpy.typing import NDArray
 
 from roboirg.core.actions import WAYPOINT
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.observations import Demonstration, DemonstrationFrames, Observation
+from roboirg.core.observations import Demonstration, Observation
 from roboirg.policies.contract.base import Policy, SubgoalFollower, close_policy, tell_policy
-from roboirg.policies.contract.requirements import (
-    wanted_actions,
-    wanted_calibration,
-    wanted_cameras,
-    wanted_demonstration_frames,
-    wanted_depth,
-    wanted_history,
-    wanted_history_cameras,
-    wanted_lower_case,
-    wanted_prompt_added,
-    wanted_prompt_tokens,
-    wanted_tokenizer,
-)
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.planners.observation_merging import (
     DemonstrationSubset,
-    merge_cameras,
-    merge_demonstration_frames,
-    merge_observe_every,
     select_history,
 )
 from roboirg.policies.planners.planner import Planner
@@ -40,13 +26,16 @@ if TYPE_CHECKING:
 class HierarchicalPolicy:
     """Gets a subgoal from the planner before each chunk and passes it to the policy.
 
-    The requirements of both are merged: the environment shows what either wants, and each
-    receives its own part. Costs are added.
+    The needs of both are merged: the environment shows what either needs, and each receives its
+    own part. Costs are added.
 
     Args:
         planner: names subgoals.
         policy: follows them.
         name: of the system, for the records.
+
+    Attributes:
+        needs: of both.
 
     Raises:
         InvalidValueError: the policy has no method ``follow``.
@@ -59,29 +48,13 @@ class HierarchicalPolicy:
                 "subgoals from a planner."
             )
         self.planner, self.policy, self.name = planner, policy, name
-        self.actions = wanted_actions(policy).name
-        self.cameras = merge_cameras(wanted_cameras(policy), _cameras(planner))
-        self._frames = _frames(planner), wanted_demonstration_frames(policy)
-        self.demonstration_frames: DemonstrationFrames = merge_demonstration_frames(*self._frames)
-        self._periods = _observe_every(planner), wanted_history(policy)
-        self.observe_every = merge_observe_every(*self._periods)
-        history_cameras = wanted_history_cameras(policy)
-        self.history_cameras = merge_cameras(
-            wanted_cameras(policy) if history_cameras is None else history_cameras,
-            _cameras(planner),
-        )
-        if self.actions == WAYPOINT.name and self.observe_every is None:
+        own, of_planner = PolicyNeeds.of(policy), PolicyNeeds.of_planner(planner)
+        self._parts = of_planner, own
+        self.needs = own.merge(of_planner)
+        if self.needs.actions == WAYPOINT.name and self.needs.observe_every is None:
             # Only the history tells how many control steps a waypoint took.
-            self.observe_every = 1
-        self.depth = wanted_depth(policy) or wanted_depth(planner)
-        self.calibration = wanted_calibration(policy) or wanted_calibration(planner)
-        # The planner's model has a context of its own, which no instruction fills.
-        self.prompt_tokens, self.prompt_added = (
-            wanted_prompt_tokens(policy),
-            wanted_prompt_added(policy),
-        )
-        self.tokenizer, self.lowers_prompt = wanted_tokenizer(policy), wanted_lower_case(policy)
-        self.grounded = any(getattr(one, "grounded", False) for one in (planner, policy))
+            self.needs = replace(self.needs, observe_every=1)
+        self.needs.declare_on(self)
         self._observed = self._step = self._rows = 0
 
     @property
@@ -103,8 +76,10 @@ class HierarchicalPolicy:
         """Begin an episode with both."""
         self._observed = self._step = self._rows = 0
         views = [
-            DemonstrationSubset(demonstration, self.demonstration_frames, one)
-            for one in self._frames
+            DemonstrationSubset(
+                demonstration, self.needs.demonstration_frames, one.demonstration_frames
+            )
+            for one in self._parts
         ]
         self.planner.reset(instruction, views[0])
         self.policy.reset(instruction, views[1])
@@ -119,13 +94,13 @@ class HierarchicalPolicy:
         history = observation.get("history", ())
         # Except for waypoints, a row is a control step.
         self._step += (
-            len(history) * (self.observe_every or 1)
-            if self.actions == WAYPOINT.name
+            len(history) * (self.needs.observe_every or 1)
+            if self.needs.actions == WAYPOINT.name
             else self._rows
         )
         views = [
-            select_history(observation, self._observed, self.observe_every, wanted)
-            for wanted in self._periods
+            select_history(observation, self._observed, self.needs.observe_every, one.observe_every)
+            for one in self._parts
         ]
         self._observed += len(history)
         subgoal = self.planner.plan(views[0], self._step)
@@ -171,17 +146,3 @@ def with_planner(planner: Planner, policy: Policy, name: str | None = None) -> H
     privileged = any(hasattr(one, "attach") for one in (planner, policy))
     kind = PrivilegedHierarchicalPolicy if privileged else HierarchicalPolicy
     return kind(planner, policy, name)
-
-
-def _cameras(planner: Planner) -> tuple[str, ...]:
-    return tuple(getattr(planner, "cameras", ()))
-
-
-def _frames(planner: Planner) -> DemonstrationFrames:
-    frames: DemonstrationFrames = getattr(planner, "demonstration_frames", "none")
-    return frames
-
-
-def _observe_every(planner: Planner) -> int | None:
-    every: int | None = getattr(planner, "observe_every", None)
-    return every

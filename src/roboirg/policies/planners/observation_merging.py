@@ -1,8 +1,7 @@
-"""Merge the observation requirements of planner and policy, and select each one's part."""
+"""Select what a planner or its policy needs of an environment that serves both."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from typing import Any, cast
 
@@ -12,28 +11,6 @@ from roboirg.core.observations import CAMERAS, Demonstration, DemonstrationFrame
 
 PICTURE_FIELDS = tuple(f"{camera}_{kind}" for camera in CAMERAS for kind in ("rgb", "depth"))
 """Fields of a demonstration that may have only every n-th frame."""
-
-
-def merge_cameras(one: tuple[str, ...], other: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the cameras that either wants."""
-    return tuple(camera for camera in CAMERAS if camera in (*one, *other))
-
-
-def merge_demonstration_frames(
-    one: DemonstrationFrames, other: DemonstrationFrames
-) -> DemonstrationFrames:
-    """Return the frames of the video that contain those that each wants."""
-    strides = [1 if frames == "all" else int(frames) for frames in (one, other) if frames != "none"]
-    if not strides:
-        return "none"
-    every = math.gcd(*strides)
-    return "all" if every == 1 else every
-
-
-def merge_observe_every(one: int | None, other: int | None) -> int | None:
-    """Return the control steps between observations that contain those that each wants."""
-    periods = [every for every in (one, other) if every is not None]
-    return math.gcd(*periods) if periods else None
 
 
 class DemonstrationSubset(Mapping[str, NDArray[Any]]):

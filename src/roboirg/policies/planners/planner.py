@@ -12,7 +12,7 @@ class Planner(Protocol):
     """Names the next subgoal before each chunk of a policy.
 
     As for policies, the attributes ``cameras`` (default: none), ``demonstration_frames``
-    (``"none"``), ``observe_every`` and ``grounded`` are its requirements, ``metadata``, ``usage()``
+    (``"none"``), ``observe_every`` and ``grounded`` are its needs, ``metadata``, ``usage()``
     and ``version`` go into the records, ``close()`` ends an episode, and ``attach(env)`` makes it
     privileged, and ``hear(text, step)`` gets what is said after `reset`; all are optional.
     """

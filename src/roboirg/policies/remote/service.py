@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from roboirg.core.actions import check_chunk
 from roboirg.core.observations import Observation
 from roboirg.policies.contract.base import Policy, tell_policy
-from roboirg.policies.contract.requirements import wanted_actions
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.remote.endpoints import MIB
 
 Message = Mapping[str, Any]
@@ -84,7 +84,7 @@ def act(policy: Policy, observation: Observation) -> tuple[NDArray[np.float64], 
         InvalidActionError: the policy gave something else.
     """
     start = time.perf_counter()
-    actions = check_chunk(policy.act(observation), wanted_actions(policy))
+    actions = check_chunk(policy.act(observation), PolicyNeeds.of(policy, "actions").action_space)
     return actions, 1000 * (time.perf_counter() - start)
 
 

@@ -29,8 +29,7 @@ from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.play.rollout_result import make_record, utc_now
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.language import LANGUAGE_VERSION
-from roboirg.policies.by_name.loading import is_privileged, load_policy_class
-from roboirg.policies.contract.requirements import wanted_actions, wanted_cameras, wanted_history
+from roboirg.policies.by_name.loading import is_privileged, policy_needs
 
 ROBOT_LOCK = ".robot.lock"
 
@@ -155,15 +154,15 @@ class Study:
 
     def _check_policy(self, spec: str) -> tuple[str, ...]:
         """Check that a policy can act on this robot, and return the cameras that it uses."""
-        found = load_policy_class(spec)
-        if wanted_actions(found) != JOINT_ANGLE:
+        needs = policy_needs(spec)
+        if needs.actions != JOINT_ANGLE.name:
             raise InvalidValueError(
-                f"Policy {spec!r} acts in {wanted_actions(found).name!r}; the control loop "
+                f"Policy {spec!r} acts in {needs.actions!r}; the control loop "
                 f"supports {JOINT_ANGLE.name!r} only."
             )
-        if wanted_history(found) is not None:
+        if needs.observe_every is not None:
             raise InvalidValueError(
-                f"Policy {spec!r} requires observe_every={wanted_history(found)}; the control loop "
+                f"Policy {spec!r} requires observe_every={needs.observe_every}; the control loop "
                 "gives one observation for each chunk."
             )
         if is_privileged(spec) and not isinstance(self.robot, JudgingRobot):
@@ -171,7 +170,7 @@ class Study:
                 f"Policy {spec!r} reads the simulator's state, which only the twin has; play it "
                 "with --robot twin."
             )
-        return wanted_cameras(found)
+        return needs.cameras
 
 
 def _check_delivery(plan: StudyPlan) -> None:

@@ -1,0 +1,225 @@
+"""What a policy needs of its environment and of its prompt, as one value.
+
+Policies declare needs as attributes, which `PolicyNeeds.of` reads and checks. A new need is a field
+here and the code that uses it: reading, checking, merging and transport go over all fields.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+import operator
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, fields, replace
+from functools import partial
+from typing import Any, Self
+
+from roboirg.core.actions import JOINT_ANGLE, ActionSpace, find_action_space
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.observations import (
+    CAMERAS,
+    DemonstrationFrames,
+    check_cameras,
+    check_demonstration_frames,
+    check_observe_every,
+)
+
+_MISSING = object()
+
+
+def merge_cameras(one: tuple[str, ...], other: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the cameras that either needs."""
+    return tuple(camera for camera in CAMERAS if camera in (*one, *other))
+
+
+def merge_demonstration_frames(
+    one: DemonstrationFrames, other: DemonstrationFrames
+) -> DemonstrationFrames:
+    """Return the frames of the video that contain those that each needs."""
+    strides = [1 if frames == "all" else int(frames) for frames in (one, other) if frames != "none"]
+    if not strides:
+        return "none"
+    every = math.gcd(*strides)
+    return "all" if every == 1 else every
+
+
+def merge_observe_every(one: int | None, other: int | None) -> int | None:
+    """Return the control steps between observations that contain those that each needs."""
+    periods = [every for every in (one, other) if every is not None]
+    return math.gcd(*periods) if periods else None
+
+
+def _check_flag(name: str, value: object) -> bool:
+    if not isinstance(value, bool):
+        raise InvalidValueError(f"{name} is {value!r}; it must be True or False.")
+    return value
+
+
+def _check_number(name: str, least: int, value: object) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        raise InvalidValueError(f"{name} is {value!r}; it must be a number from {least}.")
+    return value
+
+
+def _check_tokenizer(path: object) -> str:
+    if not (isinstance(path, str) and path):
+        raise InvalidValueError(f"tokenizer is {path!r}; it must be the path of a file, or None.")
+    return path
+
+
+def need_rules(
+    check: Callable[[Any], object],
+    merge: Callable[[Any, Any], object] | None = None,
+    *,
+    env: bool = False,
+) -> dict[str, Any]:
+    """Return the metadata of a field of `PolicyNeeds`.
+
+    Args:
+        check: returns a value in its final form, or raises `InvalidValueError`; it never gets the
+            default None.
+        merge: returns what serves a policy and its planner; None if planners have no such need.
+        env: whether it is an option of the environment, of the same name.
+    """
+    return {"check": check, "merge": merge, "env": env}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PolicyNeeds:
+    """What a policy needs, each under the name of the attribute that declares it.
+
+    Attributes:
+        cameras: whose pictures observations hold.
+        actions: name of the action space.
+        demonstration_frames: frames of the video.
+        observe_every: control steps between two observations in ``history``; None for no history.
+        history_cameras: whose pictures ``history`` holds; None becomes `cameras`.
+        depth: whether there is depth for the same cameras.
+        calibration: whether there are the matrices of the same cameras.
+        grounded: whether subgoals come with pixels.
+        prompt_tokens: that the policy's model reads of a prompt; None if it is not declared.
+        prompt_added: most tokens of a state or subgoal that share this budget.
+        tokenizer: file of the model's tokenizer; None if it is not declared.
+        lowers_prompt: whether prompts are sent in lower case.
+
+    Raises:
+        InvalidValueError: a value is invalid, or there is no camera for depth or calibration.
+        UnknownNameError: there is no such action space or camera.
+    """
+
+    cameras: tuple[str, ...] = field(
+        default=CAMERAS, metadata=need_rules(check_cameras, merge_cameras, env=True)
+    )
+    actions: str = field(
+        default=JOINT_ANGLE.name,
+        metadata=need_rules(lambda name: find_action_space(name).name, env=True),
+    )
+    demonstration_frames: DemonstrationFrames = field(
+        default="all",
+        metadata=need_rules(check_demonstration_frames, merge_demonstration_frames, env=True),
+    )
+    observe_every: int | None = field(
+        default=None, metadata=need_rules(check_observe_every, merge_observe_every, env=True)
+    )
+    history_cameras: tuple[str, ...] | None = field(
+        default=None, metadata=need_rules(check_cameras, merge_cameras, env=True)
+    )
+    depth: bool = field(
+        default=False, metadata=need_rules(partial(_check_flag, "depth"), operator.or_, env=True)
+    )
+    calibration: bool = field(
+        default=False,
+        metadata=need_rules(partial(_check_flag, "calibration"), operator.or_, env=True),
+    )
+    grounded: bool = field(default=False, metadata=need_rules(bool, operator.or_, env=True))
+    # A planner's model has a context of its own, which no instruction fills.
+    prompt_tokens: int | None = field(
+        default=None, metadata=need_rules(partial(_check_number, "prompt_tokens", 1))
+    )
+    prompt_added: int = field(
+        default=0, metadata=need_rules(partial(_check_number, "prompt_added", 0))
+    )
+    tokenizer: str | None = field(default=None, metadata=need_rules(_check_tokenizer))
+    lowers_prompt: bool = field(default=False, metadata=need_rules(bool))
+
+    def __post_init__(self) -> None:
+        for one in fields(self):
+            value = getattr(self, one.name)
+            if value is not None or one.default is not None:
+                object.__setattr__(self, one.name, one.metadata["check"](value))
+        if self.history_cameras is None:
+            object.__setattr__(self, "history_cameras", self.cameras)
+        for name in ("depth", "calibration"):
+            if getattr(self, name) and not self.cameras:
+                raise InvalidValueError(f"{name} is True, but cameras is (); name a camera.")
+
+    @classmethod
+    def of(cls, policy: object, *names: str) -> Self:
+        """Return what a policy, or a class of policies, declares.
+
+        Args:
+            policy: the policy or class. A property of a class counts as not declared: its value is
+                known only for an object.
+            names: needs to read, all by default; the others get their defaults.
+
+        Raises:
+            InvalidValueError: an attribute has an invalid value.
+        """
+        return cls(**_declared(policy, names or [one.name for one in fields(cls)]))
+
+    @classmethod
+    def of_planner(cls, planner: object) -> Self:
+        """Return what a planner declares; by default, it needs no pictures.
+
+        Raises:
+            InvalidValueError: an attribute has an invalid value.
+        """
+        unseen = {"cameras": (), "demonstration_frames": "none"}
+        return cls(**{**unseen, **_declared(planner, _names(cls, "merge"))})
+
+    @property
+    def action_space(self) -> ActionSpace:
+        """The action space that `actions` names."""
+        return find_action_space(self.actions)
+
+    @property
+    def env_options(self) -> dict[str, Any]:
+        """The options of an environment that meets the needs, as `roboirg.make` takes them."""
+        return {one: getattr(self, one) for one in _names(type(self), "env")}
+
+    def merge(self, planner: PolicyNeeds) -> Self:
+        """Return the needs of this policy together with those of its planner."""
+        return replace(
+            self,
+            **{
+                one.name: merged(getattr(self, one.name), getattr(planner, one.name))
+                for one in fields(self)
+                if (merged := one.metadata["merge"]) is not None
+            },
+        )
+
+    def declare_on(self, policy: object) -> None:
+        """Set the attributes of a policy, or of what stands for one, so that `of` reads these."""
+        for one in fields(self):
+            setattr(policy, one.name, getattr(self, one.name))
+
+
+def _names(needs: type[PolicyNeeds], rule: str) -> tuple[str, ...]:
+    """Return the names of the fields that have a rule."""
+    return tuple(one.name for one in fields(needs) if one.metadata[rule])
+
+
+ENV_NEEDS = _names(PolicyNeeds, "env")
+"""Needs that are options of the environment."""
+
+
+def _declared(policy: object, names: Iterable[str]) -> dict[str, Any]:
+    """Return the attributes of those names that a policy, or a class of policies, has."""
+    is_class = inspect.isclass(policy)
+    known = [
+        name
+        for name in names
+        if not (is_class and hasattr(inspect.getattr_static(policy, name, None), "__get__"))
+    ]
+    found = {name: getattr(policy, name, _MISSING) for name in known}
+    return {name: value for name, value in found.items() if value is not _MISSING}

@@ -1,0 +1,126 @@
+"""What policies need: declared as attributes, carried as one value."""
+
+import json
+from dataclasses import FrozenInstanceError, asdict, dataclass, field, fields
+from types import SimpleNamespace
+
+import pytest
+
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.envs.env_settings import EnvSettings
+from roboirg.policies import play
+from roboirg.policies.contract.policy_needs import PolicyNeeds, need_rules
+from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
+from roboirg.policies.remote.service import act
+
+
+class Demanding:
+    cameras = ["wrist", "front"]  # noqa: RUF012 - a policy need not annotate it
+    actions = "ee_pose"
+    demonstration_frames = 6
+    observe_every = 4
+    history_cameras = ("wrist",)
+    depth = calibration = grounded = lowers_prompt = True
+    prompt_tokens, prompt_added, tokenizer = 64, 3, "words.model"
+
+    def reset(self, instruction, demonstration): ...
+    def act(self, observation): ...
+    def follow(self, subgoal): ...
+
+
+class Guide:
+    cameras = ("front",)
+    demonstration_frames = 4
+
+    def reset(self, instruction, demonstration): ...
+    def plan(self, observation, step): ...
+
+
+def test_every_need_is_read_and_survives_a_message():
+    needs = PolicyNeeds.of(Demanding())
+    assert all(getattr(needs, one.name) != one.default for one in fields(needs))
+    assert needs.cameras == ("wrist", "front")
+    assert PolicyNeeds(**json.loads(json.dumps(asdict(needs)))) == needs
+    with pytest.raises(FrozenInstanceError):
+        needs.depth = False
+    copy = Demanding()
+    PolicyNeeds().declare_on(copy)
+    assert PolicyNeeds.of(copy) == PolicyNeeds()
+
+
+def test_a_message_is_checked_like_a_policy():
+    with pytest.raises(UnknownNameError, match="no camera 'back'"):
+        PolicyNeeds(cameras=["back"])
+    with pytest.raises(InvalidValueError, match="depth is True, but cameras is"):
+        PolicyNeeds(cameras=(), depth=True)
+    with pytest.raises(InvalidValueError, match="prompt_tokens is 0; it must be a number from 1"):
+        PolicyNeeds(prompt_tokens=0)
+    with pytest.raises(InvalidValueError, match="prompt_added is None"):
+        PolicyNeeds(prompt_added=None)
+    with pytest.raises(TypeError, match="touch"):
+        PolicyNeeds(touch=True)
+
+
+def test_the_history_has_the_cameras_of_observations_unless_declared():
+    assert PolicyNeeds(cameras=("front",)).history_cameras == ("front",)
+    assert PolicyNeeds(history_cameras=["wrist"]).history_cameras == ("wrist",)
+
+
+def test_properties_count_for_objects_only():
+    class Late(Demanding):
+        actions = property(lambda _self: "waypoint")
+        prompt_tokens = property(lambda _self: 9)
+
+    assert (PolicyNeeds.of(Late).actions, PolicyNeeds.of(Late).prompt_tokens) == (
+        "joint_angle", None,
+    )  # fmt: skip
+    assert (PolicyNeeds.of(Late()).actions, PolicyNeeds.of(Late()).prompt_tokens) == (
+        "waypoint", 9,
+    )  # fmt: skip
+    assert PolicyNeeds.of(Late(), "actions") == PolicyNeeds(actions="waypoint")
+
+
+def test_a_planner_needs_what_it_declares_and_its_model_is_its_own():
+    assert PolicyNeeds.of_planner(object()) == PolicyNeeds(cameras=(), demonstration_frames="none")
+    guide = Guide()
+    guide.tokenizer, guide.prompt_tokens, guide.actions = object(), 7, "teleport"
+    both = PolicyNeeds.of(Demanding()).merge(PolicyNeeds.of_planner(guide))
+    assert both == PolicyNeeds.of(HierarchicalPolicy(guide, Demanding()))
+    assert (both.cameras, both.history_cameras) == (("front", "wrist"), ("front", "wrist"))
+    assert (both.demonstration_frames, both.observe_every, both.depth) == (2, 4, True)
+    assert (both.actions, both.prompt_tokens, both.tokenizer) == ("ee_pose", 64, "words.model")
+
+
+def test_a_tokenizer_that_is_no_path_matters_where_prompts_are_counted():
+    thinking = Demanding()
+    thinking.tokenizer, thinking.act = object(), lambda _observation: [[0.0] * 7]
+    with pytest.raises(InvalidValueError, match="tokenizer is <object"):
+        PolicyNeeds.of(thinking)
+    assert act(thinking, {})[0].shape == (1, 7)  # of a server
+    with pytest.raises(InvalidValueError, match="acts in 'ee_pose'"):
+        play(SimpleNamespace(actions="waypoint"), thinking)
+
+
+def test_the_environment_has_an_option_for_each_of_its_needs():
+    options = PolicyNeeds.of(Demanding()).env_options
+    assert asdict(EnvSettings(**options)).items() >= options.items()
+    assert set(options) < {one.name for one in fields(PolicyNeeds)}
+
+
+def test_a_new_need_is_one_field():
+    @dataclass(frozen=True, kw_only=True)
+    class MoreNeeds(PolicyNeeds):
+        touch: int = field(default=0, metadata=need_rules(int, max, env=True))
+
+    class Touching(Demanding):
+        touch = "2"
+
+    class Feeling(Guide):
+        touch = 5
+
+    needs = MoreNeeds.of(Touching)
+    assert (needs.touch, needs.env_options["touch"]) == (2, 2)
+    assert needs.merge(MoreNeeds.of_planner(Feeling())).touch == 5
+    assert MoreNeeds(**json.loads(json.dumps(asdict(needs)))) == needs
+    needs.declare_on(standing_for := Demanding())
+    assert MoreNeeds.of(standing_for) == needs
