@@ -13,6 +13,10 @@ ROBOMME_NAME = "robomme"
 """Name of the wordings with RoboMME's sentences, before the @ of their identity."""
 FIELD = re.compile(r"\{([a-z]+(?:\.[0-9])?)\}")
 """A field of a template, such as ``{color}`` or ``{colors.1}``."""
+PLACE_NOUN = r"(?:target|disc|plate|pad|goal|place|spot|location|position)"
+"""Pattern of the nouns for what a cube is placed on."""
+_AFTER_PLACE = re.compile(rf"\b{PLACE_NOUN} $")
+_AFTER_PREPOSITION = re.compile(r"\b(?:for|on|at|in|by|during) $")
 
 
 class StatedPhrase(NamedTuple):
@@ -33,6 +37,11 @@ class StatedPhrase(NamedTuple):
         """All of the words."""
         return f"{self.before}{self.core}{self.after}"
 
+    @property
+    def is_place(self) -> bool:
+        """Whether the core stands for a target: *the target right before the button press*."""
+        return re.match(rf"(?:the|its|an?) .*\b{PLACE_NOUN}\b", self.core) is not None
+
 
 @dataclass(frozen=True, slots=True)
 class WordedCommand:
@@ -42,11 +51,13 @@ class WordedCommand:
         text: the sentence, with fields.
         when: the slot values of the goals that it is for; empty for all.
         phrases: field or slot → value → words.
+        pointed: the fields that referring expressions must fill; with none, they may fill any.
     """
 
     text: str
     when: Mapping[str, SlotValue] = field(default_factory=dict)
     phrases: Mapping[str, Mapping[str, StatedPhrase]] = field(default_factory=dict)
+    pointed: frozenset[str] = frozenset()
 
     @property
     def fields(self) -> tuple[str, ...]:
@@ -55,8 +66,10 @@ class WordedCommand:
 
     def phrase(self, name: str, value: str) -> StatedPhrase | None:
         """Return the words for a value of a field; ``colors`` has those of ``colors.1``, too."""
-        table = self.phrases.get(name) or self.phrases.get(name.partition(".")[0], {})
-        return table.get(value)
+        return self._table(name).get(value)
+
+    def _table(self, name: str) -> Mapping[str, StatedPhrase]:
+        return self.phrases.get(name) or self.phrases.get(name.partition(".")[0], {})
 
     def fits(self, goal: Goal, pointed: Collection[str] = ()) -> bool:
         """Return whether the template tells a goal.
@@ -72,11 +85,32 @@ class WordedCommand:
             return False
         if not set(self.fields) <= set(values) or not set(pointed) <= set(self.fields):
             return False
+        if not self.pointed <= set(pointed) or not all(map(self._gives_way, pointed)):
+            return False
         for name, value in values.items():
             if name not in self.fields:
                 if not _slots_of(name) <= set(self.when):
                     return False
             elif name not in pointed and self.phrase(name, value) is None:
+                return False
+        return True
+
+    def _gives_way(self, name: str) -> bool:
+        """Return whether a referring expression can take the place of the words for a field.
+
+        It is an adverbial for numbers and visits, *just as often*, which follows no preposition; a
+        target for placements; and for moments a target, or what follows a word like *placed*.
+        """
+        before = self.text.partition(f"{{{name}}}")[0]
+        for phrase in self._table(name).values():
+            start = f"{before}{phrase.before}"
+            fits = {
+                "repeats": not _AFTER_PREPOSITION.search(start),
+                "visit": not _AFTER_PREPOSITION.search(start),
+                "placement": phrase.is_place,
+                "relation": phrase.is_place or not _AFTER_PLACE.search(start),
+            }
+            if not fits.get(name, True):
                 return False
         return True
 
