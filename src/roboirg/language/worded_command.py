@@ -17,6 +17,7 @@ PLACE_NOUN = r"(?:target|disc|plate|pad|goal|place|spot|location|position)"
 """Pattern of the nouns for what a cube is placed on."""
 _AFTER_PLACE = re.compile(rf"\b{PLACE_NOUN} $")
 _AFTER_PREPOSITION = re.compile(r"\b(?:for|on|at|in|by|during) $")
+_RELATIVE_CLAUSE = re.compile(r" (?:that|which|where|it|(?:the|a) cube) ")
 
 
 class StatedPhrase(NamedTuple):
@@ -85,7 +86,7 @@ class WordedCommand:
             return False
         if not set(self.fields) <= set(values) or not set(pointed) <= set(self.fields):
             return False
-        if not self.pointed <= set(pointed) or not all(map(self._gives_way, pointed)):
+        if not self.pointed <= set(pointed) or not all(map(self._can_point, pointed)):
             return False
         for name, value in values.items():
             if name not in self.fields:
@@ -95,24 +96,13 @@ class WordedCommand:
                 return False
         return True
 
-    def _gives_way(self, name: str) -> bool:
-        """Return whether a referring expression can take the place of the words for a field.
-
-        It is an adverbial for numbers and visits, *just as often*, which follows no preposition; a
-        target for placements; and for moments a target, or what follows a word like *placed*.
-        """
-        before = self.text.partition(f"{{{name}}}")[0]
-        for phrase in self._table(name).values():
-            start = f"{before}{phrase.before}"
-            fits = {
-                "repeats": not _AFTER_PREPOSITION.search(start),
-                "visit": not _AFTER_PREPOSITION.search(start),
-                "placement": phrase.is_place,
-                "relation": phrase.is_place or not _AFTER_PLACE.search(start),
-            }
-            if not fits.get(name, True):
-                return False
-        return True
+    def _can_point(self, name: str) -> bool:
+        """Return whether a referring expression can take the place of the words for a field."""
+        before, _, after = self.text.partition(f"{{{name}}}")
+        return all(
+            _gives_way(name, before + phrase.before, phrase, phrase.after + after)
+            for phrase in self._table(name).values()
+        )
 
     def state(self, goal: Goal) -> str:
         """Return the explicit command for a goal that the template fits."""
@@ -184,6 +174,21 @@ class Wordings:
     def identity(self) -> str:
         """Name and fingerprint, as in records."""
         return f"{self.name}@{self.fingerprint}"
+
+
+def _gives_way(name: str, before: str, phrase: StatedPhrase, after: str) -> bool:
+    """Return whether a referring expression reads well between these words.
+
+    It is an adverbial for numbers and visits (*just as often*, *during that visit*), a target for
+    placements, and for moments a target or an adverbial (*the target used then*, *placed then*).
+    """
+    if name in ("repeats", "visit"):
+        return _AFTER_PREPOSITION.search(before) is None
+    if name not in ("placement", "relation"):
+        return True
+    if phrase.is_place:
+        return _RELATIVE_CLAUSE.match(after) is None
+    return name == "relation" and _AFTER_PLACE.search(before) is None
 
 
 def goal_fields(goal: Goal) -> dict[str, str]:

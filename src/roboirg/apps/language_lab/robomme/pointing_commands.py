@@ -22,10 +22,17 @@ def with_pointing(commands: Iterable[WordedCommand]) -> tuple[WordedCommand, ...
     """Return commands, each with one before it that is for referring expressions, if it needs it."""
     found: list[WordedCommand] = []
     for command in commands:
-        text = command.text
-        if "repeats" in command.fields:
-            text = _RELATIVE_CLAUSE.sub(r"\g<clause>, doing so ", _REPEATEDLY.sub("", text))
+        text = _pointing(command.text)
         if text != command.text:
             found.append(replace(command, text=text, pointed=frozenset({"repeats"})))
         found.append(command)
     return tuple(found)
+
+
+def _pointing(text: str) -> str:
+    if "{repeats}" not in text:
+        return text
+    rest = _REPEATEDLY.sub("", text)
+    if text[0].isupper():
+        rest = rest[0].upper() + rest[1:]
+    return _RELATIVE_CLAUSE.sub(r"\g<clause>, doing so ", rest)
