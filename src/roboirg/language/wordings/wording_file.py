@@ -140,7 +140,7 @@ class _TaskReader:
         return WordedCommand(text, when, phrases, self._pointed(table.get("pointed", []), names))
 
     def _pointed(self, content: object, names: list[str]) -> frozenset[str]:
-        if not isinstance(content, list):
+        if not isinstance(content, list) or not all(isinstance(one, str) for one in content):
             self._fail(f"has pointed = {content!r}; it must be a list of fields of the command")
         for name in content:
             if name not in names:
