@@ -363,14 +363,14 @@ def test_both_forms_have_our_command_or_none(setting):
         ),
         (
             "VideoPlaceButton",
-            "relation = { after = 'the target [right after the button press]' }\n"
-            "color = { red = 'the red cube' }",
+            """relation = { after = 'the target [right after the button press]' }
+            color = { red = 'the red cube' }""",
             "place {color} on {relation}",
         ),
         (
             "VideoPlaceButton",
-            "relation = { after = 'right after the button press' }\n"
-            "color = { red = 'the red cube' }",
+            """relation = { after = 'right after the button press' }
+            color = { red = 'the red cube' }""",
             "place {color} on the target {relation}",
         ),
     ],

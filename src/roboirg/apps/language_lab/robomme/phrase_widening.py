@@ -74,7 +74,7 @@ _CONTEXTS: Mapping[str, _Context] = {
         whole=rf"the .*\b{PLACE_NOUN}\b.*",
     ),
     "relation": _Context(
-        left=rf"\b(?:{_PLACE} )?(?:right|just|directly|immediately|shortly) $",
+        left=rf"\b(?:{_PLACE} )?(?:(?:right|just|directly|immediately|shortly) )?$",
         right=rf" {_CLAUSE}",
         whole=rf"(?:{_PLACE} )?(?:\w+ )?(?:before|after|prior to|following)\b"
         r".*\b(?:button|press\w*|push\w*)\b.*",

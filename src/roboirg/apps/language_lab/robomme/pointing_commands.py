@@ -19,7 +19,7 @@ _RELATIVE_CLAUSE = re.compile(
 
 
 def with_pointing(commands: Iterable[WordedCommand]) -> tuple[WordedCommand, ...]:
-    """Return commands, each with one before it that is for referring expressions, if it needs it."""
+    """Return the commands, with those that are for referring expressions before the others."""
     found: list[WordedCommand] = []
     for command in commands:
         text = _pointing(command.text)
