@@ -162,9 +162,20 @@ UNSPOILED = {
 HARDEST = tuple(UNSPOILED)
 
 
+@functools.cache
+def in_digits(task: str) -> Wordings:
+    """One task of the import in digits, open."""
+    with tempfile.TemporaryDirectory() as folder:
+        say = goal_sentences.load_function(make_clone(Path(folder), "sentences_in_digits"))
+    found = robomme_import._TaskImport(all_tasks()[task], say).run()
+    wordings = Wordings("digits", task, {task: found})
+    register_wordings(wordings)
+    return wordings
+
+
 def pointed_commands(task: str, last: int) -> Iterator[Instruction]:
     """The instructions in digits whose command does not state the slot that is no color."""
-    wordings = imported("sentences_in_digits").wordings
+    wordings = in_digits(task)
     for episode in train_episodes(task, 0, last):
         (slot,) = set(episode.goal.as_mapping()) - {"color"}
         stated = wordings.tasks[task].phrase(episode.goal, slot)
@@ -227,8 +238,7 @@ def test_no_expression_spoils_the_sentence_in_any_training_episode(task):
     ],
 )
 def test_the_direct_command_is_good_english(task, commands):
-    identity = imported("sentences_in_digits").wordings.identity
-    direct = InstructionOptions("direct", wordings=identity)
+    direct = InstructionOptions("direct", wordings=in_digits(task).identity)
     assert {instruct_with(one, direct).command for one in train_episodes(task, 0, 12)} == commands
 
 
