@@ -195,6 +195,14 @@ def test_a_goal_or_task_without_a_command_is_told(tmp_path):
             "the brackets must hold a whole phrase with its article, such as [the red cube].",
         ),
         (
+            'name = "a"\n' + UNMASK + 'phrases.colors = { red = "x" }\npointed = "colors.0"',
+            "has pointed = 'colors.0'; it must be a list of fields of the command",
+        ),
+        (
+            'name = "a"\n' + UNMASK + 'phrases.colors = { red = "x" }\npointed = ["colors"]',
+            "Did you mean 'colors.0'?",
+        ),
+        (
             'name = "a"\n' + UNMASK + 'phrases.colors = { red = "  " }',
             "has the phrase '  ' for colors red; it must be words",
         ),
@@ -256,13 +264,17 @@ PHRASES = st.builds(StatedPhrase, BEFORE, WORDS, TEXT)
     st.dictionaries(st.sampled_from(["red", "green", "blue"]), PHRASES, min_size=1),
     st.dictionaries(st.sampled_from(["red", "green", "blue"]), PHRASES, min_size=1),
     st.sets(st.sampled_from(["direct", "spatial"])),
+    st.sets(st.sampled_from(["colors.0", "colors.1"])),
     st.text(st.characters(codec="utf-8", exclude_categories=["C"])),
 )
-def test_what_is_written_is_read_again(words, first, second, own, source):
+def test_what_is_written_is_read_again(words, first, second, own, pointed, source):
     commands = (
         WordedCommand(f"{{colors.0}}{words}", {"colors": ("red",)}, {"colors.0": first}),
         WordedCommand(
-            f"{words}{{colors.0}}{{colors.1}}", {}, {"colors.0": first, "colors.1": second}
+            f"{words}{{colors.0}}{{colors.1}}",
+            {},
+            {"colors.0": first, "colors.1": second},
+            frozenset(pointed),
         ),
     )
     text = wording_text("a", source, {"VideoUnmask": TaskWordings(commands, frozenset(own))})
@@ -270,8 +282,8 @@ def test_what_is_written_is_read_again(words, first, second, own, source):
     assert (read.name, read.source) == ("a", source)
     found = read.tasks["VideoUnmask"]
     assert found.own == own
-    assert [(one.text, one.when) for one in found.commands] == [
-        (one.text, one.when) for one in commands
+    assert [(one.text, one.when, one.pointed) for one in found.commands] == [
+        (one.text, one.when, one.pointed) for one in commands
     ]
     for before, after in zip(commands, found.commands, strict=True):
         for field, table in before.phrases.items():
@@ -308,6 +320,12 @@ text = "twice, put {color} on the target, then press the button"
 """
 
 
+OWN_SETTINGS = """[PickXtimes]
+own = ["direct"]
+[PickXtimes.phrases]
+"""
+
+
 @pytest.mark.parametrize("setting", ["direct", "contextual"])
 def test_both_forms_have_our_command_or_none(setting):
     identity = opened(OWN_SENTENCES)
@@ -321,6 +339,93 @@ def test_both_forms_have_our_command_or_none(setting):
     for form in FORMS:
         said = instruct(episode, "spatial", form, wordings=identity)
         assert said.metadata["command"].startswith("twice, put")
+
+
+@pytest.mark.parametrize(
+    ("task", "phrases", "text"),
+    [
+        ("StopCube", "visit = { 3 = 'the third time' }", "stop the cube at the target for {visit}"),
+        ("StopCube", "visit = { 3 = '[its third visit]' }", "stop the cube on {visit}"),
+        (
+            "PickXtimes",
+            "repeats = { 3 = 'three times' }\ncolor = { red = 'the red cube' }",
+            "put {color} on the target, doing this for {repeats}, then press the button",
+        ),
+        (
+            "VideoPlaceOrder",
+            "placement = { 3 = 'the third target' }\ncolor = { red = 'the red cube' }",
+            "place {color} on {placement} it was placed on",
+        ),
+        (
+            "VideoPlaceOrder",
+            "placement = { 3 = 'the third time' }\ncolor = { red = 'the red cube' }",
+            "place {color} on the target where a cube was placed {placement}",
+        ),
+        (
+            "VideoPlaceButton",
+            """relation = { after = 'the target [right after the button press]' }
+            color = { red = 'the red cube' }""",
+            "place {color} on {relation}",
+        ),
+        (
+            "VideoPlaceButton",
+            """relation = { after = 'right after the button press' }
+            color = { red = 'the red cube' }""",
+            "place {color} on the target {relation}",
+        ),
+    ],
+)
+def test_a_phrase_that_no_expression_can_replace_leaves_our_command(task, phrases, text):
+    identity = opened(f"[{task}.phrases]\n{phrases}\n[[{task}.commands]]\ntext = '{text}'")
+    goals = {"visit": 3, "repeats": 3, "placement": 3, "relation": "after"}
+    (slot,) = goals.keys() & episode_with(task).goal.as_mapping().keys()
+    color = {} if task == "StopCube" else {"color": "red"}
+    episode = episode_with(task, **{slot: goals[slot]}, **color)
+    assert instruct(episode, wordings=identity).metadata["command"] == text
+    for form in FORMS:
+        said = instruct(episode, "direct", form, wordings=identity)
+        assert said.metadata["command"] == "own"
+        assert said.text == instruct(episode, "direct", form).text
+
+
+def test_a_command_may_be_for_referring_expressions_only():
+    identity = opened(
+        """
+        [VideoRepick.phrases]
+        repeats = { 2 = "for two times", 3 = "for three times" }
+        [[VideoRepick.commands]]
+        pointed = ["repeats"]
+        text = "lift the cube of the video and put it down, doing so {repeats}"
+        [[VideoRepick.commands]]
+        text = "repeatedly lift the cube of the video and put it down {repeats}"
+        """
+    )
+    episode = episode_with("VideoRepick", repeats=2)
+    stated = "repeatedly lift the cube of the video and put it down for two times"
+    assert instruct(episode, wordings=identity).text == stated
+    assert instruct(episode, "direct", "resolved", wordings=identity).command == stated
+    said = instruct(episode, "direct", wordings=identity)
+    assert said.command == (
+        f"lift the cube of the video and put it down, doing so {same_number(said)}"
+    )
+
+
+def test_a_setting_under_own_ignores_the_commands():
+    identity = opened(f"{OWN_SENTENCES.replace('[PickXtimes.phrases]', OWN_SETTINGS)}")
+    without_command = episode_with("PickXtimes", repeats=3)
+    said = instruct(without_command, "direct", wordings=identity)
+    assert said.text == instruct(without_command, "direct").text
+    assert (said.metadata["command"], said.metadata["wordings"]) == ("own", identity)
+    with pytest.raises(InvalidValueError, match="have no command of PickXtimes"):
+        instruct(without_command, "spatial", wordings=identity)
+    # A command from outside has no rival; our own has.
+    rival = InstructionOptions("direct", rival="drawn")
+    assert find_refusal(without_command, rival) is None
+    options = rival._replace(wordings=identity)
+    assert find_refusal(without_command, options) is None
+    drawn = instruct_with(without_command, options)
+    assert drawn.text == instruct_with(without_command, rival).text
+    assert drawn.metadata["rival"] is not None
 
 
 def test_a_pair_with_our_command_in_one_form_is_no_pair(monkeypatch):

@@ -128,7 +128,7 @@ def instruct_with(episode: Episode, options: InstructionOptions) -> Instruction:
             f"The {setting.name} setting cannot express episode {episode.key} "
             f"(seed {episode.seed}): {reason}."
         )
-    if request.wordings is not None and setting.name not in request.wordings.own:
+    if request.wordings is not None:
         with contextlib.suppress(NoCommandError):
             # Both forms have a command from outside, or none of them.
             forms = {str(form): _say_outside(request, setting, form) for form in FORMS}
@@ -196,6 +196,8 @@ def _request(episode: Episode, options: InstructionOptions) -> InstructionReques
     wordings = None
     if options.wordings is not None and options.wordings not in POOLS:
         wordings = find_wordings(options.wordings).tasks.get(task.name, TaskWordings(()))
+        if options.setting in wordings.own:
+            wordings = None
     return InstructionRequest(episode, task, options, _sampler(episode), wordings)
 
 

@@ -13,6 +13,11 @@ ROBOMME_NAME = "robomme"
 """Name of the wordings with RoboMME's sentences, before the @ of their identity."""
 FIELD = re.compile(r"\{([a-z]+(?:\.[0-9])?)\}")
 """A field of a template, such as ``{color}`` or ``{colors.1}``."""
+PLACE_NOUN = r"(?:target|disc|plate|pad|goal|place|spot|location|position)"
+"""Pattern of the nouns for what a cube is placed on."""
+_AFTER_PLACE = re.compile(rf"\b{PLACE_NOUN} $")
+_AFTER_PREPOSITION = re.compile(r"\b(?:for|on|at|in|by|during) $")
+_RELATIVE_CLAUSE = re.compile(r" (?:that|which|where|it|(?:the|a) cube) ")
 
 
 class StatedPhrase(NamedTuple):
@@ -33,6 +38,11 @@ class StatedPhrase(NamedTuple):
         """All of the words."""
         return f"{self.before}{self.core}{self.after}"
 
+    @property
+    def is_place(self) -> bool:
+        """Whether the core stands for a target: *the target right before the button press*."""
+        return re.match(rf"(?:the|its|an?) .*\b{PLACE_NOUN}\b", self.core) is not None
+
 
 @dataclass(frozen=True, slots=True)
 class WordedCommand:
@@ -42,11 +52,13 @@ class WordedCommand:
         text: the sentence, with fields.
         when: the slot values of the goals that it is for; empty for all.
         phrases: field or slot → value → words.
+        pointed: the fields that referring expressions must fill; with none, they may fill any.
     """
 
     text: str
     when: Mapping[str, SlotValue] = field(default_factory=dict)
     phrases: Mapping[str, Mapping[str, StatedPhrase]] = field(default_factory=dict)
+    pointed: frozenset[str] = frozenset()
 
     @property
     def fields(self) -> tuple[str, ...]:
@@ -55,8 +67,10 @@ class WordedCommand:
 
     def phrase(self, name: str, value: str) -> StatedPhrase | None:
         """Return the words for a value of a field; ``colors`` has those of ``colors.1``, too."""
-        table = self.phrases.get(name) or self.phrases.get(name.partition(".")[0], {})
-        return table.get(value)
+        return self._table(name).get(value)
+
+    def _table(self, name: str) -> Mapping[str, StatedPhrase]:
+        return self.phrases.get(name) or self.phrases.get(name.partition(".")[0], {})
 
     def fits(self, goal: Goal, pointed: Collection[str] = ()) -> bool:
         """Return whether the template tells a goal.
@@ -72,6 +86,8 @@ class WordedCommand:
             return False
         if not set(self.fields) <= set(values) or not set(pointed) <= set(self.fields):
             return False
+        if not self.pointed <= set(pointed) or not all(map(self._can_point, pointed)):
+            return False
         for name, value in values.items():
             if name not in self.fields:
                 if not _slots_of(name) <= set(self.when):
@@ -79,6 +95,14 @@ class WordedCommand:
             elif name not in pointed and self.phrase(name, value) is None:
                 return False
         return True
+
+    def _can_point(self, name: str) -> bool:
+        """Return whether a referring expression can take the place of the words for a field."""
+        before, _, after = self.text.partition(f"{{{name}}}")
+        return all(
+            _gives_way(name, before + phrase.before, phrase, phrase.after + after)
+            for phrase in self._table(name).values()
+        )
 
     def state(self, goal: Goal) -> str:
         """Return the explicit command for a goal that the template fits."""
@@ -150,6 +174,21 @@ class Wordings:
     def identity(self) -> str:
         """Name and fingerprint, as in records."""
         return f"{self.name}@{self.fingerprint}"
+
+
+def _gives_way(name: str, before: str, phrase: StatedPhrase, after: str) -> bool:
+    """Return whether a referring expression reads well between these words.
+
+    It is an adverbial for numbers and visits (*just as often*, *during that visit*), a target for
+    placements, and for moments a target or an adverbial (*the target used then*, *placed then*).
+    """
+    if name in ("repeats", "visit"):
+        return _AFTER_PREPOSITION.search(before) is None
+    if name not in ("placement", "relation"):
+        return True
+    if phrase.is_place:
+        return _RELATIVE_CLAUSE.match(after) is None
+    return name == "relation" and _AFTER_PLACE.search(before) is None
 
 
 def goal_fields(goal: Goal) -> dict[str, str]:

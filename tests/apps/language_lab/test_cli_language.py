@@ -27,9 +27,12 @@ def call(*words: str | Path) -> str:
 WORDINGS = """\
 name = "test"
 [StopCube.phrases]
-visit = { 2 = "the second time", 3 = "the third time", 4 = "the 4th time", 5 = "the 5th time" }
+visit.2 = "for the second time"
+visit.3 = "for the third time"
+visit.4 = "for the 4th time"
+visit.5 = "for the 5th time"
 [[StopCube.commands]]
-text = "press the button to stop the cube when it reaches the target for {visit}"
+text = "press the button to stop the cube when it reaches the target {visit}"
 """
 
 
@@ -37,7 +40,7 @@ def test_instructions_in_words_from_outside(tmp_path: Path):
     file, out = tmp_path / "test.toml", tmp_path / "rows.jsonl"
     file.write_text(WORDINGS)
     said = call("show", "StopCube", "0", "--words", "--wordings", file)
-    assert said.count("press the button to stop the cube when it reaches the target for") == 4
+    assert said.count("press the button to stop the cube when it reaches the target") == 4
     call("export", "instructions", "--out", out, "--wordings", file, "--forms", "implicit")
     rows = [json.loads(line) for line in out.read_text().splitlines()]
     assert {row["task"] for row in rows} == {"StopCube"}  # all of the file
@@ -52,7 +55,7 @@ def test_instructions_in_words_from_outside(tmp_path: Path):
 
 def test_validation_finds_what_words_from_outside_break(tmp_path: Path):
     file = tmp_path / "test.toml"
-    file.write_text(WORDINGS.replace('"the 4th time"', '"the third time"'))
+    file.write_text(WORDINGS.replace("the 4th time", "the third time"))
     with pytest.raises(RoboIRGError, match="broken rule"):
         call("language", "validate", "--split", "val", "--seeds", "0", "--wordings", file)
 

@@ -48,16 +48,18 @@ def picks(self, count):
 
 
 def video_repick(self):
+    if self.num_repeats == 1:
+        return "Pick up the cube that was picked up in the video again, then press the button"
     return (
-        "Pick up the cube shown in the video and put it back down "
-        f"{TIMES[self.num_repeats]}, then press the button"
+        "Repeatedly pick up and put back down the cube that was picked up in the video "
+        f"for {self.num_repeats} times, then press the button"
     )
 
 
 def video_place_button(self):
     return (
-        f"After watching the video, place the {self.target_color_name} cube on the target it was "
-        f"placed on immediately {self.target_target_language} pressing the button."
+        f"After watching the video, place the {self.target_color_name} cube on the target "
+        f"immediately {self.target_target_language} the button was pressed."
     )
 
 

@@ -12,7 +12,7 @@ from roboirg.language.patterns.pattern import Derived, Pattern
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.slot_types import Fields, amount
-from roboirg.language.slot_types.ordinal import series_noun, wrapped
+from roboirg.language.slot_types.ordinal import wrapped
 
 LARGEST = len(CARDINALS) - 1
 NUMBER_SLOTS = ("repeats", "counts", "visit", "placement")
@@ -129,7 +129,7 @@ def _fields(
         (color,) = request.color_values
         shade = antecedent(color.color, color.slot, color.value)
         return amount.amounts([fill(relation.cubes, {"color": shade, "number": pointer})])
-    noun = plain(f"the {series_noun(request, goal_value)} whose number is ")
+    noun = plain(f"the {goal_value.slot_type} whose number is ")
     value = fill(relation.value, {"number": pointer})
     return wrapped(request, goal_value, (*noun, *value))
 

@@ -48,7 +48,7 @@ def _neighbor(request: InstructionRequest) -> Derived:
         template, {"moment": antecedent(derivations.MOMENTS[rejected], REFERENCE, rejected)}
     )
     outside = request.outside_phrase(goal_value.field)
-    if outside is not None and not outside.before:
+    if outside is not None and not outside.before and not outside.is_place:
         raise NoCommandError  # there is no word for the target that this could replace
     words = _single(request, rejected)
     single = (

@@ -98,7 +98,7 @@ def _ordinal(request: InstructionRequest) -> Derived:
     step = request.sampler.pick("relation", _steps(request, goal_value))
     reference = _reference(request, goal_value.number - step.offset)
     element = (
-        *plain(f"the {ordinal.series_noun(request, goal_value)} "),
+        *plain(f"the {goal_value.slot_type} "),
         *fill(step.words, {"reference": reference}),
     )
     fields = ordinal.wrapped(request, goal_value, element)
@@ -110,8 +110,7 @@ def _counted(request: InstructionRequest) -> Derived:
     (goal_value,) = request.values_of("visit")
     step = request.sampler.pick("relation", _counted_steps(request))
     reference = _reference(request, goal_value.number - step.offset)
-    template = ordinal.counted(request, goal_value, step.words)
-    words = request.around(goal_value.field, fill(template, {"reference": reference}))
+    words = request.around(goal_value.field, fill(step.words, {"reference": reference}))
     return _derived(request, "number deduction", step, {goal_value.field: words})
 
 

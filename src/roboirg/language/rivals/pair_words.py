@@ -12,7 +12,7 @@ from roboirg.language.request import GoalValue, InstructionRequest, UtteranceSpe
 from roboirg.language.rivals import rival_templates as templates
 from roboirg.language.rivals.value_pair import PairDraw
 from roboirg.language.slot_types import Fields, amount, described, relation, stated
-from roboirg.language.slot_types.ordinal import series_noun, wrapped
+from roboirg.language.slot_types.ordinal import wrapped
 from roboirg.language.templates.derivations import MOMENTS
 
 Name = Callable[[GoalValue], str]
@@ -179,7 +179,7 @@ def _chosen_fields(request: InstructionRequest, draw: PairDraw) -> Fields:
         return {meant.field: chosen(request, draw, "the number of times")}
     if kind == "relation":
         return relation.placed(request, meant, chosen(request, draw, "at the moment"))
-    return wrapped(request, meant, chosen(request, draw, f"the {series_noun(request, meant)}"))
+    return wrapped(request, meant, chosen(request, draw, f"the {meant.slot_type}"))
 
 
 def _counted(request: InstructionRequest, draw: PairDraw) -> Fields:

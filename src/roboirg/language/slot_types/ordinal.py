@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 from roboirg.core.motions import Shuttle
 from roboirg.language.number_words import ordinal
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill
@@ -17,8 +15,6 @@ INTRODUCTIONS = {
 }
 WRAPPED = {"visit": "during {which}", "placement": "the target of {which}"}
 """The command's field around the words for the element of the series."""
-OUTSIDE_NOUNS = ("visit", "placement", "time", "pass", "occasion")
-"""Nouns for an element in the words of others that may follow *that*."""
 OWNERS = {"visit": "its", "placement": "the"}
 """The determiner; *its placement* would give the cube away, as only one was placed."""
 INTRODUCED_OWNERS = {"visit": "the cube's", "placement": "the"}
@@ -37,26 +33,10 @@ def series_length(request: InstructionRequest, goal_value: GoalValue) -> int:
     return sum(fact.kind == "placed" and fact.place in targets for fact in scene.past)
 
 
-def series_noun(request: InstructionRequest, goal_value: GoalValue) -> str:
-    """Return the command's word for an element: ``visit``, or the one used outside: ``time``."""
-    outside = request.outside_phrase(goal_value.field)
-    noun = "" if outside is None else outside.core.split()[-1]
-    return noun if noun in OUTSIDE_NOUNS else goal_value.slot_type
-
-
 def wrapped(request: InstructionRequest, goal_value: GoalValue, which: Phrase) -> Fields:
     """Return the command's field, given the words for the visit or placement."""
-    words = fill(_wrapping(request, goal_value), {"which": which})
+    words = fill(WRAPPED[goal_value.slot_type], {"which": which})
     return {goal_value.field: request.around(goal_value.field, words)}
-
-
-def _wrapping(request: InstructionRequest, goal_value: GoalValue) -> str:
-    """Return the words around an element; none if words from outside name just the element."""
-    outside = request.outside_phrase(goal_value.field)
-    stays = goal_value.slot_type == "visit"  # so does its preposition
-    if outside is not None and (stays or outside.core.split()[-1] in OUTSIDE_NOUNS):
-        return "{which}"
-    return WRAPPED[goal_value.slot_type]
 
 
 def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
@@ -69,13 +49,12 @@ def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> 
 def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
     """Return ``that visit``."""
     (goal_value,) = goal_values
-    words = f"that {series_noun(request, goal_value)}"
+    words = f"that {goal_value.slot_type}"
     slot, value = goal_value.slot, goal_value.value
-    outside = request.outside_phrase(goal_value.field)
-    if outside is None:
+    if request.outside_phrase(goal_value.field) is None:
         return wrapped(request, goal_value, anaphor(words, "that", slot, value))
     # All of it takes the place of "the second target".
-    words = _wrapping(request, goal_value).format(which=words)
+    words = WRAPPED[goal_value.slot_type].format(which=words)
     pointing = anaphor(words, "that", slot, value)
     return {goal_value.field: request.around(goal_value.field, pointing)}
 
@@ -94,18 +73,6 @@ def introduce_position(
     words = f"{INTRODUCED_OWNERS[goal_value.slot_type]} {ordinal(position)} {goal_value.slot_type}"
     which = antecedent(words, slot, position)
     return fill(template, {"which": which})
-
-
-def counted(request: InstructionRequest, goal_value: GoalValue, template: str) -> str:
-    """Return ``one visit earlier than {reference}``, which takes the place of ``during ...``.
-
-    Words from outside keep their preposition: ``the time one earlier than {reference}``.
-    """
-    if request.outside_phrase(goal_value.field) is None:
-        noun = goal_value.slot_type
-        nouns = {"{noun}": f"{noun} ", "{nouns}": f"{noun}s "}
-        return re.sub(r"{nouns?}", lambda field: nouns[field[0]], template)
-    return f"the {series_noun(request, goal_value)} {re.sub(r'{nouns?}', '', template)}"
 
 
 def _pointing(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:

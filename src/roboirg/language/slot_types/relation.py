@@ -8,6 +8,7 @@ from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_remarks
 from roboirg.language.templates import derivations, introductions, remarks
 
+USED = "the target used "
 EXPRESSIONS: dict[str, Expression] = {"at that moment": "that", "then": "then"}
 
 
@@ -16,8 +17,9 @@ def placed(request: InstructionRequest, goal_value: GoalValue, moment: Phrase) -
 
     Not *it*: only one cube is placed in the video, so *it* would give the cube away.
     """
-    if request.outside_phrase(goal_value.field) is None:
-        moment = (*plain("the target used "), *moment)
+    outside = request.outside_phrase(goal_value.field)
+    if outside is None or outside.is_place:
+        moment = (*plain(USED), *moment)
     return {goal_value.field: request.around(goal_value.field, moment)}
 
 
@@ -34,8 +36,13 @@ def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) ->
     """Return ``at that moment``, or ``then``."""
     (goal_value,) = goal_values
     words = request.sampler.pick("moment anaphor", derivations.MOMENT_ANAPHORS)
-    moment = anaphor(words, EXPRESSIONS[words], goal_value.slot, goal_value.value)
-    return placed(request, goal_value, moment)
+    outside, pointing = request.outside_phrase(goal_value.field), EXPRESSIONS[words]
+    if outside is None or not outside.is_place:
+        moment = anaphor(words, pointing, goal_value.slot, goal_value.value)
+        return placed(request, goal_value, moment)
+    # All of it takes the place of "the target right before the button press".
+    target = anaphor(f"{USED}{words}", pointing, goal_value.slot, goal_value.value)
+    return {goal_value.field: request.around(goal_value.field, target)}
 
 
 def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:

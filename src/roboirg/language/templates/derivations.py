@@ -184,9 +184,9 @@ NEIGHBORS = {
 }
 """The steps in a series of two elements, by position."""
 COUNTED_STEPS = (
-    Step("one earlier", "one {noun}earlier than {reference}", -1, spells=1),
-    Step("one later", "one {noun}later than {reference}", 1, spells=1),
-    Step("two earlier", "two {nouns}earlier than {reference}", -2, spells=2),
-    Step("two later", "two {nouns}later than {reference}", 2, spells=2),
+    Step("one earlier", "one visit earlier than {reference}", -1, spells=1),
+    Step("one later", "one visit later than {reference}", 1, spells=1),
+    Step("two earlier", "two visits earlier than {reference}", -2, spells=2),
+    Step("two later", "two visits later than {reference}", 2, spells=2),
 )
 """The same as numbers: *one visit earlier than that*."""

@@ -119,7 +119,7 @@ class _TaskReader:
     def _command(
         self, content: object, shared: Mapping[str, Mapping[str, StatedPhrase]]
     ) -> WordedCommand:
-        table = self._table(content, "a command", ("text", "when", "phrases"))
+        table = self._table(content, "a command", ("text", "when", "phrases", "pointed"))
         text = table.get("text")
         if not isinstance(text, str) or not text.strip():
             self._fail(f"has a command with the text {text!r}; it must be a sentence")
@@ -137,7 +137,15 @@ class _TaskReader:
                 self._fail(f"has the field {{{name}}} twice in the command {text!r}")
             if name not in phrases and name.partition(".")[0] not in phrases:
                 self._fail(f"has no phrases for the field {{{name}}} of the command {text!r}")
-        return WordedCommand(text, when, phrases)
+        return WordedCommand(text, when, phrases, self._pointed(table.get("pointed", []), names))
+
+    def _pointed(self, content: object, names: list[str]) -> frozenset[str]:
+        if not isinstance(content, list) or not all(isinstance(one, str) for one in content):
+            self._fail(f"has pointed = {content!r}; it must be a list of fields of the command")
+        for name in content:
+            if name not in names:
+                raise UnknownNameError(f"field in pointed ({self._where})", name, names)
+        return frozenset(content)
 
     def _condition(self, slot: str, value: object) -> SlotValue:
         kind, several = SLOTS[slot]

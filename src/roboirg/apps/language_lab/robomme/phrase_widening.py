@@ -1,8 +1,8 @@
 """Widen the words for a value to a phrase that a referring expression can replace.
 
 *red* becomes *the red cube*, or *the container hiding [the red cube]*; *three* becomes *three
-times*; *third* becomes *the third time*; *before* becomes *the target where it was placed [right
-before the press]*.
+times*; *third* becomes *for the third time*, or *the third target it was placed on*; *before*
+becomes *the target where it was placed [right before the press]*.
 """
 
 from __future__ import annotations
@@ -14,13 +14,15 @@ from typing import NamedTuple
 from roboirg.apps.language_lab.robomme.template_search import DraftTemplate
 from roboirg.core.episode import ALL_COLORS
 from roboirg.language.number_words import CARDINALS
-from roboirg.language.worded_command import StatedPhrase
+from roboirg.language.worded_command import PLACE_NOUN, StatedPhrase
 
 _COLOR = rf"(?:{'|'.join(ALL_COLORS)})"
 _CUBE = r"(?:cube|block)"
 _COUNT = rf"(?:{'|'.join(CARDINALS)}|[0-9]+|an?|the)"
-_PLACE = r"(?:target|disc|plate|pad|goal|place|spot|location|position)"
+_PLACE = rf"(?:the|an?) (?:\w+ )?{PLACE_NOUN}"
+_VISIT = r"(?:time|visit|pass|occasion)"
 _COVER = r"(?:container|cube|block|bin|cup|bowl|box|one)"
+_PLACED = r"(?:(?:that|which|where|on which) )?(?:it|the cube|a cube) (?:was|were|is|had) "
 _CLAUSE = r"[^,;]*?(?=[,;.]| and | then |$)"
 
 
@@ -33,6 +35,7 @@ class _Context(NamedTuple):
         whole: pattern of a complete phrase.
         before: pattern of words before the phrase that go with it, outside the brackets.
         after: the same after it.
+        far: whether the phrase reaches as far as possible, or no farther than it must.
     """
 
     left: str
@@ -40,12 +43,14 @@ class _Context(NamedTuple):
     whole: str
     before: str = "$"
     after: str = ""
+    far: bool = True
 
 
 _CUBES = _Context(
     left=r"\b(?:the|an?) (?:same )?$",
     right=rf"[ -]?(?:colou?red )?{_CUBE}\b",
     whole=rf"(?:the|an?) .*\b{_COLOR}\b.*{_CUBE}",
+    far=False,
 )
 _CONTEXTS: Mapping[str, _Context] = {
     "cube": _CUBES,
@@ -53,17 +58,27 @@ _CONTEXTS: Mapping[str, _Context] = {
         before=rf"\b(?:the|an?|another) (?:\w+ )?{_COVER} (?:(?!and |then )\w+ ){{0,5}}$",
         after=rf" (?:is|was|are|were|lies|inside|under|beneath|underneath|below)\b{_CLAUSE}",
     ),
-    "repeats": _Context("$", r" times?\b(?:\(s\))?", r"[\w-]+ times?(?:\(s\))?|once|twice|thrice"),
-    "series": _Context(
-        left=r"\b(?:the|its) $",
-        right=rf" (?:time|visit|placement|pass|occasion|(?:\w+ )?{_PLACE})\b",
-        whole=rf"(?:the|its) [\w-]+ (?:time|visit|placement|pass|occasion|(?:\w+ )?{_PLACE})",
+    "repeats": _Context(
+        left=r"\bfor $",
+        right=r" times?\b(?:\(s\))?",
+        whole=r"(?:for )?(?:[\w-]+ times?(?:\(s\))?|once|twice|thrice)",
+    ),
+    "visit": _Context(
+        left=r"\b(?:(?:for|on|at|in|by|during) )?(?:the|its) $",
+        right=rf" {_VISIT}\b",
+        whole=rf"(?:\w+ )?(?:the|its) [\w-]+ {_VISIT}",
+    ),
+    "placement": _Context(
+        left=rf"\b(?:{_PLACE} (?!.*\b{PLACE_NOUN}\b)[^,;]*|the )$",
+        right=rf"(?: (?:time|placement|(?:\w+ )?{PLACE_NOUN})\b)?(?: {_PLACED}{_CLAUSE})?",
+        whole=rf"the .*\b{PLACE_NOUN}\b.*",
     ),
     "relation": _Context(
-        left=r"\b(?:right|just|directly|immediately|shortly) $",
+        left=rf"\b(?:{_PLACE} )?(?:(?:right|just|directly|immediately|shortly) )?$",
         right=rf" {_CLAUSE}",
-        whole=r"(?:\w+ )?(?:before|after|prior to|following)\b.*\b(?:button|press\w*|push\w*)\b.*",
-        before=rf"\b(?:the|an?) (?:\w+ )?{_PLACE}\b(?!.*\b{_PLACE}\b)[^,;]*$",
+        whole=rf"(?:{_PLACE} )?(?:\w+ )?(?:before|after|prior to|following)\b"
+        r".*\b(?:button|press\w*|push\w*)\b.*",
+        before=rf"\b{_PLACE}\b(?!.*\b{PLACE_NOUN}\b)[^,;]*$",
     ),
     "cubes": _Context(
         left="$",
@@ -71,8 +86,6 @@ _CONTEXTS: Mapping[str, _Context] = {
         whole=rf"{_COUNT} (?:of the )?{_COLOR}(?: {_CUBE}s?)?",
     ),
 }
-_KINDS = {"visit": "series", "placement": "series", "repeats": "repeats", "relation": "relation",
-          "cubes": "cubes"}  # fmt: skip
 _AMOUNT = re.compile(rf"({_COUNT} (?:of the )?)(.+)")
 
 
@@ -101,7 +114,8 @@ def widen(draft: DraftTemplate, thing: str) -> WidenedTemplate:
     phrases: dict[str, dict[str, StatedPhrase]] = {}
     stuck: list[str] = []
     for at, name in enumerate(draft.fields):
-        kind = _KINDS.get(name.partition(".")[0], "container" if thing == "container" else "cube")
+        kind, colored = name.partition(".")[0], "container" if thing == "container" else "cube"
+        kind = kind if kind in _CONTEXTS else colored
         context, table = _CONTEXTS[kind], draft.tables[name]
         left, right = _reach(context, literals[at], literals[at + 1], table)
         cores = {value: f"{left}{words}{right}" for value, words in table.items()}
@@ -126,9 +140,7 @@ def _reach(context: _Context, before: str, after: str, table: Mapping[str, str])
     """Return the words before and after a value that complete its phrase."""
     left, right = _found(re.search(context.left, before)), _found(re.match(context.right, after))
     tries = (("", ""), ("", right), (left, ""), (left, right))
-    if context is _CONTEXTS["relation"] or context is _CONTEXTS["cubes"]:
-        tries = tries[::-1]  # as far as possible
-    for one in tries:
+    for one in tries[::-1] if context.far else tries:
         if all(re.fullmatch(context.whole, one[0] + words + one[1]) for words in table.values()):
             return one
     return "", ""

@@ -21,6 +21,7 @@ from roboirg.apps.language_lab.robomme.goal_sentences import (
     load_function,
 )
 from roboirg.apps.language_lab.robomme.phrase_widening import widen
+from roboirg.apps.language_lab.robomme.pointing_commands import with_pointing
 from roboirg.apps.language_lab.robomme.template_search import find_templates
 from roboirg.apps.language_lab.robomme.wording_writer import wording_text
 from roboirg.apps.language_lab.validation.episode_checks import check_episode
@@ -126,7 +127,10 @@ class _TaskImport:
             return None
         commands, stuck = self._commands(sentences)
         wordings = self._readable(TaskWordings(tuple(commands)), sentences)
-        if not wordings.commands or not self._kept_in_file(wordings, sentences):
+        if not wordings.commands:
+            return None
+        wordings = TaskWordings(with_pointing(wordings.commands))
+        if not self._kept_in_file(wordings, sentences):
             return None
         own = {setting for setting in settings_of(self._task) if self._needs_own(setting, stuck)}
         wordings = replace(wordings, own=frozenset(own))

@@ -32,6 +32,8 @@ def _task_lines(task: str, wordings: TaskWordings) -> Iterator[str]:
         if command.when:
             conditions = (f"{slot} = {_value(value)}" for slot, value in command.when.items())
             yield f"when = {{ {', '.join(conditions)} }}"
+        if command.pointed:
+            yield f"pointed = [{', '.join(map(_quoted, sorted(command.pointed)))}]"
         yield f"text = {_quoted(command.text)}"
         rivaled = any(_both_may_fit(command, one) for one in wordings.commands)
         special = {
