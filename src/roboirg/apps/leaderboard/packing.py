@@ -20,8 +20,8 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.version import __version__
 from roboirg.evaluation.records.action_log import ACTION_FOLDER
 from roboirg.evaluation.records.episode_log import LOG_FOLDER
-from roboirg.evaluation.records.plan_files import EARLIER_PLANS, PLAN_FILE, earlier_plans
 from roboirg.evaluation.records.record_codec import StoreError, read_index_entry
+from roboirg.evaluation.records.run_files import EARLIER_PLANS, PLAN_FILE, earlier_plans
 from roboirg.evaluation.records.store import RECORDS_FILE, StoredRun
 from roboirg.util.atomic_write import replacing
 

@@ -14,12 +14,17 @@ import msgspec
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.records.action_log import action_path
 from roboirg.evaluation.records.episode_log import log_path, logged_slugs
-from roboirg.evaluation.records.plan_files import PLAN_FILE, earlier_plans, keep_earlier_plan
 from roboirg.evaluation.records.record_codec import (
     RecordIndexEntry,
     StoreError,
     identity_key,
     read_line,
+)
+from roboirg.evaluation.records.run_files import (
+    PLAN_FILE,
+    earlier_plans,
+    keep_earlier_plan,
+    run_file,
 )
 from roboirg.evaluation.records.store import RecordStore, StoredRun
 
@@ -155,7 +160,7 @@ def _lines(
 
 def _copy_video(name: str, source: Path, target: Path) -> bool:
     """Copy a video and its poster; return whether the video exists."""
-    video, copy = source / name, target / name
+    video, copy = run_file(source, name), run_file(target, name)
     if not video.is_file():
         return False
     if not copy.exists():
