@@ -1,4 +1,4 @@
-"""Read a file that somebody else may have put there: a regular one, and not too large."""
+"""Read a file that others may have put there: a regular one, and not too large."""
 
 from __future__ import annotations
 

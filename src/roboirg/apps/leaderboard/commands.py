@@ -146,7 +146,7 @@ def _print(found: Verification) -> None:
     if len(found.checks) > _MOST_SHOWN:
         typer.echo(f"… and {len(found.checks) - _MOST_SHOWN:,} more records.")
     wrong = len(found.checks) + len(found.missing) + len(found.doubled)
-    typer.echo("All of it holds." if found.holds else f"{counted(wrong, 'thing')} do not hold.")
+    typer.echo("All of it holds." if found.holds else f"Does not hold: {counted(wrong, 'thing')}.")
 
 
 def _print_some(what: str, slugs: tuple[str, ...]) -> None:

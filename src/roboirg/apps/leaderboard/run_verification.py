@@ -141,7 +141,8 @@ def _completeness(
     missing |= {slug for key, slug in jobs.items() if key not in there}
     notes = []
     if outside := len(there - jobs.keys()):
-        notes.append(f"{counted(outside, 'record')} are not in the newest plan of the folder.")
+        whose = "an earlier plan" if plans else "no plan that is kept"
+        notes.append(f"Of {whose}: {counted(outside, 'record')}.")
     return tuple(sorted(missing)), tuple(notes)
 
 

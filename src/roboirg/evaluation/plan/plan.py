@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 import secrets
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -35,7 +36,13 @@ from roboirg.evaluation.hosting.policy_descriptions import describe_policy
 from roboirg.evaluation.plan.plan_parsing import check_names, name_and_spec
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.film import VideoMode
-from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, ErrorKind, Job
+from roboirg.evaluation.records.record import (
+    DEFAULT_MAX_STEPS,
+    DEFAULT_MESHES,
+    NAME,
+    ErrorKind,
+    Job,
+)
 from roboirg.evaluation.records.run_files import PLAN_FILE, earlier_plans, store_plan
 from roboirg.language.generator import check_options, find_refusal
 from roboirg.language.settings import EXPLICIT, all_settings
@@ -197,6 +204,11 @@ class Plan(BaseModel):
         for name, spec in self.specs.items():
             if not is_encodable(f"{name}={spec}"):
                 raise InvalidValueError(f"Policy {name!r} is not text: it has lone surrogates.")
+            if not re.fullmatch(NAME, name):
+                raise InvalidValueError(
+                    f"Policy {name[:80]!r} has no name for records: at most 1,000 characters, "
+                    "none of which controls a terminal."
+                )
             if self.policy_process == "own":
                 describe_policy(spec, again=True)
             else:

@@ -16,6 +16,7 @@ from roboirg.evaluation.records.action_log import action_path
 from roboirg.evaluation.records.episode_log import log_path, logged_slugs
 from roboirg.evaluation.records.record_codec import (
     RecordIndexEntry,
+    RunPath,
     StoreError,
     identity_key,
     read_line,
@@ -46,7 +47,7 @@ class MergeSummary(NamedTuple):
 class _MergeEntry(RecordIndexEntry, frozen=True):
     """An index entry with the path of the video and the digest of the actions."""
 
-    video: str | None = None
+    video: RunPath | None = None
     action_log: str | None = None
 
 

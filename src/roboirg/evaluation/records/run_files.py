@@ -17,7 +17,7 @@ PLAN_FILE = "plan.json"
 EARLIER_PLANS = "plans"
 
 RELATIVE_PATH = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*(/[A-Za-z0-9_][A-Za-z0-9_.-]*)*$"
-"""A path in a record: relative, without ``..`` or hidden parts, in characters that need no quotes."""
+"""A path in a record: relative, without ``..`` and hidden parts, in characters without meaning."""
 MOST_PATH_LETTERS = 300
 
 

@@ -21,6 +21,7 @@ from roboirg.language.worded_command import (
     WordedCommand,
     Wordings,
 )
+from roboirg.language.wordings.robomme_sentences import check_robomme_name
 from roboirg.tasks import every_task
 from roboirg.util.regular_file import read_regular
 from roboirg.util.short_hash import short_hash
@@ -55,7 +56,10 @@ def read_wordings(path: str | Path) -> Wordings:
         raise InvalidValueError(f"The wording file {str(path)!r} cannot be read: {error}.") from (
             error
         )
-    return parse_wordings(text, f"wording file {str(path)!r}")
+    where = f"wording file {str(path)!r}"
+    wordings = parse_wordings(text, where)
+    check_robomme_name(wordings, where)
+    return wordings
 
 
 def parse_wordings(text: str, where: str) -> Wordings:
