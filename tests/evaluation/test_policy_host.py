@@ -250,10 +250,11 @@ class It:
         return np.ones((24, 8))
 """,
     )
-    plan = paper_plan(spec, 1)
-    play(plan, tmp_path / "run", LocalProcesses(1))
+    plan = paper_plan(f"privileged:{spec}", 1)
+    play(plan.checked(), tmp_path / "run", LocalProcesses(1))
     (record,) = read_records(tmp_path / "run")
     assert record.privileged
+    assert record.policy == "privileged:insider:It"
     assert "token" in str(record.policy_metadata["secret"])
 
 

@@ -42,7 +42,7 @@ from roboirg.evaluation.records.action_log import write_actions
 from roboirg.evaluation.records.film import VideoMode, VideoOptions
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.language.wordings.wording_store import open_wordings
-from roboirg.policies.by_name.loading import needs_host
+from roboirg.policies.by_name.loading import is_privileged, needs_host
 from roboirg.policies.contract.base import Policy, PrivilegedPolicy, close_policy, tell_policy
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.random_state import episode_policy_seed
@@ -310,7 +310,7 @@ def _play_to_end(
         result.add_events(info)
         result.heard += info.get("heard", ())
     with guard.policy("policy's reset()", "policy_reset"):
-        if isinstance(policy, PrivilegedPolicy):
+        if isinstance(policy, PrivilegedPolicy) and is_privileged(job.policy_spec):
             policy.attach(env)
         policy.reset(first, info["demonstration"])
         result.policy_metadata = policy_metadata(policy)
