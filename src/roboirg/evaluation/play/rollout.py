@@ -18,6 +18,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from socket import socket
 from typing import TYPE_CHECKING, Any
 
 from roboirg import policies
@@ -29,7 +30,7 @@ from roboirg.evaluation.episode_errors import (
     format_cause,
     one_line,
 )
-from roboirg.evaluation.hosting.host_pool import HostAddress, HostSettings
+from roboirg.evaluation.hosting.host_pool import HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_here
 from roboirg.evaluation.play.call_guard import CallGuard
@@ -42,7 +43,7 @@ from roboirg.evaluation.records.action_log import write_actions
 from roboirg.evaluation.records.film import VideoMode, VideoOptions
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.language.wordings.wording_store import open_wordings
-from roboirg.policies.by_name.loading import is_privileged, needs_host
+from roboirg.policies.by_name.loading import is_foreign, is_privileged, needs_host
 from roboirg.policies.contract.base import Policy, PrivilegedPolicy, close_policy, tell_policy
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.random_state import episode_policy_seed
@@ -74,7 +75,7 @@ class EpisodeRunner:
         policy_timeout_s: seconds that one call of the policy may take, if a supervisor watches.
         plan: fingerprint of the plan, for the records.
         hosting: how policies get processes of their own; None for policies in the world's process.
-        hosts: where to ask for them; an executor sets it.
+        hosts: the line on which to ask for them; an executor sets it.
         refuse_long: whether an episode is not played if its prompt is longer than what the policy's
             model reads.
         seed_secret: of the run, for the policies' seeds.
@@ -86,7 +87,7 @@ class EpisodeRunner:
     policy_timeout_s: float | None = None
     plan: str | None = None
     hosting: HostSettings | None = None
-    hosts: HostAddress | None = None
+    hosts: socket | None = None
     refuse_long: bool = False
     seed_secret: str = ""
 
@@ -94,8 +95,8 @@ class EpisodeRunner:
         """Return a copy that writes its videos to another folder."""
         return replace(self, folder=folder)
 
-    def with_hosts(self, hosts: HostAddress) -> EpisodeRunner:
-        """Return a copy that asks these hosts."""
+    def with_hosts(self, hosts: socket) -> EpisodeRunner:
+        """Return a copy that asks for hosts on a line, as `HostPool.connect` returns it."""
         return replace(self, hosts=hosts)
 
     def __call__(self, job: Job) -> Record:
@@ -106,7 +107,7 @@ class EpisodeRunner:
             MissingDependencyError: a package has to be installed first.
         """
         started_at, start = utc_now(), time.monotonic()
-        writer, result = self._play(job)
+        writer, result, attempt = self._play(job)
         video = self._finish_video(writer, result)
         error = None if writer is None else writer.error
         log = result.action_log
@@ -119,17 +120,21 @@ class EpisodeRunner:
             duration_s=round(time.monotonic() - start, 3),
             plan=self.plan,
             action_log=None if log is None else write_actions(log, self.folder),
-        )
+        ).model_copy(update={"attempt": attempt})
 
-    def _play(self, job: Job) -> tuple[VideoWriter | None, RolloutResult]:
-        """Play a job, again from its beginning if the policy's process is lost meanwhile."""
+    def _play(self, job: Job) -> tuple[VideoWriter | None, RolloutResult, int]:
+        """Play a job, again from its beginning if the policy's process is lost meanwhile.
+
+        Returns:
+            The video, the result, and how often the episode was begun.
+        """
         alone = False
-        for losses in range(1, MAX_LOSSES + 1):
+        for attempt in range(1, MAX_LOSSES + 1):
             writer = None
             if self.video != "off":
                 writer = VideoWriter(self.folder / VIDEO_FOLDER / f"{job.slug}.mp4", self.options)
             try:
-                return writer, play_episode(
+                result = play_episode(
                     job,
                     writer,
                     self.policy_timeout_s,
@@ -138,12 +143,13 @@ class EpisodeRunner:
                     refuse_long=self.refuse_long,
                     seed_secret=self.seed_secret,
                 )
+                return writer, result, attempt
             except EpisodeLostError as error:
                 alone = alone or error.alone
-                if losses == MAX_LOSSES:
-                    result, message = RolloutResult(), f"{error}, {losses} times in a row"
+                if attempt == MAX_LOSSES:
+                    result, message = RolloutResult(), f"{error}, {attempt} times in a row"
                     result.record_error(error.kind, format_cause(error.kind, message))
-                    return writer, result
+                    return writer, result, attempt
                 if writer is not None:
                     writer.discard()
         raise AssertionError("the last loss returns")
@@ -163,7 +169,7 @@ def play_episode(
     job: Job,
     writer: FrameSink | None = None,
     policy_timeout_s: float | None = None,
-    hosts: HostAddress | None = None,
+    hosts: socket | None = None,
     *,
     alone: bool = False,
     refuse_long: bool = False,
@@ -175,7 +181,7 @@ def play_episode(
         job: what to play.
         writer: gets the frames of a video.
         policy_timeout_s: seconds that one call of the policy may take, if a supervisor watches.
-        hosts: where policies have processes of their own; None to run them in this process.
+        hosts: the line on which to ask for processes of policies; None to run them in this one.
         alone: whether a hosted policy must not be asked about this episode together with others.
         refuse_long: whether not to play an episode whose prompt will be cut.
         seed_secret: of the run, for the policy's seed.
@@ -189,18 +195,20 @@ def play_episode(
     if job.wordings is not None:
         open_wordings(job.wordings_file, job.wordings)
     result = RolloutResult()
-    guard = CallGuard(result, policy_timeout_s, is_hosted=hosts is not None)
+    guard = CallGuard(result, policy_timeout_s)
     policy: Policy | None = None
     try:
-        if hosts is not None and needs_host(job.policy_spec):
-            with guard.policy("policy's constructor", "policy_load"):
-                seed = _policy_seed(job, seed_secret)
-                policy = _load_hosted(job, hosts, result, seed, alone=alone)
-        if policy is None:
-            guard = CallGuard(result, policy_timeout_s)
+        seed = _policy_seed(job, seed_secret)
+        is_hosted = hosts is not None and needs_host(job.policy_spec)
+        guard = CallGuard(result, policy_timeout_s, is_hosted=is_hosted)
+        if hosts is None or not is_hosted:
             result.policy = describe_here(job.policy_spec)
-            with guard.policy("policy's constructor", "policy_load"):
+        with guard.policy("policy's constructor", "policy_load"):
+            if hosts is None or not is_hosted:
                 policy = load_policy(job, seed_secret)
+            else:
+                policy = hosted = HostedPolicy(hosts, job.policy_spec, seed, alone=alone)
+                result.policy = PolicyDescription(hosted.version, is_privileged=False)
         with guard.policy("policy's constructor", "policy_load"):
             needs = job_needs(policy, job)
             result.prompt_limit = prompt_limit(needs)
@@ -267,17 +275,6 @@ def load_policy(job: Job, seed_secret: str = "") -> Policy:
     return policy
 
 
-def _load_hosted(
-    job: Job, hosts: HostAddress, result: RolloutResult, seed: int, *, alone: bool
-) -> HostedPolicy | None:
-    """Return a new policy object in its host; None if it is privileged and must run here."""
-    policy = HostedPolicy(hosts, job.policy_spec, seed, alone=alone)
-    if policy.is_privileged:
-        return None
-    result.policy = PolicyDescription(policy.version, is_privileged=False)
-    return policy
-
-
 def _policy_seed(job: Job, secret: str) -> int:
     episode = get_episode(job.task, job.split, job.episode)
     return episode_policy_seed(job.policy_seed, episode.seed, secret)
@@ -313,7 +310,8 @@ def _play_to_end(
         if isinstance(policy, PrivilegedPolicy) and is_privileged(job.policy_spec):
             policy.attach(env)
         policy.reset(first, info["demonstration"])
-        result.policy_metadata = policy_metadata(policy)
+        ours = not is_foreign(job.policy_spec)
+        result.policy_metadata = policy_metadata(policy, is_ours=ours)
     result.action_space = actions.name
     status, cause = "ongoing", None
     while status == "ongoing":
@@ -326,7 +324,7 @@ def _play_to_end(
         result.steps = int(info["steps"])
         result.add_events(info)
         if info.get("heard"):
-            _tell(policy, info["heard"], writer, result, guard)
+            _tell(policy, info["heard"], writer, result, guard, is_ours=ours)
         status, cause = info["status"], info.get("cause")
     if not result.record_status(status, cause, job.max_steps):
         result.cause = f"environment: the episode ended with status {status!r}"
@@ -338,6 +336,8 @@ def _tell(
     writer: FrameSink | None,
     result: RolloutResult,
     guard: CallGuard,
+    *,
+    is_ours: bool,
 ) -> None:
     """Tell the policy what has just been said, and write it under the video."""
     result.heard += utterances
@@ -345,7 +345,7 @@ def _tell(
         writer.caption = " ".join(one["text"] for one in result.heard)
     with guard.policy("policy's hear()", "policy_hear"):
         tell_policy(policy, utterances)
-        result.policy_metadata = policy_metadata(policy)
+        result.policy_metadata = policy_metadata(policy, is_ours=is_ours)
 
 
 def _close_policy(policy: Policy, result: RolloutResult, guard: CallGuard) -> None:

@@ -210,7 +210,7 @@ class _RunLoop:
         record = _refuse_contradiction(record)
         before = self._store.stored.get(identity_key(job))
         if before is not None:
-            record = record.model_copy(update={"attempt": before.attempt + 1})
+            record = record.model_copy(update={"attempt": before.attempt + record.attempt})
         self._store.append(record)
         self.tries[job] += 1
         self._reporter.advance(record, is_new=self.tries[job] == 1)
