@@ -79,7 +79,8 @@ class PolicyChild(ChildProcess):
             self.connection.send_bytes(encode(message))
             if block is not None:
                 send_descriptor(self.connection, block)
-            return read_child(self.connection.recv_bytes(MAX_MESSAGE))
+            reply: Ask | list[Outcome] = read_child(self.connection.recv_bytes(MAX_MESSAGE))
+            return reply
         except (EOFError, OSError):
             raise _explain(self.close()) from None
         except (RoboIRGError, RecursionError, ValueError) as error:

@@ -105,9 +105,9 @@ class PolicyHost:
         with self._changed:
             self._waiting.append(session)
             self._changed.notify_all()
-            self._changed.wait_for(lambda: session.reply is not None or self._is_next(session))
-            if session.reply is not None:
-                return session.reply
+            done = self._changed.wait_for(lambda: session.reply or self._is_next(session))
+            if isinstance(done, Reply):  # carried out with the call of another
+                return done
             self._waiting.popleft()
             self._is_busy = True
             calls = self._gather(session)
@@ -133,8 +133,6 @@ class PolicyHost:
         self._is_stopped = True
         self._kill()
         self._limit.__exit__()
-        if (child := self.child) is not None:
-            child.close()
 
     def _kill(self) -> None:
         if (child := self.child) is not None:
@@ -213,6 +211,8 @@ class PolicyHost:
     def _started_child(self) -> PolicyChild:
         if self.child is None:
             self.child, self._starts = self._start(), self._starts + 1
+            if self._is_stopped:
+                self._kill()
             # The start of the interpreter is not the policy's time.
             self.child.exchange([])
         return self.child
