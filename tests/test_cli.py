@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import typer.main
+from msgspec.structs import replace
 
 from roboirg import main as cli
 from roboirg.cli import demo_commands
@@ -366,11 +367,7 @@ def test_a_dry_run_checks_what_a_run_checks(
     job = Job(policy="random", task="PickXtimes", split="test", episode=0, setting="direct")
     with RecordStore(other) as store:
         result = RolloutResult("success", cause=None, steps=7)
-        store.append(
-            make_record(job, result, started_at="now").model_copy(
-                update={"language_version": "1.1"}
-            )
-        )
+        store.append(replace(make_record(job, result, started_at="now"), language_version="1.1"))
     places = {"file": file, "other": other}
     given = [word.format(**places) for word in words]
     before = sorted(tmp_path.rglob("*"))

@@ -22,8 +22,7 @@ from roboirg.evaluation.analysis.stats.run_summary import ALL, summarize
 from roboirg.evaluation.analysis.tables.paper_tables import WHICH, is_informative, make_table
 from roboirg.evaluation.analysis.tables.rendering import get_format
 from roboirg.evaluation.plan.plan import read_plan
-from roboirg.evaluation.records.record import Job, Record
-from roboirg.evaluation.records.record_codec import EpisodeSummary
+from roboirg.evaluation.records.record import Job, Record, Summary
 from roboirg.evaluation.records.store import read_records, read_results
 
 if TYPE_CHECKING:
@@ -58,7 +57,7 @@ class Results:
         object.__setattr__(self, "missing", sum(cell.missing for cell in cells))
 
     @functools.cached_property
-    def summaries(self) -> tuple[EpisodeSummary, ...]:
+    def summaries(self) -> tuple[Summary, ...]:
         """The verdicts, one for each episode, without instructions and events."""
         return read_results(self.folder)
 
