@@ -118,7 +118,7 @@ def test_lines_of_one_s_own_become_records(tmp_path):
     with pytest.raises(InvalidValueError, match=r"line 1: success is 1; it must be true or false"):
         import_results("jsonl", path, tmp_path / "other", OPTIONS)
     path.write_text('{"task": "StopCube", "success": true}')
-    with pytest.raises(InvalidValueError, match="episode: Field required"):
+    with pytest.raises(InvalidValueError, match="required field `episode`"):
         import_results("jsonl", path, tmp_path / "other", OPTIONS)
     path.write_text('{"task": "StopCube", "episode": 0, "success": true, "colour": 1}')
     with pytest.raises(InvalidValueError, match="colour"):

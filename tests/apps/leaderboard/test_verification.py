@@ -163,7 +163,7 @@ def test_the_command_tells_what_does_not_hold(honest: Path, tmp_path: Path, cli:
     bad = cli.invoke(app, ["leaderboard", "verify", str(forged), "--workers", "0"])
     assert bad.exit_code == 2
     lines = (forged / "records.jsonl").read_text().splitlines()
-    assert json.loads(lines[0])["schema_version"] == 3
+    assert json.loads(lines[0])["schema_version"] == 4
     assert "outcome: the record says 'success'; it should be 'failure'" in bad.output
     wrong = cli.invoke(app, ["leaderboard", "verify", str(honest), "--sample", "many"])
     assert wrong.exit_code != 0
