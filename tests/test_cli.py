@@ -14,10 +14,12 @@ import typer.main
 from roboirg import main as cli
 from roboirg.cli import demo_commands
 from roboirg.cli.progress_bar import progress_bars
+from roboirg.cli.run_commands import report_problems
 from roboirg.evaluation.plan.plan import read_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.store import RecordStore
+from roboirg.evaluation.run.runner import RunSummary
 from roboirg.util.console_width import progress_console
 
 RUN = ("run", "--policy", "random", "--tasks", "PickXtimes")
@@ -80,7 +82,7 @@ def canned(monkeypatch: pytest.MonkeyPatch) -> type[CannedPlayer]:
         (("--episodes", "50,"), "There is no episode 50: split 'test' has episodes 0 to 49."),
         (("--episodes", "four"), "'four' is not a valid episode"),
         (("--policy", "listner"), "Did you mean 'listener'?"),
-        (("--workers", "-1"), "workers is -1; it must be at least 1."),
+        (("--workers", "-1"), "workers is -1; it must be at least 0, this process only."),
         (("--plan", "papr"), "Did you mean 'paper'?"),
         (("--executor", "slurm"), "There is no executor 'slurm'; known: local, ray."),
         (("--address", "auto"), "needs --executor ray."),
@@ -332,6 +334,14 @@ def test_what_is_typed_goes_before_what_the_plan_says(
     assert (made.policies, made.tasks, made.episodes) == (("random",), ("StopCube",), (0, 1))
 
 
+@pytest.mark.parametrize(("missing", "verb"), [(1, "was"), (2, "were")])
+def test_one_episode_takes_a_singular_verb(capsys, missing: int, verb: str) -> None:
+    summary = RunSummary(9, 9 - missing, (), missing, 0, (), ())
+    with pytest.raises(SystemExit):
+        report_problems(summary, Path("out"))
+    assert f"{missing} of 9 episodes {verb} not played" in capsys.readouterr().err
+
+
 def test_a_run_without_a_policy_is_told(roboirg, tmp_path: Path) -> None:
     said = roboirg("run", "--plan", "paper", "--out", tmp_path)
     assert said.code == 2
@@ -350,7 +360,7 @@ def test_a_dry_run_counts_and_plays_nothing(roboirg, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (("--workers", "-2"), "workers is -2; it must be at least 1"),
+        (("--workers", "-2"), "workers is -2; it must be at least 0, this process only."),
         (("--executor", "slurm"), "There is no executor 'slurm'"),
         (("--address", "auto"), "--address 'auto' needs --executor ray"),
         (("--out", "{file}"), "Cannot write to {file}: {file} is not a folder"),

@@ -13,7 +13,7 @@ import typer
 from roboirg.cli import plan_options as options
 from roboirg.cli.options import Workers, add_working_directory, spread
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.core.plain_text import counted, printable
+from roboirg.core.plain_text import counted, printable, verb_for
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -163,16 +163,18 @@ def report_problems(summary: RunSummary, folder: Path) -> None:
         )
     if summary.errors:
         first = summary.errors[0]
+        verb = verb_for(len(summary.errors), "are")
         typer.echo(
             f"roboirg: {len(summary.errors):,} of {counted(summary.total, 'episode')} ended in an "
-            f"error and are not counted in the rates; the first ({first.task} "
+            f"error and {verb} not counted in the rates; the first ({first.task} "
             f"{first.split}/{first.episode} {first.setting}): {printable(str(first.cause))}",
             err=True,
         )
     if summary.missing:
+        verb = verb_for(summary.missing, "were")
         typer.echo(
-            f"roboirg: {summary.missing:,} of {counted(summary.total, 'episode')} were not played; "
-            f"run the same command to play them in {folder}.",
+            f"roboirg: {summary.missing:,} of {counted(summary.total, 'episode')} {verb} not "
+            f"played; run the same command to complete {folder}.",
             err=True,
         )
     if summary.errors or summary.missing:

@@ -165,6 +165,7 @@ def test_the_command_tells_what_does_not_hold(honest: Path, tmp_path: Path, cli:
     lines = (forged / "records.jsonl").read_text().splitlines()
     assert json.loads(lines[0])["schema_version"] == 3
     assert "outcome: the record says 'success'; it should be 'failure'" in bad.output
+    assert "1 thing does not hold." in bad.output
     wrong = cli.invoke(app, ["leaderboard", "verify", str(honest), "--sample", "many"])
     assert wrong.exit_code != 0
 

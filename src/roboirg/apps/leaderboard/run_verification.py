@@ -17,7 +17,7 @@ from roboirg.apps.leaderboard.record_check import (
 )
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.plain_text import counted
+from roboirg.core.plain_text import counted, verb_for
 from roboirg.evaluation.plan.plan import read_earlier_plans, read_plans
 from roboirg.evaluation.records.record_codec import EpisodeSummary, identity_key
 from roboirg.evaluation.records.store import StoredRun, read_summaries
@@ -141,7 +141,8 @@ def _completeness(
     missing |= {slug for key, slug in jobs.items() if key not in there}
     notes = []
     if outside := len(there - jobs.keys()):
-        notes.append(f"{counted(outside, 'record')} are not in the newest plan of the folder.")
+        verb = verb_for(outside, "are")
+        notes.append(f"{counted(outside, 'record')} {verb} not in the newest plan of the folder.")
     return tuple(sorted(missing)), tuple(notes)
 
 
