@@ -358,6 +358,22 @@ def test_a_dry_run_counts_and_plays_nothing(roboirg, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("words", "caption"),
+    [
+        (("--settings", "explicit"), "episodes"),
+        (("--settings", "explicit,direct"), "episodes: implicit"),
+        (("--settings", "direct", "--forms", "resolved"), "episodes: resolved"),
+        (("--settings", "direct", "--forms", "implicit,resolved"), "episodes: implicit + resolved"),
+    ],
+)
+def test_a_dry_run_names_the_forms_it_counts(
+    roboirg, tmp_path: Path, words: tuple[str, ...], caption: str
+) -> None:
+    said = roboirg(*RUN, *words, "--dry-run", "--out", tmp_path / "out")
+    assert caption in map(str.strip, said.out.splitlines())
+
+
+@pytest.mark.parametrize(
     ("words", "sentence"),
     [
         (("--workers", "-2"), "workers is -2; it must be at least 0, this process only."),
@@ -472,6 +488,21 @@ def test_a_module_without_a_class_gets_a_hint(
     assert said.code == 2
     name = word.removesuffix(".py").replace("/", ".")
     assert said.err.endswith(f"Policy {word!r} is a module; name its class, {name}:Mine.\n")
+
+
+@pytest.mark.parametrize(
+    ("word", "meant"),
+    [
+        ("p15.py:Reach", "p15:Reach"),
+        ("./p15.py:Reach", "p15:Reach"),
+        ("folder/p15:Reach", "folder.p15:Reach"),
+        ("/elsewhere/p15.py:Reach", "p15:Reach"),
+    ],
+)
+def test_a_file_with_a_class_gets_a_hint(roboirg, tmp_path: Path, word: str, meant: str) -> None:
+    said = roboirg("run", "--policy", word, "--out", tmp_path / "out")
+    assert said.code == 2
+    assert said.err == f"roboirg: Policy {word!r} names a file; name its module: {meant}.\n"
 
 
 def test_runs_are_merged_and_exported(roboirg, tmp_path: Path, canned: type[CannedPlayer]) -> None:

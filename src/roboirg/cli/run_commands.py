@@ -243,6 +243,7 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
     from roboirg.evaluation.records.store import read_index
     from roboirg.evaluation.run.estimate import cell_sizes, estimate, estimate_text
     from roboirg.evaluation.run.world_speed import ASSUMED, measure_world
+    from roboirg.language.settings import EXPLICIT
     from roboirg.util.console_width import widen
     from roboirg.util.processor import core_count
 
@@ -257,7 +258,8 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
     for (policy, task), cells in sizes.items():
         counts = (" + ".join(map(str, cells.get(one, {}).values())) or "–" for one in settings)
         table.add_row(policy, task, *counts)
-    table.caption = "episodes: implicit" + (" + resolved" if "resolved" in plan.forms else "")
+    forms = dict.fromkeys(job.form for job in jobs if job.setting != EXPLICIT)  # it has one form
+    table.caption = f"episodes: {' + '.join(forms)}" if forms else "episodes"
     widen(console, table)
     console.print(table)
     _print_prompt_shares(jobs, settings, console)
