@@ -168,7 +168,7 @@ def test_a_run_in_turns_has_records_and_videos_of_them(tmp_path):
     words += ["--episodes", "1", "--delivery", "turns", "--video", "all", "--workers", "0"]
     result = CliRunner().invoke(app, ["run", *words, "--out", str(tmp_path)])
     assert result.exit_code == 0, result.output
-    explicit, direct = read_records(tmp_path)
+    direct, explicit = read_records(tmp_path)
     assert (explicit.outcome, direct.outcome) == ("success", "success")
     assert (explicit.delivery, direct.delivery) == ("prompt", "turns")
     assert [one.step for one in explicit.instruction] == [0]

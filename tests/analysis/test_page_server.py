@@ -183,9 +183,9 @@ def test_a_port_that_is_taken_or_is_none_is_one_sentence(server: PageServer, run
 
 def test_the_command_says_where_and_ends_with_ctrl_c(run: Path, wait_s: float) -> None:
     pytest.importorskip("jinja2")
-    code = "import typer; from roboirg.cli.report_commands import view; typer.run(view)"
+    command = [sys.executable, "-m", "roboirg", "report", str(run), "--serve"]
     with subprocess.Popen(
-        [sys.executable, "-c", code, str(run)], stdout=subprocess.PIPE, text=True,
+        command, stdout=subprocess.PIPE, text=True,
         env={**os.environ, "PYTHONUNBUFFERED": "1"},
     ) as process:  # fmt: skip
         assert process.stdout is not None

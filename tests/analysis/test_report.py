@@ -309,10 +309,10 @@ def test_cells_say_how_sure_they_are_and_each_difficulty_has_its_own() -> None:
 
 def test_films_are_inside_or_beside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "videos").mkdir()
-    (tmp_path / "videos" / "a b.mp4").write_bytes(b"film")
-    (tmp_path / "videos" / "a b.jpg").write_bytes(b"poster")
+    (tmp_path / "videos" / "a-b.mp4").write_bytes(b"film")
+    (tmp_path / "videos" / "a-b.jpg").write_bytes(b"poster")
     first, second, *_ = records()
-    filmed = first.model_copy(update={"video": "videos/a b.mp4"})
+    filmed = first.model_copy(update={"video": "videos/a-b.mp4"})
     lost = second.model_copy(update={"video": "videos/gone.mp4", "video_error": "no room"})
 
     page = Page(render([filmed, lost], tmp_path))
@@ -326,8 +326,8 @@ def test_films_are_inside_or_beside(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(episode_videos, "MAX_EMBEDDED_BYTES", 3)
     page = Page(render([filmed, lost], tmp_path))
-    assert page.details[0]["film"] == "videos/a%20b.mp4"
-    assert page.details[0]["poster"] == "videos/a%20b.jpg"
+    assert page.details[0]["film"] == "videos/a-b.mp4"
+    assert page.details[0]["poster"] == "videos/a-b.jpg"
     assert "plays them from the folder" in page.text
 
 

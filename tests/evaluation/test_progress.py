@@ -26,13 +26,13 @@ def test_a_terminal_sees_pace_time_left_and_score_in_80_columns() -> None:
     assert "6/6" in last
     assert "0:00 left" in last
     assert "/min" in last
-    assert "explicit 2/2 · direct " in last
+    assert "direct 0/2 · explicit 2/2" in last
 
 
 def test_elsewhere_every_episode_is_one_plain_line() -> None:
     lines = report(terminal=False).splitlines()
     assert lines[0] == "2 of 6 episodes already stored."
-    assert lines[1].startswith("[3/6] random PickXtimes test/0 explicit: success")
+    assert lines[1].startswith("[3/6] random PickXtimes test/0 direct: failure")
     assert len(lines) == 5
     assert "\x1b" not in "".join(lines)
 
@@ -47,6 +47,6 @@ def test_errors_are_in_the_score_but_in_no_rate() -> None:
     for record in RECORDS[:1]:
         score.add(record)
         score.add(record.model_copy(update={"outcome": "error"}))
-    assert score.summary() == "explicit 1/1 · errors 1"
+    assert score.summary() == "direct 0/1 · errors 1"
     assert score.time_left(0) == "0:00"
     assert ProgressCounter().time_left(5) == "-:--"

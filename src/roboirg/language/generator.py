@@ -26,6 +26,7 @@ from roboirg.language.landmarks import FRAMES
 from roboirg.language.phrases import speak
 from roboirg.language.request import (
     DISTRACTORS,
+    MOST_DISTRACTORS,
     STAGE_SETS,
     InstructionRequest,
     InstructionSpec,
@@ -229,8 +230,10 @@ def check_options(options: InstructionOptions) -> None:
         sets = ", ".join(str(one) for one in STAGE_SETS)
         raise InvalidValueError(f"The stages {options.stages} must be one of {sets}.")
     count: object = options.distractors
-    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
-        raise InvalidValueError(f"distractors is {count!r}; it must be a whole number from 1 on.")
+    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_DISTRACTORS:
+        raise InvalidValueError(
+            f"distractors is {count!r}; it must be a whole number from 1 to {MOST_DISTRACTORS}."
+        )
     for kind, name, known in (
         ("form", options.form, FORMS),
         ("distractor", options.distractor, DISTRACTORS),

@@ -22,6 +22,7 @@ from roboirg.tasks import Task, get_task
 Distractor = Literal["neutral", "competing"]
 Option = TypeVar("Option")
 DISTRACTORS: tuple[Distractor, ...] = ("neutral", "competing")
+MOST_DISTRACTORS = 100
 STAGE_SETS: tuple[tuple[int, ...], ...] = ((1, 5), (1, 2, 5), (1, 2, 3, 5), (1, 2, 3, 4, 5))
 
 AMOUNT_FIELD = "cubes"

@@ -45,7 +45,7 @@ from roboirg.tasks import all_tasks, get_task
 def imported(style: str) -> robomme_import.ImportedWordings:
     """The import of a stand-in; its wordings are open."""
     with tempfile.TemporaryDirectory() as folder:
-        found = robomme_import.import_robomme(make_clone(Path(folder), style))
+        found = robomme_import.import_robomme(make_clone(Path(folder), style), "stand-in")
     register_wordings(found.wordings)
     return found
 
@@ -273,7 +273,7 @@ def test_an_unreadable_template_is_refused_with_its_reason(tmp_path):
     file.write_text(text.replace("press the button so that the cube stops", "juggle the cube"))
     out = tmp_path / "out.toml"
     call = CliRunner().invoke(
-        cli.app, ["language", "import-robomme", str(clone), "--out", str(out)]
+        cli.app, ["language", "import-robomme", str(clone), "--out", str(out), "--name", "stand-in"]
     )
     assert isinstance(call.exception, RoboIRGError)  # main() prints it, exit code 2
     assert str(call.exception) == f"1 template could not be read back; {out} has the rest."
@@ -439,7 +439,7 @@ def test_all_reasons_are_told_if_nothing_can_be_used(tmp_path):
     clone = make_clone(tmp_path, "sentences_in_words")
     (clone / goal_sentences.FILE).write_text("def get_language_goal(self, env):\n    return ['']")
     out = tmp_path / "out.toml"
-    words = ["language", "import-robomme", str(clone), "--out", str(out)]
+    words = ["language", "import-robomme", str(clone), "--out", str(out), "--name", "stand-in"]
     call = CliRunner().invoke(cli.app, words)
     assert isinstance(call.exception, RoboIRGError)
     assert str(call.exception).startswith(f"No sentence of {str(clone)!r} can be used")

@@ -16,7 +16,7 @@ from roboirg.evaluation.records.action_log import (
     read_actions,
     write_actions,
 )
-from roboirg.evaluation.records.plan_files import PLAN_FILE
+from roboirg.evaluation.records.run_files import PLAN_FILE
 from roboirg.evaluation.records.store import RECORDS_FILE
 
 Lines = list[dict[str, Any]]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +16,9 @@ from roboirg.apps.leaderboard.pack_checks import CHECKS_FILE, PackCheck, check_p
 from roboirg.apps.leaderboard.packing import pack_run
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.published import published_rows
+from roboirg.evaluation.plan.plan import write_plan
+from roboirg.evaluation.plan.plan_file import read_plan_file
+from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.store import RecordStore
@@ -169,8 +174,10 @@ def test_statuses_of_packs(tmp_path: Path) -> None:
     assert "actions were not kept" in str(checks["empty-handed"])
     assert (packs / CHECKS_FILE).is_file()
     page = render_board(found)
-    assert "broken: " in page
-    assert re.search(r'<b class="refuted">refuted</b>', page)
+    assert "broken is not ranked: " in page
+    assert "empty-handed is not ranked: 1 record of no plan in the pack" in page
+    run = run_of("p", 3, episodes=4)._replace(check=checks["empty-handed"])
+    assert re.search(r'<b class="refuted">refuted</b>', render_board([run]))
 
 
 def test_checks_are_remembered_until_the_pack_changes(
@@ -244,3 +251,67 @@ def test_the_page_of_thirty_runs_sorts_and_filters_without_network(
         assert shown() == []
         page.check("#published")
         assert set(shown()) == {row.policy for row in rows if row.status == "published"}
+
+
+def whole_run(folder: Path, **changes: Any) -> Path:
+    """Store a whole run of the plan `challenge`, in which every seventh episode is an error."""
+    plan = make_plan(["random"], **(read_plan_file("challenge") | changes))
+    folder.mkdir()
+    write_plan(plan, folder)
+    made = []
+    for number, job in enumerate(plan.jobs()):
+        outcome = "error" if number % 7 == 0 else "success"
+        result = RolloutResult(outcome=outcome, error="policy")
+        result.cause = None if outcome == "success" else "policy: it raised"
+        made.append(make_record(job, result, started_at="", plan=plan.fingerprint))
+    return store(folder, made)
+
+
+def packs_of(tmp_path: Path, run: Path) -> PackedRun:
+    pack_run(run, tmp_path / "packs" / f"{run.name}.roboirg.zip")
+    return next(one for one in read_packs(tmp_path / "packs") if one.name == run.name)
+
+
+def drop(run: Path, wanted: Callable[[dict[str, Any]], bool], **changes: Any) -> Path:
+    """Keep only some records of a run, changed."""
+    file = run / "records.jsonl"
+    kept = [one for line in file.read_text().splitlines() if wanted(one := json.loads(line))]
+    file.write_text("".join(json.dumps(one | changes) + "\n" for one in kept))
+    return run
+
+
+@pytest.mark.parametrize(
+    ("forge", "reason"),
+    [
+        (lambda run: run, ""),
+        (lambda run: drop(run, lambda one: one["outcome"] == "success"), "nearest is challenge"),
+        (lambda run: drop(run, lambda one: True, plan=None), "110 records of no plan"),
+        (lambda run: drop(run, lambda one: one["task"] != "StopCube"), "10 missing"),
+        (lambda run: drop(run, lambda one: True, wordings="mine@1a2b3c4d"), "of no named plan"),
+        (lambda run: drop(run, lambda one: True, max_steps=3000), "110 not in it"),
+        (lambda run: drop(run, lambda one: True, policy_seed=5), "110 not in it"),
+    ],
+)
+def test_only_whole_runs_of_named_plans_are_ranked(
+    tmp_path: Path, forge: Callable[[Path], Path], reason: str
+) -> None:
+    (tmp_path / "packs").mkdir()
+    found = packs_of(tmp_path, forge(whole_run(tmp_path / "run")))
+    assert reason in found.refusal
+    assert bool(reason) == bool(found.refusal)
+    rows = own(board_rows([found]))
+    assert len(rows) == (0 if reason else 1)
+
+
+def test_a_run_of_a_plan_of_ones_own_is_not_ranked(tmp_path: Path) -> None:
+    (tmp_path / "packs").mkdir()
+    found = packs_of(tmp_path, whole_run(tmp_path / "run", episodes="0-4"))
+    assert "55 missing" in found.refusal
+    assert own(board_rows([found])) == []
+    assert "run is not ranked" in render_board([found])
+
+
+def test_errors_count_as_failures(tmp_path: Path) -> None:
+    (tmp_path / "packs").mkdir()
+    (row,) = own(board_rows([packs_of(tmp_path, whole_run(tmp_path / "run"))]))
+    assert row.rates[EXPLICIT].percent == pytest.approx(100 * (110 - 16) / 110)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from roboirg.apps.leaderboard.admission import refusal
 from roboirg.apps.leaderboard.board_rows import BoardRate, BoardRow, PackedRun, board_rows
 from roboirg.apps.leaderboard.pack_checks import check_pack, read_check
 from roboirg.apps.leaderboard.packing import PACK_SUFFIX, opened_run
@@ -66,8 +67,10 @@ def read_packs(
         if check is None or check.records:  # else it could not even be opened
             with opened_run(path) as run:
                 results = read_results(run)
-                planned = [job for plan in read_plans(run) for job in plan.drawable_jobs()]
-            packs.append(PackedRun(_name(path), results, planned, check))
+                plans = read_plans(run)
+            planned = [job for plan in plans for job in plan.drawable_jobs()]
+            why = refusal(results, plans)
+            packs.append(PackedRun(_name(path), results, planned, check, why))
         else:
             packs.append(PackedRun(_name(path), (), (), check))
         if progress is not None:
@@ -102,8 +105,14 @@ def render_board(runs: Sequence[PackedRun]) -> str:
         columns=columns,
         rows=[(row, [_cell(_rate(row, *column)) for column in columns]) for row in rows],
         conditions=sorted({row.conditions for row in rows}),
-        unreadable=[run for run in runs if not run.results],
+        unranked=[(run.name, _why_unranked(run)) for run in runs if run.refusal or not run.results],
     )
+
+
+def _why_unranked(run: PackedRun) -> str:
+    if run.refusal:
+        return run.refusal
+    return run.check.problem if run.check else "no records"
 
 
 def _rate(row: BoardRow, setting: str, is_private: bool) -> BoardRate | None:

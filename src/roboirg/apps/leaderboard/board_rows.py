@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
+from roboirg.apps.leaderboard.admission import with_failures
 from roboirg.apps.leaderboard.pack_checks import PackCheck
 from roboirg.evaluation.analysis.published import MAX_STEPS, published_rows
 from roboirg.evaluation.analysis.stats.cells import Cells, PolicyRun, clustered_interval, gather
@@ -60,12 +61,14 @@ class PackedRun(NamedTuple):
         results: of its records.
         planned: jobs of its plans.
         check: what `roboirg leaderboard verify` found; None if it was not asked.
+        refusal: why the run is not ranked; empty if it is.
     """
 
     name: str
     results: Sequence[AnyResult]
     planned: Sequence[Job]
     check: PackCheck | None
+    refusal: str = ""
 
 
 @dataclass(frozen=True)
@@ -106,13 +109,13 @@ class BoardRow:
 def board_rows(runs: Iterable[PackedRun]) -> tuple[BoardRow, ...]:
     """Return the rows of packed runs, best first by their mean over settings, then published ones.
 
-    Of each run only the default options of the settings count. A row is at the top of a setting if
-    it has a verdict on every task of it and the best comparable row that also has is not
-    significantly better: an exact paired test on the same episodes, corrected by Holm over the
-    rows of the setting. Privileged rows are compared with none. A policy's private results stand in
-    the row of its public ones if all but the split is equal.
+    Of each run only the default options of the settings count, and errors count as failures. A row
+    is at the top of a setting if it has a verdict on every task of it and the best comparable row
+    that also has is not significantly better: an exact paired test on the same episodes,
+    corrected by Holm over the rows of the setting. Privileged rows are compared with none. A
+    policy's private results stand in the row of its public ones if all but the split is equal.
     """
-    rows = [row for run in runs for row in _rows_of(run)]
+    rows = [row for run in runs if not run.refusal for row in _rows_of(run)]
     groups: dict[str, list[int]] = defaultdict(list)
     for index, row in enumerate(rows):
         if not row.is_privileged:
@@ -169,13 +172,14 @@ def _without_split(policy_run: PolicyRun | None) -> PolicyRun | None:
 
 
 def _rows_of(run: PackedRun) -> Iterable[BoardRow]:
-    cells = gather([(run.name, run.results)], run.planned)
+    results = with_failures(run.results)
+    cells = gather([(run.name, results)], run.planned)
     rng = np.random.default_rng(SEED)
     by_policy_run = _by_policy_run(cells)
     for policy_run in sorted(by_policy_run, key=repr):
         by_setting = by_policy_run[policy_run]
         status, text = _status(run.check, needs_salt=is_private(policy_run.conditions.split))
-        played = [one for one in run.results if PolicyRun.of(one) == policy_run]
+        played = [one for one in results if PolicyRun.of(one) == policy_run]
         yield BoardRow(
             policy=policy_run.policy,
             source=run.name,

@@ -8,20 +8,28 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import json
+import re
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.plain_text import printable
 from roboirg.core.version import __version__
 from roboirg.evaluation.records.action_log import ACTION_FOLDER
 from roboirg.evaluation.records.episode_log import LOG_FOLDER
-from roboirg.evaluation.records.plan_files import EARLIER_PLANS, PLAN_FILE, earlier_plans
 from roboirg.evaluation.records.record_codec import StoreError, read_index_entry
+from roboirg.evaluation.records.run_files import (
+    EARLIER_PLANS,
+    MOST_PATH_LETTERS,
+    PLAN_FILE,
+    RELATIVE_PATH,
+    earlier_plans,
+)
 from roboirg.evaluation.records.store import RECORDS_FILE, StoredRun
 from roboirg.util.atomic_write import replacing
 
@@ -30,6 +38,11 @@ MANIFEST = "manifest.json"
 _PACKED_FOLDERS = {"actions": ACTION_FOLDER, "logs": LOG_FOLDER, "videos": "videos"}
 _MAX_BYTES = 20 << 30
 """Most bytes that a pack may hold unpacked."""
+_MAX_MANIFEST_BYTES = 64 << 20
+_MOST_SHOWN = 200
+_UNREADABLE = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, OSError, RuntimeError,
+               ValueError)  # fmt: skip
+"""What `zipfile` and the file system raise for archives that are damaged, encrypted or odd."""
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 _BLOCK = 1 << 20
 
@@ -107,8 +120,9 @@ def opened_run(path: Path) -> Iterator[Path]:
         try:
             with zipfile.ZipFile(path) as archive:
                 _unpack(archive, path, folder)
-        except (zipfile.BadZipFile, EOFError, NotImplementedError) as error:
-            raise StoreError(f"{path} is no packed run: {error}.") from error
+        except _UNREADABLE as error:
+            words = printable(" ".join(str(error).split()))[:_MOST_SHOWN]
+            raise StoreError(f"{path} is no packed run: {words}.") from error
         yield folder
 
 
@@ -121,14 +135,17 @@ def read_manifest(path: Path) -> PackManifest:
     try:
         with zipfile.ZipFile(path) as archive:
             return _manifest(archive, path)
-    except (OSError, zipfile.BadZipFile) as error:
-        raise StoreError(f"{path} is no packed run: {error}.") from error
+    except _UNREADABLE as error:
+        words = printable(" ".join(str(error).split()))[:_MOST_SHOWN]
+        raise StoreError(f"{path} is no packed run: {words}.") from error
 
 
 def _manifest(archive: zipfile.ZipFile, path: Path) -> PackManifest:
     try:
-        return PackManifest.model_validate(json.loads(archive.read(MANIFEST)))
-    except (KeyError, ValueError, ValidationError) as error:
+        if archive.getinfo(MANIFEST).file_size > _MAX_MANIFEST_BYTES:
+            raise ValueError("it is too large")
+        return PackManifest.model_validate_json(archive.read(MANIFEST))
+    except (KeyError, ValueError) as error:
         raise StoreError(f"{path} is no packed run: its {MANIFEST} cannot be read.") from error
 
 
@@ -162,8 +179,9 @@ def _safe(name: str, path: Path) -> str:
     top = parts[0] if parts else ""
     folders = {EARLIER_PLANS, *_PACKED_FOLDERS.values()}
     is_known = name in (RECORDS_FILE, PLAN_FILE) or top in folders
-    if not is_known or ".." in parts or "\\" in name or name.startswith("/"):
-        raise StoreError(f"{path} holds {name!r}, which is no file of a run.")
+    if not is_known or len(name) > MOST_PATH_LETTERS or not re.fullmatch(RELATIVE_PATH, name):
+        shown = printable(name[:_MOST_SHOWN])
+        raise StoreError(f"{path} holds {shown!r}, which is no file of a run.")
     return name
 
 

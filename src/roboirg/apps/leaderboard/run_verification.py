@@ -17,7 +17,7 @@ from roboirg.apps.leaderboard.record_check import (
 )
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.plain_text import counted, verb_for
+from roboirg.core.plain_text import counted
 from roboirg.evaluation.plan.plan import read_earlier_plans, read_plans
 from roboirg.evaluation.records.record_codec import EpisodeSummary, identity_key
 from roboirg.evaluation.records.store import StoredRun, read_summaries
@@ -141,8 +141,8 @@ def _completeness(
     missing |= {slug for key, slug in jobs.items() if key not in there}
     notes = []
     if outside := len(there - jobs.keys()):
-        verb = verb_for(outside, "are")
-        notes.append(f"{counted(outside, 'record')} {verb} not in the newest plan of the folder.")
+        whose = "an earlier plan" if plans else "no plan that is kept"
+        notes.append(f"Of {whose}: {counted(outside, 'record')}.")
     return tuple(sorted(missing)), tuple(notes)
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import itertools
+import re
 import secrets
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, field_validator, model_validator
 
 from roboirg import language, policies, tasks
 from roboirg.core.actions import find_action_space
@@ -35,15 +36,23 @@ from roboirg.evaluation.hosting.policy_descriptions import describe_policy
 from roboirg.evaluation.plan.plan_parsing import check_names, name_and_spec
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.film import VideoMode
-from roboirg.evaluation.records.plan_files import PLAN_FILE, earlier_plans, store_plan
-from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, ErrorKind, Job
+from roboirg.evaluation.records.record import (
+    DEFAULT_MAX_STEPS,
+    DEFAULT_MESHES,
+    NAME,
+    ErrorKind,
+    Job,
+)
+from roboirg.evaluation.records.run_files import PLAN_FILE, earlier_plans, store_plan
 from roboirg.language.generator import check_options, find_refusal
 from roboirg.language.settings import EXPLICIT, all_settings
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.tasks.splits import splits
 from roboirg.tasks.splits.private_splits import MissingSaltError, is_private
+from roboirg.util.regular_file import read_regular
 from roboirg.util.short_hash import short_hash
 
+MOST_PLAN_BYTES = 64_000_000
 REQUIRED = "required"
 """Instead of a wording file in a plan: one must be given when the plan is run."""
 
@@ -195,6 +204,11 @@ class Plan(BaseModel):
         for name, spec in self.specs.items():
             if not is_encodable(f"{name}={spec}"):
                 raise InvalidValueError(f"Policy {name!r} is not text: it has lone surrogates.")
+            if not re.fullmatch(NAME, name):
+                raise InvalidValueError(
+                    f"Policy {name[:80]!r} has no name for records: at most 1,000 characters, "
+                    "none of which controls a terminal."
+                )
             if self.policy_process == "own":
                 describe_policy(spec, again=True)
             else:
@@ -408,6 +422,6 @@ def read_earlier_plans(folder: Path) -> tuple[Plan, ...]:
 
 def _read_plan_at(path: Path) -> Plan | None:
     try:
-        return Plan.model_validate_json(path.read_bytes())
-    except (OSError, ValidationError):
+        return Plan.model_validate_json(read_regular(path, MOST_PLAN_BYTES))
+    except (OSError, ValueError, InvalidValueError):
         return None

@@ -57,7 +57,7 @@ def make_plan(
     split = str(options.get("split", "test"))
     if options.get("wordings") == REQUIRED:
         raise InvalidValueError(
-            "This plan needs words from outside: make a wording file with `roboirg wordings "
+            "This plan needs words from outside: make a wording file with `roboirg language "
             "import-robomme PATH --out robomme.toml`, where PATH is a clone of RoboMME's "
             "repository, and give it with --wordings robomme.toml."
         )

@@ -263,7 +263,7 @@ def load_policy(job: Job, seed_secret: str = "") -> Policy:
     """Return a new policy object, so that no state of an earlier episode remains."""
     policy = policies.make_policy(job.policy_spec, seed=_policy_seed(job, seed_secret))
     if callable(take := getattr(policy, "take_job", None)):
-        take(job)  # of ours that look up what somebody did in this episode
+        take(job)  # of ours that look up what a person answered
     return policy
 
 

@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.actions import check_chunk, find_action_space
-from roboirg.core.errors import InvalidActionError, UnknownNameError
+from roboirg.core.errors import InvalidActionError, InvalidValueError
 from roboirg.evaluation.records.record_codec import StoreError
 from roboirg.util.atomic_write import write_atomically
+from roboirg.util.regular_file import read_regular
 
 ACTION_FOLDER = "actions"
 _SUFFIX = ".npz"
@@ -55,8 +56,8 @@ class ActionLog:
         return digest.hexdigest()
 
     def chunks(self) -> list[NDArray[np.float64]]:
-        """Return the rows of each answer of the policy."""
-        return np.split(self.rows, self.requests[1:])
+        """Return the rows of each answer of the policy; none if it gave none."""
+        return np.split(self.rows, self.requests[1:]) if len(self.requests) else []
 
 
 def action_path(folder: Path, digest: str) -> Path:
@@ -93,12 +94,12 @@ def read_actions(folder: Path, digest: str) -> ActionLog:
     """
     path = action_path(folder, digest)
     try:
-        log = _unpack(path.read_bytes())
+        log = _unpack(read_regular(path, _MAX_BYTES))
     except FileNotFoundError:
         raise StoreError(f"The actions {path} are missing.") from None
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise StoreError(f"{path} is no action log: {error}") from error
-    except (InvalidActionError, UnknownNameError) as error:
+    except (InvalidActionError, InvalidValueError) as error:
         raise StoreError(f"{path} is no action log: {error}") from error
     if log.digest != digest:
         raise StoreError(f"{path} has another content than its name says: {log.digest}.")

@@ -18,13 +18,12 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
+from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.records.record_codec import DamagedLineError, StoreError
 from roboirg.util.atomic_write import sync_to_disk
+from roboirg.util.regular_file import open_regular
 
 LOCK_FILE = ".lock"
-
-_BUFFER = 1 << 20
-"""Bytes to read at a time."""
 
 Parsed = TypeVar("Parsed")
 
@@ -59,11 +58,13 @@ class LineFile:
             StoreError: the file cannot be read, or `parse_line` raises it.
         """
         try:
-            file = self._path.open("rb", buffering=_BUFFER)
+            file = open_regular(self._path)
         except FileNotFoundError:
             return
         except OSError as error:
             raise StoreError(f"Cannot read {self._path}: {error.strerror}.") from error
+        except InvalidValueError as error:
+            raise StoreError(str(error)) from error
         with file:
             start = 0
             for number, line in enumerate(file, start=1):

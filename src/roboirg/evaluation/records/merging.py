@@ -14,12 +14,18 @@ import msgspec
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.records.action_log import action_path
 from roboirg.evaluation.records.episode_log import log_path, logged_slugs
-from roboirg.evaluation.records.plan_files import PLAN_FILE, earlier_plans, keep_earlier_plan
 from roboirg.evaluation.records.record_codec import (
     RecordIndexEntry,
+    RunPath,
     StoreError,
     identity_key,
     read_line,
+)
+from roboirg.evaluation.records.run_files import (
+    PLAN_FILE,
+    earlier_plans,
+    keep_earlier_plan,
+    run_file,
 )
 from roboirg.evaluation.records.store import RecordStore, StoredRun
 
@@ -41,7 +47,7 @@ class MergeSummary(NamedTuple):
 class _MergeEntry(RecordIndexEntry, frozen=True):
     """An index entry with the path of the video and the digest of the actions."""
 
-    video: str | None = None
+    video: RunPath | None = None
     action_log: str | None = None
 
 
@@ -155,7 +161,7 @@ def _lines(
 
 def _copy_video(name: str, source: Path, target: Path) -> bool:
     """Copy a video and its poster; return whether the video exists."""
-    video, copy = source / name, target / name
+    video, copy = run_file(source, name), run_file(target, name)
     if not video.is_file():
         return False
     if not copy.exists():

@@ -11,9 +11,9 @@ import hashlib
 import operator
 import re
 from collections.abc import Mapping
-from typing import Literal, Self, get_args
+from typing import Annotated, Literal, Self, get_args
 
-from pydantic import BaseModel, ConfigDict, JsonValue, model_validator
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, model_validator
 
 from roboirg.core.delivery import PromptVerdict
 from roboirg.core.instruction_options import (
@@ -27,8 +27,14 @@ from roboirg.core.instruction_options import (
     InstructionOptions,
 )
 from roboirg.core.observations import DemonstrationFrames, DemonstrationSource
+from roboirg.evaluation.records.run_files import RELATIVE_PATH
 
 SCHEMA_VERSION: Literal[3] = 3
+
+NAME = "^[^\\x00-\\x1f\\x7f-\\x9f\\u200e\\u200f\\u202a-\\u202e\\u2066-\\u2069]{0,1000}$"
+"""A name in a record: text without characters that control a terminal or reorder what is read."""
+
+Name = Annotated[str, Field(pattern=NAME)]
 
 Outcome = Literal["success", "failure", "error"]
 
@@ -102,26 +108,26 @@ class Job(_RecordModel):
             address may change.
     """
 
-    policy: str
-    task: str
-    split: str
+    policy: Name
+    task: Name
+    split: Name
     episode: int
-    setting: str
-    form: str = "implicit"
+    setting: Name
+    form: Name = "implicit"
     stages: tuple[int, ...] = ALL_STAGES
-    distractor: str = DEFAULT_DISTRACTOR
+    distractor: Name = DEFAULT_DISTRACTOR
     distractors: int = DEFAULT_DISTRACTORS
-    frame: str = DEFAULT_FRAME
-    delivery: str = DEFAULT_DELIVERY
-    rival: str = DEFAULT_RIVAL
-    reasoning: str = DEFAULT_REASONING
+    frame: Name = DEFAULT_FRAME
+    delivery: Name = DEFAULT_DELIVERY
+    rival: Name = DEFAULT_RIVAL
+    reasoning: Name = DEFAULT_REASONING
     policy_seed: int = 0
     max_steps: int = DEFAULT_MAX_STEPS
-    actions: str | None = None
+    actions: Name | None = None
     demonstration_frames: DemonstrationFrames | None = None
     observe_every: int | None = None
-    meshes: str = DEFAULT_MESHES
-    wordings: str | None = None
+    meshes: Name = DEFAULT_MESHES
+    wordings: Name | None = None
     wordings_file: str | None = None
     spec: str | None = None
 
@@ -316,8 +322,8 @@ class Result(Job):
     demonstration_steps: int = 0
     demonstration_source: DemonstrationSource = "none"
     privileged: bool
-    policy_version: str = "unknown"
-    server_version: str | None = None
+    policy_version: Name = "unknown"
+    server_version: Name | None = None
     language_version: str
     environment_version: int
     package_version: str
@@ -386,7 +392,7 @@ class Record(Result):
     events: tuple[EventRecord, ...] = ()
     usage: dict[str, float] = {}
     timings: dict[str, float] = {}
-    video: str | None = None
+    video: Annotated[str, Field(pattern=RELATIVE_PATH)] | None = None
     video_error: str | None = None
     details: str | None = None
     render_device: str | None = None

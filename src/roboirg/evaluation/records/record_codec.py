@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import msgspec
 from pydantic import ValidationError
@@ -26,6 +26,7 @@ from roboirg.evaluation.records.record import (
     DEFAULT_MAX_STEPS,
     DEFAULT_MESHES,
     IDENTITY,
+    NAME,
     SCHEMA_VERSION,
     ErrorKind,
     FailureKind,
@@ -37,6 +38,10 @@ from roboirg.evaluation.records.record import (
     real_robot,
     slug_of,
 )
+from roboirg.evaluation.records.run_files import RELATIVE_PATH
+
+Name = Annotated[str, msgspec.Meta(pattern=NAME)]
+RunPath = Annotated[str, msgspec.Meta(pattern=RELATIVE_PATH)]
 
 EntryType = TypeVar("EntryType", bound="RecordIndexEntry")
 
@@ -55,33 +60,33 @@ class RecordIndexEntry(msgspec.Struct, frozen=True, gc=False):
     Read instead of whole records to save time and memory: it takes a tenth of both.
     """
 
-    policy: str
-    task: str
-    split: str
+    policy: Name
+    task: Name
+    split: Name
     episode: int
-    setting: str
+    setting: Name
     schema_version: int
     seed: int
     outcome: str
     language_version: str
     environment_version: int
-    form: str = "implicit"
+    form: Name = "implicit"
     stages: tuple[int, ...] = ALL_STAGES
-    distractor: str = DEFAULT_DISTRACTOR
+    distractor: Name = DEFAULT_DISTRACTOR
     distractors: int = DEFAULT_DISTRACTORS
-    frame: str = DEFAULT_FRAME
-    delivery: str = DEFAULT_DELIVERY
-    rival: str = DEFAULT_RIVAL
-    reasoning: str = DEFAULT_REASONING
+    frame: Name = DEFAULT_FRAME
+    delivery: Name = DEFAULT_DELIVERY
+    rival: Name = DEFAULT_RIVAL
+    reasoning: Name = DEFAULT_REASONING
     policy_seed: int = 0
     max_steps: int = DEFAULT_MAX_STEPS
-    actions: str | None = None
+    actions: Name | None = None
     demonstration_frames: int | str | None = None
     observe_every: int | None = None
-    meshes: str = DEFAULT_MESHES
-    wordings: str | None = None
-    policy_version: str = "unknown"
-    server_version: str | None = None
+    meshes: Name = DEFAULT_MESHES
+    wordings: Name | None = None
+    policy_version: Name = "unknown"
+    server_version: Name | None = None
     cause: str | None = None
     attempt: int = 1
     duration_s: float = 0.0
@@ -141,7 +146,7 @@ class EpisodeSummary(RecordIndexEntry, frozen=True, kw_only=True):
     prompt_verdict: PromptVerdict = "unknown"
     started_at: str
     render_device: str | None = None
-    video: str | None = None
+    video: RunPath | None = None
     policy_metadata: StoredPolicyMetadata = StoredPolicyMetadata()
 
     @property

@@ -21,7 +21,9 @@ from roboirg.language.worded_command import (
     WordedCommand,
     Wordings,
 )
+from roboirg.language.wordings.robomme_sentences import check_robomme_name
 from roboirg.tasks import every_task
+from roboirg.util.regular_file import read_regular
 from roboirg.util.short_hash import short_hash
 
 FIELDS: tuple[str, ...] = (
@@ -34,6 +36,8 @@ SLOTS: Mapping[str, tuple[type, bool]] = {
     "visit": (int, False), "placement": (int, False), "relation": (str, False),
 }  # fmt: skip
 """The slots that a condition may have: the type of their values, and whether it is a list."""
+MOST_BYTES = 4_000_000
+"""Of a wording file; the largest that was seen has 30,000."""
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 _PHRASE = re.compile(r"([^\[\]{}]*)\[([^\[\]{}]+)\]([^\[\]{}]*)|([^\[\]{}]+)")
 
@@ -47,13 +51,15 @@ def read_wordings(path: str | Path) -> Wordings:
         InvalidValueError: it cannot be read, is not TOML, or something in it is missing or wrong.
     """
     try:
-        data = Path(path).read_bytes()
-        text = data.decode()
-    except (OSError, UnicodeDecodeError) as error:
+        text = read_regular(Path(path), MOST_BYTES).decode()
+    except (OSError, ValueError) as error:  # a path may hold NUL
         raise InvalidValueError(f"The wording file {str(path)!r} cannot be read: {error}.") from (
             error
         )
-    return parse_wordings(text, f"wording file {str(path)!r}")
+    where = f"wording file {str(path)!r}"
+    wordings = parse_wordings(text, where)
+    check_robomme_name(wordings, where)
+    return wordings
 
 
 def parse_wordings(text: str, where: str) -> Wordings:

@@ -65,6 +65,12 @@ def published_episode(task: str, split: str, index: int) -> PublishedEpisode | N
     )
 
 
+def published_goals(task: str) -> tuple[Goal, ...]:
+    """Return the goals of all published episodes of a task, in the order of the file."""
+    lines = (line for key, line in _lines().items() if key[0] == task)
+    return tuple(cast("Goal", decode(json.loads(line)["goal"])) for line in lines)
+
+
 def published_text() -> str:
     """Return the text of the shipped file, checked.
 

@@ -36,6 +36,7 @@ from roboirg.language.worded_command import (
     describe_goal,
     goal_fields,
 )
+from roboirg.language.wordings.robomme_sentences import check_robomme_name
 from roboirg.language.wordings.wording_file import check_name, parse_wordings
 from roboirg.language.wordings.wording_store import forget_wordings, register_wordings
 from roboirg.reader import interpret
@@ -102,6 +103,8 @@ def import_robomme(root: Path, name: str = ROBOMME_NAME) -> ImportedWordings:
     source = f"The first sentences of {FUNCTION} in RoboMME's repository."
     text = wording_text(name, source, tasks)
     wordings = parse_wordings(text, where) if tasks else None
+    if wordings is not None:
+        check_robomme_name(wordings, where)
     return ImportedWordings(text, wordings, tuple(refused))
 
 

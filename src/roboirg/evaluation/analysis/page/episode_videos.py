@@ -10,6 +10,7 @@ from typing import NamedTuple
 from urllib.parse import quote
 
 from roboirg.evaluation.analysis.page.entries import EpisodeEntry
+from roboirg.evaluation.records.run_files import run_file
 
 MAX_EMBEDDED_BYTES = 60_000_000
 """Larger videos, taken together, are linked to."""
@@ -42,7 +43,7 @@ class EpisodeVideos:
             path.stat().st_size
             for one in entries
             if one.run.folder is not None and one.record.video is not None
-            if (path := one.run.folder / one.record.video).is_file()
+            if (path := run_file(one.run.folder, one.record.video)).is_file()
         ]
         return cls(embed and sum(sizes) <= MAX_EMBEDDED_BYTES, len(sizes))
 
@@ -56,7 +57,7 @@ class EpisodeVideos:
         return EpisodeVideo(source, self._link(entry, poster, "image/jpeg"))
 
     def _link(self, entry: EpisodeEntry, name: str, kind: str) -> str | None:
-        if entry.run.folder is None or not (path := entry.run.folder / name).is_file():
+        if entry.run.folder is None or not (path := run_file(entry.run.folder, name)).is_file():
             return None
         if not self.embeds:
             return quote(f"{entry.run.link}{name}")

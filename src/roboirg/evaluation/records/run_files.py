@@ -1,14 +1,45 @@
-"""Which files of a run's folder hold its plans: the newest, and those of earlier commands."""
+"""The files of a run's folder: its plans, and what its records name.
+
+`plan.json` is the newest plan; those of earlier commands are in ``plans/``.
+"""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
+from roboirg.core.errors import RoboIRGError
+from roboirg.core.plain_text import printable
 from roboirg.util.atomic_write import write_atomically
 from roboirg.util.short_hash import short_hash
 
 PLAN_FILE = "plan.json"
 EARLIER_PLANS = "plans"
+
+RELATIVE_PATH = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*(/[A-Za-z0-9_][A-Za-z0-9_.-]*)*$"
+"""A path in a record: relative, without ``..`` and hidden parts, in characters without meaning."""
+MOST_PATH_LETTERS = 300
+
+
+class ForeignPathError(RoboIRGError):
+    """A path in a record names no file of the run's folder."""
+
+
+def run_file(folder: Path, name: str) -> Path:
+    """Return the path of a file that a record names, which need not exist.
+
+    Raises:
+        ForeignPathError: it is outside of the run's folder, perhaps by a symbolic link.
+    """
+    path = folder / name
+    if (
+        len(name) > MOST_PATH_LETTERS
+        or not re.fullmatch(RELATIVE_PATH, name)
+        or not path.resolve().is_relative_to(folder.resolve())
+    ):
+        shown = printable(name[:MOST_PATH_LETTERS])
+        raise ForeignPathError(f"{shown!r} in a record is no file below {folder}.")
+    return path
 
 
 def store_plan(content: bytes, folder: Path) -> None:

@@ -1,0 +1,103 @@
+"""Which packed runs the board ranks: whole runs of a plan that comes with the package.
+
+So tasks, settings, episodes and seeds are not chosen after the results are known. What this
+cannot catch stands in docs/verification.md.
+"""
+
+from __future__ import annotations
+
+import functools
+import operator
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+import msgspec
+
+from roboirg.core.plain_text import counted
+from roboirg.evaluation.analysis.comparability import is_robomme
+from roboirg.evaluation.analysis.stats.cells import PolicyRun
+from roboirg.evaluation.plan.plan import REQUIRED, Plan
+from roboirg.evaluation.plan.plan_file import named_plans, read_plan_file
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.records.record import IDENTITY, Result
+from roboirg.evaluation.records.record_codec import AnyResult
+
+_CHOSEN = {"policy", "actions", "demonstration_frames", "observe_every", "wordings"}
+"""What a named plan leaves to the policy; words are compared apart."""
+_key = operator.attrgetter(*(name for name in IDENTITY if name not in _CHOSEN))
+
+
+class NamedEpisodes(NamedTuple):
+    """The episodes of a plan that comes with the package, for any policy.
+
+    Attributes:
+        keys: what identifies them, the policy's own choices left out.
+        in_robommes_words: whether they are told in RoboMME's words.
+    """
+
+    keys: frozenset[object]
+    in_robommes_words: bool
+
+
+def refusal(results: Sequence[AnyResult], plans: Sequence[Plan]) -> str:
+    """Return why a packed run is not ranked; empty if it is."""
+    known = {plan.fingerprint for plan in plans}
+    if stray := sum(one.plan not in known for one in results):
+        return f"{counted(stray, 'record')} of no plan in the pack"
+    by_run: dict[PolicyRun, list[AnyResult]] = defaultdict(list)
+    for one in results:
+        by_run[PolicyRun.of(one)].append(one)
+    return next(filter(None, map(_run_refusal, by_run.values())), "")
+
+
+def _run_refusal(played: Sequence[AnyResult]) -> str:
+    """Return why one policy's episodes are no whole named plan; empty if they are one."""
+    first = played[0]
+    keys = frozenset(map(_key, played))
+    if all(one.outcome == "error" for one in played):
+        return f"every episode of {first.policy} ended in an error"
+    differences = {
+        name: (len(plan.keys - keys), len(keys - plan.keys))
+        for name, plan in _plans(first.split, first.wordings)
+    }
+    if (0, 0) in differences.values():
+        return ""
+    if not differences:
+        return f"the words of {first.policy} are those of no named plan"
+    name, (missing, more) = min(differences.items(), key=lambda one: sum(one[1]))
+    parts = [f"{missing:,} missing"] * bool(missing) + [f"{more:,} not in it"] * bool(more)
+    return (
+        f"the episodes of {first.policy} are no whole plan of {', '.join(named_plans())}; "
+        f"nearest is {name}: {' and '.join(parts)}"
+    )
+
+
+def _plans(split: str, wordings: str | None) -> Iterator[tuple[str, NamedEpisodes]]:
+    for name in named_plans():
+        plan = _named(name, split)
+        if is_robomme(wordings) if plan.in_robommes_words else wordings is None:
+            yield name, plan
+
+
+@functools.cache
+def _named(name: str, split: str) -> NamedEpisodes:
+    """Return the episodes of a named plan, on a split such as a private one."""
+    chosen = read_plan_file(name)
+    needs_words = chosen.get("wordings") == REQUIRED
+    if needs_words:
+        del chosen["wordings"]  # of explicit episodes, which any words can express
+    plan = make_plan(["random"], **{**chosen, "split": split})
+    return NamedEpisodes(frozenset(map(_key, plan.jobs())), needs_words)
+
+
+def with_failures(results: Iterable[AnyResult]) -> list[AnyResult]:
+    """Return results in which errors are failures: what a policy broke, it did not do."""
+    return [_as_failure(one) if one.outcome == "error" else one for one in results]
+
+
+def _as_failure(result: AnyResult) -> AnyResult:
+    changes = {"outcome": "failure", "error": None, "attribution": None}
+    if isinstance(result, Result):
+        return result.model_copy(update=changes)
+    return msgspec.structs.replace(result, **changes)

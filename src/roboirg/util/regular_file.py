@@ -1,0 +1,39 @@
+"""Read a file that others may have put there: a regular one, and not too large."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+from typing import BinaryIO
+
+from roboirg.core.errors import InvalidValueError
+
+
+def open_regular(path: Path) -> BinaryIO:
+    """Open a file for reading; a pipe or a device, which could block for ever, is refused.
+
+    Raises:
+        InvalidValueError: it is no regular file.
+        OSError: it cannot be opened.
+    """
+    # Not blocking, so that a pipe without a writer is opened and then refused.
+    file = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    if not stat.S_ISREG(os.fstat(file).st_mode):
+        os.close(file)
+        raise InvalidValueError(f"{path} is no regular file.")
+    return os.fdopen(file, "rb")
+
+
+def read_regular(path: Path, most: int) -> bytes:
+    """Return the content of a file of at most `most` bytes.
+
+    Raises:
+        InvalidValueError: it is no regular file, or larger.
+        OSError: it cannot be read.
+    """
+    with open_regular(path) as file:
+        content = file.read(most + 1)
+    if len(content) > most:
+        raise InvalidValueError(f"{path} has more than {most:,} bytes; no such file is that large.")
+    return content
