@@ -168,7 +168,7 @@ def repeat(
     """Play a run's plan again with its policies, and print which verdicts changed."""
     from roboirg.apps.leaderboard.repeats import flips_by_cell, repeated_episodes, write_flips
     from roboirg.cli.run_commands import play
-    from roboirg.evaluation.plan.plan import read_plan
+    from roboirg.evaluation.plan.plan import read_plan, with_secret
     from roboirg.evaluation.run.executor import choose_executor
 
     folder, target = folder_of(run), folder_of(out)
@@ -181,7 +181,10 @@ def repeat(
         )
     add_working_directory()
     summary = play(
-        plan.checked(), target, choose_executor(workers, plan.episode_timeout_s), retry=True
+        with_secret(plan, folder).checked(),
+        target,
+        choose_executor(workers, plan.episode_timeout_s),
+        retry=True,
     )
     found = repeated_episodes(folder, target)
     _print_flips(found)
