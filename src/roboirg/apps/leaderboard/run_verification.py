@@ -146,7 +146,18 @@ def _completeness(
 
 
 def _holes(entries: Iterable[Summary]) -> Iterator[str]:
-    """Yield episodes that a policy played in one setting or seed of a task, but not in another."""
+    """Yield episodes that a policy played in one setting or seed of a task, but not in another.
+
+    Only within one plan: a folder may hold commands with other settings, episodes and seeds.
+    """
+    plans: dict[str | None, list[Summary]] = defaultdict(list)
+    for one in entries:
+        plans[one.plan].append(one)
+    for played in plans.values():
+        yield from _holes_of_plan(played)
+
+
+def _holes_of_plan(entries: Iterable[Summary]) -> Iterator[str]:
     episodes: dict[tuple[str, ...], set[int]] = defaultdict(set)
     seeds: dict[str, set[int]] = defaultdict(set)
     cells: dict[tuple[str, str, str, InstructionOptions], set[tuple[int, int]]] = defaultdict(set)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
+from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.figures import FIGURES, FigureData, draw_figure
 from roboirg.evaluation.analysis.stats.cells import Cells, gather
 from roboirg.evaluation.analysis.stats.comparison import compare
@@ -160,8 +161,10 @@ class Results:
         return write_report(self.folder, planned=self._planned, videos=videos)
 
     def __repr__(self) -> str:
-        counts = f"{self.errors} errors, {self.missing} missing"
-        lines = [f"Results of {len(self.summaries)} episodes ({counts}) in {self.folder}"]
+        counts = f"{counted(self.errors, 'error')}, {self.missing:,} missing"
+        lines = [
+            f"Results of {counted(len(self.summaries), 'episode')} ({counts}) in {self.folder}"
+        ]
         lines += [f"  {policy} {name}: {100 * rate:.1f} %"
                   for (policy, name), rate in self.rates().items()]  # fmt: skip
         return "\n".join(lines)

@@ -77,7 +77,7 @@ def estimate_text(
         return tuple(lines)
     times = [_format_duration(seconds) for seconds in (found.least, found.most)]
     where = f"on {counted(workers, 'worker')}"
-    others = f"The other {found.episodes:,} take about"
+    others = f"Playing the other {found.episodes:,} takes about"
     if not found.unknown:
         return (*lines, f"{others} {times[0]} {where}, as long as the stored ones.")
     basis = "measured just now" if speed.is_measured else "assumed, as nothing can be played here"
