@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from evaluation_fakes import comparable
+from msgspec.structs import replace
 
 from roboirg.core.errors import (
     InvalidActionError,
@@ -24,7 +25,8 @@ from roboirg.evaluation.play.rollout import EpisodeRunner, load_policy, play_epi
 from roboirg.evaluation.play.rollout_result import RolloutResult
 from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.records.film import VideoOptions
-from roboirg.evaluation.records.record import EventRecord, Job, Record
+from roboirg.evaluation.records.record import EventRecord, Job
+from roboirg.evaluation.records.record_codec import encode, read_record
 
 JOB = Job(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
 
@@ -223,7 +225,7 @@ def test_ctrl_c_is_no_episode_error(stage: Callable[..., RolloutResult]) -> None
 
 def test_the_policys_luck_is_the_same_in_every_setting_and_another_in_every_episode() -> None:
     def luck(**changes: object) -> int:
-        return load_policy(JOB.model_copy(update=changes)).seed  # type: ignore[attr-defined]
+        return load_policy(replace(JOB, **changes)).seed  # type: ignore[attr-defined]
 
     assert luck() == luck(setting="explicit")
     assert len({luck(), luck(episode=3), luck(policy_seed=1)}) == 3
@@ -309,17 +311,17 @@ def test_wrong_cameras_of_an_object_are_the_policys_fault(
 
 
 def test_a_record_says_what_is_in_the_words_and_who_cheats() -> None:
-    job = JOB.model_copy(update={"setting": "reasoning", "policy": "oracle"})
+    job = replace(JOB, setting="reasoning", policy="oracle")
     record = rollout.make_record(job, RolloutResult("success", cause=None), started_at="now")
     assert record.metadata["pattern"]
     assert record.metadata["templates"]
     assert record.privileged
     assert not rollout.make_record(JOB, RolloutResult(), started_at="now").privileged
-    assert type(record).model_validate_json(record.model_dump_json()) == record
+    assert read_record(encode(record), Path(), 1) == record
 
 
 def test_a_record_has_the_words_that_were_spoken() -> None:
-    spoken = instruct_job(JOB.model_copy(update={"setting": "spatial"}))
+    spoken = instruct_job(replace(JOB, setting="spatial"))
     result = RolloutResult("success", cause=None, instruction=spoken)
     record = rollout.make_record(JOB, result, started_at="now")
     assert record.instruction[-1].text == spoken.utterances[-1].text
@@ -354,7 +356,7 @@ class TellingWorld(PaperWorld):
 
     def __init__(self, steps: tuple[int, ...], length: int) -> None:
         super().__init__(length)
-        job = JOB.model_copy(update={"setting": "contextual"})
+        job = replace(JOB, setting="contextual")
         self.instruction = instruct_job(job)
         self.told = list(zip(self.instruction.turns, steps, strict=False))
 
@@ -383,7 +385,7 @@ class Hearing(PaperPolicy):
         return {"heard": len(self.heard)}
 
 
-TURNS = JOB.model_copy(update={"setting": "contextual", "delivery": "turns"})
+TURNS = replace(JOB, setting="contextual", delivery="turns")
 
 
 @pytest.mark.parametrize("policy_class", [PaperPolicy, Hearing])
@@ -403,7 +405,7 @@ def test_a_record_holds_what_was_heard_when(
     hears = policy_class is Hearing
     assert policy.heard == [turns[0], 3, *(later if hears else ())]
     assert record.policy_metadata == ({"heard": 8} if hears else {})
-    assert Record.model_validate_json(record.model_dump_json()) == record
+    assert read_record(encode(record), Path(), 1) == record
 
 
 def test_the_caption_grows_as_utterances_are_heard(

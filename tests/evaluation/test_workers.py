@@ -14,6 +14,7 @@ from types import SimpleNamespace
 import chaos_policy
 import pytest
 from evaluation_fakes import FakePlay, WaitingPlay, comparable, small_plan
+from msgspec.structs import replace
 
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.waiting import Wait, waiting
@@ -265,7 +266,7 @@ class Unreachable:
         if job.policy != self.policy:
             return record
         lost = {"outcome": "error", "error": "connection", "cause": "connection: refused"}
-        return record.model_copy(update=lost)
+        return replace(record, **lost)
 
 
 def test_a_policy_that_cannot_be_reached_is_left_and_the_others_go_on(tmp_path: Path) -> None:

@@ -108,10 +108,8 @@ def test_validation_counts_what_a_setting_refuses(register):
     assert results.texts["PickXtimes", "dummy"] == 2 * 2
     assert results.refused["PickXtimes", "dummy", "", "easy"] == 2
     text = printed(*validation_tables(results))
-    assert "Scenes that the dummy setting cannot express" in text
-    assert "Scenes that the spatial setting cannot express" in text
-    assert "2 of 2 (100.00 %)" in text
-    assert f"{REASON}: 2 refusals" in text
+    assert re.search(r"PickXtimes\s+dummy\s+2 of 2\b", text)
+    assert f"dummy: {REASON}: 2 refusals" in text
 
 
 def test_a_pairing_rule_of_a_setting_can_fail(register):

@@ -4,7 +4,9 @@ import contextlib
 import json
 import sqlite3
 
+import msgspec
 import pytest
+from msgspec.structs import replace
 from typer.testing import CliRunner
 
 from roboirg.apps.integrations.result_import import ImportOptions, import_results
@@ -89,16 +91,16 @@ def test_inspect_s_logs_hold_whole_records(tmp_path):
     records = read_records(source)
     job = Job(policy="x", task="PickXtimes", split="test", episode=4, setting="contextual")
     samples = [
-        {"scores": {"grounds_reference": {"metadata": {"record": one.model_dump(mode="json")}}}}
+        {"scores": {"grounds_reference": {"metadata": {"record": msgspec.to_builtins(one)}}}}
         for one in records
     ]
     error = {"message": "the model is busy", "traceback": "Traceback"}
-    samples.append({"metadata": {"job": job.model_dump(mode="json")}, "error": error})
+    samples.append({"metadata": {"job": msgspec.to_builtins(job)}, "error": error})
     log = tmp_path / "log.json"
     log.write_text(json.dumps({"samples": samples}))
     import_results("inspect", log, tmp_path / "run", ImportOptions("gpt"))
     *whole, lost = read_records(tmp_path / "run")
-    assert [one.model_copy(update={"policy": "theirs"}) for one in whole] == list(records)
+    assert [replace(one, policy="theirs") for one in whole] == list(records)
     assert (lost.outcome, lost.task, lost.episode) == ("error", "PickXtimes", 4)
     assert lost.cause == "environment: the model is busy"
 
@@ -116,7 +118,7 @@ def test_lines_of_one_s_own_become_records(tmp_path):
     with pytest.raises(InvalidValueError, match=r"line 1: success is 1; it must be true or false"):
         import_results("jsonl", path, tmp_path / "other", OPTIONS)
     path.write_text('{"task": "StopCube", "success": true}')
-    with pytest.raises(InvalidValueError, match="episode: Field required"):
+    with pytest.raises(InvalidValueError, match="required field `episode`"):
         import_results("jsonl", path, tmp_path / "other", OPTIONS)
     path.write_text('{"task": "StopCube", "episode": 0, "success": true, "colour": 1}')
     with pytest.raises(InvalidValueError, match="colour"):

@@ -22,12 +22,14 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from pydantic import JsonValue, ValidationError
+import msgspec
+from pydantic import JsonValue
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, ErrorKind, Job, Record
+from roboirg.evaluation.records.record_codec import encode
 from roboirg.evaluation.records.store import RecordStore
 from roboirg.tasks.splits.splits import split_size
 
@@ -80,17 +82,15 @@ def import_results(harness: str, path: Path, out: Path, options: ImportOptions) 
         records = list(_READERS[harness](path, options))
     except OSError as error:
         raise InvalidValueError(f"{path} cannot be read: {error.strerror}.") from error
-    except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(map(str, first["loc"]))
-        raise InvalidValueError(f"{path}: {place}: {first['msg']}.") from error
+    except msgspec.ValidationError as error:
+        raise InvalidValueError(f"{path}: {error}.") from error
     except (KeyError, TypeError, AttributeError, json.JSONDecodeError, sqlite3.Error) as error:
         raise InvalidValueError(
             f"{path} is not a file of results of {harness} ({type(error).__name__}: {error})."
         ) from error
     _refuse_repeated(records, path)
     with RecordStore(out) as store:
-        store.extend(record.model_dump_json().encode() for record in records)
+        store.extend(map(encode, records))
     return len(records)
 
 
@@ -129,7 +129,7 @@ def _read_vla_eval(path: Path, options: ImportOptions) -> Iterator[Record]:
         ).fetchall()
     for name, task, status, steps, seconds, context, reason, detail in rows:
         params = {_NAMES.get(key, key): value for key, value in configs[name].items()}
-        told = {key: value for key, value in params.items() if key in Job.model_fields}
+        told = {key: value for key, value in params.items() if key in Job.__struct_fields__}
         job = _job(
             options, **{"setting": "explicit", "split": "test", **told},
             task=task, episode=json.loads(context)["episode_idx"],
@@ -155,8 +155,8 @@ def _read_inspect(path: Path, options: ImportOptions) -> Iterator[Record]:
         scores = sample.get("scores") or {}
         found = next((one["metadata"]["record"] for one in scores.values()), None)
         if found is not None:
-            record = Record.model_validate(found)
-            yield record.model_copy(update={"policy": options.policy, **options.fields})
+            record = msgspec.convert(found, Record)
+            yield msgspec.structs.replace(record, policy=options.policy, **options.fields)
             continue
         job = _job(options, **{**sample["metadata"]["job"], "policy": options.policy})
         error, result = sample.get("error") or {}, RolloutResult()
@@ -183,7 +183,9 @@ def _read_lines(path: Path, options: ImportOptions) -> Iterator[Record]:
 
 def _job(options: ImportOptions, **fields: Any) -> Job:  # noqa: ANN401 - values of JSON
     named = {"policy": options.policy, "max_steps": DEFAULT_MAX_STEPS, **fields}
-    return Job.model_validate({**named, **options.fields})
+    if unknown := named.keys() - set(Job.__struct_fields__):
+        raise UnknownNameError("field of an episode", min(unknown), Job.__struct_fields__)
+    return msgspec.convert({**named, **options.fields}, Job, strict=False)
 
 
 def _verdict(success: bool, job: Job) -> RolloutResult:
@@ -208,7 +210,7 @@ def _record(
     result.policy_metadata = {"imported": imported}
     written = dt.datetime.fromtimestamp(path.stat().st_mtime, dt.UTC).isoformat(timespec="seconds")
     record = make_record(job, result, started_at=written, duration_s=round(seconds, 3))
-    return record.model_copy(update={"attribution": None})
+    return msgspec.structs.replace(record, attribution=None)
 
 
 def _refuse_repeated(records: list[Record], path: Path) -> None:

@@ -145,7 +145,7 @@ def validate_instructions(
         found.add(results)
     console = _console()
     for table in validation_tables(found):
-        console.print(table)
+        console.print(table, "")
     for failure in found.failures[:MOST_FAILURES]:
         where = f"{failure.episode}, seed {failure.seed}, {failure.setting}"
         console.print(f"{failure.rule}: {where}: {failure.words}", markup=False)

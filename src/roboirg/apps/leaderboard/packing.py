@@ -22,7 +22,7 @@ from roboirg.core.plain_text import printable
 from roboirg.core.version import __version__
 from roboirg.evaluation.records.action_log import ACTION_FOLDER
 from roboirg.evaluation.records.episode_log import LOG_FOLDER
-from roboirg.evaluation.records.record_codec import StoreError, read_index_entry
+from roboirg.evaluation.records.record_codec import StoreError, read_summary
 from roboirg.evaluation.records.run_files import (
     EARLIER_PLANS,
     MOST_PATH_LETTERS,
@@ -80,7 +80,7 @@ def pack_run(folder: Path, out: Path, *, videos: bool = False, logs: bool = Fals
         StoreError: there are no records, or a line is not a record.
         InvalidValueError: the file cannot be written.
     """
-    entries = StoredRun(folder, read_index_entry).newest
+    entries = StoredRun(folder, read_summary).newest
     wanted = {"actions", *(["videos"] if videos else []), *(["logs"] if logs else [])}
     names = [name for name in (RECORDS_FILE, PLAN_FILE) if (folder / name).is_file()]
     names += [path.relative_to(folder).as_posix() for path in earlier_plans(folder)]

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+import msgspec
 import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -208,7 +209,7 @@ def _assign(jobs: list[Job], place: int, column: int) -> Job:
     square = balanced_square(len(jobs))
     chosen = [square[one % len(square)][column % len(jobs)] for one in range(place + 1)]
     earlier = chosen[:-1].count(chosen[-1])
-    return jobs[chosen[-1]].model_copy(update={"policy_seed": earlier})
+    return msgspec.structs.replace(jobs[chosen[-1]], policy_seed=earlier)
 
 
 def words_of(job: Job) -> tuple[str, str, int, InstructionOptions]:

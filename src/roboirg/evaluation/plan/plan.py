@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+import msgspec
 from pydantic import BaseModel, ConfigDict, field_validator, model_validator
 
 from roboirg import language, policies, tasks
@@ -298,7 +299,7 @@ class Plan(BaseModel):
             yield job
             # Copying is faster, and there may be very many.
             for seed in seeds[1:]:
-                yield job.model_copy(update={"policy_seed": seed})
+                yield msgspec.structs.replace(job, policy_seed=seed)
 
     def _options_of(self, setting: str) -> Iterator[InstructionOptions]:
         """Yield the instruction options to play in a setting.

@@ -13,6 +13,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import JsonValue
@@ -193,12 +194,12 @@ def make_record(
     episode = get_episode(job.task, job.split, job.episode)
     # An episode that failed before its reset has a record with the words it would have had.
     instruction = result.instruction or instruct_job(job)
-    explicit = instruct_job(job.model_copy(update={"setting": EXPLICIT}))
+    explicit = instruct_job(msgspec.structs.replace(job, setting=EXPLICIT))
     policy = result.policy or _describe(job)
     utterances = _utterances(job, instruction, result)
     prompt, verdict = _audit(job, instruction, utterances, result)
     return Record(
-        **dict(job),
+        **msgspec.structs.asdict(job),
         **{name: getattr(result, name) for name in _COPIED},
         seed=episode.seed,
         difficulty=episode.difficulty,

@@ -14,12 +14,13 @@ import msgspec
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.records.action_log import action_path
 from roboirg.evaluation.records.episode_log import log_path, logged_slugs
+from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.record_codec import (
-    RecordIndexEntry,
-    RunPath,
     StoreError,
+    encode,
     identity_key,
-    read_line,
+    read_record,
+    read_summary,
 )
 from roboirg.evaluation.records.run_files import (
     PLAN_FILE,
@@ -41,24 +42,14 @@ class MergeSummary(NamedTuple):
 
     added: int
     duplicates: int
-    conflicts: tuple[RecordIndexEntry, ...]
-
-
-class _MergeEntry(RecordIndexEntry, frozen=True):
-    """An index entry with the path of the video and the digest of the actions."""
-
-    video: RunPath | None = None
-    action_log: str | None = None
-
-
-_decoder = msgspec.json.Decoder(_MergeEntry)
+    conflicts: tuple[Summary, ...]
 
 
 def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
     """Copy the records, videos and logs of several runs into one folder.
 
     If several runs have the same episode, the first verdict is kept; a verdict replaces an error.
-    Records are checked and copied one by one; the memory holds only their index entries.
+    Records are checked and copied one by one; the memory holds only their summaries.
 
     Args:
         folders: output folders of the runs; they are not changed.
@@ -70,11 +61,11 @@ def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
     """
     if out.resolve() in {folder.resolve() for folder in folders}:
         raise InvalidValueError(f"{out} is one of the runs to be merged; choose another --out.")
-    runs = [(folder, StoredRun(folder, _read_entry)) for folder in folders]
+    runs = [(folder, StoredRun(folder, _read_checked)) for folder in folders]
     entries = [(folder, run.newest) for folder, run in runs]
     _check_versions(entries)
     added, duplicates = 0, 0
-    conflicts: list[RecordIndexEntry] = []
+    conflicts: list[Summary] = []
     with RecordStore(out) as store:
         _keep_plans(folders, out)
         kept = dict(store.stored)
@@ -106,13 +97,13 @@ def _keep_plans(folders: Sequence[Path], out: Path) -> None:
                 keep_earlier_plan(path.read_bytes(), out)
 
 
-def _read_entry(line: bytes, path: Path, number: int) -> _MergeEntry:
-    """Check that a line is a whole record and return its entry."""
-    read_line(line, path, number)
-    return _decoder.decode(line)
+def _read_checked(line: bytes, path: Path, number: int) -> Summary:
+    """Check that a line is a whole record and return its summary."""
+    read_record(line, path, number)
+    return read_summary(line, path, number)
 
 
-def _check_versions(runs: Sequence[tuple[Path, Iterable[RecordIndexEntry]]]) -> None:
+def _check_versions(runs: Sequence[tuple[Path, Iterable[Summary]]]) -> None:
     """Refuse records of different versions, as a run does."""
     first: dict[object, tuple[Path, object]] = {}
     for folder, entries in runs:
@@ -133,14 +124,14 @@ def _check_versions(runs: Sequence[tuple[Path, Iterable[RecordIndexEntry]]]) -> 
                     )
 
 
-def _server_version(record: RecordIndexEntry) -> Iterator[tuple[tuple[object, ...], object]]:
+def _server_version(record: Summary) -> Iterator[tuple[tuple[object, ...], object]]:
     """Yield the version of the policy's server, if the episode has a verdict."""
     if record.outcome != "error":
         yield ("version", "of the server of", record.policy), record.server_version
 
 
 def _lines(
-    run: StoredRun[_MergeEntry], wanted: Sequence[_MergeEntry], source: Path, target: Path
+    run: StoredRun[Summary], wanted: Sequence[Summary], source: Path, target: Path
 ) -> Iterator[bytes]:
     """Yield the lines of records and copy their videos, logs and actions.
 
@@ -156,7 +147,7 @@ def _lines(
             yield line
         else:
             record = next(run.records([one]))
-            yield record.model_copy(update={"video": None}).model_dump_json().encode()
+            yield encode(msgspec.structs.replace(record, video=None))
 
 
 def _copy_video(name: str, source: Path, target: Path) -> bool:

@@ -1,8 +1,11 @@
-"""Data of one episode: what to play (`Job`), the verdict (`Result`), and everything (`Record`).
+"""Data of one episode: what to play (`Job`), how it went (`Summary`), and everything (`Record`).
 
 A record is one JSON object with everything that reports and statistics need, so they never start
 the simulator. It depends only on its job, not on the worker, the order, or what ran before, except
 for the fields in `NON_DETERMINISTIC_FIELDS`.
+
+These structs are the one list of fields: identity, Parquet columns and keys derive from them.
+Types are checked when a line is read, and every line is read before it is stored.
 """
 
 from __future__ import annotations
@@ -11,9 +14,9 @@ import hashlib
 import operator
 import re
 from collections.abc import Mapping
-from typing import Annotated, Literal, Self, get_args
+from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue, model_validator
+import msgspec
 
 from roboirg.core.delivery import PromptVerdict
 from roboirg.core.instruction_options import (
@@ -29,12 +32,13 @@ from roboirg.core.instruction_options import (
 from roboirg.core.observations import DemonstrationFrames, DemonstrationSource
 from roboirg.evaluation.records.run_files import RELATIVE_PATH
 
-SCHEMA_VERSION: Literal[3] = 3
+SCHEMA_VERSION: Literal[4] = 4
 
 NAME = "^[^\\x00-\\x1f\\x7f-\\x9f\\u200e\\u200f\\u202a-\\u202e\\u2066-\\u2069]{0,1000}$"
 """A name in a record: text without characters that control a terminal or reorder what is read."""
 
-Name = Annotated[str, Field(pattern=NAME)]
+Name = Annotated[str, msgspec.Meta(pattern=NAME)]
+RunPath = Annotated[str, msgspec.Meta(pattern=RELATIVE_PATH)]
 
 Outcome = Literal["success", "failure", "error"]
 
@@ -73,11 +77,7 @@ NON_DETERMINISTIC_FIELDS = frozenset(
 """Fields that may differ when the same command runs twice: times, costs, paths, attempts, …"""
 
 
-class _RecordModel(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Job(_RecordModel):
+class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
     """One episode to play. All fields but `spec` and `wordings_file` identify its record.
 
     Attributes:
@@ -151,7 +151,7 @@ class Job(_RecordModel):
         return slug_of({name: getattr(self, name) for name in IDENTITY})
 
 
-IDENTITY = tuple(name for name in Job.model_fields if name not in {"spec", "wordings_file"})
+IDENTITY = tuple(name for name in Job.__struct_fields__ if name not in {"spec", "wordings_file"})
 """The fields that identify a job."""
 
 
@@ -173,7 +173,7 @@ def slug_of(identity: Mapping[str, object]) -> str:
     return f"{readable}-{digest[:8]}"
 
 
-class UtteranceRecord(_RecordModel):
+class UtteranceRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One utterance and its stage in the discourse.
 
     Attributes:
@@ -188,7 +188,7 @@ class UtteranceRecord(_RecordModel):
     step: int | None = 0
 
 
-class MentionSpan(_RecordModel):
+class MentionSpan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A span of an utterance that introduces a slot value or refers back to one.
 
     Attributes:
@@ -210,7 +210,7 @@ class MentionSpan(_RecordModel):
     value: str | int
 
 
-class EventRecord(_RecordModel):
+class EventRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A fact that became true or false during the episode.
 
     Attributes:
@@ -228,7 +228,7 @@ class EventRecord(_RecordModel):
     holds: bool = True
 
 
-class Attribution(_RecordModel):
+class Attribution(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Why an episode failed, concluded from its events.
 
     Attributes:
@@ -247,7 +247,7 @@ class Attribution(_RecordModel):
     sentence: str
 
 
-class PromptAudit(_RecordModel):
+class PromptAudit(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What of the instruction reached the policy's language model, by the limit it declares.
 
     Attributes:
@@ -283,10 +283,13 @@ def real_robot(trial: object) -> str | None:
     return None if robot in (None, TWIN) else str(robot)
 
 
-class Result(Job):
-    """Verdict on a job, without instruction and events: everything that rates are computed from.
+class Summary(Job, frozen=True, kw_only=True, gc=False):
+    """How a job went, without instruction and events: everything that rates are computed from.
+
+    Read instead of whole records to save time and memory.
 
     Attributes:
+        schema_version: version of the list of a record's fields.
         seed: seed of the episode's scene.
         difficulty: easy, medium or hard.
         outcome: success, failure (due to the policy) or error (the episode could not be judged;
@@ -310,8 +313,16 @@ class Result(Job):
         plan: fingerprint of the plan.
         attempt: number of the attempt, from 1.
         prompt_verdict: whether all that was said reached the policy's language model.
+        robot: the real robot that played it; None in simulation, a study's twin included.
+        action_log: digest of the executed actions, as in `roboirg.evaluation.records.action_log`;
+            None if they were not kept.
+        video: path of the video relative to the records file, or None.
+        render_device: the driver's name of the render device; None if nothing was rendered.
+        started_at: ISO 8601, UTC.
+        duration_s: wall-clock seconds.
     """
 
+    schema_version: Literal[4] = SCHEMA_VERSION
     seed: int
     difficulty: str
     outcome: Outcome
@@ -331,29 +342,23 @@ class Result(Job):
     plan: str | None = None
     attempt: int = 1
     prompt_verdict: PromptVerdict = "unknown"
-
-    @model_validator(mode="after")
-    def _refuse_success_with_cause(self) -> Self:
-        if self.outcome == "success" and self.cause is not None:
-            raise ValueError(f"a success has no cause, but there is {self.cause!r}")
-        return self
+    robot: Name | None = None
+    action_log: str | None = None
+    video: RunPath | None = None
+    render_device: str | None = None
+    started_at: str
+    duration_s: float
 
     @property
     def identity(self) -> Job:
-        """The job of this result, without the policy's spec."""
+        """Its job, without the policy's spec."""
         return Job(**{name: getattr(self, name) for name in IDENTITY})
 
-    @property
-    def robot(self) -> str | None:
-        """The real robot that played it; None in simulation, a study's twin included."""
-        return None
 
-
-class Record(Result):
+class Record(Summary, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Everything that is stored of an episode.
 
     Attributes:
-        schema_version: version of this list of fields.
         instruction: the utterances that the policy was given.
         mentions: the referring expressions in them.
         prompt: what of them reached its language model; None if the policy declares no limit.
@@ -361,46 +366,29 @@ class Record(Result):
         goal: what the instruction conveys, a value for each slot.
         metadata: of the instruction: reasoning pattern, relation, stages, landmarks, ….
         policy_metadata: what the policy reports about itself: checkpoint, server, model, ….
-        action_log: digest of the executed actions, as in `roboirg.evaluation.records.action_log`;
-            None if they were not kept.
         end_state: hash of the state in which the episode left the world and the judge; None if it
             did not come to an end.
         events: facts that became true or false, in order.
         usage: what models queried by the policy cost: ``calls``, ``input_tokens``,
             ``output_tokens``, ``cost_usd``.
         timings: wall-clock seconds by phase: ``policy_load``, ``policy_act``, ``env_step``, ….
-        video: path of the video relative to the records file, or None.
         video_error: why the requested video could not be written, or None.
         details: traceback of an error, or None.
-        render_device: the driver's name of the render device; None if nothing was rendered.
         processor: architecture, maker and family of the processor that simulated it, which decide
             the last bits of `end_state`; None in records from before this was kept.
-        started_at: ISO 8601, UTC.
-        duration_s: wall-clock seconds.
     """
 
-    schema_version: Literal[3] = SCHEMA_VERSION
     instruction: tuple[UtteranceRecord, ...]
     mentions: tuple[MentionSpan, ...] = ()
     prompt: PromptAudit | None = None
     command: str
-    goal: dict[str, str | int | tuple[str, ...] | tuple[int, ...]]
-    metadata: dict[str, JsonValue]
-    policy_metadata: dict[str, JsonValue] = {}
-    action_log: str | None = None
+    goal: dict[str, str | int | tuple[str | int, ...]]
+    metadata: dict[str, Any]
+    policy_metadata: dict[str, Any] = {}
     end_state: str | None = None
     events: tuple[EventRecord, ...] = ()
     usage: dict[str, float] = {}
     timings: dict[str, float] = {}
-    video: Annotated[str, Field(pattern=RELATIVE_PATH)] | None = None
     video_error: str | None = None
     details: str | None = None
-    render_device: str | None = None
     processor: str | None = None
-    started_at: str
-    duration_s: float
-
-    @property
-    def robot(self) -> str | None:
-        """The real robot that played it; None in simulation, a study's twin included."""
-        return real_robot(self.policy_metadata.get(REAL_TRIAL))

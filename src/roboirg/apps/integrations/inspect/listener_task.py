@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import anyio
+import msgspec
 from inspect_ai import Task, task
 from inspect_ai.dataset import MemoryDataset, Sample
 from inspect_ai.model import (
@@ -99,7 +100,7 @@ def _sample(job: Job) -> Sample:
         input=instruct_job(job).text,
         target=SUCCESS,
         id=f"{job.task}-{job.setting}-{job.episode:03d}",
-        metadata={"task": job.task, "setting": job.setting, "job": job.model_dump(mode="json")},
+        metadata={"task": job.task, "setting": job.setting, "job": msgspec.to_builtins(job)},
     )
 
 
@@ -122,8 +123,8 @@ def play_with_model(frames: int = 16, think: bool = False, structured: bool = Tr
             frames=frames,
             reasoning=think,
         )
-        job = Job.model_validate(state.metadata["job"])
-        job = job.model_copy(update={"policy": f"vlm-listener:inspect?model={model}"})
+        job = msgspec.convert(state.metadata["job"], Job)
+        job = msgspec.structs.replace(job, policy=f"vlm-listener:inspect?model={model}")
         record = await _play(model, job, options, state)
         if record["outcome"] == "error":
             raise RoboIRGError(record["cause"])  # Inspect counts errors apart

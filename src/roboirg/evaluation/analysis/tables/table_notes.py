@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.plain_text import counted
+from roboirg.core.plain_text import counted, verb_for
 from roboirg.evaluation.analysis.comparability import AllDifferences, comparison_notes
 from roboirg.evaluation.analysis.published import TRIALS, RateTable
 from roboirg.evaluation.analysis.stats.cells import (
@@ -137,12 +137,12 @@ def _incomplete_notes(cells: Iterable[CellResults], entries: Iterable[Entry]) ->
     notes = []
     errors, missing = sum(one.errors for one in found), sum(one.missing for one in found)
     if errors:
-        verb = "is" if errors == 1 else "are"
+        verb = verb_for(errors, "are")
         notes.append(
             f"{ERROR_MARK} {counted(errors, 'trial')} ended in an error and {verb} in no rate."
         )
     if missing:
-        verb = "is" if missing == 1 else "are"
+        verb = verb_for(missing, "are")
         notes.append(
             f"{MISSING_MARK} {counted(missing, 'trial')} of the plan {verb} still to be played."
         )
