@@ -16,7 +16,7 @@ from roboirg import main as cli
 from roboirg.cli import demo_commands
 from roboirg.cli.progress_bar import progress_bars
 from roboirg.cli.run_commands import report_problems
-from roboirg.evaluation.plan.plan import read_plan
+from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.store import RecordStore

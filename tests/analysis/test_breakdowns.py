@@ -38,7 +38,8 @@ from roboirg.evaluation.analysis.stats.comparison_text import sentences
 from roboirg.evaluation.analysis.stats.intervals import SEED
 from roboirg.evaluation.analysis.stats.paired_tests import Pairs, measure_gap
 from roboirg.evaluation.analysis.tables.breakdown_table import make_breakdown_table
-from roboirg.evaluation.plan.plan import Plan, write_plan
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.record_codec import encode

@@ -20,7 +20,8 @@ from roboirg.evaluation.analysis.page import episode_videos
 from roboirg.evaluation.analysis.page.columns import UNATTRIBUTED
 from roboirg.evaluation.analysis.page.entries import Run
 from roboirg.evaluation.analysis.page.report import make_view, render, render_runs, write_report
-from roboirg.evaluation.plan.plan import Plan, write_plan
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.episode_log import EpisodeLog, log_path
 from roboirg.evaluation.records.record import (

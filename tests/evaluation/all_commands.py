@@ -3,8 +3,8 @@
 import typer.main
 from msgspec.structs import replace
 
-from roboirg.evaluation.plan.plan import write_plan
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.store import RecordStore

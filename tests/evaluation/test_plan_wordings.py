@@ -12,9 +12,10 @@ import pytest
 from msgspec.structs import replace
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.plan.plan import Plan, read_plan, write_plan
+from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_file import read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.stored_plans import read_plan, write_plan
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.record_codec import identity_key

@@ -47,7 +47,7 @@ def test_records_of_older_schemas_are_refused(tmp_path: Path, version: int) -> N
 def test_a_record_from_before_turns_was_told_at_once(tmp_path: Path) -> None:
     record = FakePlay()(small_plan().jobs()[1])
     line = {**msgspec.to_builtins(record), "schema_version": 3}
-    for name in ("delivery", "rival", "reasoning", "robot"):
+    for name in ("delivery", "robot"):
         del line[name]
     for utterance in line["instruction"]:
         del utterance["step"]

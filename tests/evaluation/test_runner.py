@@ -15,7 +15,7 @@ from evaluation_fakes import FakePlay, comparable, is_alive, small_plan, starts,
 from msgspec.structs import replace
 
 from roboirg.core.errors import InvalidValueError, RenderDeviceError
-from roboirg.evaluation.plan.plan import read_plan
+from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.store import RECORDS_FILE, RecordStore, StoreError, read_records
 from roboirg.evaluation.run.executor import InProcess, LocalProcesses, choose_executor

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from evaluation_fakes import comparable
 
-from roboirg.evaluation.plan.plan import read_plan
+from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.episode_log import log_path
 from roboirg.evaluation.records.store import RECORDS_FILE, read_records
 

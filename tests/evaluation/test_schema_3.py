@@ -11,8 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 from roboirg.apps.leaderboard.packing import MANIFEST
-from roboirg.evaluation.plan.plan import read_earlier_plans, read_plan
-from roboirg.evaluation.records.record_codec import identity_key
+from roboirg.evaluation.plan.stored_plans import read_earlier_plans, read_plan
+from roboirg.evaluation.records.record_codec import harder_setting, identity_key
 from roboirg.evaluation.records.store import RECORDS_FILE, read_index
 from roboirg.main import app
 
@@ -59,15 +59,21 @@ def test_its_pack_verifies(run: Path) -> None:
 
 
 def test_its_tables_are_equal(run: Path) -> None:
-    said = command("tables", str(run), "--format", "csv")
-    assert said == (STORED / "tables.csv").read_text()
+    assert command("tables", str(run), "--format", "csv") == (STORED / "tables.csv").read_text()
 
 
 def test_its_export_is_equal(run: Path, tmp_path: Path) -> None:
+    """But for the settings that were options, and their notes."""
     command("records", "export", str(run), "--out", str(tmp_path / "records.parquet"))
     now = pd.read_parquet(tmp_path / "records.parquet")
     then = pd.read_parquet(STORED / "records.parquet")
-    changed = {"schema_version"}
-    columns = [name for name in then.columns if name not in changed]
+    changed = ["schema_version", "setting", "metadata"]
     assert set(now.columns) - set(then.columns) == {"robot"}
+    for stored, read in zip(then.to_dict("records"), now.to_dict("records"), strict=True):
+        options = {"rival": stored["rival"], "reasoning": stored["reasoning"]}
+        assert harder_setting(stored["setting"], **options) == read["setting"]
+        before = json.loads(stored["metadata"])
+        assert before.pop("reasoning") in (None, stored["reasoning"])
+        assert json.loads(read["metadata"]) == before
+    columns = [name for name in then.columns if name not in (*changed, "rival", "reasoning")]
     pd.testing.assert_frame_equal(now[columns], then[columns])

@@ -2,8 +2,8 @@
 
 import pytest
 
-from roboirg.evaluation.plan.plan import read_plan, with_secret, write_plan
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.stored_plans import read_plan, with_secret, write_plan
 from roboirg.evaluation.play.rollout import load_policy
 from roboirg.evaluation.run.runner import episode_runner
 from roboirg.policies.contract.random_state import episode_policy_seed

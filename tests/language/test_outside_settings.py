@@ -93,7 +93,7 @@ def test_a_refusal_says_why_wherever_it_shows(register):
     register(DUMMY)
     assert "dummy" not in expressible(EPISODE)
     assert "dummy" in expressible(HARD)
-    assert find_refusals(EPISODE) == {"dummy": REASON}
+    assert find_refusals(EPISODE)["dummy"] == REASON
     with pytest.raises(InvalidValueError, match=f"dummy setting cannot express .*{REASON}"):
         instruct(EPISODE, "dummy")
     assert REASON in printed(instructions_table(EPISODE, ["dummy"], InstructionOptions()))

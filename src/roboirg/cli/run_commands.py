@@ -106,7 +106,7 @@ def play(
     plan: Plan, out: Path, executor: Executor, *, retry: bool, on_record: str | None = None
 ) -> RunSummary:
     """Play a plan with a progress bar; exits the process when it is interrupted."""
-    from roboirg.evaluation.plan.plan import with_secret
+    from roboirg.evaluation.plan.stored_plans import with_secret
     from roboirg.evaluation.run.progress import ConsoleReporter
     from roboirg.evaluation.run.record_hook import CommandHook, HookedReporter
     from roboirg.evaluation.run.runner import Terminated, episode_runner, run_plan
@@ -147,7 +147,7 @@ def print_tables_of(folder: Path, planned: Sequence[Job]) -> None:
 
 def planned_jobs(folder: Path) -> tuple[Job, ...]:
     """Return the jobs of a run's newest plan; none if the plan or its episodes are not known."""
-    from roboirg.evaluation.plan.plan import read_plan
+    from roboirg.evaluation.plan.stored_plans import read_plan
 
     plan = read_plan(folder)
     return plan.drawable_jobs() if plan else ()

@@ -1,4 +1,4 @@
-"""Refuse stages that nobody could complete: facts that can never hold in their scene."""
+"""Refuse stages that cannot be completed: facts that can never hold in their scene."""
 
 from __future__ import annotations
 

@@ -17,9 +17,9 @@ from roboirg.apps.leaderboard.pack_checks import CHECKS_FILE, PackCheck, check_p
 from roboirg.apps.leaderboard.packing import pack_run
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.published import published_rows
-from roboirg.evaluation.plan.plan import write_plan
 from roboirg.evaluation.plan.plan_file import read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.store import RecordStore

@@ -26,10 +26,10 @@ from roboirg.apps.real.study.plan_csv import demonstrations_csv, trials_csv
 from roboirg.apps.real.study.study_plan import StudyPlan, make_study, read_study, write_study
 from roboirg.apps.real.study.study_run import Study
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.language.settings import setting_names
+from roboirg.language.settings import plain_settings
 
 TASKS = ("PutInBox", "PickByCount")
-SETTINGS = setting_names()
+SETTINGS = plain_settings()
 
 plans = st.builds(
     make_study,

@@ -15,8 +15,9 @@ import numpy as np
 
 from roboirg.core.conditions import Fact, FactCount, OccurrenceCount, facts_of
 from roboirg.core.episode import Episode, Stage
-from roboirg.evaluation.plan.plan import Plan, write_plan
+from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Attribution, EventRecord, Job, Outcome, Record
 from roboirg.evaluation.records.record_codec import encode

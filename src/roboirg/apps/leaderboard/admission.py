@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import operator
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import msgspec
@@ -17,7 +17,7 @@ import msgspec
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.comparability import is_robomme
 from roboirg.evaluation.analysis.stats.cells import PolicyRun
-from roboirg.evaluation.plan.plan import REQUIRED, Plan
+from roboirg.evaluation.plan.plan import REQUIRED
 from roboirg.evaluation.plan.plan_file import named_plans, read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.records.record import IDENTITY, Summary
@@ -39,9 +39,13 @@ class NamedEpisodes(NamedTuple):
     in_robommes_words: bool
 
 
-def refusal(results: Sequence[Summary], plans: Sequence[Plan]) -> str:
-    """Return why a packed run is not ranked; empty if it is."""
-    known = {plan.fingerprint for plan in plans}
+def refusal(results: Sequence[Summary], known: Collection[str]) -> str:
+    """Return why a packed run is not ranked; empty if it is.
+
+    Args:
+        results: of the run.
+        known: fingerprints of the plans in the pack.
+    """
     if stray := sum(one.plan not in known for one in results):
         return f"{counted(stray, 'record')} of no plan in the pack"
     by_run: dict[PolicyRun, list[Summary]] = defaultdict(list)

@@ -14,7 +14,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.version import __version__
 from roboirg.evaluation.analysis.page.report import check_report_support
 from roboirg.evaluation.analysis.stats.option_labels import setting_sort_key
-from roboirg.evaluation.plan.plan import read_plans
+from roboirg.evaluation.plan.stored_plans import kept_fingerprints, read_plans
 from roboirg.evaluation.records.store import read_results
 from roboirg.util.atomic_write import write_atomically
 from roboirg.util.web.page_templates import template_environment
@@ -67,9 +67,9 @@ def read_packs(
         if check is None or check.records:  # else it could not even be opened
             with opened_run(path) as run:
                 results = read_results(run)
-                plans = read_plans(run)
+                plans, known = read_plans(run), kept_fingerprints(run)
             planned = [job for plan in plans for job in plan.drawable_jobs()]
-            why = refusal(results, plans)
+            why = refusal(results, known)
             packs.append(PackedRun(_name(path), results, planned, check, why))
         else:
             packs.append(PackedRun(_name(path), (), (), check))

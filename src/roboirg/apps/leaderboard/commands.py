@@ -168,7 +168,7 @@ def repeat(
     """Play a run's plan again with its policies, and print which verdicts changed."""
     from roboirg.apps.leaderboard.repeats import flips_by_cell, repeated_episodes, write_flips
     from roboirg.cli.run_commands import play
-    from roboirg.evaluation.plan.plan import read_plan, with_secret
+    from roboirg.evaluation.plan.stored_plans import read_plan, with_secret
     from roboirg.evaluation.run.executor import choose_executor
 
     folder, target = folder_of(run), folder_of(out)

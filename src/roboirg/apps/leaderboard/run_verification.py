@@ -18,7 +18,7 @@ from roboirg.apps.leaderboard.record_check import (
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.plan.plan import read_earlier_plans, read_plans
+from roboirg.evaluation.plan.stored_plans import kept_fingerprints, read_plans
 from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.record_codec import identity_key
 from roboirg.evaluation.records.store import StoredRun, read_summaries
@@ -133,8 +133,8 @@ def _completeness(
     plans = read_plans(folder)
     missing = set(_holes(entries))
     made_by = {one.plan for one in entries if one.plan is not None}
-    known = {plan.fingerprint for plan in (*plans, *read_earlier_plans(folder))}
-    missing |= {f"the plan {one}, by which episodes were played" for one in made_by - known}
+    unknown = made_by - kept_fingerprints(folder)
+    missing |= {f"the plan {one}, by which episodes were played" for one in unknown}
     jobs = {identity_key(job): job.slug for plan in plans for job in plan.jobs()}
     there = {identity_key(one) for one in entries}
     missing |= {slug for key, slug in jobs.items() if key not in there}

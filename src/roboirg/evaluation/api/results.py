@@ -22,7 +22,7 @@ from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.analysis.stats.run_summary import ALL, summarize
 from roboirg.evaluation.analysis.tables.paper_tables import WHICH, is_informative, make_table
 from roboirg.evaluation.analysis.tables.rendering import get_format
-from roboirg.evaluation.plan.plan import read_plan
+from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.record import Job, Record, Summary
 from roboirg.evaluation.records.store import read_records, read_results
 

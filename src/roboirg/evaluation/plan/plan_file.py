@@ -12,6 +12,7 @@ import yaml
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.stored_plans import from_schema_3
 
 _PACKAGE = "roboirg.evaluation.plan"
 _FOLDER = "plans"
@@ -80,12 +81,14 @@ class _UniqueKeyLoader(yaml.SafeLoader):
 def _load(name: str) -> object:
     try:
         # A safe loader, with one more check.
-        return yaml.load(_find(name).read_text(encoding="utf-8"), _UniqueKeyLoader)  # noqa: S506
+        data = yaml.load(_find(name).read_text(encoding="utf-8"), _UniqueKeyLoader)  # noqa: S506
     except (OSError, UnicodeDecodeError) as error:
         raise InvalidValueError(f"The plan {name!r} cannot be read: {error}.") from error
     except yaml.YAMLError as error:
         words = " ".join(str(error).split())
         raise InvalidValueError(f"The plan {name!r} is not valid YAML: {words}.") from error
+    is_stored = name.endswith(".json") and isinstance(data, dict)
+    return from_schema_3(data) if is_stored else data
 
 
 def _find(name: str) -> Path | Traversable:

@@ -25,8 +25,6 @@ from roboirg.core.instruction_options import (
     DEFAULT_DISTRACTOR,
     DEFAULT_DISTRACTORS,
     DEFAULT_FRAME,
-    DEFAULT_REASONING,
-    DEFAULT_RIVAL,
     InstructionOptions,
 )
 from roboirg.core.observations import DemonstrationFrames, DemonstrationSource
@@ -93,8 +91,6 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
         distractors: number of distractors; the default if the setting does not read it.
         frame: frame of reference; the default if the setting does not read it.
         delivery: ``prompt`` or ``turns``; the default if the setting does not read it.
-        rival: ``none`` or ``drawn``; the default if the setting does not read it.
-        reasoning: ``plain`` or ``open``; the default if the setting does not read it.
         policy_seed: seed chosen for the run; the policy's seed is derived from it and the episode.
         max_steps: the policy's limit, control steps.
         actions: required action space; None for the policy's own.
@@ -119,8 +115,6 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
     distractors: int = DEFAULT_DISTRACTORS
     frame: Name = DEFAULT_FRAME
     delivery: Name = DEFAULT_DELIVERY
-    rival: Name = DEFAULT_RIVAL
-    reasoning: Name = DEFAULT_REASONING
     policy_seed: int = 0
     max_steps: int = DEFAULT_MAX_STEPS
     actions: Name | None = None

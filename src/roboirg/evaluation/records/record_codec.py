@@ -117,7 +117,22 @@ def _read_other_version(
 
 
 def _from_schema_3(data: dict[str, Any]) -> dict[str, Any]:
-    """Return a record of schema 3 with the fields of this one."""
-    metadata = data.get("policy_metadata", {})
-    robot = real_robot(metadata.get("real_trial"))
-    return {**data, "schema_version": SCHEMA_VERSION, "robot": robot}
+    """Return a record of schema 3 with the fields of this one; what it lacks is still lacking."""
+    found = {**data, "schema_version": SCHEMA_VERSION}
+    rival, reasoning = found.pop("rival", "none"), found.pop("reasoning", "plain")
+    if "setting" in found:
+        found["setting"] = harder_setting(found["setting"], rival=rival, reasoning=reasoning)
+    if "metadata" in found:
+        notes = found["metadata"].items()
+        found["metadata"] = {name: note for name, note in notes if name != "reasoning"}
+    if "policy_metadata" in found:
+        found["robot"] = real_robot(found["policy_metadata"].get("real_trial"))
+    return found
+
+
+def harder_setting(setting: str, *, rival: str, reasoning: str) -> str:
+    """Return the setting that schema 3 wrote as another one with an option."""
+    if setting == "reasoning":
+        return setting if reasoning == "plain" else f"{setting}-{reasoning}"
+    has_rival = rival == "drawn" and setting in ("direct", "contextual", "spatial")
+    return f"{setting}-rival" if has_rival else setting

@@ -19,7 +19,8 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.episode_errors import MAX_CAUSE_LENGTH, format_cause
 from roboirg.evaluation.hosting.policy_descriptions import describe_policy
-from roboirg.evaluation.plan.plan import Plan, write_plan
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.play.rollout import VIDEO_FOLDER, EpisodeRunner, PlayJob
 from roboirg.evaluation.play.video_writer import check_video_support, without_unfinished_videos
 from roboirg.evaluation.records.record import Job, Record, Summary

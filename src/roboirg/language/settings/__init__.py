@@ -16,6 +16,7 @@ __all__ = [
     "EXPLICIT",
     "all_settings",
     "get_setting",
+    "plain_settings",
     "setting_names",
     "settings_of",
 ]
@@ -45,6 +46,11 @@ def all_settings() -> Mapping[str, Setting]:
 def setting_names() -> tuple[str, ...]:
     """Return the names of all settings, explicit first."""
     return tuple(all_settings())
+
+
+def plain_settings() -> tuple[str, ...]:
+    """Return the names that ``all`` means: of every setting but the harder ones."""
+    return tuple(name for name, setting in all_settings().items() if setting.plain is None)
 
 
 def settings_of(task: Task) -> tuple[str, ...]:

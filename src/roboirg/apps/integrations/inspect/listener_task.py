@@ -31,7 +31,7 @@ from inspect_ai.util import JSONSchema
 from roboirg.apps.integrations.inspect.episode_process import SPEC, ModelRequest, play
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
-from roboirg.core.instruction_options import DEFAULT_DELIVERY, DEFAULT_REASONING, DEFAULT_RIVAL
+from roboirg.core.instruction_options import DEFAULT_DELIVERY
 from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, Job
 from roboirg.policies.vlm.models import ModelOptions
 from roboirg.policies.vlm.vlm_listener import ListenerOptions
@@ -52,8 +52,6 @@ def listener(
     tasks: str | list[str] = "all",
     split: str = "test",
     episodes: int = 50,
-    rival: str = DEFAULT_RIVAL,
-    reasoning: str = DEFAULT_REASONING,
     delivery: str = DEFAULT_DELIVERY,
     max_steps: int = DEFAULT_MAX_STEPS,
     frames: int = 16,
@@ -63,12 +61,10 @@ def listener(
     """Instructions whose goal a vision-language model names and the scripted expert executes.
 
     Args:
-        setting: explicit, direct, reasoning, contextual or spatial.
+        setting: name of a setting, such as contextual or direct-rival.
         tasks: names of tasks or suites, separated by commas, or a list of them.
         split: train, val, test or random.
         episodes: number of episodes of each task, from 0 on.
-        rival: none or drawn.
-        reasoning: plain or open.
         delivery: prompt or turns.
         max_steps: control steps of an episode.
         frames: most pictures of the video.
@@ -79,8 +75,7 @@ def listener(
     jobs = [
         Job(
             policy="vlm-listener", spec=SPEC, task=name, split=split, episode=index,
-            setting=setting, rival=rival, reasoning=reasoning, delivery=delivery,
-            max_steps=max_steps,
+            setting=setting, delivery=delivery, max_steps=max_steps,
         )
         for name in find_tasks(tasks.split(",") if isinstance(tasks, str) else tasks)
         for index in range(count)

@@ -11,9 +11,11 @@ from rich.table import Table
 from roboirg.apps.language_lab.validation.validation_results import ValidationResults
 from roboirg.core.episode import DIFFICULTIES, Difficulty
 from roboirg.core.plain_text import counted
-from roboirg.language.settings import setting_names
+from roboirg.language.settings import plain_settings
 from roboirg.tasks import every_task
 
+HARDER = "hard"
+"""Column of the harder settings, such as direct-rival."""
 NONE = "–"
 """Cell of a task that lacks the setting."""
 
@@ -26,15 +28,21 @@ def validation_tables(results: ValidationResults) -> Iterator[Table]:
 
 
 def _texts(results: ValidationResults) -> Table:
-    names, texts = setting_names(), results.texts
-    table = _table("Texts read back, and rules broken", ("task",), (*names, "broken"))
-    broken = Counter((failure.task, failure.setting) for failure in results.failures)
+    """Return the number of texts of each task and setting; the harder settings share a column."""
+    names = plain_settings()
+    texts, broken = Counter[tuple[str, str]](), Counter[tuple[str, str]]()
+    for (task, setting), count in results.texts.items():
+        texts[task, setting if setting in names else HARDER] += count
+    for failure in results.failures:
+        broken[failure.task, failure.setting if failure.setting in names else HARDER] += 1
+    columns = (*names, HARDER)
+    table = _table("Texts read back, and rules broken", ("task",), (*columns, "broken"))
     tasks = _tasks(task for task, _ in texts)
     for task in tasks:
-        cells = [_count(texts, broken, (task, setting)) for setting in names]
-        table.add_row(task, *cells, f"{sum(broken[task, setting] for setting in names):,}")
+        cells = [_count(texts, broken, (task, setting)) for setting in columns]
+        table.add_row(task, *cells, f"{sum(broken[task, setting] for setting in columns):,}")
     if len(tasks) > 1:
-        sums = [sum(texts[task, setting] for task in tasks) for setting in names]
+        sums = [sum(texts[task, setting] for task in tasks) for setting in columns]
         table.add_section()
         table.add_row("all tasks", *(f"{one:,}" for one in sums), f"{broken.total():,}")
     return table

@@ -20,7 +20,7 @@ from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.evaluation.plan.plan_parsing import name_and_spec
 from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, Job
-from roboirg.language.settings import setting_names, settings_of
+from roboirg.language.settings import plain_settings, settings_of
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.atomic_write import write_atomically
@@ -242,7 +242,7 @@ def _demonstrations(
 def _shared_settings(tasks: Sequence[str]) -> tuple[str, ...]:
     """Return the settings that all tasks have, in the registry's order."""
     available = [settings_of(get_task(task)) for task in tasks]
-    return tuple(name for name in setting_names() if all(name in names for names in available))
+    return tuple(name for name in plain_settings() if all(name in names for names in available))
 
 
 def _check(
