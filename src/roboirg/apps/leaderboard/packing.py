@@ -11,7 +11,6 @@ import hashlib
 import re
 import tempfile
 import zipfile
-import zlib
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
@@ -31,6 +30,7 @@ from roboirg.evaluation.records.run_files import (
     earlier_plans,
 )
 from roboirg.evaluation.records.store import RECORDS_FILE, StoredRun
+from roboirg.util.archive_errors import UNREADABLE_ARCHIVE
 from roboirg.util.atomic_write import replacing
 
 PACK_SUFFIX = ".roboirg.zip"
@@ -40,9 +40,6 @@ _MAX_BYTES = 20 << 30
 """Most bytes that a pack may hold unpacked."""
 _MAX_MANIFEST_BYTES = 64 << 20
 _MOST_SHOWN = 200
-_UNREADABLE = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, OSError, RuntimeError,
-               ValueError)  # fmt: skip
-"""What `zipfile` and the file system raise for archives that are damaged, encrypted or odd."""
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 _BLOCK = 1 << 20
 
@@ -120,7 +117,7 @@ def opened_run(path: Path) -> Iterator[Path]:
         try:
             with zipfile.ZipFile(path) as archive:
                 _unpack(archive, path, folder)
-        except _UNREADABLE as error:
+        except UNREADABLE_ARCHIVE as error:
             words = printable(" ".join(str(error).split()))[:_MOST_SHOWN]
             raise StoreError(f"{path} is no packed run: {words}.") from error
         yield folder
@@ -135,7 +132,7 @@ def read_manifest(path: Path) -> PackManifest:
     try:
         with zipfile.ZipFile(path) as archive:
             return _manifest(archive, path)
-    except _UNREADABLE as error:
+    except UNREADABLE_ARCHIVE as error:
         words = printable(" ".join(str(error).split()))[:_MOST_SHOWN]
         raise StoreError(f"{path} is no packed run: {words}.") from error
 
