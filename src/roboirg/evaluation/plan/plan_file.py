@@ -13,6 +13,8 @@ import yaml
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.stored_plans import from_schema_3
+from roboirg.evaluation.records.run_files import MOST_PLAN_BYTES
+from roboirg.util.regular_file import read_regular
 
 _PACKAGE = "roboirg.evaluation.plan"
 _FOLDER = "plans"
@@ -81,7 +83,7 @@ class _UniqueKeyLoader(yaml.SafeLoader):
 def _load(name: str) -> object:
     try:
         # A safe loader, with one more check.
-        data = yaml.load(_find(name).read_text(encoding="utf-8"), _UniqueKeyLoader)  # noqa: S506
+        data = yaml.load(_text(_find(name)), _UniqueKeyLoader)  # noqa: S506
     except (OSError, UnicodeDecodeError) as error:
         raise InvalidValueError(f"The plan {name!r} cannot be read: {error}.") from error
     except yaml.YAMLError as error:
@@ -89,6 +91,12 @@ def _load(name: str) -> object:
         raise InvalidValueError(f"The plan {name!r} is not valid YAML: {words}.") from error
     is_stored = name.endswith(".json") and isinstance(data, dict)
     return from_schema_3(data) if is_stored else data
+
+
+def _text(file: Path | Traversable) -> str:
+    if isinstance(file, Path):
+        return read_regular(file, MOST_PLAN_BYTES).decode()
+    return file.read_text(encoding="utf-8")
 
 
 def _find(name: str) -> Path | Traversable:

@@ -11,11 +11,14 @@ from typing import Any
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.records.record_codec import harder_setting
-from roboirg.evaluation.records.run_files import PLAN_FILE, earlier_plans, store_plan
+from roboirg.evaluation.records.run_files import (
+    MOST_PLAN_BYTES,
+    PLAN_FILE,
+    earlier_plans,
+    store_plan,
+)
 from roboirg.util.regular_file import read_regular
 from roboirg.util.short_hash import short_hash
-
-MOST_PLAN_BYTES = 64_000_000
 
 
 def with_secret(plan: Plan, folder: Path) -> Plan:
