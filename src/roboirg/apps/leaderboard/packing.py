@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import os
 import re
 import tempfile
 import zipfile
@@ -33,6 +34,7 @@ from roboirg.evaluation.records.run_files import (
 from roboirg.evaluation.records.store import RECORDS_FILE, StoredRun
 from roboirg.util.archive_errors import UNREADABLE_ARCHIVE
 from roboirg.util.atomic_write import replacing
+from roboirg.util.regular_file import open_regular
 
 PACK_SUFFIX = ".roboirg.zip"
 MANIFEST = "manifest.json"
@@ -123,13 +125,13 @@ def opened_run(path: Path) -> Iterator[Path]:
     Raises:
         StoreError: the file is no pack, or one of its files is not what the manifest says.
     """
-    if not path.is_file():
+    if path.is_dir() or not os.path.lexists(path):
         yield path
         return
     with tempfile.TemporaryDirectory(prefix="roboirg-") as name:
         folder = Path(name)
         try:
-            with zipfile.ZipFile(path) as archive:
+            with open_regular(path) as file, zipfile.ZipFile(file) as archive:
                 _unpack(archive, path, folder)
         except UNREADABLE_ARCHIVE as error:
             words = printable(" ".join(str(error).split()))[:_MOST_SHOWN]
@@ -144,7 +146,7 @@ def read_manifest(path: Path) -> PackManifest:
         StoreError: the file is no pack.
     """
     try:
-        with zipfile.ZipFile(path) as archive:
+        with open_regular(path) as file, zipfile.ZipFile(file) as archive:
             return _manifest(archive, path)
     except UNREADABLE_ARCHIVE as error:
         words = printable(" ".join(str(error).split()))[:_MOST_SHOWN]

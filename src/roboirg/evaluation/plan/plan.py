@@ -159,6 +159,8 @@ class Plan(BaseModel):
 
     @model_validator(mode="after")
     def _check_text(self) -> Plan:
+        if not is_encodable(self.seed_secret or ""):
+            raise InvalidValueError(f"seed_secret is {self.seed_secret!r}: it has lone surrogates.")
         texts = self.model_dump(exclude={"seed_secret"})
         for name, value in texts.items():
             for text in value if isinstance(value, tuple) else (value,):

@@ -69,7 +69,16 @@ def read_plan_file(name: str) -> dict[str, Any]:
 
 
 class _UniqueKeyLoader(yaml.SafeLoader):
-    """Refuses a mapping with a key twice, of which YAML would take the last."""
+    """Refuses a mapping with a key twice, of which YAML would take the last, and aliases.
+
+    A few lines of aliases of aliases stand for billions of values.
+    """
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        if self.check_event(yaml.AliasEvent):
+            line = self.peek_event().start_mark.line + 1
+            raise yaml.YAMLError(f"line {line} has an alias, which a plan cannot have")
+        return super().compose_node(parent, index)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         keys = [self.construct_object(key, deep=True) for key, _ in node.value]
@@ -86,7 +95,9 @@ def _load(name: str) -> object:
         data = yaml.load(_text(_find(name)), _UniqueKeyLoader)  # noqa: S506
     except (OSError, UnicodeDecodeError) as error:
         raise InvalidValueError(f"The plan {name!r} cannot be read: {error}.") from error
-    except yaml.YAMLError as error:
+    except RecursionError as error:
+        raise InvalidValueError(f"The plan {name!r} is nested too deeply.") from error
+    except (yaml.YAMLError, ValueError) as error:  # such as a number of too many digits
         words = " ".join(str(error).split())
         raise InvalidValueError(f"The plan {name!r} is not valid YAML: {words}.") from error
     is_stored = name.endswith(".json") and isinstance(data, dict)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.plain_text import is_encodable
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.records.record_codec import harder_setting
 from roboirg.evaluation.records.run_files import (
@@ -82,9 +83,10 @@ def _stored(paths: list[Path]) -> Iterator[dict[str, Any]]:
     for path in paths:
         try:
             data = json.loads(read_regular(path, MOST_PLAN_BYTES))
+            can_be_written = is_encodable(json.dumps(data, ensure_ascii=False))
         except (OSError, ValueError, RecursionError, InvalidValueError):
             continue
-        if isinstance(data, dict):
+        if isinstance(data, dict) and can_be_written:
             yield data
 
 
