@@ -68,7 +68,7 @@ def read_plan_file(name: str) -> dict[str, Any]:
     return {key: _as_typed(key, value) for key, value in data.items() if value is not None}
 
 
-class _UniqueKeyLoader(yaml.SafeLoader):
+class _PlanLoader(yaml.SafeLoader):
     """Refuses a mapping with a key twice, of which YAML would take the last, and aliases.
 
     A few lines of aliases of aliases stand for billions of values.
@@ -90,9 +90,10 @@ class _UniqueKeyLoader(yaml.SafeLoader):
 
 
 def _load(name: str) -> object:
+    file = _find(name)
     try:
-        # A safe loader, with one more check.
-        data = yaml.load(_text(_find(name)), _UniqueKeyLoader)  # noqa: S506
+        # A safe loader, with two more checks.
+        data = yaml.load(_text(file), _PlanLoader)  # noqa: S506
     except (OSError, UnicodeDecodeError) as error:
         raise InvalidValueError(f"The plan {name!r} cannot be read: {error}.") from error
     except RecursionError as error:
