@@ -26,7 +26,7 @@ from roboirg.util.regular_file import open_regular
 
 LOCK_FILE = ".lock"
 MOST_BYTES = 64 << 20
-"""Of a line; the longest records have the events of thousands of steps, and less than 1 MB."""
+"""Of a line; longer ones are not read."""
 
 Parsed = TypeVar("Parsed")
 

@@ -42,7 +42,7 @@ _MOST_KEY_PARTS = 20
 _KEY_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
 _DEEP_KEY = re.compile(rf"(?<![\w-]){_KEY_PART}(?:{_KEY_PART}){{{_MOST_KEY_PARTS}}}")
 MOST_LETTERS = 2_000
-"""Of a command or phrase; the longest that was seen has 200."""
+"""Of a command or phrase."""
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 _PHRASE = re.compile(r"([^\[\]{}]*)\[([^\[\]{}]+)\]([^\[\]{}]*)|([^\[\]{}]+)")
 
