@@ -377,6 +377,13 @@ PLAN_FILES: Mapping[str, tuple[str, str]] = {
 }
 
 
+@pytest.mark.parametrize("make", [os.mkfifo, link("/dev/zero")], ids=["pipe", "device"])
+def test_plan_files_are_regular_files(make: Callable[[Path], object], tmp_path: Path) -> None:
+    make(tmp_path / "plan.yaml")
+    message = refusal(lambda folder: read_plan_file(str(folder / "plan.yaml")), tmp_path)
+    assert message.endswith("is no regular file.")
+
+
 @pytest.mark.parametrize("name", PLAN_FILES)
 def test_plan_files_are_refused(name: str, tmp_path: Path) -> None:
     content, says = PLAN_FILES[name]

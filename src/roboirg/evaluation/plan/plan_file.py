@@ -13,11 +13,12 @@ import yaml
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.stored_plans import from_schema_3
-from roboirg.evaluation.records.run_files import MOST_PLAN_BYTES
 from roboirg.util.regular_file import read_regular
 
 _PACKAGE = "roboirg.evaluation.plan"
 _FOLDER = "plans"
+_MOST_BYTES = 4_000_000
+"""Of a plan file; lists of 10,000 numbers, the longest that are played, have less than 0.2 MB."""
 _SUFFIXES = (".yaml", ".yml", ".json")
 """JSON is YAML, too: a run's plan.json can be played again."""
 _LISTS = frozenset(
@@ -94,8 +95,9 @@ def _load(name: str) -> object:
     try:
         # A safe loader, with two more checks.
         data = yaml.load(_text(file), _PlanLoader)  # noqa: S506
-    except (OSError, UnicodeDecodeError) as error:
-        raise InvalidValueError(f"The plan {name!r} cannot be read: {error}.") from error
+    except (OSError, UnicodeDecodeError, InvalidValueError) as error:
+        words = str(error).rstrip(".")
+        raise InvalidValueError(f"The plan {name!r} cannot be read: {words}.") from error
     except RecursionError as error:
         raise InvalidValueError(f"The plan {name!r} is nested too deeply.") from error
     except (yaml.YAMLError, ValueError) as error:  # such as a number of too many digits
@@ -107,7 +109,7 @@ def _load(name: str) -> object:
 
 def _text(file: Path | Traversable) -> str:
     if isinstance(file, Path):
-        return read_regular(file, MOST_PLAN_BYTES).decode()
+        return read_regular(file, _MOST_BYTES).decode()
     return file.read_text(encoding="utf-8")
 
 
