@@ -275,12 +275,20 @@ class Plan(BaseModel):
         )
 
     def drawable_jobs(self) -> tuple[Job, ...]:
-        """Return every job; none if the episodes are private and their salt is not known."""
+        """Return the jobs that can be told here, for counting what a stored run lacks.
+
+        None if the episodes are private and their salt is not known; none of tasks and settings
+        whose package is not installed.
+        """
         try:
             splits.check_split(self.split)
         except MissingSaltError:
             return ()
-        return self.jobs()
+        known = tuple(name for name in self.tasks if name in tasks.every_task())
+        settings = self.settings
+        if settings != "all":
+            settings = tuple(name for name in settings if name in all_settings())
+        return self.model_copy(update={"tasks": known, "settings": settings}).jobs()
 
     def settings_of(self, task: str, episode: int) -> tuple[str, ...]:
         """Return the settings in which an episode is played."""
