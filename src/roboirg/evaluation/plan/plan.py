@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import itertools
+import math
+import os
 import re
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 from typing import Any, Literal, get_args
 
 import msgspec
@@ -35,6 +36,7 @@ from roboirg.evaluation.plan.plan_parsing import check_names, name_and_spec
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.film import VideoMode
 from roboirg.evaluation.records.record import (
+    CONTROLS,
     DEFAULT_MAX_STEPS,
     DEFAULT_MESHES,
     NAME,
@@ -48,6 +50,7 @@ from roboirg.tasks.splits import splits
 from roboirg.tasks.splits.private_splits import MissingSaltError, is_private
 from roboirg.util.short_hash import short_hash
 
+MOST_JOBS = 1_000_000
 REQUIRED = "required"
 """Instead of a wording file in a plan: one must be given when the plan is run."""
 
@@ -146,13 +149,40 @@ class Plan(BaseModel):
             return fields
         if fields["wordings"] in POOLS:
             return {**fields, "wordings_identity": fields["wordings"]}
-        path = Path(str(fields["wordings"])).resolve()
-        return {**fields, "wordings": str(path), "wordings_identity": open_wordings(path)}
+        path = os.path.realpath(str(fields["wordings"]))
+        return {**fields, "wordings": path, "wordings_identity": open_wordings(path)}
 
     @field_validator("demonstration_frames", mode="before")
     @classmethod
     def _check_frames(cls, value: object) -> object:
         return None if value is None else check_demonstration_frames(value)
+
+    @model_validator(mode="after")
+    def _check_text(self) -> Plan:
+        if not is_encodable(self.seed_secret or ""):
+            raise InvalidValueError(f"seed_secret is {self.seed_secret!r}: it has lone surrogates.")
+        texts = self.model_dump(exclude={"seed_secret"})
+        for name, value in texts.items():
+            for text in value if isinstance(value, tuple) else (value,):
+                if isinstance(text, str) and re.search(f"[{CONTROLS}]", text):
+                    raise InvalidValueError(
+                        f"The plan has {text[:80]!r} as {name}; no character of it may control a "
+                        "terminal."
+                    )
+        return self
+
+    @model_validator(mode="after")
+    def _check_size(self) -> Plan:
+        if not self.policy_seeds:
+            raise InvalidValueError("The plan has no policy seeds; it needs at least one.")
+        several = (self.policies, self.tasks, self.forms, self.episodes, self.policy_seeds)
+        settings = plain_settings() if self.settings == "all" else self.settings
+        size = math.prod(map(len, (*several, settings, self.stages)))
+        if size > MOST_JOBS:
+            raise InvalidValueError(
+                f"The plan has up to {size:,} episodes; a plan has at most {MOST_JOBS:,}."
+            )
+        return self
 
     @property
     def specs(self) -> dict[str, str]:

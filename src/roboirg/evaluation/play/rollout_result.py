@@ -25,11 +25,13 @@ from roboirg.core.delivery import TURNS, PromptVerdict
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.observations import DemonstrationSource
+from roboirg.core.plain_text import clip_text
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_policy
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.play.prompt_shares import audit_job, audit_prompt
 from roboirg.evaluation.records.action_log import ActionLog
 from roboirg.evaluation.records.record import (
+    MOST_CAUSE_LETTERS,
     Attribution,
     ErrorKind,
     EventRecord,
@@ -155,7 +157,6 @@ class RolloutResult:
 
 _COPIED = (
     "outcome",
-    "cause",
     "steps",
     "demonstration_steps",
     "demonstration_source",
@@ -203,6 +204,7 @@ def make_record(
         **{name: getattr(result, name) for name in _COPIED},
         seed=episode.seed,
         difficulty=episode.difficulty,
+        cause=None if result.cause is None else clip_text(result.cause, MOST_CAUSE_LETTERS),
         error=result.error if result.outcome == "error" else None,
         attribution=_attribution(episode, result, instruction),
         instruction=utterances,
