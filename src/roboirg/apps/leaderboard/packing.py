@@ -134,7 +134,7 @@ def opened_run(path: Path) -> Iterator[Path]:
             with open_regular(path) as file, zipfile.ZipFile(file) as archive:
                 _unpack(archive, path, folder)
         except UNREADABLE_ARCHIVE as error:
-            words = printable(" ".join(str(error).split()))[:_MOST_SHOWN]
+            words = printable(" ".join(str(error).split()))[:_MOST_SHOWN].rstrip(".")
             raise StoreError(f"{path} is no packed run: {words}.") from error
         yield folder
 
@@ -149,7 +149,7 @@ def read_manifest(path: Path) -> PackManifest:
         with open_regular(path) as file, zipfile.ZipFile(file) as archive:
             return _manifest(archive, path)
     except UNREADABLE_ARCHIVE as error:
-        words = printable(" ".join(str(error).split()))[:_MOST_SHOWN]
+        words = printable(" ".join(str(error).split()))[:_MOST_SHOWN].rstrip(".")
         raise StoreError(f"{path} is no packed run: {words}.") from error
 
 
