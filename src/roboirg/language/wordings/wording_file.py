@@ -58,9 +58,9 @@ def read_wordings(path: str | Path) -> Wordings:
     try:
         text = read_regular(Path(path), MOST_BYTES).decode()
     except (OSError, ValueError) as error:  # a path may hold NUL
-        raise InvalidValueError(f"The wording file {str(path)!r} cannot be read: {error}.") from (
-            error
-        )
+        reason = str(error).rstrip(".")
+        message = f"The wording file {str(path)!r} cannot be read: {reason}."
+        raise InvalidValueError(message) from error
     where = f"wording file {str(path)!r}"
     wordings = parse_wordings(text, where)
     check_robomme_name(wordings, where)
