@@ -70,7 +70,8 @@ class PaperWorld:
         first = {"step": 3, "kind": "still", "subject": "robot", "place": None, "holds": True}
         shown = {"joint_positions": np.zeros((3, 7))}
         info = {"demonstration": shown, "elapsed_steps": 4, "events": [first]}
-        return {}, {**info, "demonstration_source": "planned"}
+        now = {"status": "ongoing", "heard": []}
+        return {}, {**info, **now, "demonstration_source": "planned"}
 
     def step_chunk(self, actions: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         assert actions.shape[1:] == (8,)
@@ -88,6 +89,7 @@ class PaperWorld:
             "cause": self.cause if over else None,
             "steps": self.steps,
             "events": [{**event, "holds": True}] if over else [],
+            "heard": [],
         }
         return {}, 0.0, over and self.status != "timeout", over and self.status == "timeout", info
 

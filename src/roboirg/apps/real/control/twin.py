@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from roboirg.apps.real.control.clock import Clock, VirtualClock
 from roboirg.apps.real.control.robot import CAMERA_RATE, COMMAND_RATE, Command, SensorReading
 from roboirg.core.actions import ARM_JOINTS
+from roboirg.evaluation.play.guarded_loop import NO_RENDER_DEVICE
 from roboirg.evaluation.play.policy_environment import make_env
 from roboirg.evaluation.play.rollout_result import RolloutResult
 from roboirg.evaluation.records.record import TWIN, Job
@@ -21,7 +22,6 @@ from roboirg.policies.contract.policy_needs import PolicyNeeds
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
-NO_RENDER_DEVICE = "none"
 _NEVER = 2**62
 
 
